@@ -71,8 +71,9 @@ class PrismShape:
 def prism_shapes(solid: Solid, height: float, changes: list[str]) -> list[PrismShape]:
     """Return the shapes of a world file that represent a solid, without any part below the ground.
 
-    If no such shape equals the solid, the shapes are prisms over its cross section at `height` m, or halfway up a solid
-    that does not reach `height`. A sentence about each difference is appended to `changes`.
+    If no such shape equals the solid, the shapes are prisms over its cross section at `height` m. If the solid is
+    entirely above or below `height`, the cross section is at its middle. A sentence about each difference is appended
+    to `changes`.
     """
     exact = _exact_shape(solid)
     shapes = [exact] if exact else list(_cross_section_prisms(solid, height, changes))
@@ -187,7 +188,7 @@ class Conversion:
 
 
 def convert_world(world: World, height: float) -> Conversion:
-    """Convert the solids of a world to obstacles, and its bodies to objects.
+    """Convert the solids of a world to obstacles, and its bodies to objects (obstacles if they have several shapes).
 
     `height` in m is the height of the cross sections of solids that are replaced by prisms (see `prism_shapes`). Solids
     and bodies that cannot be converted are left out, with a sentence in `changes`.

@@ -43,7 +43,10 @@ def top_height(solid: Solid) -> float:
 
 
 def oversize_hint(world: World) -> str:
-    """Return a hint for a world whose map is too large: move the largest model, or else move start and goals."""
+    """Return a hint for a world whose map is too large: move or remove the model that enlarges the world most.
+
+    If all models fit on a map, the hint is to move the start and the goals.
+    """
     if name := _largest_model(world):
         return f'"{name}" makes it large; move or remove it'
     return "move the start and the goals closer together"

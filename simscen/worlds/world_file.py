@@ -37,7 +37,7 @@ def world_from_spec(
     """Return the world that `spec` specifies.
 
     name:   name of the world if `spec` has none
-    grid:   occupancy grid of the key `map`; becomes walls of the height `map_height`, and is also the robot's map
+    grid:   occupancy grid of the key `map`; becomes walls of the height `map_height`, and the robot's map
     base:   world of the key `sdf`; its solids and bodies come first, and `spec` overrides its places and regions
     notes:  notes of the map's loader, appended to the notes of `base`
     """

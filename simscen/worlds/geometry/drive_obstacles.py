@@ -35,11 +35,11 @@ _PRISM_FACES = np.array(
 def drive_obstacles(
     solids: tuple[Solid, ...], wheel_radius: float, max_slope: float, max_step: float
 ) -> tuple[Solid, ...]:
-    """Return the solids that block a robot. If no solid is drivable ground, returns `solids` itself.
+    """Return the solids that block a robot. If `max_slope` is 0 or no solid is ground, returns `solids` itself.
 
-    The robot climbs slopes up to `max_slope` rad and steps up to `max_step` m. A solid is ground if it is convex or a
-    height field, and has an upward face at most `wheel_radius` m above the floor or above other ground. Edges and steep
-    slopes of the ground are returned as thin solids.
+    The robot climbs slopes up to `max_slope` rad and steps up to `max_step` m. A solid is ground if wheels that climb
+    steps of `wheel_radius` m can drive onto it (see `drivable_solids`), and if it is convex or a height field. Edges
+    and steep slopes of the ground are returned as thin solids.
     """
     if max_slope <= 0 or has_no_drivable_solids(solids, wheel_radius):
         return solids

@@ -1,4 +1,4 @@
-"""Convert shapes to triangle meshes: closed surfaces with outward normals and a fixed order of vertices and faces."""
+"""Convert shapes to triangle meshes with outward normals and a fixed order of vertices and faces."""
 
 import math
 from collections.abc import Iterable
@@ -86,7 +86,7 @@ def _is_convex_by_kind(shape: Shape) -> bool:
 
 
 def triangulate(shape: Shape) -> Mesh:
-    """Return the triangles of a shape in its own frame. Round shapes have inscribed facets (see `facet_count`)."""
+    """Return the triangles of a shape in its own frame. Round shapes have inscribed facets; a mesh is unchanged."""
     match shape:
         case Box(size):
             return Mesh(_BOX_CORNERS * size, _BOX_FACES)

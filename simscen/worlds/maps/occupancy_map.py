@@ -16,7 +16,7 @@ from simscen.worlds.maps.rasterization import CellMask, filled_cells, touched_ce
 MIN_OCCUPIED_VALUE = 65
 """Minimum value of an occupied cell, for maps in mode scale or raw: Nav2's occupied_thresh in percent."""
 MAX_EDGES = 500_000
-"""Maximum number of straight edges of walls. A building of 16 million cells has about 10 000."""
+"""Maximum number of straight wall edges in one direction. A building of 16 million cells has about 10 000 in total."""
 
 
 def draw_map(world: World, mesh: TriangleMesh, height: float, resolution: float = MAP_RESOLUTION_M) -> OccupancyGrid:
@@ -119,7 +119,7 @@ def _cells_in_convex_hull(occupied: CellMask) -> CellMask:
 def walls_from_map(grid: OccupancyGrid, height: float, name: str = "map") -> list[Solid]:
     """Return the occupied cells of a map as one closed mesh, `height` m tall; [] if no cell is occupied.
 
-    Each straight edge becomes one rectangle. Raises InvalidInput for a map with more than MAX_EDGES straight edges.
+    Each straight edge becomes one rectangle. Raises InvalidInput for more than MAX_EDGES edges in one direction.
     """
     occupied = grid.cells >= MIN_OCCUPIED_VALUE
     if not occupied.any():

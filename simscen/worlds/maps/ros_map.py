@@ -172,7 +172,7 @@ def _to_8_bits(quanta: Grays16) -> Grays8:
 
 
 def load_map(spec: RosMapSpec, image_path: Path) -> tuple[OccupancyGrid, tuple[str, ...]]:
-    """Return the map with the YAML file `spec` and the image at `image_path`, and warnings for the user.
+    """Return the map with the YAML content `spec` and the image at `image_path`, and warnings for the user.
 
     As in map_server, the occupancy depends on the 8-bit gray of a pixel. In the modes trinary and scale, pixels that
     are not opaque are unknown. Raises InvalidInput for an image that cannot be read, and for a map that extends farther
@@ -229,7 +229,7 @@ def _warnings(spec: RosMapSpec, table: npt.NDArray[np.int8], unknown_gray_count:
 def save_map(grid: OccupancyGrid, yaml_path: Path) -> None:
     """Write a map to the file `yaml_path` and to a PGM file of the same name. Raises OSError.
 
-    The mode is trinary, with map_saver's grays and thresholds. It is raw if a cell is not free, occupied or unknown.
+    The mode is trinary, with map_saver's grays and thresholds, or raw if a cell is neither free, occupied, nor unknown.
     """
     image_path = yaml_path.with_suffix(".pgm")
     require_regular_file(image_path)

@@ -104,7 +104,7 @@ class ClearanceField:
 
 
 def search_grid(bounds: Bounds, radius: float, min_resolution: float = MIN_RESOLUTION_M) -> OccupancyGrid:
-    """Return an empty grid to search paths of a disc of `radius` m, with room for a path around the world.
+    """Return an empty grid for the search for paths of a disc of `radius` m, with room for a path around the world.
 
     `bounds` are the bounds of the world. Cells are `min_resolution` m wide, or wider in a large world.
     """
@@ -168,7 +168,7 @@ def _sample_segments(segments: Array, owners: npt.NDArray[np.int32]) -> tuple[Ar
 def footprint_overlaps_solid(solid: Solid, corners: Polygon, z_range: tuple[float, float]) -> bool:
     """Return whether a footprint overlaps the part of a solid between two heights.
 
-    `corners` are the corners of the footprint in the frame of the solid's pose.
+    `corners` are the corners of the footprint. They and the pose of the solid are in the same frame.
     """
     return any(_overlaps_outline(cut.segments, corners) for cut in sections_between(merge_solids([solid]), z_range))
 

@@ -19,7 +19,7 @@ MIN_CLEARANCE_CELLS = 0.71
 SAME_THICKNESS_CELLS = 0.3
 """Difference below which walls count as equally thin. The one nearest to the midpoint of the two ends is then used."""
 OPPOSITE_COSINE = -0.5
-"""Cosine of the minimum angle (120°), seen from the gap, between points on different sides of the gap."""
+"""Cosine of the minimum angle (120°), seen from the gap, between the nearest point and points on the other side."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def _connecting_cell(
 ) -> npt.NDArray[np.int64]:
     """Return a cell with the clearance `level` that connects two regions of greater clearance.
 
-    One region contains the cell `first`. The other one contains `last`, if possible. All cells are (row, column).
+    If possible, one region contains the cell `first`, and the other one `last`. All cells are (row, column).
     """
     from scipy import ndimage
 

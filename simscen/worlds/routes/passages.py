@@ -17,7 +17,7 @@ from simscen.worlds.routes.clearance import ClearanceField
 MAX_WIDTH_M = 4.0
 """Maximum width of a passage."""
 PROBE_SPACING_M, MAX_PROBES = 0.25, 80
-"""Distance between the points of the path at which passages are searched, and maximum number of these points."""
+"""Minimum distance between the points of the path at which passages are searched, and maximum number of points."""
 NARROW_WIDTH_M = 2.0
 """Width up to which a passage is measured at its narrowest point. A wider one is measured where the path crosses it."""
 RAY_ROTATIONS = np.array(

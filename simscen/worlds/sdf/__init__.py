@@ -1,4 +1,4 @@
-"""Import Gazebo worlds: convert SDF 1.3 to 1.12 to the shapes that physics, ray casting and maps use."""
+"""Import Gazebo worlds (SDF versions 1.3 to 1.12) as the shapes that physics, ray casting and maps use."""
 
 from simscen.worlds.sdf.load import load_sdf
 

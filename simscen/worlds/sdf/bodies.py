@@ -275,7 +275,10 @@ def _movable_mass(group: list[LinkContent], report: ImportReport) -> float:
 
 
 def _is_kinematic(group: list[LinkContent], report: ImportReport) -> bool:
-    """Return whether any link of the group is `<kinematic>`, so that contacts do not move the body."""
+    """Return whether any link of the group is `<kinematic>`, so that contacts do not move the body.
+
+    Adds a note to the report for each link without gravity.
+    """
     is_kinematic = False
     for content in group:
         element = content.link.frame.element

@@ -216,7 +216,7 @@ def _read_relative_heights(uri: Element, files: WorldFiles) -> Array:
 def terrain_mesh(heights: Array, width: float, depth: float) -> Mesh:
     """Return a mesh with two triangles per cell between the samples `heights` (rows, columns); all lengths in m.
 
-    The terrain is `width` m long along x and `depth` m along y, and centered on the origin. The first row is at +y.
+    The terrain is `width` m long along x and `depth` m along y, and centered on the z axis. The first row is at +y.
     """
     rows, columns = heights.shape
     x, y = np.meshgrid(np.linspace(-width / 2, width / 2, columns), np.linspace(depth / 2, -depth / 2, rows))

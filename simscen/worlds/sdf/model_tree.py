@@ -110,7 +110,7 @@ class FrameScope:
         return self.pose_of(model).compose(model.model_scope.pose_of_name(rest, referrer))
 
     def link_of_frame(self, name: str, referrer: Element, visited: tuple[Frame, ...] = ()) -> Frame | None:
-        """Return the frame of the link with which the frame `name` moves; None for the world.
+        """Return the frame of the link with which the frame `name` moves; None for the world or a model without links.
 
         `visited` are the frames that lead to this one, to detect cycles. Raises UnusableElement at the element
         `referrer` if there is no such frame, or if it is attached to itself.
@@ -199,6 +199,7 @@ class TreeReader:
         """Return the node of a `<model>`. Raises UnusableElement.
 
         The children name, pose, static and placement_frame of an `include` override the same children of the model.
+        A merged model is static only if its parent is static.
         """
         self._model_count += 1
         if self._model_count > MAX_MODELS:

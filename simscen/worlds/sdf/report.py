@@ -27,7 +27,7 @@ class SourceLocation:
 
 
 class UnusableElement(Exception):
-    """An element cannot be used, although it affects the geometry."""
+    """An element cannot be used, although it may affect the geometry."""
 
     is_harmless = False
     """Whether the element is left out with a note instead of a problem, because it cannot affect a robot."""
@@ -52,9 +52,9 @@ class MissingAsset(UnusableElement):
 
 
 class ImportReport:
-    """Collects problems and notes in the order in which they are found, without repetitions.
+    """Collects problems and notes in the order in which they are found, without repetitions; missing files come last.
 
-    An unusable element is a problem. If `lenient`, it is left out with a note, and counted in `skipped_count`.
+    An unusable element is a problem. If `lenient`, it is only a note, and counted in `skipped_count`.
     """
 
     def __init__(self, *, lenient: bool = False) -> None:
