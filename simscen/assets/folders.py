@@ -43,7 +43,7 @@ class AllowedFolders:
     """The folders in which files may be read.
 
     roots:     absolute paths without symbolic links: the root of the scenarios, then the folders of `--world-path`
-    packages:  known folders of ROS packages by name; for other packages, the folders are searched
+    packages:  known folders of ROS packages by name; other packages are searched for in `roots`
     """
 
     roots: tuple[Path, ...]
@@ -99,8 +99,9 @@ class AllowedFolders:
         return Path(os.path.realpath(path.parent)) / path.name
 
     def package_folder(self, name: str, near: Path) -> Path:
-        """Return the folder of the ROS package `name`. The search begins at the folder `near`.
+        """Return the folder of the ROS package `name` for a file in the folder `near`.
 
+        If it is not in `packages`, looks in the search folders first, then at the `uris.package_folder_candidates`.
         Raises UnusableFile, or NoSuchFile if there is no such package.
         """
         if name in self.packages:
@@ -134,7 +135,10 @@ class AllowedFolders:
         return real
 
     def check_file(self, path: Path, max_bytes: int) -> Path:
-        """Return the real path of a file. Raises UnusableFile if it is not a regular file of at most `max_bytes`."""
+        """Return the real path of a file.
+
+        Raises UnusableFile as `resolve` does, or if it is not a regular file of at most `max_bytes`.
+        """
         real = self.resolve(path)
         try:
             status = real.stat()

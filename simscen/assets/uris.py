@@ -133,8 +133,8 @@ def is_package_name(name: str) -> bool:
 def package_folder_candidates(name: str, near: Path, roots: Sequence[Path]) -> Iterator[Path]:
     """Yield folders that may be the ROS package `name`, to which a file in the folder `near` refers.
 
-    First come folders of this name: at `near` and its parents, in the roots, and up to two levels below the roots. Then
-    come folders whose package.xml has this name.
+    First come folders of this name: `near`, its parents, their subfolders, and folders up to three levels below the
+    roots. Then come folders whose package.xml has this name.
     """
     for folder in (near, *near.parents):
         if folder.name == name:
