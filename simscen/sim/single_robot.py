@@ -14,7 +14,7 @@ from simscen.sim.simulation import RobotPlacement, Simulation
 
 
 class SingleRobotSimulation(Simulation):
-    """A simulation with one unnamed robot, `robot`."""
+    """A simulation with one robot, which is its attribute `robot`."""
 
     def __init__(
         self,

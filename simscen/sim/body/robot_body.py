@@ -80,8 +80,8 @@ def assemble_body(
 ) -> RobotBody:
     """Return the body of a robot from the solids of its hull, its wheels, and the mass properties of its chassis.
 
-    Adds boxes around the wheels (see `wheel_guards`), motors, and casters for a differential drive. Without a footprint
-    in the specification, the footprint is the outline of the hull.
+    Adds boxes around the wheels (see `wheel_guards`), motors, and casters for a differential drive. If the
+    specification has neither footprint nor radius, the footprint is the outline of the hull.
     """
     hull = (*parts, *(guard for wheel in wheels for guard in wheel_guards(wheel, parts)))
     outline = footprint(hull)
@@ -137,7 +137,7 @@ MIN_GROUND_CLEARANCE_M = 0.003
 
 
 def check_ground_clearance(spec: RobotSpec, file: Path | None) -> None:
-    """Raise InvalidInput with the path `file` if a part of `spec.body` is below MIN_GROUND_CLEARANCE_M."""
+    """Raise InvalidInput with the path `file` if a robot on wheels has a part below MIN_GROUND_CLEARANCE_M."""
     on_wheels = not isinstance(spec.drive, Omnidirectional)
     if on_wheels and any(part.z < MIN_GROUND_CLEARANCE_M for part in spec.body or ()):
         message = f"a part of the body of {spec.name!r} reaches the ground: it would drag instead of roll"
@@ -212,9 +212,9 @@ def _driven_weight_ratio(body: RobotBody) -> float:
 
 
 def approach_angle(body: RobotBody) -> float:
-    """Return the smallest slope in rad of a ramp that the hull touches when the front wheels are at its foot.
+    """Return the slope in rad of the flattest ramp that touches the hull when the front wheels are at its foot.
 
-    Returns the steepest examined slope if the hull touches no ramp.
+    Raised casters count as hull. Returns the steepest examined slope if no ramp touches the hull.
     """
     foremost = max(body.wheels, key=lambda wheel: wheel.x)
     raised = [c for c in casters_for_uneven_ground(body.casters) if caster_gap(c) > 0 and c.pose.x > foremost.x]

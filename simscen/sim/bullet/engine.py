@@ -101,7 +101,7 @@ def split_into_tiles(vertices: Array, faces: Faces) -> list[Faces]:
 
 
 def faces_above_floor(vertices: Array, faces: Faces) -> Faces:
-    """Return the triangles that do not lie on the floor."""
+    """Return the triangles that extend above the floor."""
     above: Faces = faces[(vertices[faces, 2] > FLOOR_HEIGHT_M).any(axis=1)]
     return above
 
@@ -166,7 +166,7 @@ def create_hull_of_solids(client: int, solids: Iterable[Solid]) -> int:
 
 
 def _reduced_hull_points(shape: Shape) -> Array:
-    """Return points (n, 3) that span the convex hull of a shape; for a mesh, as few as possible."""
+    """Return points (n, 3) that span the convex hull of a shape; for a large mesh, only some of its vertices."""
     return reduce_hull_vertices(shape) if isinstance(shape, Mesh) else hull_points(shape)
 
 

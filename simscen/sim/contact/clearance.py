@@ -110,7 +110,7 @@ class Clearance:
     def measure(self, tick: int, period: int = NEVER) -> float:
         """Return the clearance in m at the current `tick`, at most `max_range`; negative inside an object.
 
-        `period` is the number of ticks until the next call. `no_contact_before` is updated if it is before this call.
+        `period` is the number of ticks until the next call. Updates `no_contact_before` if it is before the next call.
         """
         if self._measured_tick == tick:
             return self._distance

@@ -12,9 +12,9 @@ from simscen.sim.bullet import pybullet
 END_DELAY_S = 0.1
 """Time without contact after which a collision has ended."""
 MIN_CAUSING_SPEED_M_S = 0.02
-"""Smallest speed of a robot that has caused a collision.
+"""Smallest speed at which a robot counts as the cause of a collision.
 
-For a collision with a movable object, this is the speed along the contact normal.
+This is its speed in any direction if the object is static, otherwise its speed along the contact normal.
 """
 NO_BODY = -1
 """Invalid body id."""

@@ -44,7 +44,7 @@ The sort key minus `_travel` is a lower bound in m of the present distance to th
 
 
 class StaticDistance:
-    """Distance from one robot to the solids of a static world, at most `max_range` m."""
+    """Measures distances up to `max_range` m from one robot to the solids of a static world."""
 
     def __init__(self, static: TriangleMesh, robot: RobotBody, max_range: float) -> None:
         self._client = CLIENT_POOL.take()

@@ -47,7 +47,7 @@ CenterPose = tuple[Vector, tuple[float, float, float, float]]
 class Actor:
     """A movable body, and the `path` that the body has followed since `path_start_tick` (None: no path).
 
-    segments:         line segments that contain every position of its origin on the path
+    segments:         line segments; every position of its origin on the path is within their `deviation`
     max_speed:        upper bound in m/s of the speed of any of its points on the path
     bounding_radius:  radius in m of its bounding sphere around the origin
     cylinder_radius:  radius in m of its bounding cylinder around the vertical axis
@@ -93,7 +93,10 @@ class Actor:
         return self.body.mass > 0 and self.path is None
 
     def is_parked(self, elapsed: float, horizon: float) -> bool:
-        """Return whether it stands still for `horizon` seconds, beginning `elapsed` seconds after its path began."""
+        """Return whether it stands still for `horizon` seconds, beginning `elapsed` seconds after its path began.
+
+        Always False for an actor that has no path or is steered.
+        """
         if self.path is None or self.is_steered:
             return False
         return self.path.has_ended(elapsed) or elapsed + horizon < self.path.start

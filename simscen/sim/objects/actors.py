@@ -132,7 +132,7 @@ class Actors:
         self.add(replace(body, pose=Pose3.planar(pose, body.pose.z), path=None), tick)
 
     def follow(self, name: str, path: MotionPath, max_speed: float, tick: int) -> None:
-        """Replace the path of a steered actor with a circular outline from `tick` on.
+        """Replace the path of a steered actor from `tick` on. The outline of the actor must be a circle.
 
         The path must begin at the current pose of the actor and must not exceed `max_speed` m/s.
         """
@@ -263,7 +263,7 @@ class Actors:
             actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
 
     def velocities(self, tick: int) -> dict[int, Vector]:
-        """Return the velocities in m/s of all actors that collide, by body id."""
+        """Return the velocities in m/s of all actors that collide and can move, by body id."""
         scripted = {actor.id: actor.path_velocity(tick, self._tick_rate)[0] for actor in self._scripted_colliding}
         pushed = {actor.id: pybullet.getBaseVelocity(actor.id, self._client)[0] for actor in self._pushable}
         return {**scripted, **pushed}

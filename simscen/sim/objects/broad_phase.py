@@ -1,4 +1,4 @@
-"""Broad phase for scripted and pushable actors: finds those that may touch soon, and wakes the pushable ones.
+"""Broad phase for scripted and pushable actors: finds pairs that may touch soon, and wakes the pushable actors.
 
 Pushable actors at rest sleep in the engine, which saves computing time. Bullet does not wake a sleeping body when a
 scripted actor (an actor without mass that follows a path) reaches it.

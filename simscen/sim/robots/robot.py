@@ -139,7 +139,7 @@ class Robot:
         self._state = CachedState(self.base.state, scene)
         self._label = f'robot "{name}"' if name else "the robot"
         self.others: tuple[Robot, ...] = ()
-        """The other robots, by name."""
+        """The other robots, sorted by name."""
         self.bodies: Mapping[str, Body] = {}
         """All movable objects and other robots by name. A change replaces the mapping."""
         self.body = Body(name, body.collision_solids, Pose3.planar(pose), body.mass)
@@ -238,7 +238,7 @@ class Robot:
         return self._placements
 
     def touching(self) -> bool:
-        """Return whether the robot touches anything besides the ground."""
+        """Return whether the robot touches anything besides the ground, or did so less than 0.1 s ago."""
         tick = self._scene.tick
         return self._collisions.is_colliding or (tick == self._placed_tick and self.clearance.measure(tick) <= 0.0)
 

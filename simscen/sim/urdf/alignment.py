@@ -23,7 +23,7 @@ MAX_CASTER_SIZE_M = 0.1
 
 
 def alignment_warnings(tree: LinkTree, drive: Drive) -> list[Problem]:
-    """Return warnings about wheels at different heights, and about casters that are too low or too high."""
+    """Return warnings about wheels at different heights, links below the wheels, and a caster that is too high."""
     wheels = select_wheels(tree, drive)
     if not wheels:
         return []

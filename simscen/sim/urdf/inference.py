@@ -44,9 +44,10 @@ def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshRead
     """Infer the specification of a robot from its URDF: the drive, its limits, and a lidar, odometry, and an IMU.
 
     A robot with steered wheels has an Ackermann drive, one with a single axle a differential drive, and any other robot
-    a skid-steer drive. Limits are 1 m/s, 1.5 rad/s, 1 m/s², and 2 rad/s², or lower if the wheel joints are slower. The
-    lidar is at a link with a name like LIDAR_NAMES, or on top of the robot. All files must be in `roots` (default: the
-    folder of `path`). Raises InvalidInput if the file is invalid or its drive cannot be inferred.
+    a skid-steer drive. Speed limits are 1 m/s and 1.5 rad/s, or lower if the wheel joints are slower or far apart;
+    acceleration limits are 1 m/s² and 2 rad/s². The lidar is at a link with a name like LIDAR_NAMES, or on top of the
+    robot. All files must be in `roots` (default: the folder of `path`). Raises InvalidInput if the file is invalid or
+    its drive cannot be inferred.
     """
     folders = AllowedFolders.of(roots or (path.resolve().parent,))
     tree = read_tree(path, folders, read_mesh)

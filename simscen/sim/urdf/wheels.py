@@ -128,7 +128,10 @@ def _with_steering(tree: LinkTree, wheel: WheelJoint, steering_joints: Sequence[
 
 
 def select_wheels(tree: LinkTree, drive: Drive) -> list[WheelJoint]:
-    """Return the wheels on the joints that the drive names, or else all wheels in the URDF. Raises InvalidInput."""
+    """Return the wheels on the joints that the drive names, or else all wheels in the URDF. Raises InvalidInput.
+
+    Swiveling wheels are left out for a differential drive that names no joints. An omnidirectional drive has no wheels.
+    """
     if isinstance(drive, Omnidirectional):
         return []
     steering = drive.steering if isinstance(drive, Ackermann) else None

@@ -13,9 +13,9 @@ BASE_LINK = "base_link"
 
 
 def to_urdf(body: RobotBody) -> str:
-    """Return URDF text: a base link with the hull, and a continuous joint with a link for each wheel.
+    """Return URDF text: a base link with the hull and casters, and a continuous joint with a link for each wheel.
 
-    Capsules become cylinders. All other shapes that URDF does not support become bounding boxes.
+    Boxes, cylinders, and spheres are kept. Capsules become cylinders, and all other shapes become bounding boxes.
     """
     robot = ET.Element("robot", name=body.name)
     base = ET.SubElement(robot, "link", name=BASE_LINK)
