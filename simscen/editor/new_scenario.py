@@ -68,7 +68,10 @@ def _pose_text(pose: Pose2) -> str:
 
 
 def _start_and_goal(built: BuiltWorld) -> tuple[Pose2, Pose2]:
-    """Return two free poses that are far apart and have a path between them; two origins without free space."""
+    """Return a free start, and the farthest free goal that a path leads to (the start if there is none).
+
+    Without free space, both are the origin.
+    """
     points = _free_points(built)
     if not len(points):
         return Pose2(0.0, 0.0), Pose2(0.0, 0.0)

@@ -1,6 +1,7 @@
 """Session of the editor: answers the requests of the editor page about one file.
 
-The page holds the edited text, and sends it as `text` with each request. The page also shows a map of the world.
+The page holds the edited text, and sends it as `text` with the requests about it. The page also shows a map of the
+world.
 """
 
 import threading
