@@ -1,4 +1,4 @@
-"""Planar world of boxes and discs for tests of navigation stacks, with drives that need no physics engine.
+"""Planar world of boxes and discs, and drives (trips) through it without a physics engine, for tests of stacks.
 
 Closed formulas give distances and ranges, independent of the tested code.
 """
@@ -128,7 +128,7 @@ class Flatland:
 
 @dataclass
 class Drive:
-    """Simulated drive of a robot that a stack controls, with perfect odometry and a noisy lidar.
+    """Simulated drive (trip) of a robot that a stack controls, with perfect odometry and a noisy lidar.
 
     world:      obstacles
     pose:       true pose

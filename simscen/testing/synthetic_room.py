@@ -1,4 +1,4 @@
-"""Drives of a robot through one asymmetric room, computed with noisy sensors for tests of localizers."""
+"""Drives of a robot through one asymmetric room, and their noisy sensor readings, for tests of localizers."""
 
 from dataclasses import dataclass
 from functools import cache

@@ -1,1 +1,1 @@
-"""Contracts: a class for each kind of plug-in. Each of its methods checks one rule of the protocol on a component."""
+"""Contracts: a class for each kind of plug-in. Each method marked with `promise` checks one rule of the protocol."""

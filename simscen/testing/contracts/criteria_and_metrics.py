@@ -202,7 +202,7 @@ class TriggerContract(Contract):
 
     @promise
     def it_returns_true_or_false_at_every_moment(self) -> None:
-        """Given any situation then the answer is True or False, also without belief, goal, plan, and objects."""
+        """Given any situation then the answer is True or False, also without belief, goal, and plan."""
         self.answers([0, 1, 2, 3])
 
     @promise
