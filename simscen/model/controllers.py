@@ -213,7 +213,7 @@ class SimpleGoalChecker(GoalCheckerSpec):
     component: ClassVar[str] = "simscen.stack.checkers:SimpleGoalChecker"
     type: Literal["simple"] = "simple"
     stateful: bool = True
-    """Whether only the heading is checked after the position was reached."""
+    """Whether a position that was reached counts as reached until the robot leaves `xy_goal_tolerance`."""
     well_inside: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
     """Fraction of the tolerances that applies while the robot moves. At rest, the full tolerances apply. Nav2: 1."""
 

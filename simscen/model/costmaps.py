@@ -66,8 +66,8 @@ class Costmap(Ranged):
 class LocalCostmap(Spec):
     """Local costmap for controllers and recovery behaviors: a rolling window in the odom frame.
 
-    The local costmap contains sensor data and keepout zones, but not the map. Parameters that are not set have the
-    values of the global costmap (`costmap`).
+    The local costmap contains sensor data and keepout zones, but not the map. Parameters without a default of their own
+    have the values of the global costmap (`costmap`).
     """
 
     width: PositiveLength | None = None
@@ -106,6 +106,6 @@ class LocalCostmap(Spec):
     """Whether cells that no beam has passed are unknown; otherwise they are free."""
 
     def with_defaults_from(self, shared: Costmap) -> Costmap:
-        """Return the complete parameters. Parameters that are not set are taken from the global costmap `shared`."""
+        """Return the parameters except `width` and `height`. The global costmap `shared` supplies missing values."""
         own = {name: value for name in sorted(Costmap.model_fields) if (value := getattr(self, name, None)) is not None}
         return shared.model_copy(update=own)

@@ -121,7 +121,7 @@ def steps_of(events: Sequence[EventEntry]) -> list[SequenceStep]:
 
 
 class FaultEntry(AnyFault):
-    """Fault of a sensor, the base, the localizer, or the map."""
+    """Fault of a sensor, the commands, the wheels, the localizer, or the map."""
 
     modifiers: ClassVar[frozenset[str]] = frozenset({"sensor", "when", "for_", "name", "required"})
 

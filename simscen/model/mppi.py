@@ -267,8 +267,8 @@ class Mppi(PathFollowerSpec):
     sgf_order: Annotated[int, Field(ge=1, le=2)] = 2
     """Order of the Savitzky-Golay filter that smooths commands: 2 keeps bends, 1 is the mean of nine commands."""
     critics: Annotated[list[CriticName], Field(min_length=1, max_length=11)] | None = None
-    """Critics to use; default: all except ObstaclesCritic and VelocityDeadbandCritic, as in Nav2. TwirlingCritic is
-    only used with the Omni model."""
+    """Critics to use; default: all except ObstaclesCritic and VelocityDeadbandCritic, and TwirlingCritic only with the
+    Omni model."""
     ConstraintCritic: MppiConstraintCritic = by_default()
     """Parameters of the critic of velocity limits."""
     CostCritic: MppiCostCritic = by_default()

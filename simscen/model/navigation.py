@@ -17,8 +17,8 @@ class Navigation(Spec):
 
     mode: Mode = "navigate_to_pose"
     """Navigation action. `navigate_to_pose`: one goal after the other, with a stop at each. `navigate_through_poses`:
-    all goals on one plan, with a stop only at the last. `follow_waypoints`: all goals with a stop at each; the waypoint
-    follower receives the whole list, and fails with STOP_ON_MISSED_WAYPOINT."""
+    all goals on one plan, with a stop only at the last. `follow_waypoints`: all goals with a stop at each. The waypoint
+    follower receives the whole list; if it stops after a failed goal, its error code is STOP_ON_MISSED_WAYPOINT."""
     loops: Annotated[int, Field(ge=1, le=1000)] = 1
     """Number of times that the list of goals is driven. In later loops, the goals are named `shelf#2`, `shelf#3`, … The
     name `shelf` refers to the goal in every loop."""

@@ -58,7 +58,7 @@ class Spin(BehaviorSpec):
 
 
 class Wait(BehaviorSpec):
-    """Wait for the obstacle to move away (nav2_behaviors::Wait)."""
+    """Wait for a fixed time, so that an obstacle can move away (nav2_behaviors::Wait)."""
 
     component: ClassVar[str] = "simscen.stack.behaviors:Wait"
     type: Literal["wait"] = "wait"
@@ -132,7 +132,10 @@ Behavior = Annotated[str | BehaviorSpec, ExtensibleUnion("behavior", _NameOrPara
 
 
 class Recovery(Spec):
-    """Recovery behaviors. The next one runs each time planning or control fails (Nav2's default behavior tree)."""
+    """Recovery behaviors, as in Nav2's default behavior tree.
+
+    If planning or control fails, a costmap is cleared. If the next attempt fails as well, the next behavior runs.
+    """
 
     number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
     """Number of retries before the goal fails."""

@@ -224,9 +224,9 @@ class Lidar(Ranged, SensorSpec):
     field_of_view: PositiveAngle = 6.283185307179586
     """Field of view, centered on straight ahead."""
     min_range: NonNegativeLength = 0.12
-    """Minimum range; nearer objects give no reading."""
+    """Minimum range; a nearer object gives the range -inf."""
     max_range: PositiveLength = 12.0
-    """Maximum range; farther objects give no reading."""
+    """Maximum range; a beam without a nearer object gives the range inf."""
     noise: NonNegativeLength = 0.01
     """Standard deviation of a range."""
     resolution: PositiveLength = 0.001
@@ -270,7 +270,7 @@ class InertialUnit(SensorSpec):
 
 
 class Bumper(SensorSpec):
-    """Contact sensor that is pressed while the base touches an object."""
+    """Contact sensor that is pressed while the robot touches an object, and for 0.1 s afterwards."""
 
     component: ClassVar[str] = "simscen.sensors.camera_and_bumper:BumperSensor"
     reading_type: ClassVar[str] = "Bump"

@@ -154,7 +154,7 @@ class MultiRobotEntry(RobotEntry):
     on_goal_failure: Literal["stop", "continue"] | None = None
     """Whether this robot stops or drives to the next goal after a failed goal."""
     faults: Annotated[list[FaultEntry], Field(max_length=500)] = []
-    """Faults of this robot's sensors and wheels. Triggers refer to this robot unless they name another one."""
+    """Faults of this robot. Triggers refer to this robot unless they name another one."""
     pass_: Annotated[list[AnyCriterion], Field(max_length=200, alias="pass")] = []
     """Criteria for this robot, in addition to those for all robots."""
 
@@ -254,7 +254,7 @@ class ScenarioSpec(Spec):
     events: Annotated[list[EventEntry], Field(max_length=500)] = []
     """Changes to the world, and when they happen."""
     faults: Annotated[list[FaultEntry], Field(max_length=500)] = []
-    """Faults of sensors, wheels, and commands, and when they happen."""
+    """Faults of sensors, commands, wheels, localizer, and map, and when they begin."""
     physics: Physics = by_default()
     """Parameters of the physics simulation."""
     pass_: Annotated[list[AnyCriterion], Field(max_length=200, alias="pass")] = []

@@ -162,7 +162,8 @@ class RosMapSpec(Spec):
     free_thresh: Annotated[Probability, Field(validate_default=True)] = 0.25
     """Maximum darkness of free pixels."""
     mode: Literal["trinary", "scale", "raw"] = "trinary"
-    """Interpretation of gray values between the thresholds."""
+    """`trinary`: gray values between the thresholds are unknown. `scale`: they are occupancies between 0 and 100 %.
+    `raw`: gray values are the values of the cells, and the thresholds have no effect."""
 
     @field_validator("free_thresh")
     @classmethod

@@ -15,7 +15,7 @@ from simscen.spec.places import PlaceOrPoint, Ring
 from simscen.spec.quantities import Angle, Duration, Length, NonNegativeLength, PositiveLength, PositiveSpeed
 
 CORNER_TURN_S = 0.25
-"""Half of the duration of a turn at a corner, but at most a quarter of the duration of a leg."""
+"""Half of the duration of a turn at a corner; in motions without stops, at most a quarter of the duration of a leg."""
 SMOOTH_DURATION_FACTOR = 1.5
 """Duration of a leg with `ease: smooth`, divided by its duration at constant top speed."""
 LOOP_TOLERANCE_M_RAD = 1e-6

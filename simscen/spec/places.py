@@ -59,7 +59,7 @@ Ring = Annotated[list[Point], Field(min_length=3, max_length=200), AfterValidato
 
 
 class PoseSpec(Spec):
-    """A position in meters and a heading in radians, in the map frame."""
+    """A position in meters and a heading in radians."""
 
     x: Length
     """Meters along the x axis."""
@@ -95,7 +95,8 @@ class ReferenceTo:
     """Annotation of a string that must be the name of an existing thing of the kind `target`.
 
     `object`: anything that can be touched. `movable`: an object or door that can move. `mover`: a movable, or a robot.
-    `disturbance`: an event, a fault, or a mark of the scenario. `mask`: the file of a filter mask.
+    `event`: an event of the scenario. `disturbance`: an event, a fault, or a mark of the scenario. `mask`: the file of
+    a filter mask.
     """
 
     target: ReferenceKind

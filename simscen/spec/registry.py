@@ -151,7 +151,7 @@ def find_type(group: str, name: str) -> RegisteredType | None:
 
 
 def unknown_groups() -> tuple[RegisteredType, ...]:
-    """Return the entry points of installed packages in groups `simscen.…` that do not exist."""
+    """Return the entry points of installed packages in groups `simscen.…` that do not exist, and damaged ones."""
     return tuple(entry for entry in _all_installed_types() if entry.group not in GROUPS)
 
 

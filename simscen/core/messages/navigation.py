@@ -19,7 +19,7 @@ ReplanReason = Literal["blocked", "missed", "tight", "better", "window", "recove
 """Reason for a new plan to the same goal.
 
 - `blocked`, `tight`: An obstacle is on the old plan, or too close to it.
-- `missed`: The robot has left the old plan.
+- `missed`: The robot has left the old plan, or has passed its end without reaching all goals.
 - `better`: A better plan exists.
 - `window`: The rolling window of the global costmap has moved.
 - `recovery`, `rate`: A recovery has ended, or the planning period has passed.

@@ -109,7 +109,7 @@ class RunResult:
     Attributes:
         path: Scenario file relative to the root, the folder that contains all files of a scenario.
         verdicts: Verdicts of required disturbances that did not take place, then the verdicts of the criteria, then the
-            verdict on the expected failure if the run does not meet it.
+            verdict on the expected failure if the scenario declares one.
         lines: Line of each verdict in the scenario file, in the same order; 0 if unknown. Empty if all are unknown.
         metrics: Value of each metric; None if the metric is undefined for the run.
         undefined: Reason for each metric that is None.
