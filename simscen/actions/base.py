@@ -32,7 +32,7 @@ class Action(ABC):
 
     @abstractmethod
     def perform(self, stage: Stage) -> Effect:
-        """Perform the action through `stage`. Return whether it changed anything, and a text about the change."""
+        """Perform the action through `stage`, and return its effect."""
 
 
 class WorldAction(Action):
@@ -48,7 +48,7 @@ class AnyAction(Choice):
     """One action, chosen by its YAML key, such as `spawn`."""
 
     group: ClassVar[str] = "action"
-    """Group of the plugin registry in which packages add actions."""
+    """Registry group in which installed packages can add actions."""
     modifiers: ClassVar[frozenset[str]] = frozenset({"robot"})
     """Keys that can be combined with any action."""
 
@@ -74,7 +74,7 @@ class AnyAction(Choice):
     """The robot that the action is for, if there are several; default: the only one."""
 
     def may_do(self, *kinds: str) -> bool:
-        """Return whether the action has one of the YAML keys `kinds`, or comes from a plugin (effects unknown)."""
+        """Return whether the action has one of the YAML keys `kinds`, or is from a plug-in, whose effect is unknown."""
         return self.kind in kinds or self.original_class is not None
 
     def perform(self, stage: Stage) -> Effect:
@@ -93,10 +93,10 @@ def is_same_pose(first: Pose2, second: Pose2) -> bool:
 
 
 def _perform_plugin_action(action: Action, stage: Stage, origin: str) -> Effect:
-    """Perform an action of a plugin and return its effect.
+    """Perform an action of a plug-in and return its effect.
 
     Raises RunError if the effect is not valid, or if it states a change but the action changed nothing. The error
-    message ends with `origin`, which names the plugin.
+    message ends with `origin`, which names the plug-in.
     """
     observed = _ObservedStage(stage)
     effect: object = action.perform(cast(Stage, observed))

@@ -153,7 +153,7 @@ class Teleport(Spec, WorldAction):
     """New pose in the world frame, or a place by name."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Move the object; has no effect if it does not exist or already rests there."""
+        """Move the object. Has no effect if it does not exist, or if it is already there and no script moves it."""
         current, target = stage.object(self.name), self.pose.pose
         if current is None:
             return Effect(False, f"there is nothing called {self.name}")
@@ -165,7 +165,7 @@ class Teleport(Spec, WorldAction):
 
 
 class Stop(Spec, WorldAction):
-    """Stop a moving object, pedestrian, or door; with `for`, the motion continues after this time.
+    """Stop a moving object, pedestrian, or door. With `for`, an object or door continues its motion after this time.
 
     Use it for a person who stops in front of the robot, a cart that waits, or a door that jams.
 

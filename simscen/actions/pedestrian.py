@@ -39,7 +39,7 @@ MAX_DRAWS = 200
 GROUP_HALF_WIDTH_M = 1.0
 """Maximum initial distance from the first member of a group to another member, along x and along y."""
 INITIAL_CLEARANCE_M = 0.1
-"""Minimum distance of the start and goals of a crowd's members from obstacles, in addition to their radius."""
+"""Minimum gap between a member of a crowd and obstacles at the start, and between the member and walls at a goal."""
 
 
 class _WalkSettings(Spec):
@@ -57,8 +57,8 @@ class _WalkSettings(Spec):
     """Distance from the robot at which the reaction starts; default, as in HuNavSim: 4 m surprised and threatening,
     10 m curious, 3 m scared."""
     reacts_for: PositiveDuration | None = None
-    """Duration of the reaction; default, as in HuNavSim: 30 s surprised and curious, 40 s threatening. `scared` does
-    not end."""
+    """Total duration of all reactions of the person; default, as in HuNavSim: 30 s surprised and curious, 40 s
+    threatening. For `scared`, the duration is not limited."""
     radius: Annotated[PositiveLength, Field(ge=0.1, le=0.5)] = 0.25
     """Radius of the upright cylinder that models a body."""
     height: Annotated[PositiveLength, Field(ge=0.5, le=2.5)] = 1.7
@@ -108,7 +108,8 @@ class Pedestrian(_WalkSettings, WorldAction):
     """Add a person who walks to goals and avoids walls, objects, other people, and robots.
 
     Pedestrians walk by the social force model of Moussaïd et al. (2009) and react to the robot like the people of
-    HuNavSim (Pérez-Higueras et al., 2023). They cannot be pushed and do not pass through anything.
+    HuNavSim (Pérez-Higueras et al., 2023). They cannot be pushed. They walk into nothing except what they are
+    `blind_to`.
 
     Example: `do: {pedestrian: {name: anna, pose: {x: 4, y: 1}, goals: [[4, 5]], behavior: surprised}}`
     """
@@ -174,7 +175,8 @@ class Crowd(_WalkSettings, WorldAction):
     def _draw_start(self, stage: Stage, index: int, group_start: Point | None) -> Point | None:
         """Return a random free point of the start region for the person with this index; None if none was found.
 
-        The point is near `group_start`, where the first member of the group starts. For the first member, it is None.
+        `group_start` is the start of the first member of the group, near which the point must be. It is None for the
+        first member itself.
         """
         rng, corners = stage.rng(f"person {self.names[index]}, start"), stage.region(self.start)
         if group_start is None:

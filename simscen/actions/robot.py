@@ -67,7 +67,7 @@ class Push(Spec, Action):
         return self.name is None
 
     def perform(self, stage: Stage) -> Effect:
-        """Push the robot or object. Has no effect for a push of zero, or for an object that is missing or massless."""
+        """Push the robot or object. Has no effect if the push is zero, or if the object is missing or not pushable."""
         target, duration = self.name or "the robot", self.for_ or 0.0
         x, y = self.impulse or self.force or (0.0, 0.0)
         if not math.hypot(x, y):
@@ -109,13 +109,13 @@ class NewGoal(Spec, Action):
 
 
 class CancelGoal(Spec, Action):
-    """Cancel the current goal as an action client would; the robot must stop.
+    """Cancel the current goal and all later goals, as an action client would; the robot must stop.
 
     Example: `do: {cancel_goal: {}}`
     """
 
     def perform(self, stage: Stage) -> Effect:
-        """Cancel the goal; has no effect if there is none."""
+        """Cancel the goals; has no effect if there is no current goal."""
         goal = stage.goal
         if goal is None:
             return Effect(False, "the robot had no goal")

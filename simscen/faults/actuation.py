@@ -45,8 +45,8 @@ class Slip(Spec, Fault):
     """Wheels slip: the robot moves less than its wheels roll, but the odometry counts the full roll of the wheels.
 
     The slip ratio is s = 1 - v / (ω r), as in vehicle dynamics (Wong, Theory of Ground Vehicles, ch. 2). With different
-    ratios for left and right, the robot also turns, and the odometry does not measure this turn. On `wheels`, the fault
-    affects all wheel odometry. On an odometry sensor, it affects only that sensor.
+    ratios for left and right, the robot also turns, and the odometry does not measure this turn. The robot slips with
+    either target. On `wheels`, all wheel odometry is wrong; on an odometry sensor, only its readings are wrong.
 
     Example: `{sensor: odom, slip: {left: 30 %, right: 10 %}, when: {time: 5 s}, for: 4 s}`
     """

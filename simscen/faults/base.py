@@ -45,7 +45,7 @@ class SensorSimulator(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class FaultSetting:
-    """What an active fault knows about its target and the run.
+    """Facts that an active fault needs about its target and the run.
 
     separation:  distance between left and right wheels in meters; 0 for a drive without left and right wheels
     clock:       conversion between ticks (physics steps) and seconds
@@ -158,7 +158,7 @@ class AnyFault(Choice):
     """YAML entry of one fault: its name as the only key, with its specification as the value."""
 
     group: ClassVar[str] = "fault"
-    """Group of the plugin registry in which packages add faults."""
+    """Registry group in which installed packages can add faults."""
 
     off: Annotated[Fault | None, LazySpec("simscen.faults.message_loss", "Off")] = None
     dropout: Annotated[Fault | None, LazySpec("simscen.faults.message_loss", "Dropout")] = None

@@ -26,7 +26,7 @@ def change_distances(reading: Reading, change: Callable[[Array], Array]) -> Read
     """Return a scan or image with its finite ranges or depths changed. Other readings are returned unchanged.
 
     `change` maps an array of distances in m to the changed distances. Ranges outside the limits of the lidar become inf
-    or -inf (REP 117).
+    or -inf (REP 117). Negative depths become 0.
     """
     match reading:
         case Scan(ranges=ranges):

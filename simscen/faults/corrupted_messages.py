@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 GARBAGE_NUMBERS = {"nan": math.nan, "inf": math.inf, "zero": 0.0, "negative": -1.0, "huge": 1e30}
-"""Number that replaces all values of a message, by the keyword of `Garbage.value`."""
+"""Number that replaces all measurements in a message, except colors, by the keyword of `Garbage.value`."""
 WRONG_SIZES = ("empty", "short")
 """Keywords of `Garbage.value` that change the number of values of a message."""
 T = TypeVar("T", bound="np.generic")
 
 
 class Garbage(Spec, Fault):
-    """Messages with meaningless content: nan, inf, negative or huge values, no values at all, or too few.
+    """Messages with meaningless content: nan, inf, zero, negative or huge values, no values at all, or too few.
 
     Real drivers send such messages while they start, when a frame is cut off, or when a checksum is not verified. A
     stack must tolerate them and must not treat them as measurements.
@@ -39,8 +39,9 @@ class Garbage(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Odometry", "Imu", "Image"})
     neutral_values: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     value: Literal["nan", "inf", "zero", "negative", "huge", "empty", "short", "anything"] = "anything"
-    """Value of all numbers of the message: nan, inf, zero, negative (-1), or huge (1e30). A scan or image can also be
-    empty (no numbers) or short (half of the numbers). `anything` draws one of these for each message."""
+    """Value of all measurements in the message, except colors: nan, inf, zero, negative (-1), or huge (1e30). A scan or
+    image can also be empty (no values) or short (half of the values). `anything` draws one of these for each
+    message."""
     probability: Probability = 1.0
     """Probability that a message is garbage."""
 

@@ -42,7 +42,7 @@ class Off(Spec, Fault):
     """No message arrives any more, as if a cable came loose or a node died.
 
     A base that receives no command stops after its `command_timeout`. If the localizer is off, the robot continues by
-    odometry: the transform from map to odometry keeps its last value, as on /tf.
+    odometry: the transform from map to odom keeps its last value, as on /tf.
 
     Example: `{sensor: lidar, off: {}, when: {time: 10 s}, for: 3 s}`
     """

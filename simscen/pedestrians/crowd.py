@@ -86,7 +86,7 @@ class Crowd:
         return self._people[name].spec.radius
 
     def top_speed(self, name: str) -> float:
-        """Return the maximum walking speed of a pedestrian in m/s."""
+        """Return an upper bound in m/s on the walking speed of a pedestrian with any behavior."""
         spec = self._people[name].spec
         return max(forces.MAX_SPEED_RATIO * spec.speed, THREATENING_SPEED_M_S)
 

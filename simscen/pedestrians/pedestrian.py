@@ -13,7 +13,7 @@ GOAL_RADIUS_M = 0.3
 CORNER_RADIUS_M = 0.5
 """Distance at which a corner of the path counts as passed."""
 HALF_FIELD_OF_VIEW_RAD = math.pi / 2 + 0.17
-"""Largest angle between the heading and a visible robot (HuNavSim's lineOfSight)."""
+"""Maximum angle between the heading and a robot at which a reaction begins (HuNavSim's lineOfSight)."""
 MAX_TURN_RATE_RAD_S = math.pi
 """Maximum turn rate (HuNavSim's max_ang_vel)."""
 MIN_TURNING_SPEED_M_S = 0.1
@@ -75,7 +75,8 @@ class Pedestrian:
     total_reaction_s: float = 0.0
     """Total duration in s of all reactions so far."""
     has_lost_interest: bool = False
-    """Whether `total_reaction_s` has reached `spec.reacts_for`. Only scared pedestrians react again afterwards."""
+    """Whether the last reaction ended after `total_reaction_s` had reached `spec.reacts_for`. Only scared pedestrians
+    react again afterwards."""
 
     @classmethod
     def at_start(cls, spec: WalkingPedestrian) -> "Pedestrian":

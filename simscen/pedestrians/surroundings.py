@@ -110,7 +110,7 @@ class WallMap:
         return self._segments_by_cell[column, row]
 
     def distance(self, point: tuple[float, float]) -> float:
-        """Return the distance in m from a point to the nearest wall, or inf if all walls are far away."""
+        """Return the distance in m from a point to the nearest wall; inf if no wall is near (OBSTACLE_RANGE_M)."""
         points = np.array([point])
         _, _, nearest = self.nearest_points(points)
         return float(np.hypot(*(nearest - points).T).min(initial=math.inf))

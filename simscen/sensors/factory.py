@@ -1,4 +1,4 @@
-"""Build the sensors of a robot, and check the readings of sensors from plugins."""
+"""Build the sensors of a robot, and check the readings of sensors from plug-ins."""
 
 import traceback
 from collections.abc import Callable
@@ -19,16 +19,16 @@ from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
 
 T = TypeVar("T")
 _DISTANCE_ARRAYS = frozenset({"ranges", "depth"})
-"""Fields of readings in which nan (invalid), inf (no hit within range), and -inf (too close, REP 117) are valid."""
+"""Fields of readings that contain distances. nan (invalid), inf (no hit), and -inf (too close, REP 117) are valid."""
 
 
 def build_sensors(
     spec: RobotSpec, clock: Clock, streams: Streams, view: SensorView, rays: RayCaster
 ) -> tuple[Sensor, ...]:
-    """Return the sensors of a robot, sorted by name, with the sensors from plugins last.
+    """Return the sensors of a robot, sorted by name, with the sensors from plug-ins last.
 
     Each sensor has its own random stream `sensor.<name>`. `view` gives the true state, and `rays` measures distances.
-    Raises ValueError if a rate does not divide the clock rate, and RunError if a plugin's sensor is invalid.
+    Raises ValueError if a period is not a whole number of ticks, and RunError if a plug-in's sensor is invalid.
     """
     return tuple(
         _build_sensor(name, spec, clock, streams, view, rays)
@@ -51,9 +51,9 @@ def _build_sensor(
 
 
 class PluginSensor:
-    """Sensor from a plugin (an installed package), with a check of each reading. `kind` is its key in YAML.
+    """Sensor from a plug-in (an installed package), with a check of each reading. `kind` is its key in YAML.
 
-    Raises RunError if the plugin's sensor raises an exception or has no method `read`.
+    Raises RunError if the plug-in's sensor raises an exception or has no method `read`.
     """
 
     def __init__(self, kind: str, spec: SensorSpec, setting: SensorSetting) -> None:
@@ -80,12 +80,12 @@ class PluginSensor:
         return reading
 
     def _call(self, function: Callable[[], T]) -> T:
-        """Call a function of the plugin, and convert its exceptions to RunError."""
+        """Call a function of the plug-in, and convert its exceptions to RunError, except MemoryError."""
         try:
             return function()
         except (RunError, MemoryError):
             raise
-        except Exception as error:  # a plugin can raise anything
+        except Exception as error:  # a plug-in can raise anything
             frame, line = list(traceback.walk_tb(error.__traceback__))[-1]
             place = f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"
             raise RunError("crashed", f"{self._label}: {type(error).__name__}: {error} ({place})") from error

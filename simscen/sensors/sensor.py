@@ -1,4 +1,4 @@
-"""Interface of sensors, what they are constructed from, and random numbers for their noise."""
+"""Interface of sensors, facts that they need about the robot and the run, and random numbers for their noise."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -42,7 +42,7 @@ class SensorView(Protocol):
         ...
 
     def touching(self) -> bool:
-        """Return whether the robot touches anything besides the ground."""
+        """Return whether the robot touches anything besides the ground, or did so within the last 0.1 s."""
         ...
 
     def image(
@@ -58,7 +58,7 @@ class SensorView(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class SensorSetting:
-    """What a sensor is constructed from, besides its specification. Second argument of each sensor's constructor.
+    """Facts that a sensor needs about the robot and the run: the second argument of each sensor's constructor.
 
     name:     name of the sensor in the robot's file, which is also in its readings
     period:   time between two readings in ticks

@@ -1,1 +1,1 @@
-"""Trigger conditions, which start events. Each class is both the YAML specification and the implementation."""
+"""Conditions of triggers, which start events and faults. Each class is both YAML specification and implementation."""

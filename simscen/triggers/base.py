@@ -34,7 +34,7 @@ class AnyCondition(Choice):
     """One condition, chosen by its YAML key, or a combination of conditions (`all`, `any`, `not`)."""
 
     group: ClassVar[str] = "trigger"
-    """Group of the plugin registry in which packages add conditions."""
+    """Registry group in which installed packages can add conditions."""
     modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot"})
     """Fields that can be combined with any condition."""
 
@@ -94,7 +94,7 @@ class AnyCondition(Choice):
     def holds(self, now: Situation) -> bool:
         """Return whether the condition is true in the current situation, regardless of `for`.
 
-        Raises RunError if a condition of a plugin does not return a boolean.
+        Raises RunError if a condition of a plug-in does not return a boolean.
         """
         now = self.situation_of_robot(now)
         if self.all is not None:
@@ -124,15 +124,15 @@ def any_holds(conditions: list[AnyCondition], now: Situation) -> bool:
 
 
 class Trigger(AnyCondition):
-    """Condition that starts an event, with the edge, delay, maximum number, and probability of the starts."""
+    """Condition that starts an event or fault, with the edge, delay, maximum number, and probability of the starts."""
 
     modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot", "edge", "delay", "times", "probability"})
 
     edge: Literal["rising", "falling"] = "rising"
-    """Start the event when the condition becomes true (rising) or false (falling)."""
+    """Start the event or fault when the condition becomes true (rising) or false (falling)."""
     delay: Duration = 0.0
     """Delay between the edge and the start."""
     times: Annotated[int, Field(ge=1, le=10_000)] = 1
     """Maximum number of starts."""
     probability: Probability = 1.0
-    """Probability that an edge starts the event. The random draw depends on the seed."""
+    """Probability that an edge starts the event or fault. The random draw depends on the seed."""

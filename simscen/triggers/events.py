@@ -45,7 +45,7 @@ class EventStatus(Spec, Condition):
 
 
 class Replan(Spec, Condition):
-    """True once the robot has replanned `count` times because its plan was blocked or outdated.
+    """True once the robot has replanned `count` times for any reason. The first plan to each goal does not count.
 
     Example: `when: {replan: {count: 2}}`
     """
@@ -54,7 +54,7 @@ class Replan(Spec, Condition):
     """Number of replans."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the log contains `count` plans, without the first plan of each goal."""
+        """Return whether the log contains `count` plans that were not made for a new goal."""
         return sum(e.kind == EventKind.PLAN_MADE and e.data.get("reason") != "goal" for e in now.events) >= self.count
 
 
@@ -131,7 +131,7 @@ class Waypoint(Spec, Condition):
 
 
 class PedestrianStatus(Spec, Condition):
-    """True once a pedestrian has reacted to the robot, stopped reacting, or reached one of the pedestrian's goals.
+    """True once a pedestrian has reacted to a robot, stopped reacting, or reached one of the pedestrian's goals.
 
     Use it, for example, for a door that opens when a pedestrian arrives.
 

@@ -175,7 +175,7 @@ class RobotWithin(Spec, Condition):
     region: RegionName | None = None
     """Name of a region of the world."""
     distance: NonNegativeLength
-    """Maximum distance from the robot's center."""
+    """Maximum distance from the robot's center to the point, the region, or the origin of the object."""
 
     @model_validator(mode="after")
     def _check_target(self) -> "RobotWithin":
