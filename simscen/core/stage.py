@@ -52,7 +52,7 @@ class Situation(Protocol):
 
     @property
     def twist(self) -> Twist:
-        """True velocity of the robot in its own frame."""
+        """True velocity of the robot in the base frame."""
         ...
 
     @property

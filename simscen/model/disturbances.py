@@ -29,8 +29,8 @@ Actions = Annotated[
 class StepEntry(Spec):
     """Step of the sequence (`then`) of an event. It becomes active when the previous step has happened.
 
-    In the trigger of a step, `time`, `for`, and `travelled` are counted from the previous step. Goals, replans,
-    recoveries, collisions, and events before that do not count.
+    The trigger of a step measures `time`, `for`, and `travelled` from the previous step. Goals, replans, recoveries,
+    collisions, and events before the previous step do not count.
     """
 
     name: Name | None = None

@@ -6,12 +6,10 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.geometry import Pose3
+from simscen.core.geometry import Pose3, Vector
 from simscen.core.geometry.ray_fans import RayCaster
 from simscen.core.messages.sensor_data import Reading
 from simscen.model.robot import Drive
-
-Vector = tuple[float, float, float]
 
 BUFFER_SIZE = 384
 """Number of random numbers that NormalStream draws at once."""
@@ -79,7 +77,7 @@ class SensorSetting:
 
 
 class Sensor(Protocol):
-    """Takes readings of one quantity at a fixed rate.
+    """Takes readings of one type at a fixed rate.
 
     *Given* the same world and generator *then* the same readings, bit for bit.
     *Given* noise *then* no two scans or inertial readings of a robot at rest are equal; without noise, all are equal.

@@ -206,4 +206,4 @@ class LazySpec:
 
 def annotation_of(field: FieldInfo) -> Any:
     """Return the type of a field. For a LazySpec field, this is the specification class, which is imported."""
-    return next((mark.load() for mark in field.metadata if isinstance(mark, LazySpec)), field.annotation)
+    return next((item.load() for item in field.metadata if isinstance(item, LazySpec)), field.annotation)

@@ -109,8 +109,9 @@ class CompressedGrid:
 class Scenery:
     """Visible parts of the world at the start of a run.
 
-    `places` are named poses, `things` are movable objects, and `zones` are zones and masks of costmap filters. `map` is
-    the map of the world; None if it is the same as the map of the robot.
+    `places` are named poses, and `things` are movable objects. `ground` contains ramps and other drivable surfaces,
+    `floors` the regions with changed friction, and `zones` the zones and masks of costmap filters. `map` is the map of
+    the world; None if all robots receive it.
     """
 
     places: Mapping[str, Pose2] = field(default_factory=dict)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 
 class Twist(NamedTuple):
-    """Velocity of the base in its own frame: m/s forward, m/s to the left, rad/s counterclockwise."""
+    """Velocity in the base frame: m/s forward, m/s to the left, rad/s counterclockwise."""
 
     vx: float = 0.0
     vy: float = 0.0

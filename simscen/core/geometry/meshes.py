@@ -132,8 +132,9 @@ def upward_faces(mesh: TriangleMesh, max_slope: float = MAX_SLOPE_RAD) -> Mask:
 def drivable_solids(mesh: TriangleMesh, max_step: float) -> SolidIndices:
     """Return the indices of the solids onto which a robot can drive if its wheels climb steps of `max_step` m.
 
-    A solid is drivable if its upward faces begin at most `max_step` m above z = 0, or are at most `max_step` m away
-    along each axis from those of a drivable solid. The bounding boxes of the upward faces are compared.
+    The search starts with the solids whose upward faces begin at most `max_step` m above z = 0. It adds solids whose
+    upward faces are at most `max_step` m away, along each axis, from those of a solid that was found. The bounding
+    boxes of the upward faces are compared.
     """
     faces = np.flatnonzero(upward_faces(mesh))
     corners = mesh.vertices[mesh.faces[faces]]

@@ -117,7 +117,7 @@ def top_speed(path: MotionPath, reach: float = 0.0) -> float:
 
 
 def largest_step(path: MotionPath, seconds: float, reach: float = 0.0) -> float:
-    """Return an upper bound in m on the distance that a point of the body moves within any `seconds` of the path.
+    """Return an upper bound in m on the distance that a point of the body moves in any period of `seconds`.
 
     The point is within `reach` m of the origin of the body. Jumps do not count: segments without duration, and the
     return to the first pose in a loop.
