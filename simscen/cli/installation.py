@@ -53,12 +53,12 @@ def _version(name: str) -> str:
 
 
 def describe_processor() -> str:
-    """Return the architecture, the number of cores, and the CPU flags of this machine."""
+    """Return the architecture, the number of usable cores, and the CPU flags of this machine."""
     return f"{platform.machine()}, {len(os.sched_getaffinity(0))} cores, {' '.join(cpu_flags()) or 'flags unknown'}"
 
 
 def check_fork() -> str:
-    """Check that processes can be forked."""
+    """Check that the system is Linux, and that processes can be forked."""
     if sys.platform != "linux":
         raise CheckFailed(f"{sys.platform}: simscen runs on Linux only")
     child = os.fork()

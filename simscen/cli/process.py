@@ -11,7 +11,7 @@ from simscen.core.cpu_kernels import pinned_variables
 from simscen.core.errors import Exit, UsageError
 
 OUTPUT_LOST_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO})
-"""Error numbers that writing to stdout or stderr can have: disk full, quota exceeded, terminal closed."""
+"""Error numbers with which output to stdout or stderr is lost: disk full, quota exceeded, terminal closed."""
 
 PYDANTIC_PLUGINS_VARIABLE = "PYDANTIC_DISABLE_PLUGINS"
 """Environment variable that disables plug-ins of pydantic."""

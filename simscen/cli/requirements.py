@@ -18,7 +18,7 @@ _CLAUSE = re.compile(r"(>=|<|==|!=)\s*([\w.]+)")
 
 
 def unmet_requirements() -> list[str]:
-    """Return a message for each package that is missing or has an unsupported version."""
+    """Return a message for each required package that is missing or has an unsupported version."""
     from importlib.metadata import PackageNotFoundError, requires
 
     try:

@@ -99,7 +99,7 @@ def _measure_sparse_logs(numbers: range, workers: int, only: list[str] | None, f
 
 
 def _print_failures(name: str, trials: "Sequence[Trial]") -> None:
-    """Print each trial without success to stderr. `name` is the name of the parameter set."""
+    """Print each unsuccessful trial to stderr. `name` is the name of the parameter set."""
     for trial in trials:
         if not trial.succeeded:
             log = f"building {trial.building}, log {trial.number}, {trial.circumstance}"

@@ -43,7 +43,12 @@ def command(
         int, typer.Option(min=0, max=10_000, help="Number of fields of moving cylinders at each speed.")
     ] = 20,
     goals: Annotated[
-        int, typer.Option(min=1, max=10_000, help="Number of random goals in each world, of ramps, and of corridors.")
+        int,
+        typer.Option(
+            min=1,
+            max=10_000,
+            help="Number of random goals in each shipped world, of generated buildings, of ramps, and of corridors.",
+        ),
     ] = 20,
     lost: Annotated[int, typer.Option(min=0, max=10_000, help="Number of drives with an unknown start.")] = 50,
     stack: Annotated[
@@ -58,7 +63,10 @@ def command(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="New or empty output folder.")] = None,
     resume: Annotated[
-        Path | None, typer.Option(help="Continue in this output folder with the runs that have no verdict yet.")
+        Path | None,
+        typer.Option(
+            help="Continue in this output folder: execute runs without a result, with an error, or with changed files."
+        ),
     ] = None,
     format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
 ) -> None:
@@ -75,7 +83,7 @@ def command(
     """
     from simscen.bench.navigation.summary import compare_experiment
     from simscen.cli.benchmarks.navigation_experiments import Sizes, experiment_groups
-    from simscen.cli.benchmarks.navigation_runs import completed_trials, execute_experiments, summarize_experiment
+    from simscen.cli.benchmarks.navigation_runs import execute_experiments, finished_trials, summarize_experiment
     from simscen.cli.benchmarks.navigation_table import as_json, as_text
     from simscen.cli.session.run_session import open_output_folder
 
@@ -102,18 +110,18 @@ def command(
     rows = [
         summarize_experiment(experiment, done)
         for experiment, runs in zip(all_experiments, trials, strict=True)
-        if (done := completed_trials(runs))
+        if (done := finished_trials(runs))
     ]
     compared = zip(experiments if others else [], trials, trials[len(experiments) :], strict=False)
     pairs = [
         compare_experiment(experiment.name, before, after)
         for experiment, before, after in compared
-        if completed_trials(before) and completed_trials(after)
+        if finished_trials(before) and finished_trials(after)
     ]
     columns = detect_style(sys.stdout, os.environ).columns
     print_text(as_json(rows, pairs) if format_ is Format.JSON else as_text(rows, pairs, columns))
     if stopped:
-        count = f"{sum(len(completed_trials(runs)) for runs in trials)} of {sum(map(len, trials))} runs"
+        count = f"{sum(len(finished_trials(runs)) for runs in trials)} of {sum(map(len, trials))} runs"
         print_text(f"simscen: interrupted: {count}; continue with --resume {escaped(str(folder))}", sys.stderr)
         sys.exit(stopped)
     if any(row.tally.errors for row in rows):

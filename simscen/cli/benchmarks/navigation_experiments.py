@@ -31,7 +31,7 @@ class Sizes:
     seeds:    number of seeds of each scenario; None for the default of each experiment
     fields:   number of generated obstacle fields; there are half as many narrow fields
     dynamic:  number of fields of moving cylinders at each speed
-    goals:    number of random goals in each world, of ramps, and of corridors
+    goals:    number of random goals in each shipped world, of generated buildings, of ramps, and of corridors
     lost:     number of drives with an unknown start
     """
 
@@ -178,7 +178,7 @@ def _barn(generated: Path, barn_data: Path, sizes: Sizes) -> Iterator[Experiment
 
 
 def _random_goals(generated: Path, worlds: Path, sizes: Sizes) -> Iterator[Experiment]:
-    """Write the experiments with random goals in shipped worlds, and on ROS maps of generated buildings."""
+    """Write the experiments with random goals in shipped worlds, and with three goals on each generated ROS map."""
     folder, maps = generated / "random_goals", generated / "buildings"
     yield random_goals.write_random_goals(
         "random goals", folder, _shipped_worlds(folder, worlds), sizes.numbers(sizes.goals), (worlds.absolute(),)

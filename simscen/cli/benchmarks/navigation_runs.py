@@ -64,7 +64,7 @@ class ExperimentResult:
 def execute_experiments(
     experiments: Sequence[Experiment], journal: Journal, workers: int
 ) -> tuple[list[list[Trial]], Exit | None]:
-    """Execute all runs that have no result in the journal yet, and print progress and failures to stderr.
+    """Execute all runs that have no reusable result in the journal, and print progress and failures to stderr.
 
     Return the trials (runs with their results) of each experiment, and the exit code of the signal that interrupted the
     runs; None without a signal. Raises InvalidInput.
@@ -90,12 +90,12 @@ def execute_experiments(
     return trials, stopped
 
 
-def completed_trials(trials: Sequence[Trial]) -> list[Trial]:
-    """Return the trials whose runs were not interrupted."""
-    return [trial for trial in trials if not _was_interrupted(trial.run)]
+def finished_trials(trials: Sequence[Trial]) -> list[Trial]:
+    """Return the trials, without runs that were interrupted or not started."""
+    return [trial for trial in trials if not _is_unfinished(trial.run)]
 
 
-def _was_interrupted(run: RunFinished) -> bool:
+def _is_unfinished(run: RunFinished) -> bool:
     return run.result.error is not None and run.result.error.kind in UNFINISHED_KINDS
 
 
@@ -106,8 +106,8 @@ ExperimentDrive = tuple[int, Drive]
 def _plan_jobs(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], dict[RunKey, ExperimentDrive]]:
     """Return a job for each run, and the experiment and drive of each run.
 
-    Only the first scenario of each experiment is validated. Raises InvalidInput, and ValueError for two runs with the
-    same key.
+    Only the first scenario of each experiment is checked in its world. Raises InvalidInput, and ValueError for two runs
+    with the same key.
     """
     jobs: list[Job] = []
     drives: dict[RunKey, ExperimentDrive] = {}
@@ -141,14 +141,14 @@ def repeat_command(job: Job) -> str:
 
 
 class _Progress:
-    """Listener that prints the number of finished runs and all failed runs to stderr."""
+    """Listener that prints the number of finished runs, and all runs that did not pass, to stderr."""
 
     def __init__(self, total: int, done: int, jobs: dict[RunKey, Job]) -> None:
         self._total, self._jobs, self._done = total, jobs, done
 
     def __call__(self, event: SessionEvent) -> None:
         """Handle an event of the session."""
-        if not isinstance(event, RunFinished) or _was_interrupted(event):
+        if not isinstance(event, RunFinished) or _is_unfinished(event):
             return
         self._done += 1
         if event.outcome is not Outcome.PASSED:

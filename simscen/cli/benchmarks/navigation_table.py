@@ -27,12 +27,13 @@ TABLE_HEAD = (
     "SCT",
     "score",
 )
+"""Column headings of the results. `failed` includes errors."""
 
 
 def as_text(
     rows: Sequence[ExperimentResult], pairs: Sequence[ExperimentComparison] = (), columns: int | None = None
 ) -> str:
-    """Return the table of results, the table of comparisons, and the published figures of BARN.
+    """Return the table of results, the localization accuracy, the comparisons, and the published figures of BARN.
 
     `pairs` are the comparisons of the experiments without and with --stack. `columns` is the width of the terminal in
     characters; None stands for unlimited width.

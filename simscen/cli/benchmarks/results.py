@@ -45,7 +45,7 @@ def as_json(result: Result, sections: dict[str, Any] | None = None) -> str:
 
 
 def read_result(file: Path) -> Result:
-    """Read a result from a JSON file. Raises UsageError if the file has another format or version."""
+    """Read a result from a JSON file. Raises UsageError if the file is unreadable, or has another format or version."""
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

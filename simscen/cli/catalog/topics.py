@@ -97,14 +97,14 @@ class Topic:
 
     @property
     def fields(self) -> list[Field]:
-        """Keys of the value in the order of the file; empty if the value is not a mapping."""
+        """Keys of the value in the order of the model; empty if the value is not a mapping."""
         if self.rows:
             return list(self.rows)
         return fields_of(self.model) if self.model is not None and not issubclass(self.model, RootModel) else []
 
     @property
     def value(self) -> str:
-        """Kind of the value, such as "text"; "" if the value is a mapping."""
+        """Kind of the value, such as "text"; "" if the value is a mapping or the topic has no model."""
         if self.model is not None and issubclass(self.model, RootModel):
             return kind_of(self.model)
         return ""

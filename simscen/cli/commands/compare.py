@@ -93,7 +93,7 @@ def command(
 
 
 def _check_scenarios(sessions: dict[str, JournaledSession], candidate: Path, changed_scenarios: bool) -> None:
-    """Raise InvalidInput if a scenario differs between the sessions and `changed_scenarios` is false."""
+    """Raise InvalidInput if a scenario in both sessions has changed, unless `changed_scenarios` is true."""
     baseline, current = (
         {run.key.test: run for run in session.planned if run.definition} for session in sessions.values()
     )

@@ -74,7 +74,7 @@ def command(
 
     The search prefers values for which the criteria have small margins. It writes each new kind of failure beside the
     file as a scenario NAME.failure-N.scenario.yaml. Two failures are of different kinds if they differ in the failed
-    criteria, in the events and faults that had happened, or in their place. The result does not depend on the number of
+    criteria, in the triggered events and faults, or in their position. The result does not depend on the number of
     parallel runs.
 
     Exit code 0: no failure was found; 1: a failure was found; 2: an invalid scenario; 3: a run could not be completed;

@@ -137,7 +137,7 @@ def _write_starter(file: Path, kind: str) -> list[Path]:
 
 
 def _schema_comment(file: Path, kind: str) -> str:
-    """Return the comment with the path of the schema for editors; "" without a folder `schemas` above the file."""
+    """Return the comment with the path of the schema for editors; "" without a schema above the file in its root."""
     root_folder = file.absolute().parent
     root = default_root([file])
     ancestors = [folder for folder in (root_folder, *root_folder.parents) if folder.is_relative_to(root)]

@@ -36,7 +36,7 @@ class Format(str, Enum):
 def command(format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT) -> None:
     """List the types that installed packages add.
 
-    Lists for each package the kind, the name used in files, the class, and the first sentence of its documentation, or
+    Lists for each package the kind, the name used in files, the class, and the first paragraph of its documentation, or
     why the type cannot be used. The command imports each type. Exit code 0: all types are usable; 3: one is not.
     """
     listed = [_row(entry) for entry in _entries_by_package()]
@@ -48,7 +48,7 @@ def command(format_: Annotated[Format, typer.Option("--format", help="Output for
 
 
 def _entries_by_package() -> list[RegisteredType]:
-    """Return the entry points of installed packages, sorted by package and then in the order of GROUPS."""
+    """Return the entry points of installed packages, sorted by package, then by GROUPS. Unknown groups come last."""
     found = [entry for kind in GROUPS for entry in installed_types(kind)]
     return sorted([*found, *unknown_groups()], key=lambda entry: (entry.distribution.lower(), entry.distribution))
 
@@ -57,7 +57,7 @@ def _row(entry: RegisteredType) -> dict[str, Any]:
     """Return the JSON data of one type. Its key `broken` is the reason why the type cannot be used; "" if it can."""
     text, broken, hint = "", "", ""
     try:
-        text = _first_sentence(inspect.cleandoc(entry.load().__doc__ or ""))
+        text = _first_paragraph(inspect.cleandoc(entry.load().__doc__ or ""))
     except BrokenPlugin as error:
         broken, hint = error.why, error.hint
     return {
@@ -73,7 +73,7 @@ def _row(entry: RegisteredType) -> dict[str, Any]:
     }
 
 
-def _first_sentence(text: str) -> str:
+def _first_paragraph(text: str) -> str:
     return " ".join(text.partition("\n\n")[0].split())
 
 

@@ -70,7 +70,7 @@ def command(
     resume: Annotated[
         Path | None,
         typer.Option(
-            help="Continue in this output folder: execute the runs that have no verdict or whose files changed."
+            help="Continue in this output folder: execute runs without a result, with an error, or with changed files."
         ),
     ] = None,
     shard: Annotated[

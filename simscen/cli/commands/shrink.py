@@ -158,7 +158,7 @@ def _folder_name(key: RunKey) -> str:
 def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: bool) -> tuple[Shrinker, MappingNode]:
     """Run the scenario, and make it as small as possible. Return the shrinker, and the scenario before shrinking.
 
-    Raises UsageError if the scenario is invalid or does not fail.
+    Raises UsageError if the scenario is invalid or does not fail, BudgetSpent, and Stopped.
     """
     scenario = candidates.scenario
     (first,) = candidates.results([scenario.tree])
@@ -235,6 +235,6 @@ def _print_summary(shrinker: Shrinker, before: MappingNode, target: Path, stack:
         if texts:
             print_text("\n".join([title, *(f"  {escaped(text)}" for text in texts)]))
     incomplete = "" if shrinker.is_complete else ", which were not enough to try everything; increase --runs"
-    print_text(f"{_size(shrinker.tree)} values left after {shrinker.runs.runs} runs{incomplete}")
+    print_text(f"{_size(shrinker.tree)} values left after {shrinker.candidates.runs} runs{incomplete}")
     option = "" if stack is None else f" --stack {escaped(stack)}"
     print_text(f"wrote {escaped(str(target))}; try: simscen run {escaped(display_path(target))}{option}")

@@ -47,7 +47,9 @@ def command(
     out: OutOption = None,
     resume: Annotated[
         Path | None,
-        typer.Option(help="Continue in this output folder: execute runs without a verdict or with changed files."),
+        typer.Option(
+            help="Continue in this output folder: execute runs without a result, with an error, or with changed files."
+        ),
     ] = None,
     workers: JobsOption = None,
     backend: BackendOption = BackendName.LOCAL,

@@ -44,14 +44,14 @@ BATCH_SIZE = 8
 MAX_EMPTY_BATCHES = 50
 """Number of consecutive batches without valid values after which the search ends."""
 SQUARE_SIZE_M = 1.0
-"""Side of the grid squares by which failures at different places are distinguished."""
+"""Side of the grid squares by which failures at different positions are distinguished."""
 CONFIDENCE = 0.95
 """Confidence of the upper bound of the failure rate."""
 
 
 @dataclass(frozen=True)
 class FalsifyRequest:
-    """Arguments of `simscen falsify`. Each field has the name of an option; `options` are options for the runs."""
+    """Arguments of `simscen falsify`. Each field has the name of an argument; `options` are options for the runs."""
 
     file: Path
     method: SearchMethod = SearchMethod.AUTO
@@ -85,9 +85,9 @@ class FoundFailure:
 
 
 Signature = tuple[tuple[str, ...], frozenset[str], tuple[int, int] | None]
-"""Failed criteria, names of the disturbances that took place, and index (x, y) of the grid square of the failure.
+"""Failed criteria, names of the triggered disturbances, and index (x, y) of the grid square of the failure.
 
-Failures with equal signatures count as the same failure. The square is None for a failure without a place.
+Failures with equal signatures count as the same failure. The square is None for a failure without a position.
 """
 
 
@@ -106,7 +106,7 @@ def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
 
 
 class Falsification:
-    """Search that runs a scenario with proposed values, and saves a scenario for each distinct failure."""
+    """Search that runs a scenario with proposed values, and writes a scenario file for each distinct failure."""
 
     def __init__(self, request: FalsifyRequest) -> None:
         """Read the scenario and its ranges. Raises InvalidInput and UsageError."""
@@ -130,7 +130,7 @@ class Falsification:
         self.found: list[FoundFailure] = []
 
     def execute(self, backend: Backend, journal: Journal, reports: Reports, output: Screen) -> Exit:
-        """Search until enough failures are found or the maximum number of runs is reached. Return the exit code."""
+        """Search until a limit of the request is reached, or no valid values are found. Return the exit code."""
         start, stopped, empty_batches = time.monotonic(), None, 0
 
         def listen(event: SessionEvent) -> None:
@@ -242,7 +242,7 @@ class Falsification:
         return StudyPlan(name, self.is_random, None, values, stops_early=True)
 
     def _save_failure(self, finished: RunFinished) -> None:
-        """Write a scenario that reproduces the run, if the run failed with a new signature."""
+        """Write a scenario that reproduces the run, if it failed with a new signature and more failures are wanted."""
         result = finished.result
         if result.outcome.is_good or not is_counted(result) or (new := signature(result)) in self._signatures:
             return

@@ -59,7 +59,8 @@ class LogJudge:
     def judge(self, log: Path, is_only_log: bool) -> RunFinished:
         """Evaluate a log and return its result.
 
-        The result of an unusable log is an error. If it is the only log, raise InvalidInput instead.
+        The result of an unusable log is an error. If it is the only log, raise the exception instead. Raises
+        UnusableScenario if the criteria file is invalid.
         """
         try:
             return (
@@ -160,7 +161,7 @@ class LogJudge:
         return masks
 
     def _foreign_case(self) -> Case:
-        """Return the world, goals, and robot of the criteria file."""
+        """Return what criteria need from the criteria file, such as goals, regions, and footprint."""
         assert self._criteria is not None
         if self._case is None:
             from simscen.run.preparation import case_from_criteria

@@ -45,7 +45,7 @@ def find_logs(paths: Sequence[Path]) -> list[Path]:
 
 
 def _logs(path: Path) -> Iterator[Path]:
-    """Yield the logs in a folder and its subfolders, except hidden ones."""
+    """Yield the logs in a folder and its visible subfolders, without a PARTIAL_LOG beside a COMPLETE_LOG."""
     for folder, subfolders, names in os.walk(path):
         current = Path(folder)
         if is_bag(names):

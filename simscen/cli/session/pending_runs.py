@@ -33,7 +33,7 @@ class PendingRuns:
     jobs:     runs to execute
     reused:   results of the other runs, from an earlier session in the same folder
     workers:  number of parallel runs
-    stacks:   names of the stacks of --stack
+    stacks:   values NAME=VALUE of --stack
     """
 
     journal: Journal

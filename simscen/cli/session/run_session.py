@@ -42,7 +42,7 @@ class Observer(Protocol):
 
 @dataclass(frozen=True)
 class SessionRequest:
-    """Arguments of `simscen run`. `selection` and `options` group options; other fields are named after theirs."""
+    """Arguments of `simscen run`. `selection` and `options` group arguments; other fields have their names."""
 
     paths: Sequence[Path]
     selection: Selection = field(default_factory=Selection)

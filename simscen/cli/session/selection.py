@@ -79,7 +79,7 @@ def _parallel_job(environ: Mapping[str, str]) -> str:
 def scenarios_of_shard(
     scenarios: list[LoadedScenario], number: int, count: int, times: Mapping[str, float]
 ) -> list[LoadedScenario]:
-    """Return the scenarios of shard `number` of `count`, in their order. Raises NothingSelected without scenarios.
+    """Return the scenarios of shard `number` of `count`, in their order. Raises NothingSelected if it is empty.
 
     `times` are durations of scenarios in s by title. The scenarios are assigned from the longest to the shortest, each
     to the shard with the least total time so far. A missing duration counts as the median. If `times` is empty, a shard
@@ -148,11 +148,11 @@ def load_selection(
     selection: Selection,
     stacks: Sequence[str] = (),
 ) -> tuple[list[LoadedScenario], list[Problem]]:
-    """Return the selected scenarios below `paths`, each with each of `stacks`, and warnings about these scenarios.
+    """Return each selected scenario below `paths` with each of `stacks`, and warnings about these scenarios.
 
     `stacks` are values of --stack; () keeps the stack of each scenario. If a stack cannot run a scenario, the scenario
-    is skipped; if `paths` contains its file, it is invalid instead. Raises InvalidInput if a file below `paths` is
-    invalid, and NothingSelected if no scenario is selected.
+    is skipped, or invalid if `paths` contains its file. Raises InvalidInput if a file below `paths` is invalid, and
+    NothingSelected if no scenario is selected.
     """
     root_folder = root if root is not None else default_root(paths)
     checker = FileChecker(root_folder, world_path, lenient, stacks=parse_stacks(stacks, root_folder, world_path))
@@ -190,7 +190,7 @@ def stack_limitation(choice: StackChoice, problems: Sequence[Problem]) -> str:
 
 
 def select_variations(scenarios: list[LoadedScenario], names: Sequence[str]) -> list[LoadedScenario]:
-    """Return the variations with one of these names; all if there are no names. Raises NothingSelected."""
+    """Return the variations with one of these names; all for no names. Raises NothingSelected for an unknown name."""
     known = dict.fromkeys(one.variation for one in scenarios if one.variation)
     if missing := [name for name in names if name not in known]:
         if number_of(missing[0]) is not None:

@@ -40,8 +40,8 @@ FirstFailing = Callable[[Sequence[Sequence[Part]]], int | None]
 def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[Part]:
     """Return a minimal list of parts that fails, by delta debugging (Zeller and Hildebrandt 2002).
 
-    All parts together must fail. The result is minimal: it passes without any single one of its parts. All tested lists
-    keep the order of the parts.
+    All parts together must fail. The result is minimal: if any one of its parts is removed, it passes. All tested
+    lists keep the order of the parts.
     """
     remaining = list(parts)
     if not remaining or first_failing([[]]) is not None:
@@ -189,7 +189,7 @@ class Shrinker:
     `tree` is the smallest scenario so far. `is_complete` is false if the maximum number of runs ended the search.
     """
 
-    runs: CandidateRuns
+    candidates: CandidateRuns
     failure: Failure
     tree: MappingNode
     is_complete: bool = True
@@ -249,7 +249,7 @@ class Shrinker:
             return []
         return minimize(
             parts,
-            lambda candidates: self.runs.first_accepted([build(part) for part in candidates], self.failure.occurs_in),
+            lambda lists: self.candidates.first_accepted([build(needed) for needed in lists], self.failure.occurs_in),
         )
 
 

@@ -50,7 +50,7 @@ BATCH_SIZE = 256
 
 @dataclass(frozen=True)
 class StudyRequest:
-    """Arguments of `simscen study`. Each field has the name of an option; `options` are options for the runs."""
+    """Arguments of `simscen study`. Each field has the name of an argument; `options` are options for the runs."""
 
     file: Path
     runs: int | None = None
@@ -82,7 +82,10 @@ class StudyRun(NamedTuple):
 
 
 def execute_study(request: StudyRequest) -> Exit:
-    """Run a study, write its reports, and return the exit code. Raises InvalidInput and UsageError."""
+    """Run a study, write its reports, and return the exit code.
+
+    Raises InvalidInput, UsageError, and NothingSelected.
+    """
     study = _StudySession(request)
     first = study.load_first_batch()
     require_writable_junit(request.junit, request.out or request.resume, study.inputs)
@@ -136,7 +139,10 @@ class _StudySession:
         return self._load([run.number for run in self._batch])
 
     def execute(self, backend: Backend, journal: Journal, reports: Reports, output: Screen) -> Exit:
-        """Run all batches, write the reports, and return the exit code."""
+        """Run batches until the claim is decided or all runs are done, write the reports, and return the exit code.
+
+        Raises InvalidInput, after the reports are written, if the values of a later run are invalid.
+        """
         start, finished_runs, stopped = time.monotonic(), RunStore(), None
         invalid: InvalidInput | None = None
         earlier = previous_results(journal)

@@ -41,8 +41,8 @@ FormatOption = Annotated[Format, typer.Option("--format", help="Output format.")
 class Screen:
     """Prints the events of a session until an error of stdout.
 
-    `stdout_error` is the first error of writing to stdout, and `summary_error` is the error of writing the job summary.
-    Both are None without an error.
+    `stdout_error` is the first error of writing to stdout, and `summary_error` is the error of writing the job summary;
+    None without an error.
     """
 
     def __init__(self, printer: Reporter) -> None:

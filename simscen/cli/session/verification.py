@@ -30,7 +30,8 @@ MAX_COLUMNS = 100
 def verify_reconstruction(reconstruction: Reconstruction) -> None:
     """Run the scenario, print a table of the differences between run and log, and write a page with both drives.
 
-    Exit with code 1 if an incident of the log, such as a collision, does not happen in the run.
+    Exit with code 1 if an incident of the log, such as a collision, does not happen in the run. Raises RunError if the
+    run is not completed.
     """
     name = reconstruction.file.name.partition(".")[0]
     log = reconstruction.file.with_name(f"{name}.verified.mcap")
