@@ -51,7 +51,7 @@ class LogContents:
         self._time = SimTime(1)
         self._map: OccupancyGrid | None = None
         self._robot_description = ""
-        self._frames: dict[str, Pose3] = {}
+        self._mounts: dict[str, Pose3] = {}
         self._types: dict[int, str] = {}
         self._counts = MessageCounts()
         self._handlers: dict[int, Handler] = {}
@@ -99,7 +99,7 @@ class LogContents:
             scenario=str(self._files.get(log_header.SCENARIO_FILE, b""), "utf-8"),
             map=self._map,
             robot_description=self._robot_description,
-            frames=self._frames,
+            mounts=self._mounts,
             files=self._other_files(),
             facts=log_header.extra_facts(self._metadata),
         )
@@ -251,7 +251,7 @@ class LogContents:
                 self._rows.object(name).add(tick, *link.pose)
 
     def _set_mounts(self, _: int, data: bytes) -> None:
-        self._frames = self.sensors.mounts = {
+        self._mounts = self.sensors.mounts = {
             self.sensors.frames.stack_frame(link.child): Pose3(*link.pose)
             for link in decode.transforms(MessageReader(data))
         }

@@ -54,7 +54,7 @@ class LogHeader:
         scenario: Resolved YAML text of the scenario.
         map: Map that the stack receives; None without a map.
         robot_description: URDF of the robot.
-        frames: Poses of the sensors on the robot's base, by sensor name. The scans of other lidars contain their pose.
+        mounts: Poses of the sensors on the robot's base, by sensor name. The scans of other lidars contain their pose.
         sensors: Class names of readings ("Scan", …) by sensor name. Empty if read from a log.
         files: Attachments by name.
         facts: Additional metadata as text by key.
@@ -67,7 +67,7 @@ class LogHeader:
     scenario: str = ""
     map: OccupancyGrid | None = None
     robot_description: str = ""
-    frames: Mapping[str, Pose3] = field(default_factory=dict)
+    mounts: Mapping[str, Pose3] = field(default_factory=dict)
     sensors: Mapping[str, str] = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)
     facts: Mapping[str, str] = field(default_factory=dict)

@@ -106,7 +106,7 @@ def _build_robot(
 ) -> RobotUnderTest:
     """Build one robot with its sensors and its stack.
 
-    Adds its stage, the interface of triggers and actions to the robot, to `stages` under the name of the robot.
+    Adds the robot's stage (interface of triggers and actions) to `stages` under the name of the robot.
     """
     spec, robot = prepared.spec, simulation.robots[name]
     clock, streams = Clock(spec.physics.tick_rate), Streams(seed, name)
@@ -162,7 +162,7 @@ def _build_stack(
     stack_log: Path | None,
     disturb_belief: Callable[[Belief], Belief],
 ) -> Stack:
-    """Build the stack of a robot. `disturb_belief` applies active faults to each belief of the localizer."""
+    """Build the stack of a robot. `disturb_belief` applies active faults to each belief of the reference stack."""
     world = prepared.built.world
     surroundings = Surroundings(
         robot=robot_model(prepared.body),
@@ -190,7 +190,7 @@ def _build_stack(
 
 
 class TruthSensor:
-    """Sensor that gives the `ground_truth` localizer the true pose (map frame) and velocity as odometry."""
+    """Sensor that reports the true pose (map frame) and velocity as odometry, for stacks that get the ground truth."""
 
     name = "ground_truth"
 

@@ -124,7 +124,7 @@ class RobotUnderTest:
             self.stage.record_event(collision)
 
     def decide(self, tick: int) -> None:
-        """Send the stack the new goals of events, read the sensors, apply faults, and get the stack's command."""
+        """Send the stack the pending orders of events, read the sensors, apply faults, and get the stack's decision."""
         stage, faults = self.stage, self.faults
         if stage.pending_orders:
             stage.deliver_orders(tick)

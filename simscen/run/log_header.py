@@ -29,7 +29,7 @@ from simscen.record.log_header import (
     scenery_to_json,
 )
 from simscen.run.preparation import PreparedScenario
-from simscen.run.robot_interface import sensor_frames, sensor_kinds
+from simscen.run.robot_interface import sensor_kinds, sensor_mounts
 from simscen.sim.body.outline import convex_hull, footprint, outlines_in_z_range
 from simscen.sim.urdf.writer import to_urdf
 from simscen.worlds.routes.shortest_paths import Z_RANGE_M
@@ -61,7 +61,7 @@ def _robot_header(prepared: PreparedScenario) -> LogHeader:
         scenario=resolved_text(prepared.loaded),
         map=prepared.map,
         robot_description=to_urdf(prepared.body),
-        frames=sensor_frames(prepared.robot),
+        mounts=sensor_mounts(prepared.robot),
         sensors=sensor_kinds(prepared),
         facts={**_run_facts(prepared), **{log_header_key(entry): requirement_of(entry) for entry in prepared.plugins}},
     )

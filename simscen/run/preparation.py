@@ -54,7 +54,7 @@ class PreparedScenario:
 
     The stack receives `map` (None: no map), `masks`, and `estimate` (the initial pose estimate). `start` is the true
     initial pose. `case` has the facts that criteria need besides the log. With several robots, `robots` has a
-    PreparedScenario for each robot by name, and the other fields describe the first robot.
+    PreparedScenario for each robot by name, and the other fields, except `loaded` and `plugins`, are of the first one.
     """
 
     loaded: LoadedScenario
@@ -100,7 +100,7 @@ def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
 
 
 def map_resolution(loaded: LoadedScenario, world: World) -> float:
-    """Return the cell size in m of the world's map. They are larger if the world is large and no robot uses the map."""
+    """Return the cell size in m of the world's map. It is larger if the world is large and no robot uses the map."""
     is_used = any(view.map is None for view in loaded.robot_views.values())
     return MAP_RESOLUTION_M if is_used else fitting_resolution(world.bounds)
 
@@ -185,7 +185,7 @@ def with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh, 
 
 
 def _clearance_range(spec: ScenarioSpec) -> float:
-    """Return the largest clearance in m that a criterion or trigger uses."""
+    """Return the largest clearance in m that a criterion or trigger uses, at least CLEARANCE_RANGE_M."""
     ranges = [entry.chosen.clearance_range for entry in spec.pass_ if isinstance(entry.chosen, Criterion)]
     near = (test.clearance_below for trigger in spec.triggers for test in trigger.parts())
     ranges += [condition.root for condition in near if isinstance(condition, ClearanceBelow)]

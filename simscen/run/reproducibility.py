@@ -212,7 +212,10 @@ def _definition(loaded: LoadedScenario) -> dict[str, Any]:
 
 
 def _without_stack_parameters(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a scenario or robot, of its stack only with the parameters that all types of stacks have."""
+    """Return a scenario or robot without `extends`, and with only the common parameters of its stack.
+
+    These are the parameters that all types of stacks have, except `controller_frequency`.
+    """
     stack = entry.get("stack")
     keys = StackBase.model_fields.keys() - {"controller_frequency"}
     common = {key: stack[key] for key in sorted(keys) if key in stack} if isinstance(stack, Mapping) else {}

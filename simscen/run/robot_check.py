@@ -19,7 +19,7 @@ TICK_RATE_HZ = 240
 COMMAND_PERIOD_TICKS = TICK_RATE_HZ // FIRMWARE_RATE_HZ
 """Ticks between two commands."""
 REST_TICKS, SETTLING_TICKS = 240, 60
-"""Ticks at rest before the first trial and after each leg."""
+"""Ticks at rest before the first trial, and before each trial and after each leg."""
 LINE_LENGTH_M, SQUARE_SIDE_M = 2.0, 1.0
 """Lengths of the straight line and of a side of the square."""
 MAX_SPEED_M_S, MAX_TURN_RATE_RAD_S = 0.5, 1.0

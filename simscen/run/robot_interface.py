@@ -1,4 +1,7 @@
-"""Interface between a robot and its stack: robot model, sensors, latencies, and the ticks at which the stack acts."""
+"""Interface between a robot and its stack: robot model, sensors, latencies, and the ticks of the robot's beats.
+
+A beat is a tick at which a sensor, the stack, or a truth sample is due.
+"""
 
 import math
 from collections import deque
@@ -43,7 +46,7 @@ def sensor_kinds(prepared: PreparedScenario) -> dict[str, str]:
     return {name: sensor.reading_type for name, sensor in prepared.robot.sensors.items()} | truth
 
 
-def sensor_frames(robot: RobotSpec) -> dict[str, Pose3]:
+def sensor_mounts(robot: RobotSpec) -> dict[str, Pose3]:
     """Return the pose in the base frame of each sensor with a mount, by sensor name."""
     mounts = {name: getattr(sensor.chosen, "mount", None) for name, sensor in robot.sensors.items()}
     return {name: mount.pose for name, mount in mounts.items() if isinstance(mount, Mount)}
@@ -121,7 +124,7 @@ class SensorSuite:
 
 
 class TickSchedule:
-    """Ticks at which a robot must act: multiples of some periods, and ticks at a fixed delay after such a multiple."""
+    """Ticks of a robot's beats: multiples of some periods, and ticks at a fixed delay after such a multiple."""
 
     def __init__(self, periods: Iterable[int], delayed: Iterable[tuple[int, int]] = ()) -> None:
         """`delayed` are pairs (period, delay after each multiple of this period). All numbers are in ticks."""

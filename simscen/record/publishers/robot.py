@@ -48,7 +48,7 @@ class EventPublisher:
             self._out.publish(topics.GOAL, now, self._goal(stamp, Pose3.planar(pose)))
 
     def _pose(self, event: Event) -> Pose2 | None:
-        """Return the pose of an accepted goal from the event or the scenario; None for other events."""
+        """Return the pose of an accepted goal from its event, or else from the scenario; None if it is unknown."""
         x, y, yaw = (event.data.get(key) for key in ("x", "y", "yaw"))
         if isinstance(x, float) and isinstance(y, float):
             return Pose2(x, y, yaw if isinstance(yaw, float) else 0.0)
@@ -80,7 +80,7 @@ class RobotPublisher:
         if header.robot_description:
             out.publish(topics.ROBOT_DESCRIPTION, 0, messages.string(header.robot_description))
         self._truth = TruthPublisher(out, time, thinning, frames, publishes_clock)
-        self._sensors = SensorPublisher(out, time, thinning, header.frames, header.sensors, frames)
+        self._sensors = SensorPublisher(out, time, thinning, header.mounts, header.sensors, frames)
         self._stack = StackPublisher(out, time, thinning, frames)
         self._events = EventPublisher(out, time, header.case)
         self._scene = ScenePublisher(out, header.case, scenery, frames, robot)

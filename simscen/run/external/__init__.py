@@ -1,1 +1,1 @@
-"""External navigation stacks: separate processes with which simscen exchanges frames of the stack protocol."""
+"""External navigation stacks: separate processes that exchange frames (packets of the stack protocol) with simscen."""

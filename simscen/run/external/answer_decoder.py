@@ -54,10 +54,10 @@ MAX_QUATERNION_COMPONENT = 1.01
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A decoded answer. A field is None or empty if the answer does not contain it.
+    """A decoded answer. A field, except `correction`, is None or empty if the answer does not contain it.
 
-    A `plan` without poses means that the stack follows no plan. `correction` is the pose of the odom frame in the map
-    frame. `lines` are messages on /rosout.
+    A `plan` without poses means that the stack follows no plan. `correction` is the last pose of the odom frame in the
+    map frame, from this or an earlier answer. `lines` are messages on /rosout.
     """
 
     command: Twist | None = None
@@ -89,9 +89,9 @@ def decode_answer(
 ) -> Answer:
     """Decode the answer at `tick`. Raises ProtocolViolation for an invalid message.
 
-    `correction` is the last received pose of the odom frame in the map frame. If it is None, the correction is computed
-    from the estimated pose and the odometry pose: the pose of the stack's filtered odometry, or else `dead_reckoned`
-    (the pose of the wheel odometry).
+    `correction` is the pose of the odom frame in the map frame from earlier answers (None: none received). While none
+    is received, the correction of the belief is computed from the estimated pose and the odometry pose: the pose of
+    the stack's filtered odometry, or else `dead_reckoned` (the pose of the wheel odometry).
     """
     if len(messages.get(topics.COMMAND.name, ())) > 1:
         raise ProtocolViolation("two commands in one answer")
@@ -130,7 +130,7 @@ def _belief(messages: MessagesByTopic, correction: Pose2 | None, dead_reckoned: 
 
 
 def _correction(messages: MessagesByTopic) -> Pose2 | None:
-    """Return the pose of the odom frame in the map frame, or None."""
+    """Return the last pose of the odom frame in the map frame in an answer, or None."""
     exact = _decode_last(messages, topics.TF.name + EXACT_SUFFIX, _decode_pose2d)
     if exact is not None:
         return exact
@@ -176,7 +176,7 @@ def _filtered_odometry(messages: MessagesByTopic, time: SimTime, now: int) -> It
 
 
 def _path(messages: MessagesByTopic, name: str, tick: int, time: SimTime) -> Path | None:
-    """Return the last path on the topic `name`, or None. A path without a stamp gets the tick `tick`."""
+    """Return the last path on the topic `name`, or None. A path that is only on the exact topic gets `tick`."""
     message = _decode_last(messages, name, partial(decode_checked, decode.path))
     exact = _decode_last(messages, name + EXACT_SUFFIX, lambda data: _decode_table(data, 3))
     if message is None and exact is None:

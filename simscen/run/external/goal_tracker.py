@@ -44,7 +44,7 @@ class GoalTracker:
 
     def preempt(self, tick: int, goal: Goal) -> None:
         """Replace the current goal by `goal`, which the stack must accept next."""
-        self._drop_goal()
+        self._ignore_cancellation()
         self._events += self._task.preempt(tick, goal)
 
     def process(self, tick: int, report: dict[str, Any]) -> None:
@@ -85,7 +85,7 @@ class GoalTracker:
         goal = self._task.goal
         if goal is None or goal.timeout is None or tick - self._task.since <= goal.timeout * self._rate:
             return False
-        self._drop_goal()
+        self._ignore_cancellation()
         self._events += self._task.record_failed(tick, ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over")
         return True
 
@@ -94,8 +94,8 @@ class GoalTracker:
         events, self._events = tuple(self._events), []
         return events
 
-    def _drop_goal(self) -> None:
-        """Drop the current goal, so that a later `goal.canceled` for it is ignored."""
+    def _ignore_cancellation(self) -> None:
+        """Remember the current goal, so that a later `goal.canceled` for it is ignored."""
         if self._task.goal is not None:
             self._dropped.add(self._task.goal.name)
 
@@ -130,7 +130,10 @@ class GoalTracker:
 
 
 def _to_error_code(value: Any) -> ErrorCode | int:
-    """Return Nav2's error code for a number or name; an unknown number is returned as is. Raises ProtocolViolation."""
+    """Return Nav2's error code for a number, a name, or None (NAVIGATE_UNKNOWN); unknown numbers are returned as is.
+
+    Raises ProtocolViolation for other values.
+    """
     if value is None:
         return ErrorCode.NAVIGATE_UNKNOWN
     if isinstance(value, str) and value in ErrorCode.__members__:

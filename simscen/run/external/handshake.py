@@ -26,7 +26,7 @@ class RunParameters:
         control_period: Ticks between two commands.
         sensors: Type of the readings by sensor name, such as "Scan".
         mounts: Pose in the base frame by sensor name; sensors without a mount are missing.
-        rates: Readings per second by sensor name; sensors without a known rate are missing.
+        rates: Readings per second by sensor name; 0 for a sensor without a fixed rate, such as a bumper.
         robot_description: URDF of the robot.
         stop_on_failure: Whether the stack must stop after a failed goal, instead of driving to the next goal.
         mode: Nav2 action that receives the goals.

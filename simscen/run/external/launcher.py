@@ -2,7 +2,7 @@
 
 A worker process starts this internal program with three file descriptors. The launcher reads the command of the stack
 from CONTROL and starts the stack, which inherits SOCKET. It writes the exit code of the stack to REPORT. After one more
-byte from CONTROL, or when the worker dies, it kills the stack and all descendants of the stack.
+byte from CONTROL, or when the worker dies, it ends the stack and kills all descendants of the stack.
 """
 
 import errno
@@ -69,7 +69,7 @@ def _start_failure(error: Exception) -> str:
 
 
 def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> bool:
-    """Wait for the end of the run, and report the exit of the stack.
+    """Wait for the end of the run. If the stack exits before, report its exit code.
 
     Returns True if the worker requested the end of the stack, and False if the worker has died.
     """
@@ -101,7 +101,7 @@ def _wait(process: "subprocess.Popen[bytes]", seconds: float) -> None:
 
 
 def _restore_user_limits() -> None:
-    """Raise the soft resource limits of the worker process to the limits of the user."""
+    """Set the soft limits of memory and file size to the hard limits, and of open files to at most MAX_OPEN_FILES."""
     for limit in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE):
         hard = resource.getrlimit(limit)[1]
         resource.setrlimit(limit, (hard, hard))

@@ -1,7 +1,7 @@
 """Topics of the stack protocol, and kinds of errors that an external stack can cause.
 
 ROS messages lose precision: headings become quaternions, and ranges become float32. Therefore, a topic `NAME/exact` has
-the values of the topic `NAME` in full precision. In one STEP or ANSWER, the n-th messages of both belong together.
+the values of the topic `NAME` in full precision. In one STEP or ANSWER, the n-th messages on both belong together.
 """
 
 from collections.abc import Iterable, Mapping
@@ -20,7 +20,7 @@ SPEED_MASK = Topic("/speed_filter_mask", topics.MAP.type, latched=True)
 """Masks of the stack's costmap filters as in their files, without the zones of the scenario."""
 KEEPOUT_ZONES = Topic("/keepout_zones", topics.MAP.type, latched=True)
 SPEED_ZONES = Topic("/speed_zones", topics.MAP.type, latched=True)
-"""Masks of the stack's costmap filters with the enabled zones of the scenario."""
+"""Masks of the stack's costmap filters from their files, together with the enabled zones of the scenario."""
 
 STACK_TOPICS = (
     *(topics.COMMAND, topics.PLAN, topics.LOCAL_PLAN, topics.BELIEF, topics.PARTICLES, topics.TF),

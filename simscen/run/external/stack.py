@@ -39,12 +39,12 @@ from simscen.run.external.stack_process import StackProcess
 from simscen.run.external.zone_masks import ZoneMasks, switchable_zones
 from simscen.run.preparation import PreparedScenario
 from simscen.run.process.isolation import clean_environment
-from simscen.run.robot_interface import sensor_frames, sensor_kinds
+from simscen.run.robot_interface import sensor_kinds, sensor_mounts
 from simscen.sim.urdf.writer import to_urdf
 from simscen.stack.protocols import Surroundings
 
 END_GRACE_S = 2.0
-"""Wall time that a stack may take to exit after the frame END."""
+"""Wall time that a stack may take to disconnect after the frame END."""
 T = TypeVar("T")
 _GOAL_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
 
@@ -52,9 +52,10 @@ _GOAL_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANC
 class ExternalStack:
     """A stack in another process.
 
-    Order of calls: `begin` (start the process), `start` (handshake), `decide` at each beat (tick at which the robot
-    acts), `end` (send END), `finish` (wait for the exit), and `close`. `release` and `close` also end the process after
-    an error. All methods that use the process raise RunError of a kind in simscen.run.external.protocol.
+    Order of calls: `begin` (start the process), `start` (handshake), `decide` at each beat (tick at which a sensor, the
+    stack, or a truth sample is due), `end` (send END), `finish` (wait until the stack disconnects), and `close`.
+    `release` and `close` also end the process after an error. `start` and `decide` raise RunError of a kind in
+    simscen.run.external.protocol.
     """
 
     def __init__(
@@ -193,7 +194,7 @@ class ExternalStack:
             self._process.send_end(wire.json_frame(wire.END, {"reason": reason}))
 
     def finish(self) -> None:
-        """Wait until the stack exits, for at most END_GRACE_S after `end`."""
+        """Wait until the stack disconnects, for at most END_GRACE_S after `end`, and keep the `about` of its BYE."""
         if self._process is not None:
             self._welcome = self._welcome.with_bye(self._process.receive_bye(END_GRACE_S))
 
@@ -301,7 +302,7 @@ def build_external_stack(
         seed=seed,
         control_period=Clock(surroundings.tick_rate).period(spec.controller_frequency),
         sensors=sensor_kinds(prepared),
-        mounts=sensor_frames(prepared.robot),
+        mounts=sensor_mounts(prepared.robot),
         rates={name: float(getattr(sensor.chosen, "rate", 0.0)) for name, sensor in prepared.robot.sensors.items()},
         robot_description=to_urdf(prepared.body),
         stop_on_failure=prepared.spec.on_goal_failure == "stop",

@@ -33,7 +33,7 @@ SPEED_STEP_M_S = 0.01
 
 
 def switchable_zones(prepared: PreparedScenario) -> Zones:
-    """Return the zones that events can switch during the run, with their speed limits."""
+    """Return the zones that events can switch during the run, with the speed limits of these events (0: none)."""
     keepout: list[Polygon] = []
     speed: list[tuple[Polygon, float]] = []
     for step in prepared.spec.steps:
@@ -49,7 +49,10 @@ def switchable_zones(prepared: PreparedScenario) -> Zones:
 
 
 class ZoneMasks:
-    """Masks with the enabled zones of one robot. The masks cover the map or, without a map, all zones."""
+    """Masks with the enabled zones of one robot.
+
+    A mask covers the map or, without a map, all zones. Without zones, it is the mask file of the stack.
+    """
 
     def __init__(self, surroundings: Surroundings, switchable: Zones) -> None:
         """`surroundings` has the zones at the start of the run. `switchable` are the zones that events can switch."""

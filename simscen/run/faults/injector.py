@@ -35,7 +35,7 @@ class _ActiveFault:
 
     index:          index of the fault in the scenario
     sensor:         name of the target (the affected sensor or actuator)
-    kind:           kind of the target: class of its readings, such as "Scan", or COMMAND, WHEELS, or BELIEF
+    kind:           kind of the target: class of its readings, such as "Scan", or COMMAND, WHEELS, BELIEF, or MAP
     effect:         implementation of the fault
     changed_count:  number of messages that the fault has changed or withheld
     has_ended:      whether only delayed messages remain
@@ -124,7 +124,7 @@ class FaultInjector:
         """Send the stack's command to the base, and return the command that the wheels execute.
 
         Faults of cmd_vel change the message to the base. Faults of the wheels change what the wheels execute. Call it
-        exactly once at each beat (tick at which a sensor, the stack, or a truth sample is due).
+        exactly once at each beat of the robot (tick at which a sensor, the stack, or a truth sample is due).
         """
         is_sent = self._link.send(tick, command)
         if not self._affects_commands and not self.active:

@@ -84,9 +84,9 @@ class HypotheticalSensor:
         self._mount = mount if isinstance(mount, Mount) else Mount()
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """Return the ranges (n,) in m that `scan` would have if the mount of the lidar had an `error` (lidar frame).
+        """Return the ranges (n,) in m, without noise, that `scan` would have if the lidar's mount had an `error`.
 
-        Beams pass through the objects with the names in `without`.
+        `error` is a pose in the lidar frame. Beams pass through the objects with the names in `without`.
         """
         pose = self._view.base_pose().compose(self._assumed_mount(error))
         angles = scan.angles()

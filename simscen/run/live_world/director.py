@@ -19,7 +19,10 @@ _IMMEDIATE_TRIGGER = Trigger(time=Time(0.0))
 
 
 class Director:
-    """Evaluates all triggers at each beat (tick at which a robot acts), and starts and ends events and faults."""
+    """Evaluates all triggers at each beat (tick at which a sensor, a stack, or a truth sample is due).
+
+    Starts events and faults when their triggers fire, and ends faults.
+    """
 
     def __init__(
         self,

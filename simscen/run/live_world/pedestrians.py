@@ -108,7 +108,10 @@ class PedestrianSimulation:
             self._crowd.remove(name)
 
     def has_room(self, center: Point, radius: float, walls_only: bool) -> bool:
-        """Return whether a pedestrian of `radius` m fits at `center`. `walls_only` ignores all moving bodies."""
+        """Return whether a pedestrian of `radius` m fits at `center`.
+
+        `walls_only` ignores objects, robots, and other pedestrians.
+        """
         if walls_only or self._map.walls.distance(center) < radius:
             return self._map.walls.distance(center) >= radius
         surroundings = self._surroundings()

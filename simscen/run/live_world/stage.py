@@ -190,7 +190,7 @@ class LiveStage:
     def has_room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
         """Return whether a pedestrian with this radius in m fits at a position (x, y) in m.
 
-        `walls_only` ignores objects and robots.
+        `walls_only` ignores objects, robots, and other pedestrians.
         """
         return self._pedestrians.has_room(place, radius, walls_only)
 
@@ -209,7 +209,10 @@ class LiveStage:
         self.record_world_event(Event(0, EventKind.OBJECT_MOVED, name, path_data(path)))
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """Return the path that an object follows and the seconds since its start; None if it follows no path."""
+        """Return the path that an object follows and the seconds since its start; None if it follows no path.
+
+        A pedestrian's path is unknown: it is returned as a path that stays at the current pose.
+        """
         pose = self.object(name)
         if pose is not None and self._pedestrians.simulates(name):
             return MotionPath((0.0, 1.0), (pose, pose), "loop"), 0.0  # the future path of a pedestrian is unknown
@@ -295,7 +298,7 @@ def path_data(path: MotionPath) -> dict[str, Value]:
 
 
 def body_data(body: Body) -> dict[str, Value]:
-    """Return the pose, the first shape, and the outlines (in the body frame) of a body as event data."""
+    """Return the pose, mass, first shape, and outlines (in the body frame) of a body as event data."""
     pose = body.pose.plane
     fields: dict[str, Value] = {"x": pose.x, "y": pose.y, "yaw": pose.yaw, "mass": body.mass}
     outlines: list[Value] = [

@@ -86,14 +86,14 @@ _DUMP_FRAME = re.compile(r'^  File "(?P<file>.*)", line (?P<line>\d+) in (?P<nam
 
 
 def innermost_frame(output: str) -> str:
-    """Return the innermost frame of a Python traceback in the output, such as "step (simulation.py:88)", or ""."""
+    """Return the innermost call of a faulthandler traceback in the output, such as "step (simulation.py:88)", or ""."""
     heads = list(_DUMP_HEADER.finditer(output))
     frame = _DUMP_FRAME.search(output, heads[-1].end()) if heads else None
     return f"{frame['name']} ({PurePath(frame['file']).name}:{frame['line']})" if frame else ""
 
 
 def output_tail(output: str) -> str:
-    """Return TAIL_LINES lines of the output: the start of a crash's Python traceback if there is one, else the end."""
+    """Return TAIL_LINES lines of the output: the start of a faulthandler traceback if there is one, else the end."""
     heads = list(_DUMP_HEADER.finditer(output))
     if heads:
         before = output[: heads[-1].start()].splitlines()[-3:]
@@ -224,7 +224,7 @@ def plugin_path_arguments(plugins: Iterable[RegisteredType]) -> tuple[str, ...]:
 def apply_plugin_path(argument: str) -> None:
     """Extend sys.path in a fork server, so that it finds the plug-ins of its parent process.
 
-    New folders are appended. A folder comes first only if another version of a plug-in's package would be found else.
+    New folders are appended. The folder of a plug-in comes first only if Python would otherwise find another version.
     """
     configuration = json.loads(argument)
     for folder in configuration["path"]:

@@ -88,7 +88,7 @@ class ProcessEnd:
 
 @dataclass(frozen=True)
 class ForkServerDeath:
-    """End of a job because the fork server died.
+    """End of a job because the fork server died or, on a Ray cluster, because the node was lost.
 
     Attributes:
         description: How the fork server ended.

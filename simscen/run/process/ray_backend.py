@@ -53,7 +53,7 @@ MAX_UNREAD_UPDATES = 64
 class _Runner:
     """Handle of the Ray actor of the class NodeRunner on one node.
 
-    `call` is its pending remote call: first `software`, and `run` when `is_ready`. It is None if there are no jobs.
+    `call` is its pending remote call: first `software`, then (`is_ready`) `run`. It is None while the queue is empty.
     """
 
     name: str
@@ -127,7 +127,7 @@ class RayBackend:
         self._finish_calls()
 
     def _add_runners(self) -> None:
-        """Start a runner on each node without a runner. Raises UsageError if there is no node."""
+        """Start runners on nodes without one, up to the number of workers. Raises UsageError if no node has a CPU."""
         if self._runners and time.monotonic() < self._last_search + NODE_SEARCH_PERIOD_S:
             return
         self._last_search = time.monotonic()
@@ -287,7 +287,7 @@ class _Batch:
         return job
 
     def is_unfinished(self) -> bool:
-        """Return whether any job is running or has not started."""
+        """Return whether any job is running or can still start."""
         if self.running:
             return True
         if not self._should_continue():

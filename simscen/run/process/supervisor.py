@@ -121,7 +121,7 @@ class ForkServerProcess:
         self._process.send_signal(signal.SIGABRT)
 
     def collect_death(self) -> ProcessDeath:
-        """Wait one second for the end of the process, then kill it; return a description of its end."""
+        """Wait up to one second for the end of the process, kill it if it still runs, and return how it ended."""
         try:
             self._process.wait(timeout=1)
         except subprocess.TimeoutExpired:
@@ -153,7 +153,8 @@ class Supervisor:
     """Runs jobs in worker processes of a fork server on this machine, `workers` at a time.
 
     If the fork server dies while it prepares a job, this job fails, and all other running jobs are repeated. After any
-    other death, each running job may be the cause: it is repeated alone, and fails if the fork server dies again.
+    other death, or a SIGKILL, each running job may be the cause: it is repeated alone, and fails if the fork server
+    dies again. If the fork server cannot start, all jobs fail.
     """
 
     def __init__(self, workers: int, entry: Sequence[str]) -> None:

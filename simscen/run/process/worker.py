@@ -61,7 +61,7 @@ def run_worker(job: Job, parent: int, pipes: WorkerPipes, execute: ExecuteJob) -
 
 
 def _set_up_process(parent: int, output: int) -> None:
-    """Set up the session, signals, output, resource limits, and fault handler of this process."""
+    """Set up the POSIX session, signals, output, resource limits, and faulthandler of this process."""
     os.setsid()
     die_with_parent(parent)
     adopt_orphans()

@@ -183,7 +183,7 @@ def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
     """Return the run, or an error if it differs from the same run of an earlier session, or if that run is missing.
 
     `earlier` is the output folder of that session. Verdicts must be equal, and trajectories nearly equal, because the
-    last bits differ between machines.
+    last bits differ between machines. A run that is an error or has no log is not compared.
     """
     if run.result.outcome is Outcome.ERROR or not run.artifacts.mcap:
         return run
@@ -210,7 +210,10 @@ def _folder(run: RunFinished, earlier: Path) -> Path:
 
 
 def _disagreement(new_path: Path, earlier_path: Path) -> str | None:
-    """Return a description of the first difference of two logs, or None. Raises InvalidInput for an unreadable log."""
+    """Return the verdicts that differ in two logs, or else the first difference of true poses; None without both.
+
+    Raises InvalidInput for an unreadable log.
+    """
     from simscen.record.log_reader import read_log
     from simscen.record.trace_difference import first_pose_difference
 

@@ -36,7 +36,7 @@ def sample_header(seed: int = 7) -> LogHeader:
         scenario="name: goal\n# ä comment\n",
         map=OccupancyGrid(cells, 0.05, Pose2(-1.0, -2.0, 0.3)),
         robot_description="<robot name='turtle'/>",
-        frames={"camera": Pose3(0.1, 0.0, 0.3)},
+        mounts={"camera": Pose3(0.1, 0.0, 0.3)},
         files={"map.pgm": b"P5 1 1 255\n\0"},
         facts={"simscen": "0.1.0"},
     )

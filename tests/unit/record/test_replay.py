@@ -79,7 +79,7 @@ def test_log_contains_the_case_and_facts_of_its_run(log: Path) -> None:
     for name in ("name", "seed", "case", "scenario", "robot_description", "files", "facts"):
         assert getattr(read.header, name) == getattr(given_, name)
     assert read.header.case == CASE
-    assert read.header.frames["camera"] == given_.frames["camera"]
+    assert read.header.mounts["camera"] == given_.mounts["camera"]
 
 
 def test_the_map_is_read_back_exactly(log: Path) -> None:

@@ -134,7 +134,7 @@ def test_frames_of_several_robots_are_in_one_tree(tmp_path: Path) -> None:
 
 def test_mounts_and_scans_of_several_robots_are_read_without_their_prefix(tmp_path: Path) -> None:
     for log in read_log(log_of_two_robots(tmp_path), with_sensors=True).robots.values():
-        assert set(log.header.frames) == {"camera", "lidar", "rear lidar"}
+        assert set(log.header.mounts) == {"camera", "lidar", "rear lidar"}
         assert set(log.trace.objects) == {"cart", "a box"}
         _, scan = log.sensors.scans["/scan"][0]
         assert log.sensors.decode_scan(scan).mount == Pose2(0.1, 0.0, 0.0)
