@@ -134,7 +134,7 @@ class Sink(Protocol):
 class McapWriter:
     """Writes an MCAP file to `sink`. Messages must be added in the order of their times.
 
-    `profile` and `library` are fields of the MCAP header. `chunk_size` is the maximum size of a chunk in bytes.
+    `profile` and `library` are fields of the MCAP header. A chunk is written when it exceeds `chunk_size` bytes.
     """
 
     def __init__(self, sink: Sink, profile: str, library: str, chunk_size: int = CHUNK_BYTES) -> None:

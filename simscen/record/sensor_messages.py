@@ -59,7 +59,7 @@ class SensorMessages:
         return None
 
     def decode_scan(self, data: bytes) -> Scan:
-        """Decode a LaserScan. The scan of a tilted lidar is projected to the floor."""
+        """Decode a LaserScan. The scan of a tilted lidar is converted to a level scan, see `level_scan`."""
         scan = decode.laser_scan(MessageReader(data))
         frame = self.frames.stack_frame(scan.frame)
         limits = scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max

@@ -1,4 +1,4 @@
-"""Comparison of the traces of two runs that should be equal, for `simscen run --check-determinism`."""
+"""Comparison of the traces of two runs that should be equal, for --check-determinism and --check-against."""
 
 from collections.abc import Iterator
 
@@ -98,7 +98,7 @@ POSE_TOLERANCE_M_RAD = 1e-5
 def first_pose_difference(first: Trace, second: Trace) -> str | None:
     """Return a description of the first difference of true poses above POSE_TOLERANCE_M_RAD; None without a difference.
 
-    Used for runs on different processors.
+    Without one, different ends of the runs are described. Used for runs on different processors.
     """
     if first.tick_rate != second.tick_rate:
         return f"tick rate: {first.tick_rate} against {second.tick_rate} Hz"

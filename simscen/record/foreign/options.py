@@ -49,7 +49,7 @@ class ForeignLogOptions:
 
     @property
     def frames(self) -> tuple[str, str] | None:
-        """Parent and child frame of the ground truth; None if the ground truth is a topic."""
+        """Parent and child frame of the ground truth; None if the ground truth is a topic or unknown."""
         return None if self.truth is None else parse_frame_pair(self.truth)
 
 

@@ -47,7 +47,7 @@ class McapMessages:
     """Iterable of the messages of an MCAP file.
 
     After the iteration, `complete` is False if the file is truncated, and `topics` has the message types by topic. The
-    iteration raises UnusableLog for a log of ROS 1, and exceptions of the mcap library for damaged files.
+    iteration raises UnusableLog for ROS 1 and for files that are not MCAP, and mcap exceptions for damaged files.
     """
 
     def __init__(self, path: Path) -> None:

@@ -79,7 +79,7 @@ MIN_LATE_SUBSCRIPTION_S, MAX_LATE_SUBSCRIPTION_S = 0.05, 2.0
 """If the first ground truth or the first scan comes between these times after the first message, the recorder
 subscribed late. The log is then judged from this ground truth or scan on."""
 MAX_DISTANCE_BEFORE_BELIEF_M = 0.3
-"""Maximum distance that the robot drives before the first pose of AMCL, for complete evidence."""
+"""Maximum diagonal of the area in which the robot drives before the first pose of AMCL, for complete evidence."""
 MAX_LISTED_TOPICS = 12
 """Maximum number of topics in a message to the user."""
 _NOT_ON_STANDARD_TOPICS = (
@@ -160,7 +160,7 @@ class ForeignTraceReader:
         return f"the log has no topic {topic}{candidates}"
 
     def _timebase(self, *tracks: Track | None) -> Timebase:
-        """Return the timebase of all decoded messages.
+        """Return the timebase of all decoded messages except /tf_static.
 
         The anchor is the first of `tracks`, odometry, and scans that has stamps.
         """

@@ -43,7 +43,8 @@ class LocalizationLog:
 def read_localization_log(path: Path, odometry: str, scan: str, reference: str | None) -> LocalizationLog:
     """Read odometry, scans, and reference poses from a rosbag2 folder, an MCAP file, a CARMEN log, or a CSV file.
 
-    `odometry`, `scan`, and `reference` are topics of ROS logs. Raises InvalidInput if the log cannot be used.
+    `odometry`, `scan`, and `reference` are topics or pairs of frames in a ROS log, see `read_rosbag_rows`. Raises
+    InvalidInput if the log cannot be used.
     """
     with unusable_log_as_invalid_input(path):
         try:

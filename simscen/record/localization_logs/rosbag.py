@@ -78,7 +78,8 @@ class _Messages:
 def read_rosbag_rows(path: Path, odometry: str, scan: str, reference: str | None) -> LocalizationRows:
     """Read an MCAP file or a rosbag2 folder. Raises UnusableLog if messages cannot be used.
 
-    Times are stamps, or times of logging if all stamps of a topic are zero. The mount of the lidar is on /tf_static.
+    Times are stamps. If all stamps of a topic are zero, the times of all topics are times of logging instead. The mount
+    of the lidar is on /tf_static.
 
     odometry:   topic, or pair of frames on /tf such as `odom:base_link`
     scan:       topic

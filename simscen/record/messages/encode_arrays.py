@@ -181,7 +181,7 @@ class TransformBatchPacker:
         """Size in bytes of these transforms in one message."""
 
     def __call__(self, stamps: Sequence[Stamp], poses: Array) -> Bytes:
-        """Return the bytes (n, size) of the transforms at n `stamps`. `poses` (n, links, 7) belong to child frames."""
+        """Return the bytes (n, size) of the transforms at n `stamps`. `poses` (n, links, 7) are of the child frames."""
         packed = np.tile(self._empty, (len(poses), 1))
         times, numbers = np.array(stamps, "<u4").view(np.uint8), np.ascontiguousarray(poses, "<f8").view(np.uint8)
         for column, (stamp, pose) in enumerate(self._slices):

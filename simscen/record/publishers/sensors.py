@@ -28,8 +28,8 @@ _DEFAULT_TOPICS = {
 class SensorPublisher:
     """Publishes readings when the stack receives them. Stamps are the times of measurement.
 
-    The first sensor of a type has the default topic, e.g. /scan. The topics of other sensors start with the name of the
-    sensor, e.g. /rear/scan.
+    The first sensor of a type has the default topic, e.g. /scan. The topics of cameras and other sensors start with the
+    name of the sensor, e.g. /rear/scan.
 
     Args:
         mounts: Poses of sensors on the base, by sensor name.
