@@ -32,7 +32,7 @@ class Message(NamedTuple):
 class Step:
     """One step of the run: the messages for the stack, and its answer.
 
-    `drive`, `publish`, and `log` add to the answer. It is sent when the loop over the Peer requests the next step.
+    `drive`, `publish`, and `log` add to the answer, which is sent when the loop over the Peer requests the next step.
 
     Attributes:
         messages: Messages since the last step.
@@ -99,7 +99,7 @@ class Peer:
     Args:
         name, version, about: Description of the stack for the run's log. `about` is any JSON object.
         topics: Topics to receive; None for all.
-        every_beat: True for a step whenever a sensor publishes, False for one step per velocity command.
+        every_beat: True for a step also whenever a sensor publishes, False for one step per velocity command.
         modes: Nav2 actions that the stack supports.
         connection: None for the socket that simscen passes to the processes that it starts.
 

@@ -1,6 +1,7 @@
 """Wire format of the stack protocol: packs, unpacks, sends, and receives the frames between simscen and a stack.
 
-docs/reference/stack-protocol.md defines the protocol. The module must run on Python 3.8.
+A frame is a packet of the protocol: size, kind, and body. docs/reference/stack-protocol.md defines the protocol. The
+module must run on Python 3.8.
 """
 
 from __future__ import annotations

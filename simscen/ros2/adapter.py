@@ -240,7 +240,7 @@ class Adapter:
         self._sender = self._senders.usable
 
     def _send(self, now: int) -> None:
-        """Send the remaining goals. If they are rejected, report the current goal as failed and send the next one."""
+        """Send the next batch of goals. If it is rejected, report its first goal as failed, and send the next batch."""
         while self._sender is not None and self._goals.accept() is not None:
             batch = self._next_batch()
             self._sent = 1 if self._sender.takes_single_goals else len(batch)
@@ -280,7 +280,10 @@ class Adapter:
         return StackState(now, is_stopped, self._estimate.pose)
 
     def _process(self, message: ReceivedMessage) -> List[Message]:
-        """Process a message of the nodes. Return the messages to send to simscen: none for a velocity command."""
+        """Process a message of the nodes. Return the messages to send to simscen.
+
+        There are none for a velocity command, and for a message on /tf without map -> odom.
+        """
         if message.topic == COMMAND:
             self._velocity = read_twist(message.data, message.type == TWIST_STAMPED_TYPE)
             return []

@@ -1,8 +1,8 @@
 """Bring-up before a run: waits until all nodes are ready, and meanwhile publishes sensor data if they need it.
 
 Some nodes become active only if sensor data arrive and time advances. For example, Nav2's costmaps wait for
-odom -> base_link. `BringUp.prepare` first waits without sensor data. Then `BringUp.wait` publishes the readings of the
-first step repeatedly, if necessary. Meanwhile, ROS time advances, but simulated time does not.
+odom -> base_link. `BringUp.prepare` first waits without sensor data. Then `BringUp.wait` publishes the latest readings
+repeatedly, if necessary. Meanwhile, ROS time advances, but simulated time does not.
 """
 
 import math
@@ -23,7 +23,10 @@ INITIAL_POSE = "/initialpose"
 PREPARE_S = 10.0
 """Maximum wall time to wait without sensor data."""
 PREPARE_SETTLE_S = 2.0
-"""Nodes probably wait for sensor data if none has appeared for this wall time, in addition to `--settle`."""
+"""Additional wall time, after `--settle`, without new nodes, after which the present nodes probably need sensor data.
+
+Not used with Nav2 or `--warm-up`.
+"""
 CHECK_PERIOD_S = 0.25
 """Wall time between two checks of the graph."""
 FIRST_SCAN_S = 2.0
@@ -61,7 +64,7 @@ class BringUp:
         return max(self._options.warm_up, FIRST_SCAN_S if self._options.nav2 else 0.0) + self._period
 
     def prepare(self) -> bool:
-        """Wait without sensor data. Return whether all nodes are ready.
+        """Wait without sensor data. Return whether all nodes are ready; always False with `--warm-up`.
 
         Raises AdapterError if the launch command ends, or a node needs a topic that cannot be published.
         """

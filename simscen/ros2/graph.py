@@ -75,7 +75,7 @@ class Graph:
         self.executor.add_node(self.node)
         self.publishers: Dict[str, Any] = {}
         self.types: Dict[str, str] = {}
-        """Types of the publishers; keys of both are topics of the protocol."""
+        """Types of the publishers. The keys of `publishers` and `types` are topics of the protocol."""
         self._subscriptions: Dict[str, Tuple[str, Any]] = {}
         self.inbox: List[ReceivedMessage] = []
         """Received messages in the order of arrival, until the caller removes them."""

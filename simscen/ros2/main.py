@@ -99,7 +99,7 @@ class ReceivedStep(NamedTuple):
 
 
 class AdapterRun:
-    """One run of the adapter. A context manager that finally ends the adapter, the launch command, and the domain."""
+    """One run of the adapter. As a context manager, it ends adapter and launch command, and frees the domain."""
 
     def __init__(self, options: Options) -> None:
         self._options = options
