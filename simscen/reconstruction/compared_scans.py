@@ -126,7 +126,7 @@ def range_noise(residuals: Array, expected: Array) -> Array:
     """Return the standard deviation (n,) of the range noise of each scan in m, from residuals and expected ranges.
 
     The noise is estimated from second differences between neighbor beams on smooth surfaces. Scans with too few of
-    these beams get the median of the other scans.
+    these beams get the median of the other scans (0.01 m without other scans).
     """
     with np.errstate(invalid="ignore"):
         steps = np.abs(np.diff(expected, axis=1))

@@ -54,7 +54,7 @@ def run_estimators(
     """Return all parts of a scenario that the estimators find in a drive.
 
     `is_map_built` states that the walls of `world` were built from the scans of this drive. `other_robots` are the
-    other robots in the log. Scans of these robots are not reported as objects.
+    other robots in the log, which become objects of the scenario. Their scan hits are not reported as further objects.
     """
     unknowns = [NEVER_ESTIMATED]
     is_calibrated = drive.has_true_poses and not is_map_built

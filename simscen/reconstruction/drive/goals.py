@@ -61,7 +61,10 @@ def find_goals(messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues)
 def _with_results_of_events(
     sent: Sequence[RecordedGoal], events: Sequence[tuple[float, Event]]
 ) -> Iterator[RecordedGoal]:
-    """Yield the accepted goals, with names and results from the events of simscen's navigator (time in s, event)."""
+    """Yield the `sent` goals that were accepted, with names and results from the events of simscen's navigator.
+
+    `events` are pairs of a time in s and an event.
+    """
     accepted = [(time, event) for time, event in events if event.kind is EventKind.GOAL_ACCEPTED]
     poses = list(sent)
     for time, event in accepted:
@@ -145,13 +148,17 @@ def goals_from_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
 
 
 MIN_IDLE_S = 1.0
-"""The time before the first goal is cut off if it is at least this long."""
+"""Minimum time before the first goal that is cut off."""
 LEAD_S = 0.5
 """Time to keep before the first motion, if goals are derived from the motion."""
 
 
 def trim_to_first_goal(drive: RecordedDrive) -> RecordedDrive:
-    """Return the drive without the time before the first goal. All times become relative to the new start."""
+    """Return the drive without the time before the first goal. All times become relative to the new start.
+
+    If goals are derived from the motion, only the time before the first motion is cut off. A drive with less than
+    MIN_IDLE_S to cut off is returned unchanged.
+    """
     if not drive.goals:
         return drive
     begin = drive.goals[0].sent

@@ -30,14 +30,14 @@ MIN_FALSE_FRACTION = 0.015
 JUMP_M = 0.3
 """Minimum difference between the ranges of neighbor beams that end at different objects."""
 BESIDE_BEAMS, SAME_OBJECT_M = 3, 0.3
-"""Number of beams beside a ghost at which the ghost must not be visible, and maximum range difference between beams on
+"""Distance in beams from a ghost at which the ghost must not be visible, and maximum range difference between beams on
 one object."""
 MIN_GHOST_FRACTION = 0.3
 """Minimum fraction of the scans, from the first to the last scan with the ghost, that show the ghost."""
 MAX_GHOST_SPREAD_M, GHOST_SPREAD_SIGMAS = 0.02, 2.0
 """Maximum median deviation of the range of a ghost: the larger of a distance and a multiple of the range noise."""
 MIN_DRIVEN_M, MIN_GHOST_S = 0.6, 2.0
-"""Minimum distance that the lidar moves, and minimum time, while a ghost is visible."""
+"""Minimum diagonal of the area in which the lidar moves, and minimum time, while a ghost is visible."""
 
 
 def false_return_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:

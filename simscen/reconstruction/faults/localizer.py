@@ -20,7 +20,7 @@ MIN_CORRECTION_M_RAD = 1e-9
 MAX_JUMP_S = 30.0
 """Maximum time between a jump and the jump back."""
 MIN_DRIVEN_M = 0.6
-"""Minimum distance that the robot drives during an outage: more than twice Nav2's default update_min_d of 0.25 m."""
+"""Minimum distance between the positions at start and end of an outage: over twice Nav2's update_min_d of 0.25 m."""
 
 
 def localizer_faults(drive: RecordedDrive) -> Iterator[FoundFault]:

@@ -38,8 +38,8 @@ CONFIDENCE_SIGMAS = 4.0
 def odometry_faults(steps: MotionSteps, wheel_separation: float, skids: bool = False) -> Iterator[FoundFault]:
     """Yield the faults of the odometry.
 
-    `wheel_separation` is the distance in m between left and right wheels. For a skid-steer robot (`skids`), wrong turns
-    and noise are not reported.
+    `wheel_separation` is the distance in m between left and right wheels. For a skid-steer robot (`skids`), a wrong
+    scale of turns and noise are not reported.
     """
     if len(steps) < 6:
         return

@@ -22,7 +22,7 @@ MIN_STEP_M = 0.01
 SPEED_PERCENTILE, SPEED_MARGIN = 99.5, 1.25
 """Percentile that is used as the maximum of the noisy speeds, and ratio of the speed limit to this maximum."""
 STOP_TIME_FACTOR, MAX_STOP_S = 1.5, 3.0
-"""Ratio of the limit to the measured time to stop, and maximum time from a fault to a stop that is a reaction to it."""
+"""Ratio of the limit (minus 0.2 s) to the measured time to stop, and maximum time from a fault to its stop."""
 REST_SPEED_M_S = 0.01
 """Speed in m/s, and turn rate in rad/s, below which the robot is at rest."""
 NON_SENSOR_TARGETS = ("cmd_vel", "wheels", "localizer")
