@@ -23,8 +23,8 @@ from simscen.stack.localizers.resampling import AugmentedMcl
 from simscen.stack.localizers.sensor_models import BeamSkipping, LikelihoodFieldProb, SensorModel
 
 UNMAPPED_LIKELIHOOD_RATIO = 0.4
-"""Likelihood of a beam that ends outside the mapped area, as a share of `z_hit`: about the mean likelihood of all beams
-of a well localized robot."""
+"""Minimum likelihood of a beam that ends outside the mapped area, as a share of `z_hit`: about the mean likelihood of
+all beams of a well localized robot."""
 MAX_WALL_THICKNESS_M = 1.0
 """Unknown cells farther than this from all known cells may be unmapped rooms, and not the inside of a wall."""
 

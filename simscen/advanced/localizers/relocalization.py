@@ -136,7 +136,7 @@ class Relocalizer:
         self._certain = self._certain and self._certain.after(last, base, distance, motion)
 
     def _search_by_initial_pose(self, initial: PosePrior, base: Pose2, current: Array) -> tuple[Array, Array] | None:
-        """Return the most likely pose, given the initial pose and all scans since; None if `current` is nearly as good.
+        """Return the most likely pose by initial pose and stored scans; None if `current` is nearly as good.
 
         If few beams end on the mapped area, many poses fit by chance, and only the pose that odometry and scan matching
         predict is considered.
@@ -197,9 +197,10 @@ class Relocalizer:
         return poses, np.ones(1)
 
     def _update_doubt(self) -> bool:
-        """Return whether recent scans do not fit the map. If they fitted before, make the next search due at once.
+        """Return whether recent scans do not fit the map.
 
-        Then also forget older scans, unless scan matching knows whether the robot was carried.
+        If they fitted before, make the next search due at once, and forget older scans. Older scans are kept if scan
+        matching knows whether the robot was carried.
         """
         is_in_doubt = (
             len(self._fitting_shares) == RECENT_SCANS and sum(self._fitting_shares) < RECENT_SCANS * MIN_FITTING_SHARE

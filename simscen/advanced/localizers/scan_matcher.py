@@ -227,7 +227,7 @@ class ScanMatcher:
         return MatchedMotion(last.between(self.pose), _step_covariance(last.yaw, found[1])) if found else None
 
     def _match(self, seen: Surface, guess: Pose2) -> tuple[Pose2, Symmetric] | None:
-        """Return the pose in the frame of `self.pose`, and its covariance in units of POINT_STD_M²; None on failure."""
+        """Return the new value of `pose`, and its covariance in units of POINT_STD_M²; None on failure."""
         guessed = pose = self.pose.compose(guess)
         reference, own = _ReferenceScans(self._surfaces, complex(pose.x, pose.y)), seen.thinned(SCAN_POINTS)
         (place, heading), gate, last = _prior_information(guess), 0, len(GATES_M) - 1

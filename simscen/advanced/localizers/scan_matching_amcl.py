@@ -103,7 +103,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             self._consistent_updates = self._consistent_updates + 1 if consistent else 0
 
     def _match(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> MatchedMotion | None:
-        """Return the motion since the last update, from scans of the first lidar only; None if matching fails."""
+        """Return the motion since the last update, from scans of the first lidar only; None if it cannot be matched."""
         sensor, previous = self._matched or (scan.sensor, odometry)
         if scan.sensor != sensor:
             return None

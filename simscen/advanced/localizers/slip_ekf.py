@@ -106,7 +106,7 @@ class SlipEkfLocalizer:
         self._scan_correction = ScanMatchingCorrection(self._tick_rate) if self._spec.match_scans else None
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Predict the state up to an odometry message."""
+        """Estimate the turn rate from wheels and gyroscope, and move the pose up to an odometry reading."""
         last = self._last
         if not is_plausible(odometry.pose) or (last is not None and odometry.tick <= last.tick):
             return
