@@ -171,7 +171,7 @@ class AdvancedPlanManager(PlanManager):
         self._is_cautious = False
 
     def report_control_failure(self) -> None:
-        """Add CAUTIOUS_CLEARANCES_M to plans until the next goal, because the controller could not follow the plan."""
+        """With `cautious`, add CAUTIOUS_CLEARANCES_M to plans until the next goal, because control has failed."""
         self._is_cautious = self._spec.cautious
 
     def _scheduled_reason(self, now: float, plan: FollowedPlan) -> str:
@@ -249,7 +249,7 @@ class AdvancedPlanManager(PlanManager):
 INITIAL_WAIT_S = 10.0
 """Time after clearing the entire costmap until this may happen again; doubled each time."""
 PROGRESS_M = 1.0
-"""Decrease of the distance to the goal that resets this time to INITIAL_WAIT_S."""
+"""Decrease of the distance to the goal that resets the time between two clearings to INITIAL_WAIT_S."""
 
 
 class ClearingBackoff:

@@ -56,7 +56,7 @@ class Trail:
         )
 
     def _thinned(self, trail: Array) -> Array:
-        """Return a subset of the poses that are at least SPACING_M apart."""
+        """Return the poses without those closer than SPACING_M to the previous one."""
         indices = [0]
         for k in range(1, len(trail)):
             if self.footprint_distance(trail[k], trail[indices[-1]]) >= SPACING_M:
@@ -93,7 +93,7 @@ HORIZON_S = 1.0
 TIMES: Array = np.linspace(0.0, HORIZON_S, 11)
 """Times in s at which a candidate command is checked for collisions."""
 MIN_FREE_STEPS = 3
-"""Number of the first TIMES at which a command must be free of collisions, if no command is free at all TIMES."""
+"""Number of TIMES after 0 until which a command must be free of collisions, if no command is free at all TIMES."""
 SLACK_CELLS = 0.3
 """Distance in cells by which the robot may come closer to an obstacle than on its trail."""
 DEVIATION_WEIGHT = 2.0
@@ -126,7 +126,7 @@ class TrailFollower:
         self._commands = _candidate_commands(setting.robot, self.speed)
 
     def start(self, pose: Pose2, length: float) -> None:
-        """Start to drive back at most `length` m from a pose in the odom frame."""
+        """Start at a pose in the odom frame. Beyond its oldest pose, the trail continues for `length` m."""
         horizon = np.array([HORIZON_S])
         self._ends = np.stack([poses_along(Pose2(0.0, 0.0), each, horizon)[0] for each in (*self._commands, STOP)])
         lever = self._footprint.circumscribed
@@ -134,7 +134,7 @@ class TrailFollower:
         self._last = pose
 
     def _remaining_trail(self) -> Sequence[Pose2]:
-        """Return the recorded poses, without those that an earlier call of the behavior has driven back."""
+        """Return the recorded poses, the oldest first, without the part that the robot has already driven back."""
         poses = self._recorded()
         if self._last is None or self._last not in poses:
             return poses
@@ -165,8 +165,8 @@ class TrailFollower:
     def command(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
         """Return the best command without collisions in HORIZON_S, otherwise the best one without early collisions.
 
-        None if no such command is better than standing still. If the collision monitor rejects a command, other
-        backward commands are tried.
+        None if no such command is better than standing still. If the collision monitor rejects a better command, other
+        backward commands are tried, even if they are not better.
         """
         *scores, stop_score = self._scores(pose).tolist()
         has_strafed, is_vetoed = self._trail.has_strafed, False
@@ -193,7 +193,7 @@ class TrailFollower:
     def _blocked(self, pose: Pose2, poses: Array, costmap: CostmapView) -> Mask:
         """Return which of the poses (n, 3) collide with obstacle cells.
 
-        A cell is ignored, as an error of the costmap, if the robot is or was about as near to it on its trail.
+        A cell is ignored, as an error of the costmap, if the robot is about as near to it now, or was so on its trail.
         """
         blocked: Mask = ~self._footprint.free(costmap, poses)
         if not blocked.any():
@@ -242,7 +242,10 @@ TIME_ALLOWANCE_RATIO = 1.5
 
 
 class Retrace:
-    """Recovery behavior that drives back along the trail of the robot until the robot can turn in place."""
+    """Recovery behavior that drives back along the trail of the robot until the robot has room to turn in place.
+
+    Without obstacles, it drives at least `backup_dist`. It drives at most `retrace_dist`.
+    """
 
     name = "retrace"
 

@@ -78,7 +78,7 @@ class SlipEkf(EkfParameters):
 class MedialAxisPlanner(OmplParameters):
     """BIT* on samples of the medial axis near the cheapest path over a coarse grid. The path is then optimized.
 
-    For cars and long hulls: RRT-Connect over poses in the region of near-shortest paths over a coarse grid.
+    For cars and long robots: RRT-Connect over poses in the region of near-shortest paths over a coarse grid.
     """
 
     component: ClassVar[str] = "simscen.advanced.planners.medial_axis_planner:medial_axis_planner"

@@ -27,7 +27,7 @@ MAX_BLOCKS, MAX_COST_BLOCKS = 40_000, 20_000
 PATH_SPACING_M = 0.45
 """Distance between the points of `InformedSet.path` where there is ample clearance."""
 MAX_LEG_M = 30.0
-"""Maximum distance between two of the `waypoints`."""
+"""Maximum distance between successive `waypoints`."""
 Mask = npt.NDArray[np.bool_]
 
 
@@ -59,8 +59,8 @@ class InformedSet:
     def restrict(self, slack: float, section: tuple[float, float] = (0.0, math.inf)) -> None:
         """Restrict the set to paths that are longer than the shortest path by at most the ratio `slack`.
 
-        `section` is the range of distances from the start in m to which the set is also restricted. The tolerance of
-        both limits is two block diagonals. Earlier restrictions no longer apply.
+        The set is also restricted to points whose distance from the start in m is in the range `section`. Both limits
+        have a tolerance of two block diagonals. Earlier restrictions no longer apply.
         """
         tolerance = 2 * math.sqrt(2.0) * self._size
         is_inside = self._through <= self.length * (1.0 + slack) + tolerance
@@ -157,8 +157,8 @@ def _as_blocks(free: Mask, factor: int) -> Mask:
 def _possible_moves(blocks: Mask) -> dict[tuple[int, int], Mask]:
     """Return, for 8 of the 16 moves (rows, columns), the mask of blocks from which the move is possible.
 
-    A move to an adjacent block is possible if free cells touch across the border. A diagonal move is possible if one of
-    the two ways over adjacent blocks is, a knight's move if both are. The other 8 moves are the reverse moves.
+    A move to an adjacent block is possible if free cells touch across the border. A diagonal move needs one of the two
+    ways over adjacent blocks, a knight's move needs both of its ways. The other 8 moves are the reverse moves.
     """
     right, up = np.zeros(blocks.shape[:2], dtype=bool), np.zeros(blocks.shape[:2], dtype=bool)
     right[:, :-1] = (blocks[:, :-1, :, -1] & blocks[:, 1:, :, 0]).any(axis=2)

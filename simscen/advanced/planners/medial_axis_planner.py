@@ -129,7 +129,7 @@ MAX_CACHED_CELLS = 500_000
 
 
 def medial_axis_planner(spec: PlannerSpec, setting: Setting) -> Planner:
-    """Return a MedialAxisPlanner or, for cars and long hulls, a ConfinedPosePlanner."""
+    """Return a MedialAxisPlanner or, for cars and long robots, a ConfinedPosePlanner."""
     space = state_space_for(spec.state_space, setting.robot)
     if space == "holonomic":
         return MedialAxisPlanner(spec, setting.robot)
@@ -144,7 +144,7 @@ class MedialAxisPlanner:
         self._costs: TraversalCosts | None = None
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return a path of poses in the map frame, SPACING_M apart. Raises NavigationFailure if there is none."""
+        """Return poses in the map frame, at most SPACING_M apart. Raises NavigationFailure if there is no path."""
         radius = self._robot.circumscribed_radius
         points = straight_path(
             costmap, start, goal, radius, lambda part, part_goal: self._path_on_part(part, start, part_goal, seed)
@@ -169,7 +169,7 @@ class MedialAxisPlanner:
         return TraversalCosts(costmap, self._robot, self._spec.cost_travel_multiplier, self._spec.allow_unknown)
 
     def _points(self, costs: TraversalCosts, start: Pose2, goal: Pose2, seed: int) -> Array:
-        """Return the points (n, 2) of a path, SPACING_M apart. Raises NavigationFailure."""
+        """Return the points (n, 2) of a path, at most SPACING_M apart. Raises NavigationFailure."""
         ends = find_endpoints(costs, start, goal, self._spec.tolerance)
         path = np.array([ends.start]) if ends.start == ends.goal else self._search(costs, ends, seed)
         return densify(np.vstack(((start.x, start.y), path)), SPACING_M)
@@ -244,7 +244,7 @@ PlanPart = Callable[[CostmapView, Pose2], tuple[Array, float]]
 def straight_path(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float, plan_part: PlanPart) -> Array | None:
     """Return a path (n, 2) that is straight, apart from a detour by `plan_part` around costly cells near the start.
 
-    A search of the entire costmap is then not necessary. None if such a path may cost too much. Cells are costly as in
+    This avoids a search of the entire costmap. None if there may be a cheaper path. Cells are costly as in
     `costly_distance`.
     """
     length = start.distance(goal)

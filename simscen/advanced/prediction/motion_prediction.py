@@ -29,7 +29,7 @@ MAX_PENDING = 10_000
 
 
 class GyroOdometry:
-    """Odometry with the distance of the wheels and the heading of the gyroscope.
+    """Odometry with the distance of the wheels and the heading of the gyroscope or, without gyroscope, of the wheels.
 
     Readings are integrated when a pose is requested, to save time.
     """
@@ -118,7 +118,7 @@ class MotionPrediction:
         self._stand_position = StandPosition(robot, full_speed)
         self._warm_up_ticks, self._must_stay = WARM_UP_S * tick_rate, False
         self.is_standing = False
-        """Whether the robot has received a command to stand since it last drove."""
+        """Whether `stand` or `hold` was called since the last call of `on_drive`."""
         self._odometry = GyroOdometry(tick_rate)
         self._no_obstacles = no_moving_obstacles(spec.acceleration)
         self._active: list[Tracker] = []  # trackers with moving obstacles
@@ -149,7 +149,7 @@ class MotionPrediction:
             self._avoidance.reset()
 
     def with_moving_hits(self, scan: Scan) -> Scan:
-        """Return the scan with a mask of its hits on moving obstacles. Costmaps do not mark these hits."""
+        """Return the scan with a mask of its hits on moving obstacles, if any. Costmaps do not mark these hits."""
         tracker = self._trackers.get(scan.sensor)
         if tracker is None or tracker.moving_hits is None or tracker.tick != scan.tick:
             return scan

@@ -134,7 +134,7 @@ class FollowedPath:
     """Path that a controller follows, for predicting its trajectory."""
 
     def __init__(self, path: Array) -> None:
-        """Take the points (n, 2) of the path."""
+        """Take the points of the path: x and y are the first two columns."""
         self._x, self._y = np.ascontiguousarray(path[:, 0]), np.ascontiguousarray(path[:, 1])
         steps = np.hypot(np.diff(self._x), np.diff(self._y))
         self._along = np.concatenate(([0.0], np.cumsum(steps)))
@@ -153,8 +153,10 @@ class FollowedPath:
         return int(dx.argmin())
 
     def ahead(self, pose: Pose2, reach: float) -> tuple[float, float]:
-        """Return the first path point (x, y) from the nearest one on that is `reach` m away from a pose; else the
-        last."""
+        """Return a path point (x, y): the first one, after the nearest one, that is at least `reach` m from a pose.
+
+        If there is none, return the last point of the path.
+        """
         nearest = self.nearest(pose)
         beyond = np.hypot(self._x[nearest:] - pose.x, self._y[nearest:] - pose.y) >= reach
         number = nearest + int(beyond.argmax()) if beyond.any() else -1

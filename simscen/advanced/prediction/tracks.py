@@ -131,14 +131,14 @@ MAX_POSITION_STD_M = 1.2
 MAX_SPEED_M_S = 4.0
 """Speed above which a track ends, because it has changed from one obstacle to another."""
 OCCLUDED_MIN_VISIBLE_UPDATES = 5
-"""The OCCLUDED constants apply if another moving obstacle may have hidden the formerly free space. This is the minimum
-number of updates with a completely visible cluster before a track then counts as moving."""
+"""The OCCLUDED constants are conditions for a moving track if another moving obstacle may have hidden the formerly free
+space. This one is the minimum number of updates with a completely visible cluster."""
 OCCLUDED_MIN_TRAVEL_M = 0.4
-"""Minimum distance from its oldest stored position before a track then counts as moving."""
+"""Minimum distance from the oldest stored position."""
 OCCLUDED_SPEED_RATIO = 1.6
-"""Minimum speed before a track then counts as moving, relative to the minimum speed of moving obstacles."""
+"""Minimum speed relative to `min_speed`, the minimum speed of moving obstacles."""
 OCCLUDED_MAX_OCCUPIED_SHARE = 0.2
-"""Maximum share of the stored updates with `was_occupied` for a track that then counts as moving."""
+"""Maximum share of the stored updates with `was_occupied`."""
 FAR_TRAVEL_M = 0.5
 """A partly hidden track counts as moving after traveling twice the largest radius plus this distance. The visible part
 of a wall at the edge of the field of view grows by less."""
