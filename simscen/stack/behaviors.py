@@ -133,7 +133,7 @@ class ClearCostmap:
 PLANNER_CODES = frozenset(get_args(PlannerCode))
 """Names of the error codes of planners."""
 MIN_PROGRESS_M = 1.0
-"""With `retries_since_progress`, retries are restored if the robot is nearer to the goal than ever by this value."""
+"""With `retries_since_progress`, retries are restored if the goal is nearer by this than at all earlier recoveries."""
 
 
 class BehaviorSequence:

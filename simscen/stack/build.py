@@ -50,7 +50,7 @@ def build_stack(
     """Build a stack from its specification, in a wrapper that checks its decisions.
 
     `wrap_localizer` returns a wrapper of the localizer, for example one that injects faults. The rest of the stack uses
-    the wrapper. Raises ValueError if a rate does not divide the tick rate.
+    the wrapper. Raises ValueError if `controller_frequency` does not divide the tick rate.
     """
     period = clock.seconds(clock.period(spec.controller_frequency))
     setting = Setting(

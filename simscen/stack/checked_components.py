@@ -45,7 +45,7 @@ def build_component(wrapper: Callable[[S, Setting], T], spec: S, setting: Settin
 class CheckedPlugin:
     """Base class of the wrappers. An invalid return value or an unexpected exception raises RunError.
 
-    Parameters `prefix` are the start of an error message, such as "returned".
+    The parameter `prefix` of methods is the start of an error message, such as "returned".
     """
 
     may_fail: ClassVar[bool] = True

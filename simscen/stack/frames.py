@@ -72,7 +72,7 @@ def is_plausible(values: tuple[float, float, float]) -> bool:
 
 
 class OdometryHistory:
-    """Odometry poses of the last HISTORY_S seconds by tick, and the trail: those of at least `trail_s` seconds."""
+    """Odometry poses of the last HISTORY_S seconds by tick, and the trail: the poses of about `trail_s` seconds."""
 
     def __init__(self, tick_rate: int, trail_s: float = HISTORY_S) -> None:
         """Create an empty history. `tick_rate` is in Hz."""

@@ -13,7 +13,7 @@ from simscen.core.geometry import Array, Pose2
 MAX_INFLATION_M = 0.8
 """Largest distance by which an obstacle is inflated: for its uncertainty, and in `nearness` also for the margin."""
 MAX_STEP_S, MIN_STEP_S = 0.5, 0.05
-"""Limits of the time steps of `is_surely_clear`. Far away from the obstacle, steps are longer."""
+"""Maximum time step of `is_surely_clear` near an obstacle, and the step below which the result is uncertain."""
 CONTACT_DISTANCE_M = 0.03
 """Distance below which obstacles count as touching."""
 
@@ -85,7 +85,7 @@ class MovingObstacles:
 
     @classmethod
     def of(cls, obstacles: Iterable[MovingObstacle], acceleration: float) -> "MovingObstacles":
-        """Create an object with these obstacles."""
+        """Create MovingObstacles from single obstacles."""
         moving = object.__new__(cls)
         moving.obstacles, moving.acceleration = tuple(obstacles), acceleration
         return moving

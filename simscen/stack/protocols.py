@@ -256,7 +256,7 @@ class SupportsZones(Protocol):
 class Stack(Protocol):
     """A complete navigation stack: takes the readings of each beat, and returns a velocity command.
 
-    *Given* no goal or an ended task *then* it commands zero. Exception: if the task was not canceled, the robot may
+    *Given* no goal or an ended task *then* it commands a stop. Exception: if the task was not canceled, the robot may
     move out of the way of an obstacle and return.
     """
 

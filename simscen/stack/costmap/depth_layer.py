@@ -66,7 +66,7 @@ def is_seen_through(
 ) -> Mask:
     """Return which of the obstacle cells (n, 2) the camera sees through: it measures a point farther away.
 
-    `heights` (n,) in m are those of the obstacles.
+    `heights` (n,) are the heights of the obstacles in m.
     """
     in_base = base.inverse().apply(frame.centers(cells))
     points = image.mount.inverse().apply(np.column_stack((in_base, heights.astype(np.float64))))

@@ -157,9 +157,8 @@ class ObstacleCritic:
     ) -> int | None:
         """Return the index of the best free trajectory among those in `order` (k,); None if none is free.
 
-        Trajectories with the preferred clearance are best. Among equal ones, later or no contact with moving obstacles
-        is better, then an earlier position in `order`. If the robot is in collision, a trajectory that leads out is
-        free.
+        Trajectories with the preferred clearance come first, then those that meet moving obstacles later or never, then
+        those earlier in `order`. If the robot is in collision and none is free, a trajectory that leads out is free.
         """
         if len(costmap.moving):
             meeting_times = self._meeting_times(costmap.moving, trajectories, order)
@@ -236,7 +235,7 @@ class OscillationCritic:
         return legal
 
     def record(self, pose: Pose2, command: Twist) -> None:
-        """Record the command at this pose. Reversals of vy and wz count only if vx is at most x_only_threshold."""
+        """Record the command at this pose. Reversals of vy and wz count only if |vx| is at most x_only_threshold."""
         x, y, theta = self._directions
         has_reversed = x.update(command.vx)
         if abs(command.vx) <= self._x_only_threshold:

@@ -59,7 +59,7 @@ def predict_velocities(now: Floats, controls: Floats, limits: VelocityLimits, dt
 
 
 def _limit_changes(velocities: Floats, requested: Floats, change: np.float32) -> None:
-    """Set the velocities of one axis (steps, n) to those requested, but change by at most `change` in each step."""
+    """Set the velocities of one axis (steps, n) to `requested`, with a change of at most `change` per step."""
     bound = np.empty_like(velocities[0])
     for (last, now), target in zip(pairwise(velocities), requested, strict=False):
         np.maximum(target, np.subtract(last, change, out=bound), out=now)
