@@ -261,8 +261,8 @@ class CurrentScan:
     def has_left(self, track: Track) -> bool:
         """Return whether at least half of the earlier positions of a track are no longer occupied.
 
-        A position is still occupied if both this scan and the earlier scan hit something there. A false track that jumps
-        from post to post leaves occupied positions behind.
+        A position is still occupied if both this scan and the earlier scan hit something there. A false track that
+        jumps from post to post leaves occupied positions behind.
         """
         current, radius = self.lidar.to_lidar(track.position), track.radius
         positions = [update.position for update in track.updates if abs(update.position - track.position) > radius]
