@@ -167,7 +167,8 @@ class Teleport(Spec, WorldAction):
 class Stop(Spec, WorldAction):
     """Stop a moving object, pedestrian, or door. With `for`, an object or door continues its motion after this time.
 
-    Use it for a person who stops in front of the robot, a cart that waits, or a door that jams.
+    Use it for a person who stops in front of the robot, a cart that waits, or a door that jams. A pedestrian can only
+    be stopped for good, without `for`.
 
     Example: `do: {stop: {name: cart, for: 3 s}}`
     """

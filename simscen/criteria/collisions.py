@@ -43,6 +43,8 @@ class Collisions(Spec, Criterion):
     Source: Arena's get_collisions, which also counts beginning contacts; ScenarioRunner's CollisionTest for
         `caused_by_robot`.
 
+    With `people`, inconclusive if the run had no people.
+
     Example: `collisions: {max: 0}`
     """
 

@@ -29,8 +29,8 @@ class PassRate(Spec):
     """Minimum probability that a robot with a pass rate below `min` is not accepted."""
     method: Literal["fixed", "sprt", "anytime"] = "fixed"
     """`fixed`: the exact Clopper-Pearson limits after all `runs`. `sprt`: the sequential probability ratio test between
-    `min` and `target`. `anytime`: a confidence sequence. `sprt` and `anytime` are evaluated after each run, and stop as
-    soon as the claim is decided."""
+    `min` and `target`. `anytime`: a confidence sequence. `sprt` and `anytime` are evaluated after each run. The study
+    ends with the batch of 32 runs in which the claim is decided."""
     runs: Annotated[int, Field(ge=1, le=MAX_RUNS)] | None = None
     """Number of runs of `fixed`, and maximum number of runs of the other methods. Default for `fixed`: the smallest
     number of runs that proves the claim if all pass. For the other methods: 20 times as many."""

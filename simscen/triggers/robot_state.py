@@ -82,6 +82,8 @@ class Travelled(Value[NonNegativeLength], Condition):
 class DistanceRemaining(Value[NonNegativeLength], Condition):
     """True while the true straight-line distance from the robot to its goal is at most the given distance.
 
+    The signal `distance_remaining` is the length of the remaining plan instead.
+
     Example: `when: {distance_remaining: 2 m}`
     """
 

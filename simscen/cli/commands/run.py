@@ -61,7 +61,7 @@ def command(
     ] = False,
     check_against: Annotated[
         Path | None,
-        typer.Option(help="Compare the logs with this output folder of another session or machine."),
+        typer.Option(help="Compare verdicts and true poses with this output folder of another session or machine."),
     ] = None,
     junit: JunitOption = None,
     junit_family: JunitFamilyOption = JunitFamily.SIMSCEN,

@@ -51,8 +51,8 @@ def command(
     Lists every problem with file, line, and column. Folders are searched for *.scenario.yaml, *.study.yaml,
     *.world.yaml, *.robot.yaml, *.stack.yaml, and *.base.yaml. A Nav2 parameter file is checked as a stack, and
     parameters that simscen does not use are listed. Base files and defaults.yaml may be incomplete. Scenarios are also
-    checked in their worlds: whether start and goals are free, the robot can arrive in time, all events can take place,
-    and all criteria can both pass and fail. Only the first 20 variations of a study are checked.
+    checked in their worlds: whether start and goals are free, whether the robot can arrive in time, and whether an
+    event, a fault, or a criterion is certainly impossible. Only the first 20 variations of a study are checked.
 
     Exit code 0: all files are valid; 2: a file is invalid; 5: no files found.
     """
