@@ -262,7 +262,7 @@ def slowest_run_lines(runs: Sequence[RunFinished], max_count: int, name: NameOfR
 
 
 def determinism_lines(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
-    """Yield whether the logs of the runs that --check-determinism repeated are equal; nothing if none was repeated."""
+    """Yield a statement whether the logs of runs that --check-determinism repeated are equal; nothing without logs."""
     if not any(run.key.is_repetition for run in runs):
         return
     first_runs = {run.key: run for run in runs if not run.key.is_repetition}

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from simscen.bench.navigation.barn import PUBLISHED_DWA_RESULTS
 from simscen.bench.navigation.summary import Difference, ExperimentComparison, ExperimentSummary
 from simscen.cli.benchmarks.navigation_runs import ExperimentResult, LocalizationAccuracy
-from simscen.cli.benchmarks.tables import align_columns, fits, label_cells, stack_rows, wrap_lines
+from simscen.cli.benchmarks.tables import align_columns, fits, label_cells, two_line_rows, wrap_lines
 
 PUBLISHED_DWA_LINE = "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: " + ", ".join(
     f"{name} {value:.3f}" for name, value in PUBLISHED_DWA_RESULTS.items()
@@ -41,7 +41,7 @@ def as_text(
     table = [TABLE_HEAD, *(_cells(result.tally) for result in rows)]
     lines = align_columns(table)
     if columns is not None and not fits(lines, columns):
-        lines = stack_rows(table, columns)
+        lines = two_line_rows(table, columns)
     for result in rows:
         if result.localized is not None:
             lines += ["", *_localization_lines(result.tally.case, result.localized)]

@@ -24,7 +24,7 @@ def align_columns(table: Sequence[TableRow], pad: PadFunction = str.rjust) -> li
     ]  # fmt: skip
 
 
-def stack_rows(table: Sequence[TableRow], columns: int) -> list[str]:
+def two_line_rows(table: Sequence[TableRow], columns: int) -> list[str]:
     """Return two lines per row, the name of the row and the other cells, for a terminal with `columns` characters."""
     widths = column_widths(table)[1:]
     gap = "  " if 2 + sum(widths) + 2 * (len(widths) - 1) <= columns else " "

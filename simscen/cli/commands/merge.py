@@ -1,4 +1,4 @@
-"""Command `simscen merge`, which merges the output folders of shards (parts of a session)."""
+"""Command `simscen merge`, which merges the output folders of sessions that ran shards (parts of the scenarios)."""
 
 from pathlib import Path
 from typing import Annotated

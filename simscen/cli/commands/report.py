@@ -81,4 +81,4 @@ def write_reports(
             line = session_summary_line(summary)
             print_text(f"{stack}: {line}" if stack else line)
     code = exit_code(finished_runs, study) if written else Exit.INCOMPLETE
-    sys.exit(output.exit(code))
+    sys.exit(output.exit_code(code))

@@ -51,7 +51,7 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class FalsifyRequest:
-    """Arguments of `simscen falsify`. Each field has the name of an argument; `options` are options for the runs."""
+    """Arguments of `simscen falsify` by name. `options` contains the options for the runs."""
 
     file: Path
     method: SearchMethod = SearchMethod.AUTO
@@ -102,7 +102,7 @@ def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
     reports = Reports(folder, request.junit, request.junit_family.value)
     reports.begin()
     with open_screen(request.format_) as output, backend_of(request.options) as backend:
-        return output.exit(falsification.execute(backend, journal, reports, output)), falsification
+        return output.exit_code(falsification.execute(backend, journal, reports, output)), falsification
 
 
 class Falsification:

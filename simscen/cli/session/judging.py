@@ -59,7 +59,7 @@ class LogJudge:
     def judge(self, log: Path, is_only_log: bool) -> RunFinished:
         """Evaluate a log and return its result.
 
-        The result of an unusable log is an error. If it is the only log, raise the exception instead. Raises
+        If the evaluation fails, the result is an error; for the only log, the exception is raised instead. Raises
         UnusableScenario if the criteria file is invalid.
         """
         try:

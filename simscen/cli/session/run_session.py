@@ -42,7 +42,7 @@ class Observer(Protocol):
 
 @dataclass(frozen=True)
 class SessionRequest:
-    """Arguments of `simscen run`. `selection` and `options` group arguments; other fields have their names."""
+    """Arguments of `simscen run` by name. `selection` and `options` each contain several arguments."""
 
     paths: Sequence[Path]
     selection: Selection = field(default_factory=Selection)
@@ -90,7 +90,7 @@ def execute_session(request: SessionRequest, observer: Observer | None = None) -
     with open_screen(request.format_, request.durations) as output:
         listeners: list[Listener] = [*([observer] if observer else []), *([LivePage(reports)] if request.open_ else [])]
         code = _run(pending, options, reports, output, listeners)
-    return output.exit(code)
+    return output.exit_code(code)
 
 
 def _last_failed(scenarios: Sequence[LoadedScenario], request: SessionRequest) -> frozenset[RunKey] | None:

@@ -1,4 +1,4 @@
-"""Selection of scenarios by the options of a session, such as tags and shards (parts of a session for CI jobs)."""
+"""Selection of scenarios by the options of a session, such as tags and shards (parts for parallel CI jobs)."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -135,7 +135,7 @@ class Selection:
 
     @property
     def variation_numbers(self) -> list[int] | None:
-        """Numbers of the selected variations if all have names such as "variation-7"; otherwise None."""
+        """Numbers of the selected variations if all have names such as "variation-7"; None otherwise, and for ()."""
         numbers = [number for name in self.variations if (number := number_of(name)) is not None]
         return numbers if numbers and len(numbers) == len(self.variations) else None
 

@@ -50,7 +50,7 @@ BATCH_SIZE = 256
 
 @dataclass(frozen=True)
 class StudyRequest:
-    """Arguments of `simscen study`. Each field has the name of an argument; `options` are options for the runs."""
+    """Arguments of `simscen study` by name. `options` contains the options for the runs."""
 
     file: Path
     runs: int | None = None
@@ -94,7 +94,7 @@ def execute_study(request: StudyRequest) -> Exit:
     reports = Reports(folder, request.junit, request.junit_family.value, used=used)
     reports.begin()
     with open_screen(request.format_) as output, backend_of(request.options) as backend:
-        return output.exit(study.execute(backend, journal, reports, output))
+        return output.exit_code(study.execute(backend, journal, reports, output))
 
 
 class _StudySession:

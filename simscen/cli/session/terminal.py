@@ -73,8 +73,8 @@ class Screen:
         except OSError as error:
             self.summary_error = error
 
-    def exit(self, code: Exit) -> Exit:
-        """Return the exit code of the session. If output was lost, print why, and return at least INCOMPLETE.
+    def exit_code(self, code: Exit) -> Exit:
+        """Return `code`, the exit code of the session; if output was lost, print why, and return at least INCOMPLETE.
 
         A closed pipe does not count as lost output.
         """

@@ -122,7 +122,7 @@ class WatchState:
         self._unfinished = self._requested if code == Exit.USAGE else ()
 
     def scenarios_to_run(self, changed: set[Path]) -> Sequence[Path]:
-        """Return the scenarios to run after these files changed: affected, new, and of a session with invalid files."""
+        """Return the scenarios to run after these files changed: affected, new, and all of a session to repeat."""
         unfinished = {file for path in self._unfinished for file in self._below(path)}
         known = set(self._files)
         existing = set(self._discovered()) if changed & self._folders else known

@@ -168,7 +168,7 @@ def draw_events(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def draw_marks(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw a flag where the robot was when an event set a mark."""
+    """Draw a flag where the robot was when an action `mark` recorded a name."""
     for event in scene.trace.of_kind(EventKind.MARK):
         x, y = scene.trace.place(event.tick)
         canvas.symbol(x, y, _FLAG, palette.AMBER)

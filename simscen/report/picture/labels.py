@@ -1,4 +1,4 @@
-"""Placement of labels next to the drawn parts that they name, so that they cover no paths, goals, or other labels."""
+"""Placement of labels next to the drawn parts that they name, if possible not on paths, goals, or other labels."""
 
 import math
 from dataclasses import dataclass

@@ -63,7 +63,7 @@ class TimelineEntry:
         name: Name of the goal, fault, object, or event.
         text: Further data of the event as text.
         place: Position (x, y) in m; () if the event has none.
-        about: Data of an event that switches a zone on or off, to draw the zone; {} for other events.
+        zone_switch: Data of an event that switches a zone on or off, to draw the zone; {} for other events.
     """
 
     tick: int
@@ -76,13 +76,13 @@ class TimelineEntry:
     is_failure: bool = False
     line: int = 0
     place: Sequence[float] = field(default=())
-    about: Mapping[str, Any] = field(default_factory=dict)
+    zone_switch: Mapping[str, Any] = field(default_factory=dict)
 
     def as_data(self, robot: str) -> dict[str, Any]:
         """Return the entry as JSON data without empty values. `robot` is "" in a run with a single robot."""
         data = {"tick": self.tick, "kind": self.kind, "lane": self.lane, "name": self.name, "text": self.text}
         more: dict[str, Any] = {"until": self.until, "ended": self.ended, "bad": self.is_failure, "line": self.line}
-        more |= {"place": self.place, "about": self.about}
+        more |= {"place": self.place, "about": self.zone_switch}
         return data | {key: value for key, value in more.items() if value} | ({"robot": robot} if robot else {})
 
 
@@ -123,7 +123,7 @@ def _entry(event: Event, lines: SourceLines) -> TimelineEntry:
         is_failure=event.kind in _FAILURE_KINDS,
         line=_line(event, lines),
         place=place,
-        about=event.data if event.kind == K.ZONE_SWITCHED else {},
+        zone_switch=event.data if event.kind == K.ZONE_SWITCHED else {},
     )
 
 
