@@ -29,10 +29,11 @@ def load_world(loaded: LoadedScenario) -> World:
 
 
 def world_from_file(source: LoadedWorld, root: Path, world_path: Sequence[Path] = (), lenient: bool = False) -> World:
-    """Build a loaded world. Files that an SDF file refers to must lie in `root` or in a folder of `world_path`.
+    """Build the world from its loaded files.
 
-    With `lenient`, unsupported elements of an SDF file become warnings in the `notes` of the world. Raises InvalidInput
-    for an unusable map image or SDF file.
+    Files that an SDF file refers to must lie in `root` or in a folder of `world_path`. With `lenient`, unsupported
+    elements of an SDF file become warnings in the `notes` of the world. Raises InvalidInput for an unusable map image
+    or SDF file.
     """
     base: World | None = None
     if source.sdf is not None:

@@ -73,7 +73,8 @@ class LoadedScenario:
     """Valid scenario, or valid variation of a scenario. All checks that do not need its built world have passed.
 
     A scenario of several robots has a view of each robot: a scenario with this robot alone. The `spec`, `tree`, and
-    `notes` of the scenario itself cover all robots; its other fields are the same as in the first view.
+    `notes` of the scenario itself cover all robots. Only the views have an `external_command`. The other fields are the
+    same as in the first view.
     """
 
     id: str

@@ -44,14 +44,14 @@ def requirement_of(entry: RegisteredType) -> str:
     return f"{entry.distribution}=={entry.version}"
 
 
-def missing_plugins(header: Mapping[str, str], groups: Container[str]) -> list[Problem]:
+def missing_plugins(facts: Mapping[str, str], groups: Container[str]) -> list[Problem]:
     """Return a problem for each type of a log whose package is not installed in the same version.
 
-    `header` are the header entries of the log. Only types of `groups`, e.g. "criterion", are checked. The path of the
+    `facts` are the header entries of the log. Only types of `groups`, e.g. "criterion", are checked. The path of the
     problems is "".
     """
     missing: list[Problem] = []
-    for key, recorded in sorted(header.items()):
+    for key, recorded in sorted(facts.items()):
         group, _, name = key.removeprefix(_HEADER_PREFIX).partition(".")
         if not key.startswith(_HEADER_PREFIX) or group not in groups:
             continue

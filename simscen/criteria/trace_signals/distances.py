@@ -82,7 +82,7 @@ def is_present(trace: Trace, name: str) -> Array:
 
 
 def distance_remaining(query: SignalQuery) -> Array:
-    """Return the length of the newest plan from the point nearest to the believed position.
+    """Return the length of the rest of the newest plan, from its point nearest to the estimated position.
 
     Before the first plan, return the true distance to the goal.
     """

@@ -51,9 +51,9 @@ def true_pose(trace: Trace, tick: int) -> Pose2:
 
 
 def clearance(trace: Trace) -> Samples:
-    """Return the distance (n, 1) in m from the robot to the nearest surface; inf if no surface is in range.
+    """Return the distance (n, 1) in m from the robot to the nearest surface, at most the measuring range of the case.
 
-    Raises InvalidTrace if a value is nan or -inf.
+    It is negative by the depth of an overlap. Raises InvalidTrace if a value is nan or -inf; inf is allowed.
     """
     bad = np.isnan(trace.clearance.values[:, 0]) | np.isneginf(trace.clearance.values[:, 0])
     if bad.any():

@@ -40,7 +40,7 @@ LOCALIZED_STD_M = 0.5
 
 
 def clearance(query: SignalQuery) -> Array:
-    """Return the true distance in m from the robot to the nearest surface; inf while no surface is near."""
+    """Return the true distance in m from the robot to the nearest surface, at most the measuring range of the case."""
     return sample_and_hold(query.trace, hull_clearance(query.trace), "clearance")[:, 0]
 
 
@@ -141,7 +141,7 @@ def localized(query: SignalQuery) -> Array:
 
 
 def goal_distance(query: SignalQuery) -> Array:
-    """Return the true distance in m to the newest accepted goal, or to the first goal if none was accepted."""
+    """Return the true distance in m to the newest accepted goal; before the first acceptance, to the first goal."""
     goals, poses = _current_goals(query.trace, query.case), true_poses(query.trace)
     return np.hypot(poses[:, 0] - goals[:, 0], poses[:, 1] - goals[:, 1])
 
@@ -305,7 +305,7 @@ def _age(trace: Trace, received: Ticks) -> Array:
 
 
 def _current_goals(trace: Trace, case: Case) -> Array:
-    """Return x, y, yaw (n, 3) of the newest accepted goal, or (1, 3) of the first goal if none was ever accepted."""
+    """Return x, y, yaw (n, 3) of the newest or else the first accepted goal; (1, 3) of the first goal without one."""
     clock = sample_ticks(trace)
     pose_by_name = {goal.name: goal.pose for goal in reversed(case.every_goal)}
     ticks, poses = [], []

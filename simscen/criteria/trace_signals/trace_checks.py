@@ -33,8 +33,8 @@ def time_gaps(trace: Trace) -> dict[Evidence, str]:
 def check_recorded_signals(trace: Trace) -> None:
     """Raise InvalidTrace if a signal of a log of simscen is not finite, or if ticks do not increase.
 
-    Ticks are checked for truth, clearance, and belief. The clearance can be infinite. Odometry is not checked, because
-    a fault can corrupt it.
+    Ticks are checked for truth, clearance, and belief. An infinite clearance is allowed. Odometry is not checked,
+    because a fault can corrupt it.
     """
     truth(trace), speed(trace), clearance(trace)
     check_samples(trace.belief, "the belief", trace)

@@ -33,7 +33,7 @@ def _zone_actions(loaded: LoadedScenario) -> list[tuple[str, Keys, Any]]:
 
 @MEANING.check("SC050")
 def speed_zones_without_limit(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find actions that enable a speed zone without a speed limit."""
+    """Find actions that enable a speed zone in a region for which nothing sets a speed limit."""
     actions = _zone_actions(loaded)
     limited = [zone.region for zone in loaded.spec.stack.speed_zones]
     limited += [action.region for _, _, action in actions if getattr(action, "speed_limit", None)]

@@ -55,7 +55,7 @@ def places_in_obstacles(built: BuiltWorldFile) -> Iterator[CheckProblem]:
 
 @BUILT_WORLD.check("SC304", severity="warning")
 def motions_into_obstacles(built: BuiltWorldFile) -> Iterator[CheckProblem]:
-    """Find keyframes and waypoints of moving objects inside obstacles."""
+    """Find motions of objects with keyframes or waypoints inside obstacles."""
     assert built.source.spec is not None
     for index, thing in enumerate(built.source.spec.objects):
         for keys, what, (x, y) in motion_stops(thing.move) if thing.move is not None else ():

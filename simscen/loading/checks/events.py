@@ -18,7 +18,7 @@ from simscen.model.disturbances import SequenceStep
 from simscen.model.stack import StackSpec
 from simscen.triggers.base import AnyCondition, Trigger
 
-Reason = tuple[Keys, str]
+LocatedReason = tuple[Keys, str]
 """Keys of the part of a trigger that prevents it from firing, and the reason as text for messages."""
 
 LATCHING_CONDITIONS = frozenset(
@@ -147,7 +147,7 @@ class PossibleRun:
         marks = {getattr(action.chosen, "name", "") for action in actions if action.kind == "mark"}
         return frozenset(happening | marks)
 
-    def why_never(self, trigger: Trigger, keys: Keys) -> Reason | None:
+    def why_never(self, trigger: Trigger, keys: Keys) -> LocatedReason | None:
         """Return the reason why the trigger at `keys` never fires; None if it can."""
         limit = self.loaded.spec.time_limit
         if trigger.probability == 0:
@@ -160,7 +160,7 @@ class PossibleRun:
             return (*keys, key), f"{earliest:g} s is not before the time limit of {limit:g} s"
         return self._why_never_true(trigger, keys)
 
-    def _why_never_true(self, condition: AnyCondition, keys: Keys) -> Reason | None:
+    def _why_never_true(self, condition: AnyCondition, keys: Keys) -> LocatedReason | None:
         """Return the reason why the condition at `keys` is never true; None if it can be true."""
         if not self.loaded.includes_robot(condition.robot):
             return None
@@ -180,7 +180,7 @@ class PossibleRun:
         reason = check(self, condition.chosen) if check else None
         return ((*keys, condition.kind), reason) if reason else None
 
-    def _why_parts_never_true(self, conditions: Sequence[AnyCondition], keys: Keys) -> list[Reason | None]:
+    def _why_parts_never_true(self, conditions: Sequence[AnyCondition], keys: Keys) -> list[LocatedReason | None]:
         """For each condition in the list at `keys`, return the reason why it is never true; None if it can be true."""
         return [self._why_never_true(condition, (*keys, k)) for k, condition in enumerate(conditions)]
 

@@ -191,7 +191,7 @@ def blocked_pedestrians(scene: Scene) -> Iterator[CheckProblem]:
 
 @WORLD.check("SC304", severity="warning")
 def motions_into_walls(scene: Scene) -> Iterator[CheckProblem]:
-    """Find keyframes and waypoints of motions, and targets of `teleport`, inside fixed obstacles."""
+    """Find `move` actions with keyframes or waypoints, and `teleport` actions with poses, inside fixed obstacles."""
     for keys, _, action in scene.actions:
         stops: list[MotionStop] = []
         if isinstance(action, Move):

@@ -5,8 +5,8 @@ A check is a generator function that yields problems. It is registered for a sta
     @MEANING.check("SC050")
     def impossible_triggers(loaded: LoadedScenario) -> Iterator[CheckProblem]: ...
 
-The stages run in the order of the table. If a stage finds errors, later stages do not run, except that NAMES always
-runs. A view is the scenario of one of several robots alone.
+The stages run in the order of the table. If a stage finds errors, later stages do not run, but NAMES runs even if
+WORLD_FILE finds errors. A view is the scenario of one of several robots alone.
 
 | stage | subject | finds, for example | needs |
 |---|---|---|---|

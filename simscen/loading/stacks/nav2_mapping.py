@@ -67,7 +67,7 @@ SCENARIO_PARAMETERS: Mapping[str, str] = {
 }
 """Notes about parameters that are ignored, because the scenario or the robot file defines their values."""
 OLD_NODE_NAMES = {"recoveries_server": "behavior_server"}
-"""Names of renamed nodes since Humble, by earlier name."""
+"""New names of nodes that were renamed in Humble, by old name."""
 IGNORED_NODES = frozenset(
     {
         "map_server", "map_saver", "lifecycle_manager", "lifecycle_manager_navigation",

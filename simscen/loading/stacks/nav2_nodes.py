@@ -197,7 +197,7 @@ def _translate_layer_parameter(
 LASER_SCAN = "LaserScan"
 """Data type of laser scans, and of an observation source without `data_type`."""
 HEIGHT_PARAMETERS = ("min_obstacle_height", "max_obstacle_height")
-"""Parameters of observation sources that simscen applies only to camera data. Their other parameters are ranges."""
+"""Parameters of observation sources that simscen applies only to camera data. All other parameters are ranges."""
 
 
 def _translate_observation_sources(
@@ -264,7 +264,7 @@ def _translate_velocity_smoother(node: str, parameters: Parameters, _: KnownPara
 
 
 def _translate_collision_monitor(node: str, parameters: Parameters, _: KnownParameters) -> Iterator[Translation]:
-    """Translate the first enabled polygon with the action `approach`. Others get a note, unless they are disabled."""
+    """Translate the first enabled polygon of the type `approach`. Other polygons get a note, unless disabled."""
     if "source_timeout" in parameters:
         yield Translation(node, "source_timeout", ("collision_monitor", "source_timeout"), parameters["source_timeout"])
     on = parameters.get("enabled", True)
@@ -292,7 +292,7 @@ def _translate_collision_monitor(node: str, parameters: Parameters, _: KnownPara
 
 
 def _translate_approach(node: str, parameters: Parameters, polygon: str) -> Iterator[Translation]:
-    """Translate the parameters of a polygon with the action `approach`."""
+    """Translate the parameters of a polygon with the `action_type` approach."""
     for nav2_name, simscen_name, offset in (
         ("time_before_collision", "time_before_collision", 0),
         ("simulation_time_step", "simulation_time_step", 0),
@@ -331,7 +331,7 @@ def translate(nodes: Mapping[str, Parameters], known: KnownParameters) -> Iterat
 
 
 def unknown_nodes(nodes: Mapping[str, Parameters]) -> list[str]:
-    """Return the names of the nodes with relevant parameters that simscen does not have."""
+    """Return the names of the nodes that have relevant parameters, but no counterpart in simscen."""
     return [
         node
         for node, parameters in nodes.items()

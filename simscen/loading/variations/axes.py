@@ -1,7 +1,7 @@
 """Building of the axes of a block of variations from its YAML tree.
 
-An axis is a list of options. An option is a new value for one path, or new values for several paths. Each variation of
-a block combines one option of each axis.
+A block is one item of `variations`. An axis is a list of options. An option is a new value for one path, or new values
+for several paths. Each variation of a block combines one option of each axis.
 """
 
 from collections.abc import Sequence

@@ -25,7 +25,7 @@ MAX_TOTAL_VALUES = 5_000_000
 MAX_REJECTED_DRAWS = 10_000
 """Number of consecutive random draws that may violate the conditions before an error is raised."""
 _DESCRIPTIVE_KEYS = frozenset({"description", "tags", "expected", "skip"})
-"""Top-level keys that do not affect a run. Their values are not part of the names of variations."""
+"""Top-level keys that do not affect the simulation. Names contain their values only if nothing else is varied."""
 
 
 @dataclass(frozen=True)
