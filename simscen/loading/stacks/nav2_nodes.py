@@ -264,7 +264,7 @@ def _translate_velocity_smoother(node: str, parameters: Parameters, _: KnownPara
 
 
 def _translate_collision_monitor(node: str, parameters: Parameters, _: KnownParameters) -> Iterator[Translation]:
-    """Translate the first enabled polygon of the type `approach`. Other polygons get a note, unless disabled."""
+    """Translate the first enabled `approach` polygon. Other polygons get a note, except disabled ones of this type."""
     if "source_timeout" in parameters:
         yield Translation(node, "source_timeout", ("collision_monitor", "source_timeout"), parameters["source_timeout"])
     on = parameters.get("enabled", True)
