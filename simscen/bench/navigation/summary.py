@@ -66,7 +66,7 @@ class Trial:
 
     @property
     def sct(self) -> float | None:
-        """Success weighted by completion time (SCT, Yokoyama et al. 2021); None if a time is unknown.
+        """Success weighted by completion time (SCT, Yokoyama et al. 2021); None if a required value is unknown.
 
         SCT is the time for the shortest path at top speed divided by the time to the goal; 0 without success.
         """

@@ -153,7 +153,7 @@ def _existing_file(file: Path, root: Path, world_path: tuple[Path, ...]) -> "Edi
 
 
 def _require_inside(edited: "EditedFile", file: Path) -> "EditedFile":
-    """Return `edited`. Raises InvalidInput if `file`, the path on the command line, is outside of the root."""
+    """Return `edited`. Raises InvalidInput if `file`, as on the command line, is outside of the root and world path."""
     from simscen.loading.files.paths import PathSandbox
 
     entered = PathSandbox.around(edited.root, edited.world_path).resolve_argument(file)

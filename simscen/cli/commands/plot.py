@@ -21,9 +21,9 @@ def command(
 ) -> None:
     """Draw a recorded run as a picture.
 
-    The picture shows the map, zones, true path, belief, plans, goals, doors, pedestrians, faults, and the places where
-    criteria were violated. A truncated log (run.partial.mcap) is drawn up to its end. Exit code 0: drawn; 2: the log is
-    unusable, or the picture cannot be written.
+    The picture shows the map, zones, true path, belief, plans, goals, doors, pedestrians, faults, and the positions
+    at which criteria were violated. A truncated log (run.partial.mcap) is drawn up to its end. Exit code 0: drawn; 2:
+    the log is unusable, or the picture cannot be written.
     """
     file = log_file(run)
     log = read_run(file)

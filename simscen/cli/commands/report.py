@@ -62,7 +62,7 @@ def write_reports(
     format_: Format,
     only_junit: bool,
 ) -> NoReturn:
-    """Write the reports of an output folder from its journal `past`, print the session, and exit with its code."""
+    """Write the reports of an output folder from its session `past`, print the session, and exit with its code."""
     require_writable_junit(junit, folder)
     reports = Reports(folder, junit, junit_family.value, junit_only=only_junit)
     finished_runs = past.runs
