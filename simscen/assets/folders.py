@@ -63,11 +63,11 @@ class AllowedFolders:
         """Return a path for messages: relative to the first root if the file is in it, otherwise absolute."""
         return path.relative_to(self.roots[0]).as_posix() if path.is_relative_to(self.roots[0]) else str(path)
 
-    def find(self, uri: str, base: Path, *, absolute: bool = False) -> Path:
+    def find(self, uri: str, base: Path, *, allow_absolute: bool = False) -> Path:
         """Return the real path of the file or folder that a URI or path refers to, see `uris.candidate_paths`.
 
-        base:      folder of the file that contains the URI
-        absolute:  whether absolute paths are accepted (xacro and Gazebo write them)
+        base:            folder of the file that contains the URI
+        allow_absolute:  whether absolute paths are accepted (xacro and Gazebo write them)
 
         Raises UnusableFile, or NoSuchFile if the file does not exist.
         """
@@ -80,7 +80,7 @@ class AllowedFolders:
                           "download it and name its folder with --world-path")  # fmt: skip
         if uri in SCHEMES or (uri.startswith(PACKAGE_SCHEMES) and not uri.partition("://")[2].strip("/")):
             raise UnusableFile("the name of a model is missing")
-        if not absolute and PurePosixPath(uri.removeprefix("file://")).is_absolute():
+        if not allow_absolute and PurePosixPath(uri.removeprefix("file://")).is_absolute():
             raise UnusableFile("absolute paths are not read", "write it relative to this file")
         real_base, tried = Path(os.path.realpath(base)), []
         for folder, candidate in candidate_paths(uri, real_base, self.roots, self.packages):

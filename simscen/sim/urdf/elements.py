@@ -93,7 +93,7 @@ class MeshSource:
     def _find(self, uri: str) -> Path:
         """Return the path of a mesh file; raises UnusableFile."""
         try:
-            return self.folders.find(uri, self.folder, absolute=self.is_from_xacro)
+            return self.folders.find(uri, self.folder, allow_absolute=self.is_from_xacro)
         except NoSuchFile:
             if uri.startswith(PACKAGE_SCHEMES):  # a missing package gives a more helpful error
                 self.folders.package_folder(uri.partition("://")[2].partition("/")[0], self.folder)

@@ -37,7 +37,7 @@ class WorldFiles(AllowedFolders):
         """
         uri = element.text
         try:
-            return self.find(uri, Path(element.source.folder), absolute=True)
+            return self.find(uri, Path(element.source.folder), allow_absolute=True)
         except NoSuchFile as error:
             raise MissingAsset(element.location, f"{uri}: {error}", error.hint, uri) from error
         except UnusableFile as error:

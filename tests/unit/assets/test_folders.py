@@ -104,9 +104,9 @@ def test_missing_file_message_reveals_nothing_outside(
 
 def test_an_absolute_path_inside_the_root_is_read_if_allowed(folders: AllowedFolders) -> None:
     there = put(folders.roots[0] / "base.stl")
-    assert folders.find(str(there), folders.roots[1], absolute=True) == there
+    assert folders.find(str(there), folders.roots[1], allow_absolute=True) == there
     with pytest.raises(UnusableFile, match="outside"):
-        folders.find("/etc/passwd", folders.roots[1], absolute=True)
+        folders.find("/etc/passwd", folders.roots[1], allow_absolute=True)
 
 
 def test_missing_file_message_lists_similar_files(folders: AllowedFolders) -> None:

@@ -186,7 +186,7 @@ class _Expansion:
             enclosing.values[space] = scope
             macros.namespaces[space] = macros = MacroScope()
         try:
-            found = self._folders.find(filename, self._texts.file.parent, absolute=True)
+            found = self._folders.find(filename, self._texts.file.parent, allow_absolute=True)
             path = self._folders.check_file(found, MAX_URDF_BYTES)
         except UnusableFile as trouble:
             if isinstance(trouble, NoSuchFile) and parse_bool(source.attributes.get("optional", "false")):
