@@ -140,7 +140,7 @@ def _side_rectangles(occupied: CellMask, name: str) -> Array:
     for swapped, cells in ((False, occupied), (True, occupied.T)):
         change = np.diff(np.pad(cells.astype(np.int8), ((1, 1), (0, 0))), axis=0)
         for sign in (1, -1):
-            line, start, stop = _runs(change == sign, name).T
+            line, start, stop = _intervals(change == sign, name).T
             # The wall must be on the left of the line from a to b.
             a, b = (start, stop) if (sign == 1) != swapped else (stop, start)
             ends = [np.column_stack((end, line) if not swapped else (line, end)) for end in (a, b, b, a)]
@@ -153,9 +153,9 @@ def _side_rectangles(occupied: CellMask, name: str) -> Array:
 def _top_and_bottom_rectangles(occupied: CellMask, name: str) -> Array:
     """Return the corners (n, 4, 3) of the rectangles of the top and the bottom; units as in `_side_rectangles`.
 
-    Each rectangle covers equal runs of occupied cells in consecutive rows.
+    Each rectangle covers equal intervals of occupied cells in consecutive rows.
     """
-    row, start, stop = _runs(occupied, name).T
+    row, start, stop = _intervals(occupied, name).T
     order = np.lexsort((row, stop, start))
     row, start, stop = row[order], start[order], stop[order]
     new = np.ones(len(row), dtype=np.bool_)
@@ -170,10 +170,10 @@ def _top_and_bottom_rectangles(occupied: CellMask, name: str) -> Array:
     return np.concatenate((top, under)).astype(np.float64)
 
 
-def _runs(lines: CellMask, name: str) -> npt.NDArray[np.int64]:
-    """Return the runs of True in the rows of a mask, as (n, 3): row, first column, column after the run.
+def _intervals(lines: CellMask, name: str) -> npt.NDArray[np.int64]:
+    """Return the intervals of True in the rows of a mask, as (n, 3): row, first column, column after the interval.
 
-    Raises InvalidInput for the map `name` if there are more than MAX_EDGES runs.
+    Raises InvalidInput for the map `name` if there are more than MAX_EDGES intervals.
     """
     steps = np.diff(np.pad(lines.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     count = int(np.count_nonzero(steps == 1))

@@ -54,7 +54,7 @@ class FrameScope:
     """The frames of one model or of the world, by name.
 
     implicit_frame:  name of the scope's own frame
-    canonical_link:  name of the link, frame, or nested model with which the scope's own frame moves; "" in the world
+    canonical_link:  name of the link, frame, or nested model with which the own frame moves; unused in the world
     merged_models:   models included with merge="true", whose frames are visible in this scope, too
     """
 
