@@ -32,7 +32,10 @@ SETTLING_TICKS = 60
 
 
 class RobotPlacement(NamedTuple):
-    """Body and initial pose of a robot. `obstacles` is the part of the static world that blocks it (None: all)."""
+    """Body and initial pose of a robot.
+
+    `obstacles` is the part of the static world that counts for its clearance (None: all).
+    """
 
     body: RobotBody
     pose: Pose2
@@ -258,7 +261,7 @@ class Simulation:
         self._scene.add_push(partial(actors.push, name), impulse, seconds, self.tick + 1)
 
     def add_steered(self, body: Body, max_speed: float) -> None:
-        """Add a body with a circular outline, such as a pedestrian. `follow` moves it at up to `max_speed` m/s."""
+        """Add a body with a circular outline, such as a pedestrian. `follow` can move it at up to `max_speed` m/s."""
         self._scene.before_change()
         path = MotionPath((0.0,), (body.pose.plane,))
         self._scene.actors.add(replace(body, path=path), self.tick, is_steered=True)
@@ -266,7 +269,7 @@ class Simulation:
         self._scene.after_change()
 
     def follow(self, name: str, path: MotionPath, max_speed: float) -> None:
-        """Let a body from `add_steered` follow a path at up to `max_speed` m/s. The path begins at the body's pose."""
+        """Let a body from `add_steered` follow a path from its pose on. The path must not exceed `max_speed` m/s."""
         self._scene.actors.follow(name, path, max_speed, self.tick)
 
     # Observing the world

@@ -39,7 +39,7 @@ ORIGIN, IDENTITY = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 PartBound = tuple[float, int, tuple[float, float, float, float]]
 """Sort key, index, and bounding rectangle (left, low, right, high) in m of a part of the static mesh.
 
-The sort key minus `_travel` is a lower bound in m of the present distance to the part.
+The sort key minus `StaticDistance._travel` is a lower bound in m of the present distance to the part.
 """
 
 

@@ -102,7 +102,7 @@ class Actor:
         return self.path.has_ended(elapsed) or elapsed + horizon < self.path.start
 
     def follow(self, path: MotionPath, max_speed: float, tick: int) -> None:
-        """Follow another path from `tick` on, never faster than `max_speed` m/s."""
+        """Follow another path from `tick` on. The path must not exceed `max_speed` m/s."""
         self.path, self.path_start_tick, self.max_speed, self._sampler = path, tick, max_speed, None
         self._path_poses.clear()
 
@@ -235,9 +235,9 @@ class ScheduledPoses:
         self._predicted = None
 
     def compute(self, tick: int, period: int, poses: Mapping[str, Pose3]) -> None:
-        """Compute the poses for every `period` ticks from `tick` on, unless they are known or an actor is steered.
+        """Compute the poses of the next PRECOMPUTED_S at every `period` ticks from `tick` on.
 
-        `poses` are the current poses of all actors.
+        Does nothing if they are known or an actor is steered. `poses` are the current poses of all actors.
         """
         is_known = self._predicted is not None and tick in self._predicted.ticks
         if is_known or any(actor.is_steered for actor in self._scripted):

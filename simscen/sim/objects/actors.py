@@ -27,8 +27,8 @@ NEVER = 2**62
 class Actors:
     """All movable objects, sorted by name.
 
-    Scripted actors are moved in the engine only if contact is possible. Pushable actors sleep in the engine until an
-    object comes near. Actors are deferred only if no actor is pushable.
+    Scripted actors are moved in the engine only if contact is possible. Pushable actors at rest sleep in the engine
+    until an object comes near. Actors are deferred only if no actor is pushable.
     """
 
     def __init__(

@@ -43,7 +43,7 @@ class CollisionCandidates(NamedTuple):
 
 
 def find_candidates(scripted: BoundingDiscs, pushable: BoundingDiscs, hit_speed: float) -> CollisionCandidates:
-    """Return the bodies that may touch within NEAR_CONTACT_S.
+    """Return the scripted and pushable bodies that may touch each other within NEAR_CONTACT_S.
 
     `hit_speed` is an upper bound in m/s of the speed of a pushable body after another body has hit it.
     """

@@ -64,8 +64,8 @@ def read_tree(
     """Read the links and joints of a URDF or xacro file. `arguments` are xacro arguments. Raises InvalidInput."""
     path = folders.resolve_parent(path)
     robot = read_xml(path, folders)
-    expanded = path.suffix == ".xacro" or "xmlns:xacro" in robot.attributes
-    if expanded:
+    is_xacro = path.suffix == ".xacro" or "xmlns:xacro" in robot.attributes
+    if is_xacro:
         defines_macros = any(robot.all("xacro:macro"))
         robot = expand(robot, path, folders, lambda included: read_xml(included, folders), arguments)
         if defines_macros and not any(robot.all("link")):
@@ -73,7 +73,7 @@ def read_tree(
             raise InvalidInput([robot.problem("the file defines macros but does not use them", hint)])
     elif arguments:
         raise UnknownArgument(robot, next(iter(arguments)), ())
-    return build_tree(robot, MeshSource(path.parent, folders, read_mesh, expanded))
+    return build_tree(robot, MeshSource(path.parent, folders, read_mesh, is_xacro))
 
 
 def _xml_text(argument: str | float | bool) -> str:
@@ -172,10 +172,10 @@ def _build_wheel(tree: LinkTree, wheel: WheelJoint, base_from_root: Pose3, scale
     if inertia is None:
         problem = wheel.joint.element.problem(f"the wheel on joint {wheel.joint.name!r} has no mass")
         raise InvalidInput([problem])
-    car = spec.drive.type == "ackermann"
+    is_car = spec.drive.type == "ackermann"
     return Wheel(
-        wheel.joint.name, x, y, wheel.radius, wheel.width, inertia, is_driven=not (car and wheel.is_steered),
-        is_steered=car and wheel.is_steered,
+        wheel.joint.name, x, y, wheel.radius, wheel.width, inertia, is_driven=not (is_car and wheel.is_steered),
+        is_steered=is_car and wheel.is_steered,
     )  # fmt: skip
 
 
