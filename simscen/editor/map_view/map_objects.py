@@ -172,8 +172,8 @@ def motion_path(
     motion = mapping(value)
     start = None if origin is None else (origin.x, origin.y)
     if through := point_handles(motion.get("through"), (*keys, "through"), places):
-        is_loop: Literal["open", "closed"] = "closed" if motion.get("repeat") == "loop" and start is None else "open"
-        yield MapObject(keys, "path", label, through, line=is_loop, origin=start, points_keys=(*keys, "through"))
+        line: Literal["open", "closed"] = "closed" if motion.get("repeat") == "loop" and start is None else "open"
+        yield MapObject(keys, "path", label, through, line=line, origin=start, points_keys=(*keys, "through"))
     elif keyframes := keyframe_handles(motion.get("keyframes"), (*keys, "keyframes")):
         begins_there = number(items(items(motion.get("keyframes"))[0])[0]) == 0
         yield MapObject(keys, "path", label, keyframes, line="open", origin=None if begins_there else start)

@@ -19,7 +19,8 @@ INDENT = 2
 def insert_entry(text: str, mapping: SourceNode, key: str, value: Any, order: Sequence[str] = ()) -> Splice:
     """Return the splice that adds a key with a value to a mapping.
 
-    `order` is the preferred order of keys. A key that is not in `order` is inserted at the end.
+    `order` is the preferred order of keys. The key is inserted after its last predecessor in `order` that the mapping
+    has, otherwise at the end.
     """
     if not mapping.entries:
         return Splice(mapping.start, mapping.end, flow_text({key: value}))

@@ -126,8 +126,8 @@ class MetricContract(Contract):
             if isinstance(value, str):
                 require(value, f"gives no reason why there is no number for {label}")
             else:
-                number = isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value)
-                require(number, f"returns {value!r} for {label}")
+                is_valid = isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value)
+                require(is_valid, f"returns {value!r} for {label}")
 
     @promise
     def the_same_trace_gives_the_same_number(self) -> None:
