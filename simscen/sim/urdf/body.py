@@ -82,7 +82,7 @@ def _xml_text(argument: str | float | bool) -> str:
 
 
 def body_from_tree(spec: RobotSpec, tree: LinkTree) -> RobotBody:
-    """Build the body of a robot from its links. All joints except wheel joints are at 0. Raises InvalidInput."""
+    """Build the body of a robot from its links. All joints except wheel joints are fixed at 0. Raises InvalidInput."""
     joints = select_wheels(tree, spec.drive)
     _check_wheels(spec, tree, joints)
     rolling = {link for wheel in joints for link in tree.subtree(wheel.joint.child)}

@@ -134,7 +134,7 @@ def _note_disabled_contacts(collision: Element, report: ImportReport) -> None:
 
 
 def _scaled(shape: Shape, scale: Scale) -> Shape:
-    """Return a shape with sizes multiplied by `scale`, and radii by its x component, as in Gazebo Classic."""
+    """Return a shape with sizes multiplied by `scale`, and a single radius by its x component, as in Gazebo Classic."""
     if scale == (1.0, 1.0, 1.0):
         return shape
     x, y, z = scale

@@ -33,9 +33,9 @@ Placed = TypeVar("Placed", Solid, Body)
 def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bool = False) -> World:
     """Load the world in a Gazebo `.sdf`, `.world` or model file of SDF 1.3 to 1.12.
 
-    Only collision geometry is used. Static models become solids, other models bodies with their mass, and actors
-    bodies of mass 0 with a path. A world whose floor is above z = 0 is lowered, because robots drive at z = 0. Files
-    that the world refers to are searched in its folder and in the folders `search`, and must be inside `root` or
+    Only collision geometry is used. Static models become solids, other models bodies with their mass (0 if kinematic),
+    and actors bodies of mass 0. A world whose floor is above z = 0 is lowered, because robots drive at z = 0. Files
+    that the world refers to are searched for in its folder and in the folders `search`, and must be inside `root` or
     `search`.
 
     Raises InvalidInput for elements that affect the geometry but cannot be used. With `lenient`, such elements are left
