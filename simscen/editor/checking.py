@@ -1,4 +1,4 @@
-"""Checks of the text in the editor, also before it is saved. They are the checks of `simscen validate`."""
+"""Checks of the text in the editor, which need not be saved. They are the checks of `simscen validate`."""
 
 from dataclasses import dataclass, field
 

@@ -1,4 +1,4 @@
-"""Trial runs of the text in the editor, also before it is saved."""
+"""Trial runs of the text in the editor, which need not be saved."""
 
 import shutil
 import tempfile
