@@ -84,7 +84,7 @@ def run_end_event(tick: int, conditions: Iterable[EndCondition]) -> Event | None
 class RobotUnderTest:
     """A robot with its sensors, its stack, its faults, and its logs.
 
-    Call `observe` at each beat. If `is_due` is true afterwards, call `decide`, `record`, and `drive`.
+    Call `observe` at each beat of any robot. If `is_due` is true afterwards, call `decide`, `record`, and `drive`.
     """
 
     robot: Robot

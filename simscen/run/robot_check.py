@@ -195,7 +195,7 @@ MAX_DISTANCE_ERROR, MAX_ODOMETRY_ERROR = 0.02, 0.01
 MAX_HEADING_RAD, MAX_DRIVING_TILT_RAD = math.radians(2.0), math.radians(3.0)
 """Largest heading at the end of the line, and largest tilt of the base while driving."""
 NEGLIGIBLE_CORRECTION = 0.005
-"""Relative deviation of the track width up to which no correction is advised."""
+"""Maximum relative deviation of the track width for which no correction is advised."""
 
 
 class TurnLimits(NamedTuple):

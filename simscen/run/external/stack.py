@@ -181,12 +181,12 @@ class ExternalStack:
         self._odometry = next(
             (r for r in readings if isinstance(r, Odometry) and r.sensor == self._wheel_odometry), self._odometry
         )
-        due = tick % self._parameters.control_period == 0
-        if not (due or self._interrupted or (self._welcome.every_beat and self._publisher.has_messages)):
+        is_command_due = tick % self._parameters.control_period == 0
+        if not (is_command_due or self._interrupted or (self._welcome.every_beat and self._publisher.has_messages)):
             return self._decision
-        answer = self._request_answer(tick, due)
+        answer = self._request_answer(tick, is_command_due)
         self._interrupted = self._canceling = False
-        return self._to_decision(tick, answer, due)
+        return self._to_decision(tick, answer, is_command_due)
 
     def end(self, reason: str) -> None:
         """Send END to the stack."""
@@ -209,22 +209,24 @@ class ExternalStack:
             self._process.close()
             self._process = None
 
-    def _request_answer(self, tick: int, due: bool) -> Answer:
-        """Send a step and return the answer. `due` states whether a command is due."""
+    def _request_answer(self, tick: int, is_command_due: bool) -> Answer:
+        """Send a step and return the answer. `is_command_due` states whether a command is due."""
         assert self._process is not None
         limit = self._command.answer_limit
         if self._awaits_first_answer or tick <= self._welcome.first_answer_until * self._time.rate:
             limit, self._awaits_first_answer = max(limit, self._welcome.first_answer_limit), False
         sec, nanosec = self._time.stamp(tick)
-        flags = wire.COMMAND_DUE if due else 0
+        flags = wire.COMMAND_DUE if is_command_due else 0
         header = wire.StepHeader(tick, sec, nanosec, round(limit * 1e3), flags)
         when = f"the step of t = {tick / self._time.rate:.3f} s"
         kind, body = self._process.exchange(
             wire.step_frame(header, self._publisher.drain()), limit, f"answer to {when} (tick {tick})"
         )
-        return self._checked(f"the answer to {when}", lambda: self._decode_answer_frame(kind, body, tick, due))
+        return self._checked(
+            f"the answer to {when}", lambda: self._decode_answer_frame(kind, body, tick, is_command_due)
+        )
 
-    def _decode_answer_frame(self, kind: int, body: bytes, tick: int, due: bool) -> Answer:
+    def _decode_answer_frame(self, kind: int, body: bytes, tick: int, is_command_due: bool) -> Answer:
         if kind != wire.ANSWER:
             raise ProtocolViolation(f"a frame {_frame_name(kind)} instead of an ANSWER")
         answered_tick, messages = wire.from_answer(body)
@@ -239,16 +241,16 @@ class ExternalStack:
             dead_reckoned,
         )
         self._correction = answer.correction
-        if due and answer.command is None:
+        if is_command_due and answer.command is None:
             raise ProtocolViolation(f"no message on {topics.COMMAND.name}, though a command is due")
         for event in answer.events:
             self._goals.process(tick, event)
         return answer
 
-    def _to_decision(self, tick: int, answer: Answer, due: bool) -> Decision:
+    def _to_decision(self, tick: int, answer: Answer, is_command_due: bool) -> Decision:
         """Return the decision in an answer, with the goal events of the GoalTracker."""
         self._goals.advance(tick)
-        if due and self._goals.fail_if_timed_out(tick):
+        if is_command_due and self._goals.fail_if_timed_out(tick):
             self._send(wire.CANCEL, {"tick": tick, "all": self._parameters.stop_on_failure, "reason": "timeout"})
         events = self._goals.take_events()
         if any(event.kind in _GOAL_ENDS for event in events):

@@ -25,7 +25,7 @@ EXIT_TIMEOUT_S = 2.0
 CLEANUP_TIMEOUT_S = 5.0
 """Time to wait until the launcher (see StackProcess) has ended the stack and all of its descendants."""
 MAX_MESSAGE_LENGTH = 2000
-"""Number of characters to which error messages of a stack are cut."""
+"""Maximum number of characters of an error message of a stack. The rest is cut off."""
 PEER_PATH_VARIABLE = "SIMSCEN_PEER_PATH"
 """Environment variable with the folder of the Python module `simscen_peer`."""
 ROBOT_VARIABLE = "SIMSCEN_ROBOT"

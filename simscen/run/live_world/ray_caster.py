@@ -77,7 +77,7 @@ class LiveRayCaster(RayCaster):
 
 
 class ReachableObjects(NamedTuple):
-    """Names of the moving objects within `reach` m of `origin`, according to `predicted` poses."""
+    """Names of all moving objects that can be within `reach` m of `origin`, according to `predicted` poses."""
 
     predicted: PredictedPoses
     origin: Vector

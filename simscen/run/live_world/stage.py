@@ -62,7 +62,7 @@ class LiveStage:
         self.belief: Belief | None = None
         """Last belief (pose estimate) of the stack, or None."""
         self.clearance: float | None = None
-        """Distance in m from the robot's hull to the nearest obstacle at the last truth sample, or None."""
+        """Clearance in m at the last truth sample, up to the measuring range (`Case.clearance_range`), or None."""
         self.travelled = 0.0
         """Driven distance in m, without teleportations."""
         self._scan_ticks: dict[str, int] = {}

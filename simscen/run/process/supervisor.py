@@ -270,23 +270,22 @@ class Supervisor:
                 self._responded = True
         return None
 
-    def _after_death(self, death: ProcessDeath, unresponsive: bool) -> Iterator[JobUpdate]:
-        """Yield the ends of the jobs that caused the death of the fork server, and queue all other jobs again."""
-        running, prepared = list(self._running.values()), self._preparing
+    def _after_death(self, death: ProcessDeath, was_unresponsive: bool) -> Iterator[JobUpdate]:
+        """Yield the end of each job that fails because the fork server died, and queue all other jobs again."""
+        running, in_preparation = list(self._running.values()), self._preparing
         self._running.clear()
         self._preparing = None
         # A SIGKILL comes from outside, perhaps from another job; other exits are caused by the fork server itself.
-        culprit = prepared if unresponsive or death.code != -signal.SIGKILL or len(running) == 1 else None
-        description = f"did not respond and {death.description}" if unresponsive else death.description
+        culprit = in_preparation if was_unresponsive or death.code != -signal.SIGKILL or len(running) == 1 else None
+        description = f"did not respond and {death.description}" if was_unresponsive else death.description
         if not self._responded:  # it could not start
             running += [*self._suspects, *self._retries, *self._jobs]
             self._suspects.clear()
             self._retries.clear()
         for job in running:
             if job is culprit or job.number in self._suspect_numbers or not self._responded:
-                yield Ended(
-                    job, ForkServerDeath(description, job is prepared, unresponsive and job is culprit, death.output)
-                )
+                timed_out = was_unresponsive and job is culprit
+                yield Ended(job, ForkServerDeath(description, job is in_preparation, timed_out, death.output))
             elif culprit is not None:
                 self._retries.appendleft(job)
             else:

@@ -172,9 +172,9 @@ def compare_twins(run: RunFinished, twin: RunFinished | None) -> RunFinished:
     return replace(run, result=replace(run.result, outcome=Outcome.ERROR, error=failure))
 
 
-def _unfinished_reason(started: bool, stopped: Exit | None) -> RunFailure:
+def _unfinished_reason(was_started: bool, stopped: Exit | None) -> RunFailure:
     """Return why a run has no result. `stopped` is the exit code of an interrupted session, else None."""
-    if started:
+    if was_started:
         return RunFailure("interrupted", "interrupted before it was finished")
     return RunFailure("not-run", "interrupted" if stopped else "another run did not pass (--fail-fast)")
 
