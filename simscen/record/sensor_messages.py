@@ -29,7 +29,7 @@ class SensorMessages:
         costmaps: Messages by topic.
         mounts: Poses of lidars on the base, by frame.
         lines: Messages of /rosout, including simscen's own lines.
-        stamped: Whether stamps count from the start of the run. If False, only the ticks of logging are meaningful.
+        stamps_are_run_times: Whether stamps count from the start of the run. If not, use the ticks of logging.
         frames: Names of the robot's frames in the log. Decoded messages have the frame names of the stack instead.
     """
 
@@ -40,7 +40,7 @@ class SensorMessages:
     costmaps: dict[str, LoggedMessages] = field(default_factory=dict)
     mounts: dict[str, Pose3] = field(default_factory=dict)
     lines: LoggedMessages = field(default_factory=list)
-    stamped: bool = True
+    stamps_are_run_times: bool = True
     frames: RobotFrames = field(default_factory=RobotFrames)
 
     def handler(self, topic: str, message_type: str) -> Callable[[int, bytes], None] | None:

@@ -167,7 +167,7 @@ class TraceBuilder:
         self._truth, self._odometry, self._belief = SignalBuffer(11), SignalBuffer(3), SignalBuffer(9)
         """Their columns are: pose, twist, and clearance; x, y, yaw; x, y, yaw, and covariance.
 
-        They are faster to append to than the buffers of TraceRows, to which `finish` converts them.
+        Appending is faster than to the buffers of TraceRows. `finish` converts their rows to rows of TraceRows.
         """
 
     def append(self, moment: Moment) -> None:

@@ -189,7 +189,7 @@ class _DriveReader:
         tree = TransformTree()
         for role in ("tf_static", "tf"):
             for message in self._messages.of(role):
-                tree.add(message.log_time, message.content, static=role == "tf_static")
+                tree.add(message.log_time, message.content, is_static=role == "tf_static")
         return tree
 
     def _scans(self) -> Scans | None:

@@ -84,7 +84,7 @@ class SensorMessageCollector:
 
     def __init__(self) -> None:
         self.map: OccupancyGrid | None = None
-        self._sensors = SensorMessages(stamped=False)
+        self._sensors = SensorMessages(stamps_are_run_times=False)
         self._messages: list[RawMessage] = []
 
     def collect(self, messages: Iterable[RawMessage]) -> Iterator[RawMessage]:

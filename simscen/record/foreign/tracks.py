@@ -84,7 +84,7 @@ def track_from_tf(outer: str, inner: str, decoded: DecodedMessages, options: For
     tree = TransformTree()
     for role in ("tf_static", "tf"):
         for logged, links in decoded.by_role[role]:
-            tree.add(logged, links, static=role == "tf_static")
+            tree.add(logged, links, is_static=role == "tf_static")
     result = tree.between(outer, inner)
     if isinstance(result, str):
         return result

@@ -22,7 +22,7 @@ class _Link:
     logged: list[int] = field(default_factory=list)
     stamps: list[int] = field(default_factory=list)
     poses: list[tuple[float, ...]] = field(default_factory=list)
-    static: bool = False
+    is_static: bool = False
 
 
 class TransformTree:
@@ -31,15 +31,15 @@ class TransformTree:
     def __init__(self) -> None:
         self._links: dict[str, _Link] = {}
 
-    def add(self, logged: int, links: list[StampedPose], static: bool) -> None:
-        """Add the transforms of one message on /tf, or on /tf_static if `static`.
+    def add(self, logged: int, links: list[StampedPose], is_static: bool) -> None:
+        """Add the transforms of one message on /tf, or on /tf_static if `is_static`.
 
         `logged` is the time of logging in ns. If the parent of a frame changes, previous transforms are dropped.
         """
         for transform in links:
             link = self._links.get(transform.child)
             if link is None or link.parent != transform.frame:
-                link = self._links[transform.child] = _Link(transform.frame, static=static)
+                link = self._links[transform.child] = _Link(transform.frame, is_static=is_static)
             link.logged.append(logged)
             link.stamps.append(transform.stamp)
             link.poses.append(transform.pose)
@@ -53,11 +53,11 @@ class TransformTree:
         chain = self._chain(outer, inner)
         if isinstance(chain, str):
             return chain
-        moving = next((link for link in chain if not link.static), None)
+        moving = next((link for link in chain if not link.is_static), None)
         if moving is None:
             return f"tf between {outer} and {inner} never changes"
         times = np.array(moving.stamps, dtype=np.int64)
-        begin = max(min(link.stamps) for link in chain if not link.static)
+        begin = max(min(link.stamps) for link in chain if not link.is_static)
         is_connected = times >= begin
         poses = np.tile([0.0, 0, 0, 0, 0, 0, 1], (int(is_connected.sum()), 1))
         for link in chain:
@@ -86,7 +86,7 @@ def _latest_poses(link: _Link, times: Ticks) -> Array:
     stamps, poses = np.array(link.stamps, dtype=np.int64), np.array(link.poses)
     order = np.argsort(stamps, kind="stable")
     newest = np.searchsorted(stamps[order], times, side="right") - 1
-    latest: Array = poses[order][len(order) - 1 if link.static else np.maximum(newest, 0)]
+    latest: Array = poses[order][len(order) - 1 if link.is_static else np.maximum(newest, 0)]
     return np.tile(latest, (len(times), 1)) if latest.ndim == 1 else latest
 
 

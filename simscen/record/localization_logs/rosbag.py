@@ -45,9 +45,9 @@ class _TransformMessages:
     transforms: TransformTree = field(default_factory=TransformTree)
     indices: dict[int, int] = field(default_factory=dict)
 
-    def add(self, logged: int, index: int, links: list[StampedPose], static: bool) -> None:
-        """Add the transforms of one message on /tf, or on /tf_static if `static`."""
-        self.transforms.add(logged, links, static)
+    def add(self, logged: int, index: int, links: list[StampedPose], is_static: bool) -> None:
+        """Add the transforms of one message on /tf, or on /tf_static if `is_static`."""
+        self.transforms.add(logged, links, is_static)
         self.indices[logged] = index
 
     def between(self, outer: str, inner: str) -> list[LoggedMessage]:
@@ -117,9 +117,9 @@ def _collect_messages(path: Path, odometry: str, scan: str, truth: str) -> _Mess
     messages = _Messages()
     for index, raw in enumerate(stream):
         if raw.topic in (topics.TF_STATIC.name, topics.TF.name):
-            links, static = _decode(raw, {topics.TF.type: transforms}), raw.topic == topics.TF_STATIC.name
-            messages.tf.add(raw.time, index, links, static)
-            messages.static_transforms.update({link.child: link for link in links if static})
+            links, is_static = _decode(raw, {topics.TF.type: transforms}), raw.topic == topics.TF_STATIC.name
+            messages.tf.add(raw.time, index, links, is_static)
+            messages.static_transforms.update({link.child: link for link in links if is_static})
         elif raw.topic == INITIAL_POSE_TOPIC:
             messages.initial.append((raw.time, index, _decode(raw, POSE_DECODERS)))
         elif raw.topic == scan:

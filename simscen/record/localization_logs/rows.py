@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from simscen.core.geometry import Array, Pose2
 
 TICK_RATE_HZ = 1000
-"""Number of ticks per second to which times are rounded."""
+"""Ticks per second. Times are rounded to ticks."""
 MAX_TIME_S, MAX_COORDINATE_M = 1e11, 1e6
 """Maximum valid time and coordinate."""
 

@@ -65,7 +65,7 @@ def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, column
         "most": round(first.range_max, 4),
         "beams": beams,
         "ticks": columns.add([tick for tick, _ in scans]),
-        "measured": columns.add([scan.tick if sensors.stamped else tick for tick, scan in scans]),
+        "measured": columns.add([scan.tick if sensors.stamps_are_run_times else tick for tick, scan in scans]),
         "ranges": columns.add(ranges, _POINT_STEP_M),
     }
 
