@@ -99,7 +99,7 @@ class Peer:
     Args:
         name, version, about: Description of the stack for the run's log. `about` is any JSON object.
         topics: Topics to receive; None for all.
-        every_beat: True for a step also whenever a sensor publishes, False for one step per velocity command.
+        every_beat: True for additional steps whenever a sensor publishes; False for one step per velocity command.
         modes: Nav2 actions that the stack supports.
         connection: None for the socket that simscen passes to the processes that it starts.
 

@@ -1,4 +1,4 @@
-"""Senders of goals to the nodes, by a Nav2 action or a pose on /goal_pose, which also observe the outcomes."""
+"""Send goals to the nodes, by a Nav2 action or a pose on /goal_pose, and observe their outcomes."""
 
 import math
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Union

@@ -142,7 +142,7 @@ class Readiness:
     def _unused_sensors(self) -> List[str]:
         """Return a problem for each sensor without a subscriber if a node waits for its type on another topic.
 
-        If there is no such sensor, return a problem if no sensor at all has a subscriber.
+        Otherwise, return a problem if no sensor has a subscriber.
         """
         found = []
         sensors = [topic for topic in self._topics if topic.type.startswith(("sensor_msgs/", ODOMETRY_TYPE))]

@@ -21,7 +21,7 @@ centers."""
 VELOCITY_CLUSTERS, MAX_SPEED_M_S = 6, 2.5
 """Number of clusters from which the velocity is computed, and upper limit of the speed."""
 MOVING_SPEED_M_S = 0.3
-"""Speed below which a hidden object may also have stopped where it was last seen."""
+"""Last measured speed below which a hidden object may have stopped at once instead of moving on."""
 MIN_CLUSTERS, MIN_TRACK_S = 6, 0.6
 """Minimum number of clusters, and minimum duration, of a track."""
 MAX_LINK_S, LINK_M, LINK_M_S = 6.0, 0.5, 0.5

@@ -32,7 +32,7 @@ UNFINISHED_TIMEOUT_FACTOR = 1.1
 MAX_TIME_LIMIT_S = 8000.0
 """Maximum time limit of the scenario."""
 RADIUS_STEP_M = 0.05
-"""Step to which the distance at which goals count as passed is rounded up."""
+"""The distance at which goals count as passed is rounded up to a multiple of this step."""
 NEAR_TRUTH_M, NEAR_TRUTH_RAD = 0.15, math.radians(6)
 """If the first belief is at most this far from the true start, the scenario has the default initial estimate."""
 UNKNOWN_START_STD_M = 1.5

@@ -40,7 +40,7 @@ MAX_EQUAL_MAP_DIFFERENCE = 0.002
 
 @dataclass(frozen=True)
 class GivenFiles:
-    """World, map, and robot from the user's options, which replace the ones in the log.
+    """World, map, and robot from the user's options. They replace those of the log.
 
     `robot` is a robot file, the name of a shipped robot, or the name of a robot in the log; "" for none.
     """
