@@ -158,13 +158,13 @@ class DynamicWindow(PathFollowerSpec):
     base_obstacle_scale: Weight = 0.02
     """Weight of the costs at the end of a trajectory."""
     path_align_scale: Weight = 32.0
-    """Weight of the distance between the front of the robot and the plan."""
+    """Weight of the distance between the front of the robot and the plan, at the end of a trajectory."""
     path_dist_scale: Weight = 32.0
-    """Weight of the distance between the robot and the plan."""
+    """Weight of the distance between the robot and the plan, at the end of a trajectory."""
     goal_align_scale: Weight = 24.0
-    """Weight of the distance between the front of the robot and the end of the plan."""
+    """Weight of the distance between the front of the robot, at the end of a trajectory, and the end of the plan."""
     goal_dist_scale: Weight = 24.0
-    """Weight of the distance between the robot and the end of the plan."""
+    """Weight of the distance between the end of a trajectory and the end of the plan."""
     rotate_to_goal_scale: Weight = 32.0
     """Weight of the heading error at the goal; 0: the robot does not stop at the goal to turn."""
     slowing_factor: Weight = 5.0

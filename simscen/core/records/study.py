@@ -99,7 +99,7 @@ class Study:
         failed: Number of runs that failed. A run whose stack crashes or does not answer counts as failed.
         errors: Number of runs that simscen could not complete.
         claim: Result of the claim about the pass rate; None if the scenario has no `acceptance`.
-        limits: 95 % confidence interval of the pass rate; None if the values are not random.
+        limits: 95 % confidence interval of the pass rate; None if the values are not random, or if all runs are errors.
         rates: Pass rate by value of each varied parameter.
         effects: Association of parameters with margins, strongest first.
         worst: Run with the smallest margin, this margin, and its unit, by criterion.
