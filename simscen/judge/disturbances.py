@@ -79,7 +79,7 @@ def _events_of_entry(trace: Trace, kind: EventKind, entry: int) -> list[Event]:
 
 
 def _event_outcome(trace: Trace, case: Case, disturbance: Disturbance, entry: int) -> DisturbanceOutcome:
-    """Return the outcome of an event. It happened if each of its actions took effect once before the run ended."""
+    """Return the outcome of an event. It happened if each action took effect at least once before the run ended."""
     started = _events_of_entry(trace, EventKind.EVENT_STARTED, entry)
     fired = tuple(event.tick for event in started)
     ended = _events_of_entry(trace, EventKind.EVENT_ENDED, entry)

@@ -161,7 +161,7 @@ LOST_DISTANCE_M = 0.5
 
 
 def diagnose_localization(trace: Trace, tick: int, error_is_reported: bool) -> Diagnosis:
-    """Return sentences on a large localization error and its causes, and the disturbances that caused it.
+    """Return sentences on a large localization error and its causes, and the names of the causing disturbances.
 
     If `error_is_reported`, the failed finding states the error, so that no sentence repeats it.
     """

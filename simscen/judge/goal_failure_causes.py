@@ -74,7 +74,7 @@ def movable_objects(trace: Trace, tick: int) -> list[MovableObject]:
 
 
 def pose_at(trace: Trace, spawned: Event, tick: int) -> Pose2:
-    """Return the pose at `tick` of an object. `spawned` is the event that spawned the object."""
+    """Return the pose at `tick` of an object. `spawned` is the recorded event OBJECT_SPAWNED of this object."""
     x, y, yaw = (spawned.data.get(key) for key in ("x", "y", "yaw"))
     samples = trace.objects.get(spawned.name)
     if samples is not None:

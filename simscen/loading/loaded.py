@@ -60,7 +60,7 @@ class LoadedRobot:
     """Specification; None for a URDF alone."""
     urdf: Path | None = None
     """URDF or xacro file: the one that the `*.robot.yaml` names, or `path` itself; None without one."""
-    bundled: bool = False
+    is_shipped: bool = False
     """Whether the robot ships with simscen."""
     tree: MappingNode | None = field(repr=False, default=None)
     """YAML tree of `spec`."""

@@ -28,10 +28,10 @@ def insert_entry(text: str, mapping: SourceNode, key: str, value: Any, order: Se
     before = [entry for name, entry in entries if name in order[: order.index(key)]] if key in order else []
     after = max(before, key=lambda entry: entry.start) if before else entries[-1][1]
     end = max(after.value.end, after.end)
-    if mapping.flow and text[mapping.start] != "{":  # one pair in brackets: [key: value]
+    if mapping.is_flow and text[mapping.start] != "{":  # one pair in brackets: [key: value]
         pair = f"{text[mapping.start : end]}, {string_text(key)}: {flow_text(value)}"
         return Splice(mapping.start, end, f"{{{pair}}}")
-    if mapping.flow:
+    if mapping.is_flow:
         return Splice(end, end, f", {string_text(key)}: {flow_text(value)}")
     place = line_end(text, end)
     indent = column(text, entries[0][1].start)
@@ -45,7 +45,7 @@ def insert_item(text: str, sequence: SourceNode, value: Any, index: int | None =
         return Splice(sequence.start, sequence.end, f"[{flow_text(value)}]")
     at_end = index is None or index >= len(items)
     like = items[-1] if at_end else items[index or 0]
-    if sequence.flow:
+    if sequence.is_flow:
         if at_end:
             return Splice(like.end, like.end, _separator(text, items) + flow_text(value))
         return Splice(like.start, like.start, f"{flow_text(value)}, ")
@@ -75,12 +75,12 @@ def _block_entry(key: str, value: Any, indent: int) -> str:
 
 def _block_value(text: str, value: Any, like: SourceNode, indent: int) -> str:
     """Return the text of a new list item in the style of the sibling `like`."""
-    if like.kind != "mapping" or like.flow or not isinstance(value, dict) or not value:
+    if like.kind != "mapping" or like.is_flow or not isinstance(value, dict) or not value:
         return flow_text(value)
     lines = []
     for key, part in value.items():
         entry = like.entries.get(key)
-        if entry is not None and not entry.value.flow and entry.value.kind == "mapping" and isinstance(part, dict):
+        if entry is not None and not entry.value.is_flow and entry.value.kind == "mapping" and isinstance(part, dict):
             inner = _block_value(text, part, entry.value, indent + INDENT)
             lines.append(f"{string_text(key)}:\n{' ' * (indent + INDENT)}{inner}")
         else:
@@ -110,13 +110,13 @@ def remove_part(text: str, source: SourceNode, keys: tuple[Key, ...]) -> Splice:
     if parent.kind == "sequence":
         assert isinstance(keys[-1], int)
         parts = [(item.start, item.end) for item in parent.items]
-        if not parent.flow:
+        if not parent.is_flow:
             parts = [(dash_before(text, start), max(end, dash_before(text, start) + 1)) for start, end in parts]
         number = keys[-1]
     else:
         parts = [(entry.start, max(entry.end, entry.value.end)) for entry in parent.entries.values()]
         number = list(parent.entries).index(str(keys[-1]))
-    if parent.flow:
+    if parent.is_flow:
         return _remove_from_flow(parent, parts, number)
     if len(parts) == 1:
         begin = len(text[: parent.start].rstrip())

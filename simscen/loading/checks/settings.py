@@ -94,7 +94,7 @@ def degrees_as_radians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
         (loaded.spec, loaded.tree),
         (loaded.world.spec, loaded.world.tree),
     ]
-    if not loaded.robot.bundled:
+    if not loaded.robot.is_shipped:
         files.append((loaded.robot.spec, loaded.robot.tree))
     for spec, tree in files:
         for keys, value in quantities_of(spec, "angle") if spec is not None and tree is not None else ():

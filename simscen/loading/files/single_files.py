@@ -38,15 +38,15 @@ def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -
     """
     shipped = shipped_robots()
     library = Library(PathSandbox.around(root, world_path))
-    bundled = written in shipped and not Path(written).exists()
-    path = shipped[written] if bundled else library.sandbox.resolve_argument(Path(written))
+    is_shipped = written in shipped and not Path(written).exists()
+    path = shipped[written] if is_shipped else library.sandbox.resolve_argument(Path(written))
     if isinstance(path, Problem):
         raise InvalidInput([path])
     if not path.is_file():
         message = "not a regular file" if path.exists() else f"no such file or shipped robot: {quoted(written)}"
         raise InvalidInput([Problem(written, 0, 0, "SC001", message, suggestion(written, shipped))])
     assets = Assets(library)
-    robot = assets.robot_file(path, bundled)
+    robot = assets.robot_file(path, is_shipped)
     if robot is None or assets.problems:
         raise InvalidInput(library.with_source(sorted(assets.problems)))
     return RobotFile(robot, library)

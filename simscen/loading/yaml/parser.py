@@ -12,7 +12,7 @@ from simscen.loading.yaml.textfile import LOOKALIKES, describe_lookalike, find_l
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode
 
 MAX_DEPTH = 40
-"""Largest number of nested mappings and lists."""
+"""Largest level of a value in nested mappings and lists. The level of the top-level value is 1."""
 MAX_VALUES = 100_000
 """Largest number of keys and values of a file, after the expansion of aliases."""
 

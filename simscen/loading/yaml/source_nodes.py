@@ -19,7 +19,7 @@ class SourceNode:
     kind: Literal["scalar", "sequence", "mapping", "alias"]
     start: int
     end: int
-    flow: bool
+    is_flow: bool
     """Whether the value is in YAML's flow style: a collection in brackets or braces, or a value inside one."""
     style: str = ""
     """First character of a quoted scalar or block scalar: `"`, `'`, `|`, or `>`; "" for other values."""
@@ -41,7 +41,7 @@ def parse_source(text: str) -> SourceNode | None:
     try:
         events = yaml.parse(text, Loader=_Loader)
         start = next(event for event in events if isinstance(event, ev.NodeEvent))
-        return _Composer(text, events).compose_node(start, flow=False)
+        return _Composer(text, events).compose_node(start, is_flow=False)
     except (yaml.YAMLError, StopIteration, RecursionError):
         return None
 
@@ -64,42 +64,42 @@ class _Composer:
     def __init__(self, text: str, events: Iterator[ev.Event]) -> None:
         self._text, self._events = text, events
 
-    def compose_node(self, event: ev.Event, flow: bool) -> SourceNode:
-        """Return the node that begins with `event`. `flow` is true inside brackets or braces."""
+    def compose_node(self, event: ev.Event, is_flow: bool) -> SourceNode:
+        """Return the node that begins with `event`. `is_flow` is true inside brackets or braces."""
         start, end = _index(event.start_mark), _index(event.end_mark)
         if isinstance(event, ev.AliasEvent):
-            return SourceNode("alias", start, end, flow)
+            return SourceNode("alias", start, end, is_flow)
         assert isinstance(event, ev.NodeEvent)
         start = self._after_properties(event, start)
         if isinstance(event, ev.ScalarEvent):
             style = "" if event.style in (None, "") else str(event.style)
             end = start + len(self._text[start:end].rstrip())  # without the line breaks after a block
-            return SourceNode("scalar", start, end, flow, style)
-        flow = flow or self._text[start : start + 1] in ("[", "{")
+            return SourceNode("scalar", start, end, is_flow, style)
+        is_flow = is_flow or self._text[start : start + 1] in ("[", "{")
         if isinstance(event, ev.SequenceStartEvent):
-            return self._compose_sequence(start, flow)
-        return self._compose_mapping(start, flow)
+            return self._compose_sequence(start, is_flow)
+        return self._compose_mapping(start, is_flow)
 
-    def _compose_sequence(self, start: int, flow: bool) -> SourceNode:
+    def _compose_sequence(self, start: int, is_flow: bool) -> SourceNode:
         """Return the sequence that begins at the index `start`."""
         items = []
         while not isinstance(event := next(self._events), ev.SequenceEndEvent):
-            items.append(self.compose_node(event, flow))
-        end = _index(event.end_mark) if flow or not items else items[-1].end
-        return SourceNode("sequence", start, end, flow, items=tuple(items))
+            items.append(self.compose_node(event, is_flow))
+        end = _index(event.end_mark) if is_flow or not items else items[-1].end
+        return SourceNode("sequence", start, end, is_flow, items=tuple(items))
 
-    def _compose_mapping(self, start: int, flow: bool) -> SourceNode:
+    def _compose_mapping(self, start: int, is_flow: bool) -> SourceNode:
         """Return the mapping that begins at the index `start`."""
         entries: dict[str, SourceEntry] = {}
         last = start
         while not isinstance(event := next(self._events), ev.MappingEndEvent):
-            key = self.compose_node(event, flow)
+            key = self.compose_node(event, is_flow)
             name = event.value if isinstance(event, ev.ScalarEvent) else self._text[key.start : key.end]
-            value = self.compose_node(next(self._events), flow)
+            value = self.compose_node(next(self._events), is_flow)
             last = max(value.end, key.end)
             entries.setdefault(str(name), SourceEntry(key.start, key.end, value))
-        end = _index(event.end_mark) if flow else last
-        return SourceNode("mapping", start, end, flow, entries=entries)
+        end = _index(event.end_mark) if is_flow else last
+        return SourceNode("mapping", start, end, is_flow, entries=entries)
 
     def _after_properties(self, event: ev.NodeEvent, start: int) -> int:
         """Return the index after the anchor and the tag of a node that begins at the index `start`."""
