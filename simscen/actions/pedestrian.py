@@ -108,8 +108,8 @@ class Pedestrian(_WalkSettings, WorldAction):
     """Add a person who walks to goals and avoids walls, objects, other people, and robots.
 
     Pedestrians walk by the social force model of Moussaïd et al. (2009) and react to the robot like the people of
-    HuNavSim (Pérez-Higueras et al., 2023). They cannot be pushed. They walk into nothing except what they are
-    `blind_to`.
+    HuNavSim (Pérez-Higueras et al., 2023). They cannot be pushed. They walk into nothing except objects and robots that
+    they are `blind_to`.
 
     Example: `do: {pedestrian: {name: anna, pose: {x: 4, y: 1}, goals: [[4, 5]], behavior: surprised}}`
     """
