@@ -36,7 +36,7 @@ class Nav2Readiness:
         return self._names._replace(base_frames=[*self._names.base_frames, *self.user_transforms.robot_frames])
 
     def node_problems(self) -> List[str]:
-        """Return one text for each severe problem of the parameter file and for each missing node."""
+        """Return a text for each missing node and each severe problem of the parameter file, except wrong topics."""
         found = self._severe_problems(self._options.parameters or {}, {}, f"{self._options.parameter_file}: ")
         names = {name for name, _ in self._graph.nodes()}
         for name in parameter_rules.NODES:
