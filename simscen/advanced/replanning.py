@@ -263,10 +263,7 @@ class ClearingBackoff:
         self._wait, self._due, self._nearest = INITIAL_WAIT_S, 0.0, float("inf")
 
     def clears_entirely(self, now: float, goal_distance: float) -> bool:
-        """Return True to clear the entire global costmap, or False to clear only the area around the robot.
-
-        Call it once per clearing. `now` is the time in s, `goal_distance` the straight distance to the goal in m.
-        """
+        """Return whether to clear the entire costmap (see ClearingPolicy). Call it once per clearing."""
         if goal_distance <= self._nearest - PROGRESS_M:
             self._wait, self._due = INITIAL_WAIT_S, now
         if now < self._due:

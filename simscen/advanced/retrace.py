@@ -93,7 +93,7 @@ HORIZON_S = 1.0
 TIMES: Array = np.linspace(0.0, HORIZON_S, 11)
 """Times in s at which a candidate command is checked for collisions."""
 MIN_FREE_STEPS = 3
-"""Number of TIMES after 0 until which a command must be free of collisions, if no command is free at all TIMES."""
+"""If no command is free of collisions at all TIMES, a command must be free at this number of TIMES after 0."""
 SLACK_CELLS = 0.3
 """Distance in cells by which the robot may come closer to an obstacle than on its trail."""
 DEVIATION_WEIGHT = 2.0
@@ -126,7 +126,7 @@ class TrailFollower:
         self._commands = _candidate_commands(setting.robot, self.speed)
 
     def start(self, pose: Pose2, length: float) -> None:
-        """Start at a pose in the odom frame. Beyond its oldest pose, the trail continues for `length` m."""
+        """Start at a pose in the odom frame. The straight part of the trail is `length` m long."""
         horizon = np.array([HORIZON_S])
         self._ends = np.stack([poses_along(Pose2(0.0, 0.0), each, horizon)[0] for each in (*self._commands, STOP)])
         lever = self._footprint.circumscribed
@@ -134,7 +134,7 @@ class TrailFollower:
         self._last = pose
 
     def _remaining_trail(self) -> Sequence[Pose2]:
-        """Return the recorded poses, the oldest first, without the part that the robot has already driven back."""
+        """Return the recorded poses, without the part that the robot has already driven back."""
         poses = self._recorded()
         if self._last is None or self._last not in poses:
             return poses
@@ -165,8 +165,8 @@ class TrailFollower:
     def command(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
         """Return the best command without collisions in HORIZON_S, otherwise the best one without early collisions.
 
-        None if no such command is better than standing still. If the collision monitor rejects a better command, other
-        backward commands are tried, even if they are not better.
+        None if no such command is better than standing still. After a veto of the collision monitor, other backward
+        commands are tried, better or not.
         """
         *scores, stop_score = self._scores(pose).tolist()
         has_strafed, is_vetoed = self._trail.has_strafed, False
@@ -193,7 +193,7 @@ class TrailFollower:
     def _blocked(self, pose: Pose2, poses: Array, costmap: CostmapView) -> Mask:
         """Return which of the poses (n, 3) collide with obstacle cells.
 
-        A cell is ignored, as an error of the costmap, if the robot is about as near to it now, or was so on its trail.
+        Cells are ignored, as errors of the costmap, if the robot is or was (on its trail) about as near to them.
         """
         blocked: Mask = ~self._footprint.free(costmap, poses)
         if not blocked.any():
@@ -242,10 +242,7 @@ TIME_ALLOWANCE_RATIO = 1.5
 
 
 class Retrace:
-    """Recovery behavior that drives back along the trail of the robot until the robot has room to turn in place.
-
-    Without obstacles, it drives at least `backup_dist`. It drives at most `retrace_dist`.
-    """
+    """Recovery behavior that drives back along the trail until there is room to turn in place, or to `retrace_dist`."""
 
     name = "retrace"
 

@@ -82,7 +82,7 @@ class AdvancedStack(ReferenceStack):
 
     @property
     def components(self) -> tuple[tuple[str, Any, tuple[str, ...]], ...]:
-        """The components to measure in benchmarks: name, object, and the methods that take time."""
+        """The components of ReferenceStack, and the motion prediction."""
         return (*super().components, ("prediction", self._prediction, ("on_scan", "steer", "stand")))
 
     def _on_motion(self, reading: Odometry | Imu) -> None:

@@ -144,8 +144,7 @@ class CovarianceEstimator:
         self._weights = np.append(self._weights[recent], weight)
 
     def _mean_residuals(self) -> tuple[float, float]:
-        """Return the share of explained beams in recent scans, and the RMS of their residuals divided by
-        `sigma_hit`."""
+        """Return the share of explained beams in recent scans, and their RMS residual in units of `sigma_hit`."""
         if not self._residuals:
             return 1.0, 1.0
         explained, square = (sum(values) / len(self._residuals) for values in zip(*self._residuals, strict=True))

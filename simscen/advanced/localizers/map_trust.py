@@ -56,7 +56,7 @@ class MapResiduals:
 FIT_DISTANCE_M = 0.3
 """Distance from an obstacle of the map below which the endpoint of a beam fits."""
 CLUSTER_RADIUS_M = 1.0
-"""Particles are one narrow cluster if all of them are within this distance of their mean."""
+"""Particles are one narrow cluster if all are within this distance of their mean, along x and along y."""
 SAMPLED_PARTICLES = 50
 """Approximate number of particles at which beams are compared with the map."""
 MAPPED_SHARE = 0.1, 0.8

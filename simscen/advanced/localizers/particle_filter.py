@@ -92,11 +92,11 @@ class ScanMatchingParticleFilter(ParticleFilter):
         super().__init__(spec, motion, sensor, free_space, rng)
 
     def reset(self, estimate: Estimate) -> None:
-        """Restart with particles around the estimate's pose, or over all free space if it has none."""
+        """Restart at an estimate, as in `ParticleFilter.reset`."""
         super().reset(estimate)
         if self._spec.relocalization == "scan_matching":  # random particles would compete with the search
             self._augmented_mcl = AugmentedMcl(0.0, 0.0)
-        self._map_weight, self._is_one_cluster = 1.0, False
+        self._map_weight, self._were_compact = 1.0, False
         self.fitting_share = 0.0
         """Share of the beams of the last scan that fit the map, among those that end on the mapped area."""
         has_prior = estimate.pose is not None and self._spec.settling_distance > 0
@@ -104,9 +104,9 @@ class ScanMatchingParticleFilter(ParticleFilter):
 
     @property
     def is_certain(self) -> bool:
-        """Whether nearly all beams of the last scan fit the map, and the particles are one narrow cluster."""
+        """Whether nearly all beams of the last scan fit the map, and the particles are compact (see `are_compact`)."""
         is_mapped = self._map_weight == 1.0 and self.fitting_share >= CERTAIN_FIT
-        return is_mapped and self._is_one_cluster and self._augmented_mcl.random_fraction == 0
+        return is_mapped and self._were_compact and self._augmented_mcl.random_fraction == 0
 
     def move(self, delta: Pose2) -> None:
         """Move each particle by its own sample of the motion model. `delta` is the odometry in the base frame."""
@@ -150,5 +150,5 @@ class ScanMatchingParticleFilter(ParticleFilter):
         return self._map_weight * self._scan_weight, beams
 
     def _resample(self) -> None:
-        self._is_one_cluster = are_compact(self.particles)
+        self._were_compact = are_compact(self.particles)
         super()._resample()

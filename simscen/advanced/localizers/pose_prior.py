@@ -38,7 +38,7 @@ class ObservedMotion:
 
     disagreement:  motion by scan matching relative to the motion by odometry, if they disagree; otherwise zero
     step:          motion by scan matching; None if scan matching failed
-    was_carried:   whether the robot was carried elsewhere, because the scans hardly overlap; None if unknown
+    was_carried:   whether the scans hardly overlap, because the robot was carried elsewhere; None if unknown
     """
 
     disagreement: Pose2 = Pose2(0.0, 0.0, 0.0)

@@ -205,7 +205,7 @@ class ScanMatcher:
 
     @property
     def was_carried(self) -> bool | None:
-        """Whether the robot was carried elsewhere, because the last scan hardly overlaps; None if unknown."""
+        """Whether the last scan hardly overlaps, because the robot was carried elsewhere; None if unknown."""
         return None if self.overlap is None else self.overlap < MIN_OVERLAP
 
     def step(self, scan: Scan, guess: Pose2) -> MatchedMotion | None:

@@ -45,7 +45,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         super().__init__(spec, particle_filter, motion, estimate, tick_rate)
 
     def reset(self, estimate: Estimate) -> None:
-        """Restart with particles around the estimate's pose, or over all free space if it has none."""
+        """Restart at an estimate, as in `ParticleFilter.reset`."""
         super().reset(estimate)
         settling = self._spec.settling_distance
         self._relocalizer = None if self._search is None else Relocalizer(*self._search, estimate, settling)

@@ -106,7 +106,7 @@ class SlipEkfLocalizer:
         self._scan_correction = ScanMatchingCorrection(self._tick_rate) if self._spec.match_scans else None
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Estimate the turn rate from wheels and gyroscope, and move the pose up to an odometry reading."""
+        """Estimate the turn rate, and move the pose up to an odometry reading."""
         last = self._last
         if not is_plausible(odometry.pose) or (last is not None and odometry.tick <= last.tick):
             return
@@ -130,14 +130,14 @@ class SlipEkfLocalizer:
         self._map_from_odom = self.pose.compose(self._last.pose.inverse())
 
     def on_imu(self, imu: Imu) -> None:
-        """Store the turn rate until the next odometry message."""
+        """Store the turn rate until the next odometry reading."""
         rate = imu.angular_velocity[2]
         if abs(rate) < MAX_TURN_RATE_RAD_S:
             self._readings.append(rate)
 
     @property
     def belief(self) -> Belief:
-        """The estimate at the newest odometry message."""
+        """The estimate at the newest odometry reading."""
         covariance: Array = self._filter.P[:RATE, :RATE].copy()
         tick = self._last.tick if self._last is not None else 0
         return Belief(self.pose, (covariance + covariance.T) / 2, self._map_from_odom, updated=tick)
@@ -187,7 +187,7 @@ class SlipEkfLocalizer:
 
     @property
     def _turn_rate(self) -> float:
-        """Mean reading of the gyroscope since the last odometry message, in rad/s."""
+        """Mean reading of the gyroscope since the last odometry reading, in rad/s."""
         return sum(self._readings) / len(self._readings)
 
     @property

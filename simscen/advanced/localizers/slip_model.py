@@ -70,7 +70,7 @@ PUSHED_SPEED_M_S = 0.3
 
 @dataclass(frozen=True)
 class WheelStep:
-    """Motion between two odometry messages, as measured by the wheels.
+    """Motion between two odometry readings, as measured by the wheels.
 
     pose:             motion, in the base frame at its start
     seconds:          duration

@@ -95,7 +95,7 @@ MAX_SAMPLES = 3000
 FIRST_REACH_M = 1.8
 """Distance up to which BIT* connects samples in the first search."""
 LATER_REACH_M = 2.3
-"""Distance up to which BIT* connects samples in later searches, divided by their `density`."""
+"""Distance up to which BIT* connects samples in later searches; divided by `density`."""
 AMPLE_CLEARANCE_M = 0.15
 """Clearance beyond the robot's radius that suffices for straight motions between samples."""
 

@@ -32,13 +32,15 @@ Mask = npt.NDArray[np.bool_]
 
 
 class InformedSet:
-    """Points on near-shortest paths from start to goal. `length` is the length of the shortest path in m.
+    """Points on near-shortest paths from start to goal; the entire map before `restrict` is called.
+
+    `length` is the length of the shortest path in m.
 
     Paths move from block to block in 16 directions, like a king or a knight in chess. They are up to 2.8 % too long.
     """
 
     def __init__(self, costs: TraversalCosts, start: Point, goal: Point, by_cost: bool = False) -> None:
-        """Search the shortest paths. If `by_cost`, all lengths are traversal costs, as m of driving in free space."""
+        """Search the shortest paths. If `by_cost`, all lengths are traversal costs; one meter in free space costs 1."""
         size, max_blocks = (COST_BLOCK_M, MAX_COST_BLOCKS) if by_cost else (BLOCK_M, MAX_BLOCKS)
         max_factor = max(1, int(2.0 * costs.inscribed / costs.resolution))
         min_factor = min(math.ceil(math.sqrt(costs.height * costs.width / max_blocks)), max_factor)
@@ -59,8 +61,8 @@ class InformedSet:
     def restrict(self, slack: float, section: tuple[float, float] = (0.0, math.inf)) -> None:
         """Restrict the set to paths that are longer than the shortest path by at most the ratio `slack`.
 
-        The set is also restricted to points whose distance from the start in m is in the range `section`. Both limits
-        have a tolerance of two block diagonals. Earlier restrictions no longer apply.
+        `section` limits the distance of points from the start in m. All limits have a tolerance of two block diagonals.
+        Earlier restrictions no longer apply.
         """
         tolerance = 2 * math.sqrt(2.0) * self._size
         is_inside = self._through <= self.length * (1.0 + slack) + tolerance

@@ -244,8 +244,8 @@ PlanPart = Callable[[CostmapView, Pose2], tuple[Array, float]]
 def straight_path(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float, plan_part: PlanPart) -> Array | None:
     """Return a path (n, 2) that is straight, apart from a detour by `plan_part` around costly cells near the start.
 
-    This avoids a search of the entire costmap. None if there may be a cheaper path. Cells are costly as in
-    `costly_distance`.
+    This avoids a search of the entire costmap. None if no detour is found, or if there may be a cheaper path.
+    `costly_distance` defines costly cells.
     """
     length = start.distance(goal)
     costly = costly_distance(costmap, start, goal, radius)

@@ -29,15 +29,15 @@ from simscen.stack.moving_obstacles import MAX_INFLATION_M, MovingObstacles, Rea
 from simscen.stack.protocols import CostmapView, RobotModel
 
 MIN_DISTANCE_M = 0.25
-"""Distance in m to keep from moving obstacles, in addition to a standard deviation of their position."""
+"""Distance to keep from moving obstacles, in addition to a standard deviation of their position."""
 DECAY_TIME_S = 1.2
-"""Time constant in s with which the weight of risk decays exponentially toward the future."""
+"""Time constant with which the weight of risk decays exponentially toward the future."""
 RISK_DECAY: Array = np.exp(-TIMES / DECAY_TIME_S)
 """Weight of the risk at each of TIMES."""
 APPROACH_WEIGHT, COLLISION_WEIGHT, MEAN_WEIGHT = 3.0, 10.0, 1.0
 """Weights of the maximum nearness to moving obstacles (1 at contact), of a collision, and of the mean nearness."""
 STATIC_WEIGHT, STATIC_DISTANCE_M = 8.0, 0.08
-"""Weight of a collision with a static obstacle, and the distance in m to keep from it."""
+"""Weight of a collision with a static obstacle, and the distance to keep from it."""
 PROGRESS_WEIGHT, BACKWARD_WEIGHT, CHANGE_WEIGHT, DEVIATION_COST = 1.0, 0.15, 0.08, 0.1
 """Weights of progress, of driving backward, and of a changed command; cost of leaving the controller's trajectory."""
 SAFE_RISK = 0.02

@@ -30,9 +30,9 @@ MAX_HALF_ANGLE_RAD = math.radians(80.0)
 MIN_HITS = 3
 """Minimum number of hits of a cluster."""
 ROUNDING_M = 1e-6
-"""Tolerance in m for rounding errors."""
+"""Tolerance for rounding errors."""
 MAX_ITERATIONS, CONVERGED_STEP_M = 4, 3e-3
-"""Maximum number of Gauss-Newton iterations of `fit_circle`, and the step in m below which they end."""
+"""Maximum number of Gauss-Newton iterations of `fit_circle`, and the step below which they end."""
 
 Indices = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]

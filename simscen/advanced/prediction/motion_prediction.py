@@ -29,7 +29,7 @@ MAX_PENDING = 10_000
 
 
 class GyroOdometry:
-    """Odometry with the distance of the wheels and the heading of the gyroscope or, without gyroscope, of the wheels.
+    """Odometry with the distance of the wheels and, if possible, the heading of the gyroscope.
 
     Readings are integrated when a pose is requested, to save time.
     """

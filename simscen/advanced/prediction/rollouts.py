@@ -13,9 +13,9 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.stack.protocols import RobotModel
 
 STEP_S, HORIZON_S = 0.1, 3.0
-"""Time step and horizon in s."""
+"""Time step and horizon."""
 FIRST_DURATIONS_S = (0.5, 1.2)
-"""Durations in s of the first velocity of a sequence."""
+"""Durations of the first velocity of a sequence."""
 SPEED_RATIOS = (-0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
 """First speeds relative to full speed."""
 TURN_RATIOS = (0.0, 0.1, 0.3, 0.6, 1.0)
@@ -134,7 +134,7 @@ class FollowedPath:
     """Path that a controller follows, for predicting its trajectory."""
 
     def __init__(self, path: Array) -> None:
-        """Take the points of the path: x and y are the first two columns."""
+        """Take the points (n, 2 or more) of the path."""
         self._x, self._y = np.ascontiguousarray(path[:, 0]), np.ascontiguousarray(path[:, 1])
         steps = np.hypot(np.diff(self._x), np.diff(self._y))
         self._along = np.concatenate(([0.0], np.cumsum(steps)))
@@ -153,10 +153,7 @@ class FollowedPath:
         return int(dx.argmin())
 
     def ahead(self, pose: Pose2, reach: float) -> tuple[float, float]:
-        """Return a path point (x, y): the first one, after the nearest one, that is at least `reach` m from a pose.
-
-        If there is none, return the last point of the path.
-        """
+        """Return the first point (x, y) at least `reach` m from a pose, starting at the nearest one; else the last."""
         nearest = self.nearest(pose)
         beyond = np.hypot(self._x[nearest:] - pose.x, self._y[nearest:] - pose.y) >= reach
         number = nearest + int(beyond.argmax()) if beyond.any() else -1

@@ -116,8 +116,8 @@ def _update(assigned: list[tuple[Track, int]], current: ScanClusters) -> None:
 def start_tracks(tracks: list[Track], current: ScanClusters, used: set[int]) -> None:
     """Start tracks for clusters that are not in `used`, if they are in formerly free space.
 
-    While something moves, clusters of at least MIN_START_RADIUS_M also start tracks elsewhere, except where an earlier
-    scan hit something.
+    While something moves, clusters of at least MIN_START_RADIUS_M also start tracks where no earlier scan hit
+    something.
     """
     # While something moves, it may have hidden the free space in which another obstacle appears.
     min_radius = MIN_START_RADIUS_M if any(track.is_moving for track in tracks) else math.inf

@@ -46,7 +46,7 @@ class ConstantVelocityFilter:
 MAX_UPDATES = 10
 """Number of last updates that a track stores."""
 INITIAL_SPEED_STD_M_S = 1.5
-"""Standard deviation in m/s of the initial velocity."""
+"""Standard deviation of the initial velocity."""
 
 
 class Update(NamedTuple):

@@ -196,7 +196,7 @@ class FreeSpaceMemory:
         self._geometry = ScanGeometry(0, 0.0, 0.0)
 
     def add(self, scan: Scan, lidar: Pose2) -> None:
-        """Store a scan taken with the lidar at a pose in the odom frame, unless the last stored one is too recent."""
+        """Store a scan taken with the lidar at a pose in the odom frame, unless the last one is too recent."""
         if self._scans and 0 <= scan.tick - self._scans[-1].tick < self._min_interval:
             return
         geometry, count = self._geometry, len(scan.ranges)
@@ -261,8 +261,8 @@ class CurrentScan:
     def has_left(self, track: Track) -> bool:
         """Return whether at least half of the earlier positions of a track are no longer occupied.
 
-        A position is still occupied if both this scan and the earlier scan hit something there. A false track that
-        jumps from post to post leaves occupied positions behind.
+        A position is still occupied if both this scan and the earlier scan hit something there. False
+        tracks that jump from post to post do not leave their positions.
         """
         current, radius = self.lidar.to_lidar(track.position), track.radius
         positions = [update.position for update in track.updates if abs(update.position - track.position) > radius]
