@@ -155,7 +155,7 @@ class BehaviorSequence:
         self._used, self._nearest = 0, math.inf
 
     def next(self, goal_distance: float) -> Behavior | None:
-        """Return the next behavior and count a retry; None if no retry or behavior is left. `goal_distance` is in m."""
+        """Return the next behavior and count a retry; None if no retry is left. `goal_distance` is in m."""
         if self._resets_on_progress and goal_distance <= self._nearest - MIN_PROGRESS_M and self._used:
             self._used = self._next = 0
         self._nearest = min(self._nearest, goal_distance)

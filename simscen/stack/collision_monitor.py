@@ -1,6 +1,6 @@
 """Collision monitor (nav2_collision_monitor): slows the robot down before obstacles in the latest scans.
 
-It uses neither map nor costmap. If the stack predicts moving obstacles, the monitor checks these predictions, too.
+It uses neither map nor costmap. If the stack predicts moving obstacles, the monitor uses the predictions.
 """
 
 import math
@@ -203,7 +203,7 @@ class CollisionMonitor:
 
 
 def _time_steps(spec: MonitorSpec) -> int:
-    """Return the number of steps, at most MAX_STEPS, of `simulation_time_step` that cover `time_before_collision`."""
+    """Return the number of time steps until `time_before_collision`, at most MAX_STEPS."""
     if spec.simulation_time_step is None:
         return DEFAULT_STEPS
     return min(MAX_STEPS, math.ceil(spec.time_before_collision / spec.simulation_time_step - STEP_TOLERANCE))
@@ -219,7 +219,7 @@ def _miter_factor(normals: Array) -> float:
 
 
 def _shortest_range(scan: Scan) -> float | None:
-    """Return the shortest valid range in m, inf if no beam hits; None if all ranges are invalid or too short."""
+    """Return the shortest valid range in m (inf without hits); None if all are invalid or too short."""
     nearest = float(np.fmin.reduce(scan.ranges, initial=math.inf))
     if nearest >= scan.range_min and nearest < math.inf:
         return nearest

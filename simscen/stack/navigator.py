@@ -4,8 +4,8 @@ After a planning failure, the global costmap is cleared and planning is retried 
 costmap is cleared and control is retried once. If the retry fails too, the next recovery behavior runs. Then planning
 and control can each be retried again. After `number_of_retries` behaviors, the goal fails with the last error code.
 
-A planner error that is not in `planner_codes` fails the goal at once. A goal in or too close to a mapped wall fails
-after the first retry. In both cases, no recovery can help.
+The goal fails at once after a planner error that is not in `planner_codes`, and after the first retry if the robot does
+not fit there on the map.
 """
 
 from typing import NamedTuple, Protocol

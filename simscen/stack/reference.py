@@ -85,7 +85,7 @@ class ReferenceStack:
         self._task.start(goals)
 
     def preempt(self, tick: int, goal: Goal) -> None:
-        """Replace the current goal, and the rest of its action, by this goal."""
+        """Replace the current goal and the rest of its action."""
         self._events += self._task.preempt(tick, goal)
         self._navigator.stop()
 

@@ -95,7 +95,7 @@ class Task:
         return (*dropped, *self._end_goal(tick, TaskResult.FAILED))
 
     def cancel(self, tick: int) -> Events:
-        """Cancel the current goal, or the wait at a goal, and all later goals. Does nothing without either."""
+        """Cancel the current goal or wait, and all later goals. Without either, do nothing."""
         if self.goal is None and self._wait_until is None:
             return ()
         dropped = () if self.goal is None else self._end_action(tick, EventKind.GOAL_CANCELED)

@@ -90,7 +90,7 @@ class PathTracker:
     def ahead(self, length: float) -> tuple[Array, Array]:
         """Return the next points (n, 3) of the segment, and the path length (n,) in m from the first one to each.
 
-        They end with the first point beyond `length` m. At the end of the path, the point before the last is included.
+        They end with the first point beyond `length` m. At the end of the segment, the point before it is included.
         """
         end = bisect_right(self._along, self._along[self.index] + length)
         end = min(end + 1, self._segment_ends[0] + 1)
@@ -104,7 +104,7 @@ class PathTracker:
     def samples_ahead(self, spacing: float, reach: float) -> Iterator[tuple[float, complex, float]]:
         """Yield (path length in m, x + iy, curvature in 1/m) of points of the segment, about `spacing` m apart.
 
-        The first point is about `spacing` m ahead, the last one about `reach` m at most.
+        They begin about `spacing` m ahead, and end about `reach` m ahead.
         """
         along, start = self._along, self._along[self.index]
         length = spacing

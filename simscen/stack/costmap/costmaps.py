@@ -79,7 +79,7 @@ class Costmaps:
     def clear(self) -> None:
         """Clear both costmaps (Nav2's ClearEntireCostmap).
 
-        Obstacles in the newest readings remain, and nearby obstacles outside the field of view of all lidars.
+        Obstacles in the newest readings remain, and nearby ones outside the view of all lidars.
         """
         self.global_costmap.clear()
         self.clear_local()
@@ -114,8 +114,8 @@ class Costmaps:
 class _Update(NamedTuple):
     """Update of a costmap with one reading.
 
-    `base` is the pose of the robot at the time of the reading, in the frame of the costmap. `frames` are its poses when
-    the update started.
+    `base` is the pose of the robot at the time of the reading, in the frame of the costmap. `frames` are those at the
+    start of the update.
     """
 
     base: Pose2

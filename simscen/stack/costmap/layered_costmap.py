@@ -190,7 +190,7 @@ class LayeredCostmap:
         return int(np.count_nonzero(self._static_squared == 0))
 
     def fits_static(self, pose: Pose2, tolerance: float) -> bool:
-        """Return whether the pose is not in a mapped wall, and the inscribed circle fits within `tolerance` m of it."""
+        """Return whether the inscribed circle fits on the map within `tolerance` m of a pose that is not in a wall."""
         center = self._frame.cell(pose.x, pose.y)
         if self._static_squared[center] == 0:
             return False

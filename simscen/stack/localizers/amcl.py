@@ -60,7 +60,7 @@ class AmclLocalizer:
         self.reset(estimate)
 
     def reset(self, estimate: Estimate) -> None:
-        """Restart with particles around the pose of the estimate, or over all free space if this pose is None."""
+        """Restart at an estimate, as in `ParticleFilter.reset`."""
         self._odometry, self._has_odometry = OdometryHistory(self._tick_rate), False
         self._filter.reset(estimate)
         self._initial_estimate = estimate

@@ -28,9 +28,9 @@ SAMPLE_SPACING_RATIO = 0.4
 class TraversalCosts:
     """Traversal costs per meter on a costmap, `rates` (height, width): 1 in free space, inf in blocked cells.
 
-    Costs are 1 + `multiplier` · cost / 252, as in nav2_smac_planner, times NO_ROTATION_COST_FACTOR where the robot
-    cannot turn in place. A cell is blocked if the inscribed circle of the robot does not fit there, or if the cell is
-    unknown and `allow_unknown` is False.
+    Costs are 1 + `multiplier` · cost / 252, as in nav2_smac_planner, and higher where the robot cannot turn in place.
+    A cell is blocked if the inscribed circle of the robot does not fit there, or if it is unknown and `allow_unknown`
+    is False.
     """
 
     def __init__(self, costmap: CostmapView, robot: RobotModel, multiplier: float, allow_unknown: bool) -> None:

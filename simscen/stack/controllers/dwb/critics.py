@@ -29,7 +29,7 @@ BATCH_TRAJECTORIES = 50
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Scores of n trajectories: `raw` scores (n,) and `scale` by critic. `legal` (n,): which are not rejected."""
+    """Scores of n trajectories: `raw` scores (n,) and `scale` by critic. `legal` (n,) is False for rejected ones."""
 
     raw: dict[str, Array]
     scale: dict[str, float]
@@ -49,8 +49,8 @@ def score_trajectories(
 ) -> Scores:
     """Return the scores of trajectories with these velocities (n, 3) and final poses `ends` (n, 3).
 
-    `pose` is that of the robot. `plan` (m, 2) is not empty. A trajectory is rejected if its end or, for the alignment
-    critics, the point ahead of its end is outside the costmap.
+    `pose` is that of the robot. `plan` (m, 2) is not empty. A trajectory is rejected if its end, or the point ahead
+    of it for the alignment critics, is outside the costmap.
     """
     forward_distance = spec.forward_point_distance
     forward = ends[:, :2] + forward_distance * np.column_stack((np.cos(ends[:, 2]), np.sin(ends[:, 2])))

@@ -30,7 +30,7 @@ class KinematicParameters(VelocityLimits):
     min_speed_theta: float
 
     def scaled(self, ratio: float) -> "KinematicParameters":
-        """Return limits with `low`, `high`, and `max_speed_xy` multiplied by `ratio`, which counts as at most 1."""
+        """Return limits with `low`, `high`, and `max_speed_xy` multiplied by `ratio`, at most by 1."""
         return replace(super().scaled(ratio), max_speed_xy=self.max_speed_xy * min(ratio, 1.0))
 
     def valid(self, velocities: Array) -> Array:
@@ -80,7 +80,7 @@ def velocity_samples(
 ) -> list[float]:
     """Return velocities of one axis that can be reached within `seconds`: `count` (at least 2) at equal distances.
 
-    0 is added if it lies between two of them. If the range is narrower than SAME_VELOCITY_M_S, only one is returned.
+    0 is added if it lies between two of them.
     """
     now = min(max(now, low), high)
     highest = project_velocity(now, acceleration, deceleration, seconds, high)

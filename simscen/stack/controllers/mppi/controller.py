@@ -180,13 +180,13 @@ class MppiController(PathFollower):
 
     @property
     def local_plan(self) -> Path | None:
-        """Trajectory of the optimized control sequence; None before the first one and while turning at the goal."""
+        """Trajectory of the optimized control sequence; None before the first one and at the goal."""
         return None if self._optimal is None else Path(self._poses(self._optimal))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
         """Return the velocity command, slowed down if a collision is near.
 
-        Raises NO_VALID_CONTROL if all samples, or their average, collide, or if the slowed-down command is too slow.
+        Raises NO_VALID_CONTROL if all samples or their average collide, or if the slowed-down command is too slow.
         """
         tracker, self._pose = self._locate(pose), pose
         if self._goal_rotation.is_position_reached(pose, twist, goal, tracker.remaining()):

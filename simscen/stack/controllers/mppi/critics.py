@@ -1,7 +1,7 @@
 """Critics of MPPI, which compute costs of rollouts (nav2_mppi_controller), and the manager that adds up the costs.
 
 A critic is a function of its parameters and the critic data. It returns the cost of each rollout (n,): the value that
-its docstring describes, times `cost_weight` (ObstaclesCritic has two other weights).
+its docstring describes, times its weight.
 """
 
 from typing import get_args
@@ -100,8 +100,7 @@ def constraint_critic(spec: model.MppiConstraintCritic, data: CriticData) -> Flo
 def cost_critic(spec: model.MppiCostCritic, data: CriticData) -> tuple[Floats, Mask]:
     """Return the mean costmap cost along each rollout, relative to MAX_COST, and which rollouts collide.
 
-    `critical_cost` and `collision_cost` replace high costs. Near the goal, lower costs count as 0. Moving obstacles add
-    costs.
+    Near obstacles and in collisions, higher costs apply. Moving obstacles add costs.
     """
     steps = slice(None, None, spec.trajectory_point_step)
     x, y, yaw = data.rollouts.x[steps], data.rollouts.y[steps], data.rollouts.yaw[steps]
