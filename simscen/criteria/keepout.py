@@ -13,7 +13,7 @@ from simscen.core.records.events import EventKind
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import InvalidTrace, at_least, undecided
-from simscen.criteria.timeline import NEVER_SWITCHED, clip_samples, enabled_spans
+from simscen.criteria.timeline import NEVER_ENABLED, clip_samples, enabled_spans
 from simscen.criteria.trace_signals.ground_truth import Flags, truth
 from simscen.spec.base import Spec
 from simscen.spec.places import MaskFile, RegionName
@@ -90,7 +90,7 @@ class Keepout(Spec, Criterion):
         paths = [clip_samples(poses, *span) for span in enabled_spans(trace, "keepout", self.region, self.grace)]
         found = [_smallest_distance(trace, path, case, distances) for path in paths if len(path)]
         if not found:
-            return [undecided(what, NEVER_SWITCHED, limit)]
+            return [undecided(what, NEVER_ENABLED, limit)]
         distance, tick = min(found)
         return [at_least(what, distance, self.distance, "m", at=(trace, tick), context="while it was on")]
 

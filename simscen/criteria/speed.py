@@ -11,7 +11,7 @@ from simscen.core.geometry.polygons import points_in_polygon
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
-from simscen.criteria.timeline import NEVER_SWITCHED, enabled_spans
+from simscen.criteria.timeline import NEVER_ENABLED, enabled_spans
 from simscen.criteria.trace_signals import ground_truth
 from simscen.spec.base import Spec
 from simscen.spec.places import RegionName, SpeedMask
@@ -109,7 +109,7 @@ class Speed(Spec, Criterion):
         if self.while_on:
             spans = enabled_spans(trace, "speed", self.in_, self.grace)
             if not spans:
-                return undecided(what, NEVER_SWITCHED, limit_text)
+                return undecided(what, NEVER_ENABLED, limit_text)
             inside &= np.any([(first <= signal.ticks) & (signal.ticks <= last) for first, last in spans], axis=0)
         if not inside.any():
             because = f"the robot never was in `{self.in_}`{' while it was on' * self.while_on}"

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 _STARTS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED, EventKind.MARK)
 _ENDS = (EventKind.FAULT_ENDED, EventKind.EVENT_ENDED)
-NEVER_SWITCHED = "no event switched the zone on or off: leave `while_on` out to judge the whole run"
-"""Reason of inconclusive findings with `while_on` if no event switched the zone."""
+NEVER_ENABLED = "no event enabled the zone for longer than `grace`: leave `while_on` out to judge the whole run"
+"""Reason of inconclusive findings with `while_on` if there is no interval in which the zone was enabled."""
 
 
 @dataclass(frozen=True)

@@ -252,7 +252,7 @@ def _is_robot_topic(topic: Dict[str, Any]) -> bool:
     name: str = topic["topic"]
     if name in MASK_TOPICS.values():  # masks without zones; the adapter publishes those with zones under these names
         return False
-    return not name.startswith(("/simscen", "/ground_truth")) and not topic.get("exact", False) and name != "/clock"
+    return not name.startswith(("/simscen", "/ground_truth")) and not name.endswith("/exact") and name != "/clock"
 
 
 def _terminate(*_: Any) -> None:

@@ -86,7 +86,9 @@ class PoseSpec(Spec):
         return Pose2(self.x, self.y, self.yaw)
 
 
-ReferenceKind = Literal["place", "region", "object", "movable", "mover", "door", "goal", "event", "disturbance", "mask"]
+ReferenceKind = Literal[
+    "place", "region", "object", "movable", "mover", "door", "goal", "event", "disturbance", "mask", "verdict"
+]
 """Kind of thing to which a name refers."""
 
 

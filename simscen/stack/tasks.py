@@ -95,8 +95,8 @@ class Task:
         return (*dropped, *self._end_goal(tick, TaskResult.FAILED))
 
     def cancel(self, tick: int) -> Events:
-        """Cancel the current goal or wait, and all later goals. Without either, do nothing."""
-        if self.goal is None and self._wait_until is None:
+        """Cancel the current goal or wait, and all later goals. Without any of them, do nothing."""
+        if self.goal is None and self._wait_until is None and not self._waiting:
             return ()
         dropped = () if self.goal is None else self._end_action(tick, EventKind.GOAL_CANCELED)
         self._waiting, self._wait_until = [], None

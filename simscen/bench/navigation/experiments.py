@@ -170,7 +170,7 @@ def write_localization_experiments(
         return Experiment(f"localization, {name}", drives, folder, (worlds,), measures_localization=is_measured)
 
     def drive(stem: str, text: str, seeds: Sequence[int]) -> Drive:
-        return Drive(write_text(folder / f"localization/{stem}.scenario.yaml", text), seeds)
+        return Drive(write_text(folder / f"localization/{stem}.scenario.yaml", text), seeds, world="house")
 
     names = LOCALIZATION_EXPERIMENTS
     directions = {seed: float(Streams(seed).generator("direction").uniform(-np.pi, np.pi)) for seed in lost_seeds}

@@ -12,6 +12,7 @@ from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, backend_of, workers_and_cluster
 from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.shrinking import (
+    BudgetSpent,
     CandidateRuns,
     Failure,
     Shrinker,
@@ -109,6 +110,9 @@ def command(
             shrinker, before = _shrink(candidates, criterion, keep, keep_world)
     except Stopped as stopped:
         sys.exit(stopped.exit)
+    except BudgetSpent as error:
+        count = "1 run is" if runs == 1 else f"{runs} runs are"
+        raise UsageError(f"{count} not enough to reproduce the failure; increase --runs") from error
     comment = _comment(chosen, shrinker, first_seed)
     text = changed_text(scenario.text, scenario.path, shrinker.tree.plain, comment)
     save(target, lambda file: write_atomically(file, text.encode()))

@@ -264,20 +264,19 @@ def _translate_velocity_smoother(node: str, parameters: Parameters, _: KnownPara
 
 
 def _translate_collision_monitor(node: str, parameters: Parameters, _: KnownParameters) -> Iterator[Translation]:
-    """Translate the first enabled `approach` polygon. Other polygons get a note, except disabled ones of this type."""
+    """Translate the first enabled `approach` polygon. Other enabled polygons get a note."""
     if "source_timeout" in parameters:
         yield Translation(node, "source_timeout", ("collision_monitor", "source_timeout"), parameters["source_timeout"])
     on = parameters.get("enabled", True)
     actions = {polygon: parameters.get(f"{polygon}.action_type") for polygon in strings(parameters.get("polygons"))}
-    approaching = {
-        polygon: parameters.get(f"{polygon}.enabled", True) for polygon in actions if actions[polygon] == "approach"
-    }
+    enabled = {polygon: parameters.get(f"{polygon}.enabled", True) for polygon in actions}
+    approaching = {polygon: enabled[polygon] for polygon in actions if actions[polygon] == "approach"}
     used = max(approaching, key=lambda polygon: bool(approaching[polygon]), default="")  # the first enabled one, if any
     for polygon, action in actions.items():
         if polygon == used:
             yield from (Translation(node, f"{polygon}.{setting}", (), None) for setting in ("action_type", "enabled"))
             yield from _translate_approach(node, parameters, polygon)
-        elif approaching.get(polygon, True):
+        elif enabled[polygon]:
             why = f"action_type {action} of {polygon} is not supported"
             if polygon in approaching:
                 why = f"only the first polygon that approaches is used: {used}, not {polygon}"

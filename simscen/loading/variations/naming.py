@@ -24,9 +24,7 @@ def name_error(name: str) -> str | None:
     return f"{quoted(name)} is not a valid name of a variation"
 
 
-NAME_HINT = (
-    f"up to {MAX_NAME_CHARS} letters, digits, `_`, `.`, `,`, `=`, `+`, `-` and `%`, starting with a letter or digit"
-)
+NAME_HINT = f"up to {MAX_NAME_CHARS} letters, digits, and `_.,=+-%`, starting with a letter, a digit, or `_`"
 """Hint that describes valid names of variations."""
 
 

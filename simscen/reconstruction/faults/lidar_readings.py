@@ -107,8 +107,6 @@ def missing_beam_faults(compared: ComparedScans, end: float) -> Iterator[FoundFa
                 blind[first : last + 1] = True
                 begin, stop = sector_limits_text(compared.scans.angles, first, last)
                 values = {"from": f"{begin} deg", "to": f"{stop} deg"}
-                if last >= len(blind):  # across the seam of a full circle
-                    continue
                 text = f"the beams from {begin} to {stop} deg return nothing"
                 yield lidar_fault_in_window("sector", values, window, compared, end, text)
         others = chosen[:, ~blind]

@@ -73,7 +73,7 @@ def signal_limits(verdicts: tuple[Verdict, ...], robot: str) -> list[dict[str, A
     """Return the limits of signals in the findings about `robot` ("" for a single robot), with verdict and status."""
     limits = []
     for verdict in verdicts:
-        owner, _, _ = verdict.id.rpartition("/")
+        owner = verdict.id.partition("/")[0] if "/" in verdict.id else ""
         for finding in verdict.findings:
             if (owner == robot or not robot) and (limit := _limit(verdict, finding)) is not None:
                 limits.append({**limit, "verdict": one_line(verdict.id), "status": finding.status.value})

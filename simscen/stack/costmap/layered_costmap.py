@@ -190,8 +190,13 @@ class LayeredCostmap:
         return int(np.count_nonzero(self._static_squared == 0))
 
     def fits_static(self, pose: Pose2, tolerance: float) -> bool:
-        """Return whether the inscribed circle fits on the map within `tolerance` m of a pose that is not in a wall."""
+        """Return whether the inscribed circle fits on the map within `tolerance` m of a pose that is not in a wall.
+
+        Return True for a pose outside the costmap, where walls are unknown.
+        """
         center = self._frame.cell(pose.x, pose.y)
+        if not all(0 <= index < size for index, size in zip(center, self._frame.shape, strict=True)):
+            return True
         if self._static_squared[center] == 0:
             return False
         window = self._frame.window(center, center, math.ceil(tolerance / self._frame.resolution))

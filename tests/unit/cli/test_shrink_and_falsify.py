@@ -95,6 +95,7 @@ def test_a_run_in_an_output_folder_is_shrunk_with_its_variation(tmp_path: Path) 
     [
         (["a.scenario.yaml", "--criterion", "collisions"], "the run did not fail in collisions, but in clearance"),
         (["good.scenario.yaml"], "the run did not fail: passed"),
+        (["a.scenario.yaml", "--runs", "1"], "1 run is not enough to reproduce the failure; increase --runs"),
     ],
 )
 def test_unshrinkable_run_is_an_error(tmp_path: Path, options: list[str], message: str) -> None:

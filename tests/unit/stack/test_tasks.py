@@ -127,6 +127,19 @@ def test_a_wait_ends_when_the_task_is_canceled_or_another_goal_comes():
     assert preempted.accept_next(4) is D
 
 
+def test_cancel_ends_a_task_whose_next_goal_is_not_accepted_yet():
+    begun, journal = task(C, D)
+    begun.cancel(1)
+    assert told(journal) == [(1, "navigation.ended", "CANCELED")]
+    assert begun.accept_next(1) is None
+    preempted, journal = task(C)
+    preempted.accept_next(1)
+    preempted.preempt(2, D)
+    preempted.cancel(2)
+    assert told(journal)[-1] == (2, "navigation.ended", "CANCELED")
+    assert preempted.accept_next(2) is None
+
+
 @pytest.mark.parametrize(
     ("mode", "stop", "code"),
     [

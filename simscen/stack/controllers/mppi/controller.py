@@ -153,6 +153,7 @@ class MppiController(PathFollower):
         self._collision_checker = CollisionChecker(setting.footprint, spec.min_slowed_speed)
         reach = self._full_speed * spec.time_steps * spec.model_dt
         self._plan_length = max(spec.prune_distance, reach + PLAN_MARGIN_M)
+        self._pose, self._optimal_from = Pose2(0.0, 0.0), Pose2(0.0, 0.0)
         self._reset()
 
     def _reset(self) -> None:
@@ -162,7 +163,6 @@ class MppiController(PathFollower):
         self._sent = np.zeros((axes, max(PAST_COMMANDS, *self._delay_steps)), np.float32)
         self._draw_noise()
         self._optimal: Rollouts | None = None
-        self._pose, self._optimal_from = Pose2(0.0, 0.0), Pose2(0.0, 0.0)
 
     def _draw_noise(self) -> None:
         """Draw the noise (axes, steps, samples)."""

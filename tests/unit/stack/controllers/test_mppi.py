@@ -25,7 +25,7 @@ from simscen.stack.controllers.path_handler import UpcomingPath
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import Footprint
 from simscen.stack.kinematics import VelocityLimits, poses_along
-from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
+from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.testing.flatland import TICK_RATE_HZ, Flatland, box_robot, round_robot, setting
 
 PERIOD = 0.05
@@ -60,6 +60,23 @@ def test_mppi_reaches_its_desired_speed_on_a_free_straight(speed: float) -> None
     commands = driven(round_robot(speed=2.5), 6.0 * speed + 4.0, 3.0, vx_max=speed)
     assert max(each.vx for each in commands) <= speed + 1e-6
     assert min(each.vx for each in commands[-20:]) > 0.9 * speed
+
+
+def test_each_attempt_uses_the_pose_of_the_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    controller = MppiController(
+        model.Mppi(type="mppi", iteration_count=1, retry_attempt_limit=1), setting(round_robot())
+    )
+    controller.set_path(Path(straight(4.0)))
+    poses = []
+
+    def collide(*_: object) -> bool:
+        poses.append(controller._pose)
+        return False
+
+    monkeypatch.setattr(controller, "_iterate", collide)
+    with pytest.raises(NavigationFailure):
+        controller.command(Pose2(1.0, 0.2), Twist(), view_of(), Goal("far", Pose2(4.0, 0.0)))
+    assert poses == [Pose2(1.0, 0.2)] * 2
 
 
 def test_mppi_reaches_its_speed_with_longer_time_steps() -> None:

@@ -276,6 +276,14 @@ def test_cells_under_the_robot_are_free() -> None:
     assert at(map_, 2.2, 3.0)[0] != 254
 
 
+def test_pose_fits_on_the_map_unless_it_is_in_a_wall() -> None:
+    map_ = costmap(Flatland([(3.0, 2.0, 5.0, 4.0)]).room(8, 6))
+    assert map_.fits_static(Pose2(1.5, 3.0), 0.25)
+    assert not map_.fits_static(Pose2(4.0, 3.0), 0.25)
+    assert map_.fits_static(Pose2(50.0, 3.0), 0.25)  # outside the costmap
+    assert map_.fits_static(Pose2(1.5, -50.0), 0.25)
+
+
 def test_revision_increases_with_each_change() -> None:
     world = Flatland().room(8, 6)
     map_ = costmap(world)
