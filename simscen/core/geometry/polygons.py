@@ -230,8 +230,15 @@ def _rotated_to(piece: Piece, corner: Corner) -> Piece:
 
 
 def _is_convex(corners: Sequence[Corner]) -> bool:
-    """Return whether a valid counterclockwise polygon is convex."""
-    return all(signed_double_area(*_triangle_at(corners, k)) >= 0 for k in range(len(corners)))
+    """Return whether a counterclockwise polygon is convex. A pentagram is not, because it winds around twice."""
+    turns = 0.0
+    for before, corner, after in (_triangle_at(corners, k) for k in range(len(corners))):
+        double_area = signed_double_area(before, corner, after)
+        if double_area < 0:
+            return False
+        step, next_step = (corner[0] - before[0], corner[1] - before[1]), (after[0] - corner[0], after[1] - corner[1])
+        turns += math.atan2(double_area, step[0] * next_step[0] + step[1] * next_step[1]) / (2 * math.pi)
+    return turns < 1.5
 
 
 def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) -> Array:

@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 import shapely
@@ -47,6 +49,12 @@ def test_the_pieces_are_convex_counterclockwise_and_cover_the_ring_exactly_once(
     assert all(piece.convex_hull.area == pytest.approx(piece.area) for piece in pieces)
     assert sum(piece.area for piece in pieces) == pytest.approx(shapely.Polygon(ring).area)
     assert shapely.union_all(pieces).symmetric_difference(shapely.Polygon(ring)).area == pytest.approx(0, abs=1e-9)
+
+
+def test_pentagram_is_not_convex():
+    corners = [(math.cos(0.8 * math.pi * k), math.sin(0.8 * math.pi * k)) for k in range(5)]
+    with pytest.raises(ValueError, match="crosses itself"):
+        convex_pieces(corners)
 
 
 def test_convex_ring_is_a_single_piece():
