@@ -74,8 +74,8 @@ class Replans(CountBounds, Criterion):
     reason: ReplanReason | None = None
     """Count only plans that were made for this reason: `blocked` (the old plan was blocked), `missed` (the robot had
     left the old plan), `tight` (an obstacle had come too near to the old plan), `better` (obstacles had gone away),
-    `window` (the local window of a robot without a map had moved), `recovery` (after a recovery), or `rate` (periodic
-    replanning)."""
+    `window` (the local window of a robot without a map had moved), `recovery` (after a recovery), `rate` (periodic
+    replanning), or `moving` (a moving obstacle would be on the old plan, with the advanced stack)."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:

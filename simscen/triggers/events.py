@@ -55,7 +55,8 @@ class Replan(Spec, Condition):
 
     def holds(self, now: Situation) -> bool:
         """Return whether the log contains `count` plans that were not made for a new goal."""
-        return sum(e.kind == EventKind.PLAN_MADE and e.data.get("reason") != "goal" for e in now.events) >= self.count
+        plans = (event for event in now.events if event.kind == EventKind.PLAN_MADE)
+        return sum(plan.data.get("reason", "goal") != "goal" for plan in plans) >= self.count
 
 
 class RecoveryStatus(Spec, Condition):

@@ -15,7 +15,7 @@ from simscen.core.geometry import Array, Pose2
 RecoveryBehavior = Literal["clear_costmap", "spin", "wait", "backup", "retrace"]
 """Recovery behavior with Nav2's name; except `retrace`, which drives back along the robot's own path."""
 
-ReplanReason = Literal["blocked", "missed", "tight", "better", "window", "recovery", "rate"]
+ReplanReason = Literal["blocked", "missed", "tight", "better", "window", "recovery", "rate", "moving"]
 """Reason for a new plan to the same goal.
 
 - `blocked`, `tight`: An obstacle is on the old plan, or too close to it.
@@ -23,6 +23,7 @@ ReplanReason = Literal["blocked", "missed", "tight", "better", "window", "recove
 - `better`: A better plan exists.
 - `window`: The rolling window of the global costmap has moved.
 - `recovery`, `rate`: A recovery has ended, or the planning period has passed.
+- `moving`: A predicted obstacle will be on the old plan (advanced stack).
 """
 
 
