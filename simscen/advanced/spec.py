@@ -38,12 +38,12 @@ class ScanMatchingAmcl(AmclParameters):
     """A scan is ignored if at most this share of its beams fits the map. This applies only while the particles are one
     narrow cluster. The pose is then probably right, and the surroundings have changed."""
     map_trust_full: Probability = 0.8
-    """A scan has its full weight if at least this share of its beams fits the map. 0 = full weight of all scans, as in
-    Nav2."""
+    """A scan has its full weight if at least this share of its beams on the mapped area fits, and 80 % of its beams end
+    there. 0 = full weight of all scans, as in Nav2."""
     settling_distance: NonNegativeLength = 4.0
-    """Distance from a given initial pose over which the weight of scans grows from a fifth to its full value. Early
-    scans count less because one room alone fits many poses. A turn of 2 rad counts as 1 m. 0 = full weight at once, as
-    in Nav2."""
+    """The weight of scans after a given initial pose starts at a fifth, and grows by 1 / `settling_distance` per meter
+    up to its full value. Over this distance, the pose is also searched near the initial one. Early scans count less
+    because one room alone fits many poses. A turn of 2 rad counts as 1 m. 0 = full weight at once, as in Nav2."""
     relocalization: Literal["scan_matching", "random"] = "scan_matching"
     """How a lost robot is found. `scan_matching`: by matching the scans of the last meters with the whole map.
     `random`: by random particles, which `recovery_alpha_*` adds as in Nav2. `scan_matching` ignores

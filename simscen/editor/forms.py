@@ -99,8 +99,8 @@ def _merge_branch(schema: Schema, branch: Schema, without: tuple[str, ...]) -> S
 def _applicable_branches(root: Schema, schema: Schema, data: Any) -> Iterator[Schema]:
     """Yield the branches of allOf, oneOf, and anyOf that apply to the data.
 
-    First, yield the branches whose condition is true, then the references to schemas with the `type` of the data, and
-    finally the first reference, which is the default.
+    The best branch comes first: `then` of each true condition, references to schemas with the `type` of the data, and
+    the first reference as a fallback.
     """
     unions = [one for key in ("allOf", "oneOf", "anyOf") for one in schema.get(key, []) if isinstance(one, dict)]
     conditional = [union for union in unions if "if" in union and "then" in union]

@@ -56,7 +56,10 @@ class OpenFiles:
             return f"world-{self._worlds.setdefault(world, len(self._worlds) + 1)}/"
 
     def _session(self, number: int) -> EditorSession | None:
-        """Return the session of world file `number`, and start it if necessary; None if the file cannot be read."""
+        """Return the session of world file `number`, and start it if necessary.
+
+        Return None for an unknown number, or if the file cannot be read.
+        """
         with self._lock:
             if number not in self._sessions:
                 path = next((path for path, known in self._worlds.items() if known == number), None)

@@ -100,7 +100,7 @@ class _BiasedReadings(FaultEffect):
 
 
 class Scale(Spec, Fault):
-    """All values of a sensor are too large or too small by a factor.
+    """All values of a sensor (of a camera: the depths) are too large or too small by a factor.
 
     Possible causes are a lidar clock that runs fast or slow, low tire pressure (odometry), and a wrong full-scale
     setting of an IMU. The factor also applies to gravity in the acceleration of an IMU.
@@ -146,8 +146,8 @@ class _ScaledReadings(FaultEffect):
 class Drift(Spec, Fault):
     """An error that starts at zero and grows with time: electronics that warm up, a gyroscope bias that drifts.
 
-    Odometry reports motion while the robot stands still. On the localizer, the estimated pose moves along the heading
-    at the start of the fault, as with a scan matcher in a corridor without features.
+    Odometry reports motion while the robot stands still. On the localizer, the estimated pose drifts in the direction
+    of its heading when the fault started, as with a scan matcher in a corridor without features.
 
     Example: `{sensor: imu, drift: {gyro: 0.01 rad/s^2}, when: {time: 2 s}, for: 10 s}`
     """

@@ -28,10 +28,10 @@ def judge(
 ) -> tuple[Verdict, ...]:
     """Return one verdict for each criterion, in order.
 
-    `coverage` states which evidence the log contains, and for which part of the run. A verdict is inconclusive
-    if the log lacks required evidence, or if the criterion raises MissingEvidence. Any other exception gives the
-    verdict error. A pass becomes inconclusive if the log is truncated or empty, or if the evidence covers only a part
-    of the run.
+    `coverage` states which evidence the log contains, and for which part of the run. A verdict is inconclusive if the
+    log lacks required evidence, or if the criterion raises MissingEvidence. Any other exception, or an invalid finding,
+    gives the verdict error. A pass becomes inconclusive if the log is truncated or empty, or if the evidence covers
+    only a part of the run.
     """
     return tuple(
         Verdict(entry.kind, name, entry.severity, _findings(entry, trace, case, coverage))

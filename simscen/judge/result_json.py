@@ -111,7 +111,7 @@ def _disturbance_data(one: DisturbanceOutcome, tick_rate: int) -> dict[str, Any]
 
 
 def _read_disturbance(data: dict[str, Any]) -> DisturbanceOutcome:
-    ordered = Disturbance(data["name"], data["kind"], data["when"], data["required"], data["line"])
+    ordered = Disturbance(data["name"], data["kind"], data["when"], data["required"], data["line"], data.get("after"))
     return DisturbanceOutcome(ordered, tuple(data["fired"]), data["happened"], data["effect"], data["tick"])
 
 

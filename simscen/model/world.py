@@ -86,7 +86,8 @@ class Door(Spec):
     points: Annotated[list[PlaceOrPoint], Field(min_length=2, max_length=2)]
     """The two door posts as [x, y] or names of places. A door swings about the first post, or slides past it."""
     motion: Literal["swing", "slide"] = "swing"
-    """`swing`: the panel turns by 90° counterclockwise about the hinge. `slide`: the panel moves along its own line."""
+    """`swing`: the panel turns by 90° counterclockwise about the hinge. `slide`: the panel moves along its own line,
+    past the first post."""
     travel: PositiveLength | None = None
     """Distance that a sliding door moves; default: its width."""
     closed: bool = False

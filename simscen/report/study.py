@@ -47,7 +47,7 @@ def pass_rate_text(study: Study) -> str:
 
 
 def pass_rate_notes(study: Study) -> list[str]:
-    """Return notes about the choice of the varied values, the covered pairs of values, and the accepted draws."""
+    """Return notes: whether values were random, the share of pairs that occurred, and the share of accepted draws."""
     texts = []
     if not study.is_random:
         texts.append(
@@ -81,7 +81,7 @@ def claim_text(claim: ClaimResult) -> str:
 
 
 def undecided_hint(claim: ClaimResult) -> str:
-    """Return the number of runs that an undecided claim still needs, or the advice to add runs."""
+    """Return the total number of runs that an undecided claim needs, or the advice to add runs."""
     if claim.runs < claim.max_runs:
         return f"{claim.max_runs} are needed"
     return "more `runs` may decide it"

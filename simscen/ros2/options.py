@@ -36,7 +36,8 @@ class Options(NamedTuple):
     base_frame:  second name of the base frame
     sync:        "lockstep" or "paced"
     factor:      speed relative to real time if `sync` is "paced"
-    rounds:      extra rounds of the node barrier if no command has arrived; 0 = one per node
+    rounds:      extra waits for all nodes (see node_barrier.py) if no command has arrived; 0 = as many as there are
+        nodes
     wait:        maximum wall time to wait for a command
     warm_up:     simulated time before goals are sent
     ready:       maximum wall time until the nodes are ready

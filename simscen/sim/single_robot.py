@@ -26,7 +26,10 @@ class SingleRobotSimulation(Simulation):
         obstacles: TriangleMesh | None = None,
         **physics: Any,
     ) -> None:
-        """Build the world; `physics` are keyword arguments of Simulation."""
+        """Build the world. `obstacles` is the part of `static` that counts for the clearance; None for all of it.
+
+        `physics` are keyword arguments of Simulation.
+        """
         super().__init__(static, bodies, {ROBOT_NAME: RobotPlacement(robot, pose, obstacles)}, triangulate, **physics)
         self.robot = self.robots[ROBOT_NAME]
 

@@ -15,7 +15,8 @@ from simscen.spec.places import PlaceOrPoint, Ring
 from simscen.spec.quantities import Angle, Duration, Length, NonNegativeLength, PositiveLength, PositiveSpeed
 
 CORNER_TURN_S = 0.25
-"""Half of the duration of a turn at a corner; in motions without stops, at most a quarter of the duration of a leg."""
+"""Half of the duration of a turn at a corner. Motions without stops shorten it to a quarter of the duration of a short
+leg."""
 SMOOTH_DURATION_FACTOR = 1.5
 """Duration of a leg with `ease: smooth`, divided by its duration at constant top speed."""
 LOOP_TOLERANCE_M_RAD = 1e-6
@@ -52,10 +53,10 @@ class Motion(Spec):
     keyframes must end at its first keyframe."""
     ease: Literal["linear", "smooth", "spline"] = "linear"
     """Velocity profile. `linear`: constant speed between waypoints or keyframes. `smooth`: a stop at each of them;
-    after the fraction u of its time, a leg is covered by the fraction 3u² - 2u³ (peak speed 1.5 times the mean).
-    `spline`: through keyframes without stopping, along a cubic Hermite curve; at rest at both ends, except in a loop.
-    The velocities at keyframes are Catmull-Rom velocities for uneven times: (next - previous) / (difference of their
-    times)."""
+    after a fraction u of the time for a leg, the object has covered 3u² - 2u³ of its length (peak speed 1.5 times the
+    mean). `spline`: through keyframes without stopping, along a cubic Hermite curve; at rest at both ends, except in a
+    loop. The velocities at keyframes are Catmull-Rom velocities for uneven times: (next - previous) / (difference of
+    their times)."""
     phase: Duration = 0.0
     """Time into the keyframes at which the motion starts, so that several objects can share keyframes."""
 

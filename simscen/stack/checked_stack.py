@@ -19,6 +19,7 @@ class CheckedStack(CheckedPlugin):
     """Calls the stack and checks each new decision."""
 
     may_fail = False
+    """A stack must not raise NavigationFailure."""
 
     def __init__(self, spec: InProcessStack, setting: Setting) -> None:
         super().__init__("stack", spec, setting, Stack)

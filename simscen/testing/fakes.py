@@ -45,7 +45,8 @@ class FakeStage:
     calls: list[Any] = field(default_factory=list)
 
     def last_scan_tick(self, sensor: str | None) -> int | None:
-        """Return the tick of the newest scan of this lidar, or for None of any lidar; None without a scan."""
+        """Return the tick of the newest scan of the lidar `sensor` (of all lidars if None). Without a scan, return
+        None."""
         return max(self.scans.values(), default=None) if sensor is None else self.scans.get(sensor)
 
     @property

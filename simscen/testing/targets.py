@@ -1,4 +1,6 @@
-"""Find the contracts of a component (sets of promises, the rules of its protocol) by its specification or name.
+"""Find the contracts of a component by its specification or name.
+
+A contract is a set of promises: rules that all components of this kind must keep.
 
 A target is a component named on the command line with --simscen-contract.
 """

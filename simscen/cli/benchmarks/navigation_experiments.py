@@ -119,7 +119,7 @@ def _other_names(group: str, scenarios: Path) -> list[str]:
 def _groups_without_names(
     barn_data: Path | None, nav2: Path | None, worlds: Path, scenarios: Path, generated: Path, sizes: Sizes
 ) -> list[ExperimentGroup]:
-    """Return all groups without `other_names`."""
+    """Return all groups, with `other_names` still empty."""
     return [
         ExperimentGroup("BARN", barn_data, lambda: list(_barn(generated, barn_data or Path(), sizes)), BARN_HINT),
         ExperimentGroup(
@@ -169,7 +169,7 @@ def _groups_without_names(
 
 
 def _barn(generated: Path, barn_data: Path, sizes: Sizes) -> Iterator[Experiment]:
-    """Write the BARN challenge at 2 m/s, with default parameters, and with each controller at 0.5 m/s."""
+    """Write the experiments of BARN: the tuned stack at 2 m/s, the default stack, and each controller at 0.5 m/s."""
     seeds = sizes.scenario_seeds(5)
     yield experiments.write_barn_challenge(generated, barn_data, seeds)
     yield experiments.write_barn_challenge(generated, barn_data, seeds, "default parameters", barn.DEFAULT_STACK)

@@ -139,7 +139,7 @@ def _new_file(
 
 
 def _existing_file(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
-    """Return an existing scenario or world file. Raises InvalidInput for other kinds of files."""
+    """Return an existing scenario, study, or world file. Raises InvalidInput for other files."""
     from simscen.editor.document import EditedFile
     from simscen.loading.checks.files import file_kind
     from simscen.loading.files.assets import SDF_SUFFIXES
@@ -153,7 +153,8 @@ def _existing_file(file: Path, root: Path, world_path: tuple[Path, ...]) -> "Edi
 
 
 def _require_inside(edited: "EditedFile", file: Path) -> "EditedFile":
-    """Return `edited`. Raises InvalidInput if `file`, as on the command line, is outside of the root and world path."""
+    """Return `edited`. Raises InvalidInput if `file`, the path as typed by the user, is outside of the root and world
+    path."""
     from simscen.loading.files.paths import PathSandbox
 
     entered = PathSandbox.around(edited.root, edited.world_path).resolve_argument(file)

@@ -65,9 +65,10 @@ class Event:
 class Disturbance:
     """Event or fault that a scenario schedules.
 
-    `when` is the trigger as text from the scenario; "" for a fault that is active from the start. If `required`, the
-    run fails unless the disturbance takes place. `line` is the line in the scenario file; 0 if unknown. `after` is the
-    index of the previous event in a sequence (`then`); None for other disturbances.
+    `when` is the trigger as text from the scenario; "" for a fault that is active from the start, and for a step of
+    `then` that follows at once. If `required`, the run fails unless the disturbance takes place. `line` is the line in
+    the scenario file; 0 if unknown. `after` is the index of the previous event in a sequence (`then`); None for other
+    disturbances.
     """
 
     name: str

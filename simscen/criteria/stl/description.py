@@ -18,7 +18,7 @@ _OPPOSITE: dict[Op, Op] = {">=": "<", ">": "<=", "<=": ">", "<": ">="}
 
 
 def describe(condition: Condition) -> str:
-    """Return a condition as text, e.g. "whenever scan_age > 0.3 s, then (eventually within 1 s speed < 0.01 m/s)"."""
+    """Return a condition as text, e.g. "whenever scan_age > 0.3 s, then eventually within 1 s speed < 0.01 m/s"."""
     if condition.signal is not None:
         return f"{describe_signal(condition)} {_limit(condition)}".rstrip()
     if condition.all is not None:

@@ -171,7 +171,7 @@ def unknown_robots(scenario: WrittenScenario) -> Iterator[CheckProblem]:
 
 @ROBOT_NAMES.check("SC043")
 def missing_robot_names(scenario: WrittenScenario) -> Iterator[CheckProblem]:
-    """Find triggers and actions for one robot that do not name one of several robots."""
+    """In a scenario of several robots, find triggers and actions that concern one robot but do not name it."""
     spec = scenario.spec
     if not spec.robots:
         return
@@ -211,7 +211,7 @@ def _conditions_without_robot(
 
 @ROBOT_NAMES.check("SC030")
 def unknown_expected_verdicts(scenario: WrittenScenario) -> Iterator[CheckProblem]:
-    """Find names under `expected.criteria` of a scenario of several robots that no verdict has."""
+    """In a scenario of several robots, find names under `expected.criteria` that belong to no verdict."""
     spec = scenario.spec
     if not spec.robots:
         return

@@ -64,7 +64,7 @@ def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
     """Return a scenario tree of one robot with the selected stack.
 
     Zones, masks, and goal tolerances of the scenario are kept. A stack file replaces all other parameters. A type or a
-    command replaces them only if the scenario has a stack of another type, and keeps COMMON_STACK_KEYS.
+    command leaves them unchanged if the scenario's stack has this type; otherwise, it keeps only COMMON_STACK_KEYS.
     """
     own = child(tree, "stack")
     if own is not None and not isinstance(own, MappingNode):
@@ -134,7 +134,8 @@ def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: S
 def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Problem]] | list[Problem]:
     """Return the section `stack` of a stack file and warnings about the file; or all problems of the file.
 
-    `path` can also be a Nav2 parameter file. The section contains the parameters in Nav2 files instead of their paths.
+    `path` can also be a Nav2 parameter file. In the section, the path of each Nav2 file is replaced by the parameters
+    in this file.
     """
     file = library.sandbox.resolve_argument(path)
     if isinstance(file, Problem):

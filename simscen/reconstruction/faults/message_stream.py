@@ -140,7 +140,7 @@ def _delay_faults(target: str, times: Array, arrivals: Array, period: float, end
 
 
 def repeated_scans(scans: Scans) -> Mask:
-    """Return a mask (n,) of scans with exactly the ranges of the previous scan."""
+    """Return a mask (n,) of scans that repeat the previous one: beams with a return in both scans have equal ranges."""
     same = np.zeros(len(scans), dtype=bool)
     if len(scans) < 2:
         return same

@@ -1,7 +1,8 @@
 """Encoders of ROS 2 messages of fixed size, and of images. Encoders of other messages are in encode_arrays.py.
 
-For a message of fixed size, the encoder returns a Template. `Template.packer()` returns a function that takes the
-values of the fields of the template, in the order of the docstring, and returns the bytes of the message.
+The encoders return a Template, except `boolean` and `image`, which return the bytes of the message. `Template.packer()`
+returns a function that takes the values of the fields of the template, in the order of the docstring, and returns the
+bytes of the message.
 
 The field `stamp` is seconds and nanoseconds, `pose` is x, y, z and a quaternion x, y, z, w, and `twist` is vx, vy, wz.
 Unknown covariances are zeros.

@@ -28,8 +28,8 @@ _DEFAULT_TOPICS = {
 class SensorPublisher:
     """Publishes readings when the stack receives them. Stamps are the times of measurement.
 
-    The first sensor of a type has the default topic, e.g. /scan. The topics of cameras and other sensors start with the
-    name of the sensor, e.g. /rear/scan.
+    The first sensor of a type has the default topic, e.g. /scan. Further sensors of this type, and all cameras, have
+    their name in front, e.g. /rear/scan.
 
     Args:
         mounts: Poses of sensors on the base, by sensor name.
@@ -200,6 +200,6 @@ def _image_topics(sensor: str) -> list[tuple[Topic, bool]]:
 
 
 def _ros_name(text: str) -> str:
-    """Return a valid ROS name for a sensor, which differs from the namespace ground_truth."""
+    """Return a valid ROS name for a sensor. It is never `ground_truth`, which is a namespace."""
     name = re.sub(r"[^A-Za-z0-9_]", "_", text)
     return f"sensor_{name}" if name[:1].isdigit() or name in ("", "ground_truth") else name

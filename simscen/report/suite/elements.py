@@ -31,7 +31,7 @@ def outcome_symbols(outcomes: Sequence[Outcome | None], label: str) -> str:
     """Return one symbol per outcome in order, with a dot for None (no run). `label` is for screen readers."""
     symbols = "".join(OUTCOME_SYMBOLS[outcome] if outcome else "·" for outcome in outcomes)
     words = ", ".join(outcome.value.replace("-", " ") if outcome else "not run" for outcome in outcomes)
-    return f'<span class="marks" role="img" aria-label="{label}: {words}">{symbols}</span>'
+    return f'<span class="marks" role="img" aria-label="{html_text(label)}: {words}">{symbols}</span>'
 
 
 def link(path: str, folder: str, label: str) -> str:

@@ -1,4 +1,4 @@
-"""Rules that check whether parameters of Nav2's nodes match the topics and frames that simscen publishes.
+"""Rules that check whether parameters of Nav2's nodes match the clock, topics, types, and frames of simscen.
 
 The rules apply to parameter files and to running nodes. https://docs.nav2.org/configuration/ describes the parameters.
 """
@@ -96,14 +96,14 @@ class _Node(NamedTuple):
         self.problems.append(ParameterProblem(self.name, key, f"{key} {message}", is_severe))
 
     def check_base(self, key: str) -> None:
-        """Add a problem unless the parameter is a name of the base frame."""
+        """Add a problem if the parameter is set, but is no name of the base frame."""
         value = self.get(key)
         if value is not None and value not in self.published.base_frames:
             hint = f"--base-frame {value} also gives it that name"
             self.add_problem(key, f"is {value!r}; simscen's base frame is {self.published.base_frames[0]!r}: {hint}")
 
     def check_frame(self, key: str, *frames: str) -> None:
-        """Add a problem unless the parameter is one of these frames."""
+        """Add a problem if the parameter is set to another frame."""
         value = self.get(key)
         if value is not None and value not in frames:
             self.add_problem(key, f"is {value!r}; expected {' or '.join(map(repr, frames))}")

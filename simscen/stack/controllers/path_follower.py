@@ -74,7 +74,8 @@ CAR_PATH_END_M = 0.03
 SETTLING_PERIODS = 2.0
 """Minimum number of control periods for the remaining rotation, so that the heading does not oscillate."""
 BRAKING_FACTOR = 1.6
-"""Factor in the speed from which the robot can stop, sqrt(factor · deceleration · distance): 2 without a reserve."""
+"""The speed before a stop is sqrt(factor · deceleration · distance). 2 is the physical limit; a smaller factor leaves a
+reserve."""
 
 
 class GoalRotation:

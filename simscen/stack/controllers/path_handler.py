@@ -90,7 +90,8 @@ class PathTracker:
     def ahead(self, length: float) -> tuple[Array, Array]:
         """Return the next points (n, 3) of the segment, and the path length (n,) in m from the first one to each.
 
-        They end with the first point beyond `length` m. At the end of the segment, the point before it is included.
+        They end with the first point beyond `length` m, or with the end of the segment. At the end of the segment,
+        these are its last two points.
         """
         end = bisect_right(self._along, self._along[self.index] + length)
         end = min(end + 1, self._segment_ends[0] + 1)
@@ -98,7 +99,7 @@ class PathTracker:
         return self.points[start:end], self.along[start:end] - self.along[start]
 
     def sampled_points(self, every: int) -> list[complex]:
-        """Return every n-th point ahead of the robot as x + iy."""
+        """Return every n-th point from the position to the end of the path, also beyond cusps, as x + iy."""
         return self._complex_points[self.index :: every]
 
     def samples_ahead(self, spacing: float, reach: float) -> Iterator[tuple[float, complex, float]]:

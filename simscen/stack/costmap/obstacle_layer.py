@@ -212,7 +212,7 @@ class ObstacleLayer:
         return len(set(self._marked.tolist())) if self._heights is None else int(np.count_nonzero(self.marked()))
 
     def on_scan(self, base: Pose2, scan: Scan, walls: Squared | None) -> CellIndices:
-        """Clear the cells that beams cross, then mark the hits of the beams. Return the changed cells.
+        """Clear marks that beams cross or that are under the robot, then mark the hits. Return the changed cells.
 
         `walls` (rows, columns) are the squared distances to mapped walls; None without walls.
         """
@@ -240,7 +240,7 @@ class ObstacleLayer:
         return remaining
 
     def _clear(self, base: Pose2, scan: Scan, hits: CellIndices) -> CellIndices:
-        """Clear the marked cells that beams cross, except for `hits`. Return the cleared cells."""
+        """Clear the marked cells that beams cross, except for `hits`, and those under the robot. Return them."""
         marks, frame, scanned = self._marked, self._frame, self._scanned.reshape(-1)
         points = frame.points(marks)
         crossed, nearest = crossed_cells(points, frame.resolution, scan, base, self._spec)
@@ -260,7 +260,8 @@ class ObstacleLayer:
         return cleared
 
     def on_image(self, base: Pose2, image: Image, walls: Squared) -> Cells:
-        """Clear the cells that the camera sees through, then mark its obstacles. Return the changed cells (n, 2)."""
+        """Clear cells that the camera sees through or that are under the robot, then mark its obstacles elsewhere.
+        Return the changed cells (n, 2)."""
         if self._heights is None:
             self._heights = np.full(self._frame.shape, np.nan, dtype=np.float32)
             self._ground = np.zeros(self._frame.shape, dtype=bool)

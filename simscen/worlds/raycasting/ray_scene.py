@@ -25,12 +25,12 @@ from simscen.worlds.raycasting.mesh_scene import (
 PlacedMesh = tuple[TriangleMesh, Pose3]
 """A mesh in the frame of a body, and the pose of that frame in the world."""
 HeightRange = tuple[float, float]
-"""Minimum and maximum height in m. Rays between these heights need only triangles between them."""
+"""Minimum and maximum height in m of rays. Triangles outside this range cannot be hit and are left out."""
 
 MAX_GROUP_TRIANGLES = 20_000
 """Maximum number of triangles of a group of several bodies. Building the scene takes about 10 ms."""
-MAX_GROUPS = 16
-"""Number of groups at which all bodies are grouped anew when another body comes to rest."""
+REGROUPING_THRESHOLD = 16
+"""If there are this many groups when a body comes to rest, all bodies are grouped anew."""
 NO_POSES: Mapping[str, Pose3] = MappingProxyType({})
 """Default of `rest_poses`: all bodies are moving."""
 _MAX_RANGE_M = 1e30
@@ -61,7 +61,7 @@ class RestingBodies:
             removed = previous.keys() - unchanged
             self._groups = [part for group in self._groups for part in group.split_without(removed)]
         if len(unchanged) < len(bodies):
-            if len(self._groups) >= MAX_GROUPS:
+            if len(self._groups) >= REGROUPING_THRESHOLD:
                 self._groups, unchanged = [], set()
             new = {name: body for name, body in bodies.items() if name not in unchanged}
             meshes = {name: Mesh(pose.apply(mesh.vertices), mesh.faces) for name, (mesh, pose) in new.items()}
@@ -70,7 +70,7 @@ class RestingBodies:
     def sweep(self, fan: RayFan, pose: Pose3, reach: float, heights: HeightRange) -> None:
         """Shorten the rays of a fan at `pose`. Rays are at most `reach` m long, and between the `heights`.
 
-        The directions of the fan must be set before.
+        The directions and lengths of the fan must be set before.
         """
         for group in self._groups:
             if group.min_distance(pose[:3]) <= reach:

@@ -122,9 +122,9 @@ def test_entries_with_the_same_name_are_distinguished():
 
 
 def test_disturbances_are_unchanged_after_writing_and_reading():
-    result = judged([*event(3), *fault(3)], EVENT, {**FAULT, "when": "", "required": False})
+    result = judged([*event(3), *fault(3)], EVENT, {**FAULT, "when": "", "required": False, "after": 0})
     assert from_json(to_json(result)) == result
-    assert result.disturbances[1].disturbance == Disturbance("lidar.off", "fault", required=False, line=9)
+    assert result.disturbances[1].disturbance == Disturbance("lidar.off", "fault", required=False, line=9, after=0)
 
 
 def test_disturbance_has_no_line_without_lines_of_criteria():

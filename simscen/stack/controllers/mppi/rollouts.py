@@ -96,7 +96,10 @@ def integrate_velocities(velocities: Floats, yaw: float, dt: float) -> Rollouts:
 
 
 def apply_model_delay(velocities: Floats, sent: Floats, steps: tuple[int, ...]) -> None:
-    """Delay velocities in place by a number of `steps` for each axis. Commands already `sent` (axes, m) come first."""
+    """Delay velocities in place: at step k, an axis follows control k - `steps` instead of k - 1.
+
+    The last commands `sent` (axes, m) fill the gap.
+    """
     for axis, earlier, delay in zip(velocities, sent, steps, strict=False):
         if delay:
             axis[delay:] = axis[1 : len(axis) - delay + 1].copy()

@@ -12,7 +12,7 @@ from simscen.core.records.verdict import COMPLETE_COVERAGE, Evidence, LogCoverag
 from simscen.criteria.base import AnyMeasure
 from simscen.criteria.findings import InvalidTrace, MissingEvidence
 from simscen.judge.metrics import compute
-from simscen.judge.metrics.compute import ZONES, MetricValues, add_plugin_metrics, person_metrics
+from simscen.judge.metrics.compute import PERSON_SPACES, MetricValues, add_plugin_metrics, person_metrics
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 TRACE = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]})
@@ -88,9 +88,9 @@ def zones(monkeypatch: pytest.MonkeyPatch, gaps: list[float], trace: Trace = TRA
     return dict(person_metrics(trace, CASE))
 
 
-@pytest.mark.parametrize("zone", ZONES)
+@pytest.mark.parametrize("zone", PERSON_SPACES)
 def test_zone_includes_its_lower_limit_and_excludes_its_upper(monkeypatch: Any, zone: str) -> None:
-    low, high = ZONES[zone]
+    low, high = PERSON_SPACES[zone]
     assert zones(monkeypatch, [low])[f"intrusion_{zone}"] == 1.0
     assert zones(monkeypatch, [high])[f"intrusion_{zone}"] == 0.0
     assert zones(monkeypatch, [math.nextafter(high, 0.0)])[f"intrusion_{zone}"] == 1.0

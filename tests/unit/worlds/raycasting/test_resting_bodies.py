@@ -51,11 +51,13 @@ def pose_sequence():
         yield dict(poses)
 
 
-@pytest.mark.parametrize(("triangles", "groups"), [(ray_scene.MAX_GROUP_TRIANGLES, ray_scene.MAX_GROUPS), (60, 3)])
+@pytest.mark.parametrize(
+    ("triangles", "groups"), [(ray_scene.MAX_GROUP_TRIANGLES, ray_scene.REGROUPING_THRESHOLD), (60, 3)]
+)
 def test_reused_scene_gives_the_ranges_of_a_new_scene(monkeypatch, triangles, groups):
     """A reused scene gives the same ranges as a new scene, or one that had fewer bodies before."""
     monkeypatch.setattr(ray_scene, "MAX_GROUP_TRIANGLES", triangles)
-    monkeypatch.setattr(ray_scene, "MAX_GROUPS", groups)
+    monkeypatch.setattr(ray_scene, "REGROUPING_THRESHOLD", groups)
     reused = RayScene(WALLS)
     for number, poses in enumerate(list(pose_sequence())[::2]):
         fresh = RayScene(WALLS)
