@@ -98,8 +98,8 @@ class Retrace(BehaviorSpec):
     backup_speed: PositiveSpeed = 0.15
     """Speed of driving back."""
     time_allowance: PositiveDuration = 10.0
-    """Time after which the behavior fails with BACKUP_TIMEOUT, at least 1.5 times the duration of driving
-    `retrace_dist` at `backup_speed`."""
+    """Time after which the behavior fails with BACKUP_TIMEOUT. If 1.5 times the duration of driving `retrace_dist` at
+    `backup_speed` is longer, that time applies."""
 
 
 class ClearCostmap(BehaviorSpec):

@@ -57,7 +57,7 @@ _EXAMPLES = {
     "bench suite": "simscen bench suite scenarios/ --most 100",
     "bench compare": "simscen bench compare before.json after.json",
     "bench nav": 'simscen bench nav --only "narrow fields" --fields 16',
-    "bench localization": "simscen bench localization --only amcl --buildings 3",
+    "bench localization": "simscen bench localization --only scan_matching --buildings 3",
 }
 """Example of a command line by the name of the command, such as "world export"."""
 _TYPE_NAMES = {int: "integer", float: "number", str: "text", Path: "path"}

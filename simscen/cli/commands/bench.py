@@ -102,9 +102,10 @@ def suite_command(
 ) -> None:
     """Measure the speed of a suite of scenarios on all cores.
 
-    Runs each scenario once with all steps of `simscen run` except reports. Prints the runs per minute, the wall time of
-    the session, and the memory of the workers. The wall time is also printed as a multiple of a baseline: the time of
-    PyBullet alone on one core for the same steps and scans, measured before and after the session.
+    Runs at most --most scenarios once each, with all steps of `simscen run` except reports. Prints the runs per minute,
+    the wall time of the session, and the memory of the workers. The wall time is also printed as a multiple of a
+    baseline: the time of PyBullet alone on one core for the same steps and scans, measured before and after the
+    session.
 
     Exit code 0: all runs were completed; 3: a run was aborted.
     """
