@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from simscen.core.errors import SimscenError
 from simscen.core.records.trace import Samples
+from simscen.loading.yaml.parser import parse_yaml
 from simscen.model.scenario import ScenarioSpec
 from simscen.reconstruction.drive.reader import DriveOptions
 from simscen.reconstruction.objects.found_object import FoundObject
@@ -102,8 +102,9 @@ def compare(file: Path, out: Path, truth: str | None = None) -> Row:
     errors = [goal.pose.distance(expected[goal.name]) for goal in made.contents.goals if goal.name in expected]
     accepted = {event.name for event in log.trace.events if str(event.kind) == "goal.accepted"}
     row.goals = max(errors, default=0.0) if len(errors) >= len(accepted) else float("inf")
-    scenario = yaml.safe_load(log.header.scenario)
-    spec = ScenarioSpec.model_validate(scenario, by_alias=True, by_name=False)
+    tree, _ = parse_yaml(log.header.scenario, "scenario.yaml")  # not PyYAML, for which the key `off` is a boolean
+    assert tree is not None
+    spec = ScenarioSpec.model_validate(tree.plain, by_alias=True, by_name=False)
     row.ordered = {(fault.sensor, fault.kind) for fault in spec.faults}
     row.found = {(fault.target, fault.kind) for fault in made.estimated.faults}
     if ("map", "shift") in row.ordered or ("map", "outdated") in row.ordered:

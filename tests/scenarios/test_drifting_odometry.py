@@ -1,4 +1,4 @@
-"""Test of narrow fields with odometry drift."""
+"""Test of the advanced stack in narrow fields with odometry drift."""
 
 from pathlib import Path
 
@@ -10,12 +10,12 @@ from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import PreparedScenario, prepare
 from simscen.run.simulate import simulate
 
-SLIPPING = """\
+ADVANCED = """\
 simscen: 1
 extends: {field}
-faults:
-  - {{sensor: odom, slip: {{left: 12 %, right: 6 %}}}}
+stack: {{profile: advanced}}
 """
+SLIP = "faults: [{sensor: odom, slip: {left: 12 %, right: 6 %}}]\n"
 
 
 def duration_s(prepared: PreparedScenario, seed: int) -> float:
@@ -33,9 +33,11 @@ def test_odometry_drift_of_a_meter_hardly_slows_narrow_fields(tmp_path: Path) ->
     _, twenty_centimeters, _ = write_narrow_fields(tmp_path, [9101, 9102, 9103])
     without_slip = slipping = 0.0
     for drive in twenty_centimeters.drives:
-        slips = drive.file.with_name(f"slipping_{drive.file.name}")
-        slips.write_text(SLIPPING.format(field=drive.file.name))
-        without_slip += 2 * duration_s(prepare(load_scenario(drive.file, tmp_path)), 1)
+        field = drive.file.name
+        plain, slips = (drive.file.with_name(f"{name}_{field}") for name in ("plain", "slipping"))
+        plain.write_text(ADVANCED.format(field=field))
+        slips.write_text(ADVANCED.format(field=field) + SLIP)
+        without_slip += 2 * duration_s(prepare(load_scenario(plain, tmp_path)), 1)
         drifting = prepare(load_scenario(slips, tmp_path))
         slipping += duration_s(drifting, 2) + duration_s(drifting, 5)
     assert slipping < 1.3 * without_slip

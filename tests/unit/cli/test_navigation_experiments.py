@@ -28,7 +28,7 @@ def test_experiment_groups_are_listed_in_order(tmp_path: Path) -> None:
 def test_group_lists_the_names_of_its_experiments(tmp_path: Path, name: str) -> None:
     small = Sizes(seeds=1, fields=2, dynamic=1, goals=1, lost=1)
     (offer,) = (offer for offer in experiment_groups(None, None, PROJECT, tmp_path, small) if offer.name == name)
-    assert [experiment.name for experiment in offer.make()] == (list(offer.parts) or [name])
+    assert [experiment.name for experiment in offer.write_experiments()] == (list(offer.other_names) or [name])
 
 
 @pytest.mark.slow
@@ -39,7 +39,7 @@ def test_first_number_changes_drives_but_not_names(tmp_path: Path) -> None:
             f"{experiment.name}: {drive.file.stem} {list(drive.seeds)}"
             for offer in experiment_groups(None, None, PROJECT, tmp_path / str(first), small)
             if offer.name in ("narrow fields", "dynamic fields", "ramps", "two robots", "localization", "corner cases")
-            for experiment in offer.make()
+            for experiment in offer.write_experiments()
             for drive in experiment.drives
         ]
 
