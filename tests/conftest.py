@@ -44,8 +44,8 @@ LONG = ("tests/scenarios/test_shipped.py", "tests/ros/", "tests/conformance/")
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int | None:
-    """Return the number of usable cores: the tests keep one busy each, and every worker imports all test modules."""
-    return None if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ else len(os.sched_getaffinity(0))
+    """Return one worker more than there are usable cores, because tests that wait for a process leave a core idle."""
+    return None if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ else len(os.sched_getaffinity(0)) + 1
 
 
 def pytest_configure(config: pytest.Config) -> None:
