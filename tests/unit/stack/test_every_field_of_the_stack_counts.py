@@ -178,7 +178,7 @@ PARTS = [
         "max_iterations": ((planner(type="rrt_connect"), scenes.planned),),
         "improving_iterations": ((planner(type="rrt_star", improving_iterations=60), scenes.planned),),
         "range": ((planner(type="rrt_connect"), scenes.planned),),
-        "goal_bias": ((planner(type="rrt_star", improving_iterations=60), scenes.planned),),
+        "goal_bias": ((planner(type="kpiece"), scenes.planned),),
         "state_space": ((planner(), scenes.planned), (planner(state_space="se2"), scenes.planned)),
     }, {"max_iterations": [1, 3], "improving_iterations": [5, 30]}),
     Part(("planner",), MedialAxisPlanner, ((planner(type="medial_axis"), scenes.planned),), {
