@@ -16,8 +16,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from everyfield import every_value
 
 from simscen.actions.base import AnyAction
+from simscen.cli.catalog.fields import fields_of
 from simscen.cli.catalog.json_schema import MODELS
-from simscen.cli.catalog.topics import Topic, fields_of, topics
+from simscen.cli.catalog.topics import Topic, topics
 from simscen.core.version import PACKAGE
 from simscen.criteria.registry import AnyCriterion
 from simscen.faults.base import AnyFault

@@ -38,6 +38,7 @@ def test_topics_types_qos_and_frames_match_nav2(with_interfaces, run, tmp_path: 
         assert offered[0] == kind
         assert STRENGTH[offered[1]] >= STRENGTH[reliability], topic
         assert STRENGTH[offered[2]] >= STRENGTH[durability], topic
+    assert not [topic for topic in seen["offered"] if topic.startswith("/simscen") or topic.endswith("/exact")]
     assert set(map(tuple, seen["frames"])) >= TREE
     assert seen["scans"] == ["lidar"]
 

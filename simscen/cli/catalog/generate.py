@@ -8,9 +8,10 @@ from itertools import groupby
 from pathlib import Path
 
 from simscen.cli.catalog.commands_page import command_section, exit_code_section, functions_of_command
+from simscen.cli.catalog.fields import OPTIONAL, Field
 from simscen.cli.catalog.json_schema import MODELS, as_text, schema_of
 from simscen.cli.catalog.reference_topics import metrics_page, signals_page
-from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics, topics
+from simscen.cli.catalog.topics import Topic, added_topics, topics
 from simscen.cli.main import COMMANDS
 from simscen.criteria.base import AnyMeasure
 from simscen.criteria.trace_signals.catalog import SIGNALS

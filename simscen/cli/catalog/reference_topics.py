@@ -1,7 +1,8 @@
 """Topics of `simscen explain` and reference pages about signals, metrics, error codes, and exit codes."""
 
 from simscen.cli.catalog.commands_page import EXIT_CODES
-from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, added_topics
+from simscen.cli.catalog.fields import OPTIONAL, Field
+from simscen.cli.catalog.topics import Topic, added_topics
 from simscen.core.errors import BROKEN_COMPONENT
 from simscen.core.messages.navigation import ErrorCode
 from simscen.criteria.base import AnyMeasure

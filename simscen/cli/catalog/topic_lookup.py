@@ -4,9 +4,10 @@ from collections.abc import Iterator, Sequence
 
 from pydantic import BaseModel
 
+from simscen.cli.catalog.fields import OPTIONAL, Field, fields_of
 from simscen.cli.catalog.json_schema import MODELS
 from simscen.cli.catalog.reference_topics import code_topics, metric_topics, signal_topics
-from simscen.cli.catalog.topics import OPTIONAL, Field, Topic, fields_of, topics
+from simscen.cli.catalog.topics import Topic, topics
 from simscen.loading.codes import CODES
 from simscen.loading.schema.lookup import models_at
 from simscen.spec.choice import Choice

@@ -8,16 +8,14 @@ import inspect
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from types import NoneType
+from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel, RootModel
-from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
 
 from simscen.actions.base import AnyAction
 from simscen.advanced.spec import MedialAxisPlanner
-from simscen.core.messages.navigation import ErrorCode
+from simscen.cli.catalog.fields import Field, fields_of, kind_of
 from simscen.criteria import error_codes
 from simscen.criteria.registry import AnyCriterion
 from simscen.faults.base import AnyFault
@@ -46,30 +44,10 @@ from simscen.spec import registry
 from simscen.spec.base import LazySpec, annotation_of, field_docs
 from simscen.spec.choice import Choice
 from simscen.spec.extensible_union import ExtensibleUnion
-from simscen.spec.places import PlaceAllowed, PlaceShorthand, PoseSpec, SpeedMask
-from simscen.spec.quantities import UNITS, Amount, Quantity
+from simscen.spec.places import PoseSpec, SpeedMask
 from simscen.triggers.base import AnyCondition, Trigger
 
 _EXAMPLE = re.compile(r"^Example: `(.+)`$", re.MULTILINE)
-OPTIONAL = "–"
-"""Text for the default of an optional key without a default value."""
-_BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
-
-
-@dataclass(frozen=True)
-class Field:
-    """Key of a YAML mapping.
-
-    key:      name of the key
-    kind:     kind of the value, such as "length in m, ≥ 0"
-    default:  default value, or OPTIONAL; "" for a required key
-    text:     description
-    """
-
-    key: str
-    kind: str
-    default: str
-    text: str
 
 
 @dataclass(frozen=True)
@@ -224,64 +202,6 @@ _ROBOT: dict[str, type[BaseModel]] = {
 """Models of the topics of six groups by name of the topic."""
 
 
-def fields_of(model: type[BaseModel]) -> list[Field]:
-    """Return the keys of a model in order; for a Choice, only its modifiers."""
-    docs = field_docs(model)
-    names = model.modifiers if issubclass(model, Choice) else model.model_fields.keys()
-    return [
-        Field(field.alias or name, kind_of(field), _default(field), docs.get(name, ""))
-        for name, field in model.model_fields.items()
-        if name in names
-    ]
-
-
-def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
-    """Return a description of the values of a type or pydantic field, such as "length in m, ≥ 0".
-
-    `metadata` are the further arguments of `Annotated`.
-    """
-    if isinstance(kind, FieldInfo):
-        return kind_of(kind.annotation, tuple(kind.metadata))
-    if mark := next((mark for mark in metadata if isinstance(mark, ExtensibleUnion)), None):
-        return kind_of(mark.shipped_union)
-    if get_origin(kind) is Annotated:
-        return kind_of(get_args(kind)[0], (*get_args(kind)[1:], *metadata))
-    if place := next((mark for mark in metadata if isinstance(mark, PlaceAllowed | PlaceShorthand)), None):
-        keywords = [f"`{word}`" for word in getattr(place, "keywords", ())]
-        return " or ".join([*keywords, "place", kind_of(kind, tuple(mark for mark in metadata if mark is not place))])
-    if get_origin(kind) in (Union, UnionType):
-        return " or ".join(dict.fromkeys(kind_of(member) for member in get_args(kind) if member is not NoneType))
-    if get_origin(kind) is Literal:
-        return " | ".join(f"`{value}`" for value in get_args(kind))
-    if get_origin(kind) is list:
-        return f"list of {_plural(kind_of(get_args(kind)[0]))}"
-    if get_origin(kind) is dict:
-        return f"names, each with {kind_of(get_args(kind)[1])}"
-    if isinstance(kind, type) and issubclass(kind, RootModel):
-        return kind_of(kind.model_fields["root"])
-    return _simple_kind(kind, metadata)
-
-
-_NOUN = re.compile(r"(?P<noun>[a-z ]+?)(?P<unit> in [^,]+)?(?P<range>, .+)?")
-_WITHOUT_PLURAL = frozenset({"text", "names", "true", "false"})
-
-
-def _plural(kind: str) -> str:
-    """Return the plural of a description, such as "lengths in m, each ≥ 0"."""
-    return " or ".join(map(_plural_of_member, kind.split(" or ")))
-
-
-def _plural_of_member(kind: str) -> str:
-    """Return the plural of a description without "or"."""
-    if kind.startswith("list of "):
-        return kind.replace("list", "lists", 1)
-    match = _NOUN.fullmatch(kind)
-    if match is None or match["noun"] in _WITHOUT_PLURAL:
-        return kind
-    bounds = f", each{match['range'][1:]}" if match["range"] else ""
-    return f"{match['noun']}s{match['unit'] or ''}{bounds}"
-
-
 def members_by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
     """Yield the `type` and the model of each shipped member of a union that `type` discriminates."""
     mark = next((mark for mark in get_args(union)[1:] if isinstance(mark, ExtensibleUnion)), None)
@@ -290,54 +210,6 @@ def members_by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
         lazy = next((mark for mark in get_args(member)[1:] if isinstance(mark, LazySpec)), None)
         model = lazy.load() if lazy else get_args(member)[0] if get_origin(member) is Annotated else member
         yield get_args(model.model_fields["type"].annotation)[0], model
-
-
-def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
-    """Return the description of a quantity, number, text, Boolean, or mapping, with its bounds."""
-    names = {int: "integer", float: "number", str: "text", bool: "true or false"}
-    quantity = next((mark for mark in _all_marks(metadata) if isinstance(mark, Quantity)), None)
-    if quantity is not None:
-        text = f"{quantity.dimension} in {next(iter(UNITS[quantity.dimension]))}"
-    else:
-        text = names.get(kind) or _kind_without_name(kind)
-    bounds = {
-        name: getattr(mark, name)
-        for mark in _all_marks(metadata)
-        for name in _BOUNDS
-        if getattr(mark, name, None) is not None
-    }
-    if bounds.keys() == {"ge", "le"}:
-        texts = [f"{bounds['ge']:g} … {bounds['le']:g}"]
-    else:
-        texts = [f"{_BOUNDS[name]} {bound:g}" for name, bound in bounds.items()]
-    return ", ".join([text.replace("ratio in %", "ratio"), *texts])
-
-
-def _kind_without_name(kind: Any) -> str:
-    """Return the description of a mapping, a list of fixed length, a quantity of any dimension, or an error code."""
-    if get_origin(kind) is tuple:
-        return f"list of {len(get_args(kind))} values"
-    if isinstance(kind, type) and issubclass(kind, BaseModel):
-        return "mapping"
-    return {Amount: "quantity", ErrorCode: "error code"}.get(kind, "value")
-
-
-def _all_marks(metadata: tuple[Any, ...]) -> Iterator[Any]:
-    """Yield all annotations, including the ones in pydantic's Field."""
-    for mark in metadata:
-        yield from mark.metadata if isinstance(mark, FieldInfo) else [mark]
-
-
-def _default(field: FieldInfo) -> str:
-    """Return the default value of a key as in the attribute `default` of Field."""
-    if field.is_required():
-        return ""
-    value = field.get_default(call_default_factory=True)
-    if value in (PydanticUndefined, None, "") or isinstance(value, BaseModel | dict):
-        return OPTIONAL
-    if isinstance(value, list):
-        return f"[{', '.join(map(str, value))}]" if value else OPTIONAL
-    return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:

@@ -7,8 +7,9 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
+from simscen.cli.catalog.fields import OPTIONAL, Field
 from simscen.cli.catalog.topic_lookup import all_topics, key_topics, known_names
-from simscen.cli.catalog.topics import OPTIONAL, Field, Topic
+from simscen.cli.catalog.topics import Topic
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import UsageError
 from simscen.loading.codes import CODES

@@ -195,7 +195,7 @@ class LayeredCostmap:
         Return True for a pose outside the costmap, where walls are unknown.
         """
         center = self._frame.cell(pose.x, pose.y)
-        if not all(0 <= index < size for index, size in zip(center, self._frame.shape, strict=True)):
+        if not self._frame.covers(pose.x, pose.y):
             return True
         if self._static_squared[center] == 0:
             return False

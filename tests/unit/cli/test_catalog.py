@@ -7,7 +7,8 @@ import pytest
 from pydantic import BaseModel, RootModel
 
 from simscen.actions.base import AnyAction
-from simscen.cli.catalog.topics import Topic, fields_of, kind_of, topics
+from simscen.cli.catalog.fields import fields_of, kind_of
+from simscen.cli.catalog.topics import Topic, topics
 from simscen.criteria.registry import AnyCriterion
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.model.controllers import GoalCheckerSpec
