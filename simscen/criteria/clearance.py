@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -39,15 +39,12 @@ class Clearance(Spec, Criterion):
     min: NonNegativeLength
     """Smallest allowed distance in meters."""
 
+    evidence: ClassVar[frozenset[Evidence]] = frozenset({Evidence.CLEARANCE})
+
     @property
     def clearance_range(self) -> float:
         """Distance in m around the robot up to which clearance must be measured."""
         return self.min + SEARCH_MARGIN_M
-
-    @property
-    def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs."""
-        return frozenset({Evidence.CLEARANCE})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return the finding for the smallest clearance. Raises InvalidTrace if a clearance is nan."""
@@ -88,10 +85,7 @@ class PersonalSpace(Spec, Criterion):
     while_driving: bool = False
     """Check only while the robot drives at more than 0.1 m/s, because people may approach a standing robot."""
 
-    @property
-    def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs."""
-        return POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT, Evidence.VELOCITY}
+    evidence: ClassVar[frozenset[Evidence]] = POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT, Evidence.VELOCITY}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return the finding for the smallest gap."""

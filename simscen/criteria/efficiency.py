@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from pydantic import model_validator
@@ -43,10 +43,7 @@ class TimeToGoal(Spec, Criterion):
     goal: GoalName | None = None
     """Measure the time of the goal with this name; default: the time of all goals together."""
 
-    @property
-    def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs."""
-        return frozenset({Evidence.NAVIGATION})
+    evidence: ClassVar[frozenset[Evidence]] = frozenset({Evidence.NAVIGATION})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for all goals. With `goal`, return one finding for each goal of this name."""
@@ -137,10 +134,7 @@ class PathLength(Spec, Criterion):
             raise ValueError("expected max or max_ratio")
         return self
 
-    @property
-    def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs."""
-        return frozenset({Evidence.TRUTH})
+    evidence: ClassVar[frozenset[Evidence]] = frozenset({Evidence.TRUTH})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each given bound: the length and the ratio. The margins of both are in m."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import Field, model_validator
 
@@ -77,10 +77,7 @@ class Replans(CountBounds, Criterion):
     `window` (the local window of a robot without a map had moved), `recovery` (after a recovery), `rate` (periodic
     replanning), or `moving` (a moving obstacle would be on the old plan, with the advanced stack)."""
 
-    @property
-    def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs."""
-        return frozenset({Evidence.PLANNING})
+    evidence: ClassVar[frozenset[Evidence]] = frozenset({Evidence.PLANNING})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each bound."""
@@ -109,10 +106,7 @@ class Recoveries(CountBounds, Criterion):
     name: BehaviorName | None = None
     """Count only the recovery behavior with this name."""
 
-    @property
-    def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs."""
-        return frozenset({Evidence.RECOVERIES})
+    evidence: ClassVar[frozenset[Evidence]] = frozenset({Evidence.RECOVERIES})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each bound."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -63,10 +63,7 @@ class GoalsReached(Spec, Criterion):
     within: PositiveDuration | None = None
     """Maximum time from the acceptance of each goal to the report that it is reached."""
 
-    @property
-    def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs."""
-        return POSITION | {Evidence.NAVIGATION}
+    evidence: ClassVar[frozenset[Evidence]] = POSITION | {Evidence.NAVIGATION}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return findings for distance, heading, and time of each reached goal, and one finding for each other goal."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -62,10 +62,7 @@ class LocalizationError(Spec, Criterion):
         """Simulated time in s before which the criterion cannot pass."""
         return self.after
 
-    @property
-    def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs."""
-        return POSITION | {Evidence.BELIEF}
+    evidence: ClassVar[frozenset[Evidence]] = POSITION | {Evidence.BELIEF}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each given bound."""
@@ -223,10 +220,7 @@ class LocalizationConsistency(Spec, Criterion):
         """Simulated time in s before which the criterion cannot pass."""
         return self.after
 
-    @property
-    def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs."""
-        return POSITION | {Evidence.BELIEF, Evidence.COVARIANCE}
+    evidence: ClassVar[frozenset[Evidence]] = POSITION | {Evidence.BELIEF, Evidence.COVARIANCE}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return the finding for the upper bound of the average, and with `both_sides` also for the lower bound."""

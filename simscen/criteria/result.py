@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from simscen.core.messages.navigation import matches_goal_name
 from simscen.core.records.events import Event, EventKind
@@ -72,10 +72,7 @@ class ErrorCodeIs(Spec, Criterion):
     goal: GoalName | None = None
     """Name of the goal; default: the whole navigation."""
 
-    @property
-    def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs."""
-        return frozenset({Evidence.NAVIGATION, Evidence.ERROR_CODES})
+    evidence: ClassVar[frozenset[Evidence]] = frozenset({Evidence.NAVIGATION, Evidence.ERROR_CODES})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding."""
@@ -134,10 +131,7 @@ class NoFalseSuccess(Spec, Criterion):
     tolerance: PositiveLength = 1.0
     """True distance from the goal above which a reported success is false."""
 
-    @property
-    def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs."""
-        return POSITION | {Evidence.NAVIGATION}
+    evidence: ClassVar[frozenset[Evidence]] = POSITION | {Evidence.NAVIGATION}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return findings for all goals that were reported as reached, and for all false reports of SUCCEEDED."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -61,10 +61,7 @@ class Smoothness(Spec, Criterion):
             raise ValueError(f"expected at least one of: {', '.join(type(self).model_fields)}")
         return self
 
-    @property
-    def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs."""
-        return frozenset({Evidence.TRUTH, Evidence.VELOCITY})
+    evidence: ClassVar[frozenset[Evidence]] = frozenset({Evidence.TRUTH, Evidence.VELOCITY})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each given bound."""

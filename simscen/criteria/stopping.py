@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -56,10 +56,7 @@ class StoppedWithin(Spec, Criterion):
     stay: bool = False
     """Require that the robot stands until the fault or event ends."""
 
-    @property
-    def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs."""
-        return frozenset({Evidence.TRUTH, Evidence.VELOCITY, Evidence.DISTURBANCES})
+    evidence: ClassVar[frozenset[Evidence]] = frozenset({Evidence.TRUTH, Evidence.VELOCITY, Evidence.DISTURBANCES})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each start of `after`. With `stay`, add a second finding if the robot stopped.
@@ -153,10 +150,7 @@ class Stuck(Spec, Criterion):
     radius: PositiveLength = 0.5
     """Distance in meters that the robot must move away from a position to make progress."""
 
-    @property
-    def evidence(self) -> frozenset[Evidence]:
-        """Evidence in the log that the criterion needs."""
-        return frozenset({Evidence.TRUTH, Evidence.NAVIGATION})
+    evidence: ClassVar[frozenset[Evidence]] = frozenset({Evidence.TRUTH, Evidence.NAVIGATION})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return the finding for the longest standstill over all goals."""
