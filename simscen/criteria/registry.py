@@ -52,7 +52,7 @@ class AnyCriterion(Choice):
     always: Annotated[Criterion | None, LazySpec("simscen.criteria.temporal", "Always")] = None
     eventually: Annotated[Criterion | None, LazySpec("simscen.criteria.temporal", "Eventually")] = None
     until: Annotated[Criterion | None, LazySpec("simscen.criteria.temporal", "Until")] = None
-    whenever: Annotated[BaseModel | None, LazySpec("simscen.criteria.temporal", "Whenever")] = None
+    whenever: Annotated[BaseModel | None, LazySpec("simscen.criteria.stl.condition", "Whenever")] = None
 
     @model_validator(mode="after")
     def _combine_whenever_and_then(self) -> "AnyCriterion":

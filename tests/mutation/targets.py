@@ -56,7 +56,10 @@ TESTS_OF_MODULE = {
         EVERY_CRITERION,
     ],
     "criteria/stl/condition": [[f"{_STL}/test_condition.py"], [f"{_STL}/test_decision_horizon.py"], TEMPORAL],
-    "criteria/stl/robustness": [TEMPORAL, [f"{_STL}/test_robustness.py", "tests/properties/test_three_valued.py"]],
+    **{
+        f"criteria/stl/{of}": [TEMPORAL, [f"{_STL}/test_robustness.py", "tests/properties/test_three_valued.py"]]
+        for of in ("evaluation", "robustness")
+    },
     "criteria/stl/operators": [TEMPORAL, [f"{_STL}/test_operators.py"]],
     **{
         f"criteria/stl/{of}": [TEMPORAL, [f"{_STL}/test_criterion.py", f"{_STL}/test_description.py"]]

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_formulas import CASE, FORMULAS, NUMBERS, SIGNALS, horizon, inner, run, validated
 
-from simscen.criteria.stl.robustness import EvaluationContext, robustness
+from simscen.criteria.stl.evaluation import EvaluationContext, robustness
 
 
 def as_rtamt(formula):

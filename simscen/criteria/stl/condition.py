@@ -160,6 +160,27 @@ class Windowed(Window, Condition):
     """Condition, and the window in which it is evaluated."""
 
 
+class Whenever(Windowed):
+    """Whenever one condition (the premise) is true, another condition (the response, `then`) is true as well.
+
+    For a response within some seconds, write `then: {eventually: {…, within: 2 s}}`.
+
+    What is measured: the distance of each signal from its bound, at each sample of the truth. The margin is the
+        smallest margin of the response at all samples at which the premise was true.
+    When it fails: at a sample, the premise was true and the response was false.
+    Why this: a robot that is lost, blind, or too close to something must react in time, and each time.
+    Source: the bounded response pattern of Dwyer, Avrunin and Corbett 1999; robust semantics of Donzé and Maler 2010.
+
+    Inconclusive if the run ended before the time for a response was over. Also inconclusive if the premise was never
+    true, because nothing was tested; `required: false` lets such a run pass.
+
+    Example: `{whenever: {signal: scan_age, op: ">", value: 0.3 s}, then: {eventually: {signal: speed, op: "<", value: 1 cm/s, within: 1 s}}}`
+    """  # noqa: E501 (an example is on one line)
+
+    required: bool = True
+    """Whether the premise must be true at least once. With `false`, a run in which it was never true passes."""
+
+
 class Release(Window):
     """Operands of `until`: `hold` must be true until `release` becomes true, which must happen in the window."""
 
@@ -206,7 +227,7 @@ def _check_decidable(op: Op, value: float, name: str, signal: Signal) -> None:
         raise ValueError(f"`{name}` is never {where}, so `{op} {value:g}{unit}` is {frequency} true")
 
 
-for _model in (Condition, Windowed, Release):
+for _model in (Condition, Windowed, Whenever, Release):
     _model.model_rebuild()  # they refer to each other, and criteria in other modules derive from them
 
 
@@ -223,24 +244,17 @@ def decision_horizon(condition: Condition, holds: bool = True) -> float:
     if condition.not_ is not None:
         return decision_horizon(condition.not_, not holds)
     if condition.always is not None:
-        return window_horizon("always", condition.always, condition.always, holds)
+        return _window_horizon(condition.always, condition.always, holds, needs_whole_window=holds)
     if condition.eventually is not None:
-        return window_horizon("eventually", condition.eventually, condition.eventually, holds)
+        return _window_horizon(condition.eventually, condition.eventually, holds, needs_whole_window=not holds)
     if condition.until is not None:
-        return until_horizon(condition.until.release, condition.until) if holds else 0.0
+        return condition.until.interval[0] + decision_horizon(condition.until.release) if holds else 0.0
+    if isinstance(condition.whenever, Whenever) and condition.then is not None:
+        return _window_horizon(condition.then, condition.whenever, holds, needs_whole_window=holds)
     return 0.0
 
 
-def window_horizon(operator: str, part: Condition, window: Window, holds: bool = True) -> float:
-    """Return the `decision_horizon` in s of `operator` ("always" or "eventually") with the condition `part`.
-
-    It is the end of the window if the whole window decides, and the start of the window if one sample can decide.
-    """
+def _window_horizon(part: Condition, window: Window, holds: bool, needs_whole_window: bool) -> float:
+    """Return the end of the window, or its start if one sample can decide, plus the `decision_horizon` of `part`."""
     begin, end = window.interval
-    needs_whole_window = (operator == "always") == holds
-    return (begin if not needs_whole_window or end is None else end) + decision_horizon(part, holds)
-
-
-def until_horizon(release: Condition, window: Window) -> float:
-    """Return the earliest time in s from now at which `until` can be known to be true."""
-    return window.interval[0] + decision_horizon(release)
+    return (end if needs_whole_window and end is not None else begin) + decision_horizon(part, holds)

@@ -10,15 +10,10 @@ from simscen.core.records.verdict import Evidence, Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.criteria.clearance import SEARCH_MARGIN_M
 from simscen.criteria.findings import undecided
+from simscen.criteria.stl.condition import Condition, decision_horizon
 from simscen.criteria.stl.description import describe, describe_limit, describe_signal, describe_value
-from simscen.criteria.stl.robustness import (
-    TIE_MARGIN,
-    Bound,
-    EvaluationContext,
-    ResponseRobustness,
-    Robustness,
-    Witness,
-)
+from simscen.criteria.stl.evaluation import EvaluationContext, robustness
+from simscen.criteria.stl.robustness import TIE_MARGIN, Bound, ResponseRobustness, Robustness, Witness
 from simscen.criteria.timeline import end_reason, has_ended
 from simscen.criteria.trace_signals.catalog import signal_evidence
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
@@ -26,43 +21,40 @@ from simscen.criteria.trace_signals.sampling import SignalUnavailable
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
     from simscen.core.records.trace import Trace
-    from simscen.criteria.stl.condition import Condition
-    from simscen.criteria.stl.robustness import Witness
 
 
 class TemporalCriterion(Criterion):
     """Criterion that a condition is true at the start of the run. Temporal operators in it cover later times."""
 
+    @property
     @abstractmethod
-    def all_comparisons(self) -> list[Condition]:
-        """Return all comparisons in the condition."""
+    def condition(self) -> Condition:
+        """The condition that must be true at the start of the run."""
 
-    @abstractmethod
-    def formula(self) -> str:
-        """Return the condition in words."""
-
-    @abstractmethod
-    def evaluate(self, context: EvaluationContext) -> Robustness:
-        """Return the robustness of the condition: the margin by which it is true; negative if it is false."""
+    @property
+    def horizon(self) -> float:
+        """Simulated time in s before which the criterion cannot pass."""
+        return decision_horizon(self.condition)
 
     @property
     def clearance_range(self) -> float:
         """Distance in m around the robot up to which clearance must be measured; 0 without a comparison of it."""
-        bounds = [one.value for one in self.all_comparisons() if one.signal == "clearance" and one.value is not None]
-        return max((bound + SEARCH_MARGIN_M for bound in bounds), default=0.0)
+        compared = [one for one in self.condition.comparisons() if one.signal == "clearance"]
+        return max((one.value + SEARCH_MARGIN_M for one in compared if one.value is not None), default=0.0)
 
     @property
     def evidence(self) -> frozenset[Evidence]:
         """Evidence that the log must contain for the compared signals."""
-        compared = self.all_comparisons()
+        compared = list(self.condition.comparisons())
         objects = {Evidence.OBJECTS} if any(one.object is not None for one in compared) else set()
         return frozenset(objects).union(*(signal_evidence(one.signal) for one in compared if one.signal is not None))
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding, with the value of the signal at the sample that decides the condition."""
-        formula = self.formula()
+        condition = self.condition
+        formula = describe(condition)
         try:
-            result = self.evaluate(EvaluationContext(trace, case, has_ended(trace)))
+            result = robustness(condition, EvaluationContext(trace, case, has_ended(trace)))
         except SignalUnavailable as missing:
             return [undecided("", str(missing), formula)]
         low, high = float(result.low[0]), float(result.high[0])
@@ -80,7 +72,7 @@ class TemporalCriterion(Criterion):
         """Return the finding of a decided condition. `value` is its robustness: `bound` of `result` at the start."""
         witness = result.witness(0, bound)
         tick = int(trace.truth.ticks[witness.sample])
-        signal, unit, margin = witness.comparison.definition, _margin_unit(self.all_comparisons()), None
+        signal, unit, margin = witness.comparison.definition, _margin_unit(list(self.condition.comparisons())), None
         if unit is None or math.isinf(value):
             unit = signal.unit
         else:
@@ -95,7 +87,7 @@ class TemporalCriterion(Criterion):
             value=None if signal.is_boolean else witness.value,
             tick=tick,
             place=trace.place(tick),
-            detail=_detail_lines(trace, self.formula(), witness),
+            detail=_detail_lines(trace, describe(self.condition), witness),
         )
 
 

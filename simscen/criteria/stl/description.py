@@ -28,37 +28,23 @@ def describe(condition: Condition) -> str:
     if condition.not_ is not None:
         return f"not {_grouped(condition.not_)}"
     if condition.always is not None:
-        return describe_windowed("always", condition.always, condition.always)
+        return f"always {_window_text(condition.always)}{_grouped(condition.always)}"
     if condition.eventually is not None:
-        return describe_windowed("eventually", condition.eventually, condition.eventually)
+        return f"eventually {_window_text(condition.eventually)}{_grouped(condition.eventually)}"
     if condition.until is not None:
-        return describe_until(condition.until.hold, condition.until.release, condition.until)
+        until = condition.until
+        return f"{_grouped(until.hold)} until {_window_text(until)}{_grouped(until.release)}"
     assert condition.whenever is not None and condition.then is not None
-    return describe_response(condition.whenever, condition.then)
+    return f"whenever {describe(condition.whenever)}, then {describe(condition.then)}"
 
 
-def describe_windowed(operator: str, part: Condition, window: Window) -> str:
-    """Return "always …" or "eventually …" with the window as text. `operator` is "always" or "eventually"."""
-    return f"{' '.join(filter(None, (operator, describe_window(window))))} {_grouped(part)}"
-
-
-def describe_until(hold: Condition, release: Condition, window: Window) -> str:
-    """Return "… until …" with the window as text."""
-    return " ".join(filter(None, (_grouped(hold), "until", describe_window(window), _grouped(release))))
-
-
-def describe_response(premise: Condition, response: Condition) -> str:
-    """Return "whenever …, then …"."""
-    return f"whenever {describe(premise)}, then {describe(response)}"
-
-
-def describe_window(window: Window) -> str:
-    """Return a window as text, e.g. "within 5 s"; "" for the rest of the run."""
+def _window_text(window: Window) -> str:
+    """Return a window as text with a space behind it, e.g. "within 5 s "; "" for the rest of the run."""
     if window.between is not None:
-        return f"between {window.between[0]:g} s and {window.between[1]:g} s"
+        return f"between {window.between[0]:g} s and {window.between[1]:g} s "
     if window.after is not None:
-        return f"after {window.after:g} s"
-    return "" if window.within is None else f"within {window.within:g} s"
+        return f"after {window.after:g} s "
+    return "" if window.within is None else f"within {window.within:g} s "
 
 
 def describe_signal(condition: Condition) -> str:

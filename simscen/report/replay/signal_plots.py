@@ -111,7 +111,7 @@ def _signals_in_criteria(spec: ScenarioSpec) -> Iterator[tuple[SignalName, tuple
     """Yield each signal in a temporal criterion, and its arguments as pairs of name and value."""
     for entry in spec.pass_:
         chosen = entry.chosen
-        for one in chosen.all_comparisons() if isinstance(chosen, TemporalCriterion) else ():
+        for one in chosen.condition.comparisons() if isinstance(chosen, TemporalCriterion) else ():
             if one.signal is not None and one.signal not in _EXCLUDED_SIGNALS:
                 yield one.signal, tuple(one.arguments.items())
 

@@ -14,7 +14,8 @@ from simscen.core.records.verdict import Status
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.registry import AnyCriterion
 from simscen.criteria.stl.condition import Window
-from simscen.criteria.stl.robustness import EvaluationContext, ResponseRobustness, robustness
+from simscen.criteria.stl.evaluation import EvaluationContext, robustness
+from simscen.criteria.stl.robustness import ResponseRobustness
 from simscen.judge.evaluation import judge
 
 

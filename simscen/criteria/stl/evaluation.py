@@ -1,0 +1,187 @@
+"""Evaluation of conditions on a run: the robustness of a condition at each sample of the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, reduce
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.criteria.findings import InvalidTrace
+from simscen.criteria.stl import operators
+from simscen.criteria.stl.condition import Condition, Release, Whenever, Window, Windowed
+from simscen.criteria.stl.operators import Continuation, SampleWindows
+from simscen.criteria.stl.robustness import (
+    TIE_MARGIN,
+    BooleanRobustness,
+    Bound,
+    ComparisonRobustness,
+    NegationRobustness,
+    ResponseRobustness,
+    Robustness,
+    UntilRobustness,
+    WindowRobustness,
+)
+from simscen.criteria.trace_signals.catalog import read_signal
+from simscen.criteria.trace_signals.sampling import usual_period
+
+if TYPE_CHECKING:
+    from simscen.core.records.case import Case
+    from simscen.core.records.trace import Trace
+
+WindowOperator = Callable[[Array, SampleWindows, Continuation], Array]
+"""Function `always` or `eventually` of the module operators."""
+
+
+@dataclass(frozen=True, eq=False)
+class EvaluationContext:
+    """Run on which conditions are evaluated, at each sample of the truth. `run_ended` is False for a truncated log."""
+
+    trace: Trace
+    case: Case
+    run_ended: bool
+
+    @cached_property
+    def period(self) -> int:
+        """Median spacing of samples in ticks."""
+        return usual_period(self.trace.truth.ticks)
+
+    def sample_windows(self, window: Window) -> SampleWindows:
+        """Return the window of each sample. Raises InvalidTrace if windows are too short to contain a sample."""
+        start, end = window.interval
+        rate, last = self.trace.tick_rate, None
+        if end is not None:
+            last = round(end * rate)
+            first_sample, last_sample = -(-round(start * rate) // self.period), last // self.period
+            if last_sample < max(first_sample, 1):
+                spacing = self.trace.seconds(self.period)
+                raise InvalidTrace(
+                    f"the window up to {end:g} s ahead contains no sample: samples are {spacing:g} s apart"
+                )
+        return SampleWindows.of_samples(self.trace.truth.ticks, self.period, round(start * rate), last)
+
+
+def robustness(condition: Condition, context: EvaluationContext, begin: int = 0) -> Robustness:
+    """Return the robustness of a condition at each sample.
+
+    The premise of a `whenever` is checked from sample `begin` on. Raises SignalUnavailable if the trace lacks a signal,
+    and InvalidTrace if a signal is not finite.
+    """
+    if condition.signal is not None:
+        return _compare(condition, context)
+    if condition.not_ is not None:
+        part = robustness(condition.not_, context, begin)
+        return NegationRobustness(-part.high, -part.low, [part])
+    if condition.all is not None:
+        return _combine([robustness(part, context, begin) for part in condition.all], "all")
+    if condition.any is not None:
+        return _combine([robustness(part, context, begin) for part in condition.any], "any")
+    if condition.always is not None:
+        return _windowed(operators.always, condition.always, context, begin)
+    if condition.eventually is not None:
+        return _windowed(operators.eventually, condition.eventually, context, begin)
+    if condition.until is not None:
+        return _until(condition.until, context, begin)
+    assert condition.whenever is not None and condition.then is not None
+    return _response(condition.whenever, condition.then, context, begin)
+
+
+def _windowed(operator: WindowOperator, condition: Windowed, context: EvaluationContext, begin: int) -> Robustness:
+    """Return the robustness of `always` or `eventually`. For `begin`, see `robustness`."""
+    windows = context.sample_windows(condition)
+    return _apply_windows(operator, robustness(condition, context, _start(windows, begin)), windows, context)
+
+
+def _until(until: Release, context: EvaluationContext, begin: int) -> Robustness:
+    windows = context.sample_windows(until)
+    holds, releases = robustness(until.hold, context, begin), robustness(until.release, context, _start(windows, begin))
+    low, high = (
+        operators.until(holds.bound(bound), releases.bound(bound), windows, continuation)
+        for bound, continuation in _continuations(context)
+    )
+    return UntilRobustness(low, high, [holds, releases], windows)
+
+
+def _response(premise: Condition, response: Condition, context: EvaluationContext, begin: int) -> ResponseRobustness:
+    """Return the robustness of "whenever `premise`, then `response`". For `begin`, see `robustness`.
+
+    The window is the rest of the run, unless the premise is that of a criterion, which has its own window. If the
+    premise is required, but was never certainly true, `low` is -inf.
+    """
+    windows = context.sample_windows(premise if isinstance(premise, Whenever) else Window())
+    required = premise.required if isinstance(premise, Whenever) else True
+    start = _start(windows, begin)
+    premise_part, response_part = robustness(premise, context, start), robustness(response, context, start)
+    negated = NegationRobustness(-premise_part.high, -premise_part.low, [premise_part])
+    implication = _combine([negated, response_part], "any")
+    always = _apply_windows(operators.always, implication, windows, context)
+    end = int(windows.last[begin]) + 1 if begin < len(windows.last) else None
+    found = ResponseRobustness(
+        always.low,
+        always.high,
+        [premise_part, response_part],
+        implication,
+        windows,
+        premise,
+        slice(start, end),
+        required,
+    )
+    return replace(found, low=np.full_like(found.low, -math.inf)) if required and not found.was_tested else found
+
+
+def _apply_windows(
+    operator: WindowOperator, part: Robustness, windows: SampleWindows, context: EvaluationContext
+) -> Robustness:
+    """Return the robustness of `always` or `eventually` with the robustness of its operand."""
+    low, high = (operator(part.bound(bound), windows, continuation) for bound, continuation in _continuations(context))
+    return WindowRobustness(low, high, [part], windows)
+
+
+def _start(windows: SampleWindows, begin: int) -> int:
+    """Return the index of the first sample in the window of sample `begin`; the number of samples if there is none."""
+    return int(windows.first[begin]) if begin < len(windows.first) else len(windows.first)
+
+
+def _continuations(context: EvaluationContext) -> list[tuple[Bound, Continuation]]:
+    """Return each bound with its assumption about the time after the last sample."""
+    return [("low", Continuation(-math.inf, context.run_ended)), ("high", Continuation(math.inf, context.run_ended))]
+
+
+def _combine(parts: Sequence[Robustness], operator: Literal["all", "any"]) -> Robustness:
+    """Return the robustness of `all` or `any` with the robustness of its operands."""
+    extremum = np.minimum if operator == "all" else np.maximum
+    low, high = reduce(extremum, [part.low for part in parts]), reduce(extremum, [part.high for part in parts])
+    return BooleanRobustness(low, high, parts)
+
+
+def _compare(condition: Condition, context: EvaluationContext) -> Robustness:
+    """Return the robustness of a comparison."""
+    assert condition.signal is not None
+    trace = context.trace
+    values = read_signal(condition.signal, trace, context.case, condition.arguments)
+    if np.isnan(values).any():
+        at = trace.seconds(int(trace.truth.ticks[int(np.argmax(np.isnan(values)))]))
+        raise InvalidTrace(f"{condition.signal} is not a number at t = {at:.2f} s")
+    if condition.definition.is_boolean:
+        certain = np.where(values, math.inf, -math.inf)
+        return ComparisonRobustness(certain, certain, (), condition, values)
+    distances = _distances(condition, values)
+    if condition.signal != "clearance":
+        return ComparisonRobustness(distances, distances, (), condition, values)
+    # Clearance is measured up to a maximum range; beyond it, the true distance may have any larger value.
+    farther = _distances(condition, np.where(values >= context.case.clearance_range, math.inf, values))
+    return ComparisonRobustness(np.minimum(distances, farther), np.maximum(distances, farther), (), condition, values)
+
+
+def _distances(condition: Condition, values: Array) -> Array:
+    """Return the signed distances of a signal from its limit, divided by `condition.scale`."""
+    assert condition.value is not None
+    above = condition.op in (">=", ">")
+    distances = (values - condition.value if above else condition.value - values) / (condition.scale or 1.0)
+    tie = TIE_MARGIN if condition.op in (">=", "<=") else -TIE_MARGIN
+    signed: Array = np.where(values == condition.value, tie, distances)
+    return signed
