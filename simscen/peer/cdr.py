@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 import sys
 from array import array
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,45 +19,51 @@ HEADER = b"\x00\x01\x00\x00"
 _BYTE_ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
 """Byte order, as in `struct`, by the first two bytes of a message."""
 _TOO_SHORT = "the message ends before its type does"
+W = TypeVar("W", bound="Writer")
 
 
 class Writer:
-    """Serializes a little-endian message field by field, in the order of its definition."""
+    """Serializes a little-endian message field by field, in the order of its definition.
+
+    Methods append a field to `buffer`, and return the writer.
+    """
 
     def __init__(self) -> None:
-        self._data = bytearray(HEADER)
+        self.buffer = bytearray(HEADER)
+        self._alignment_offset = -len(HEADER)
 
-    def put(self, codes: str, *values: Any) -> Writer:
+    def put(self: W, codes: str, *values: Any) -> W:
         """Append numbers of the same width. `codes` are their format codes of `struct`, e.g. "iI" or "7d"."""
-        self._align(struct.calcsize("<" + codes[-1]))
-        self._data += struct.pack("<" + codes, *values)
+        self.align(struct.calcsize("<" + codes[-1]))
+        self.buffer += struct.pack("<" + codes, *values)
         return self
 
-    def string(self, text: str) -> Writer:
+    def string(self: W, text: str) -> W:
         """Append a string: its length with the terminating NUL, then its UTF-8 bytes."""
         encoded = text.encode() + b"\0"
         self.put("I", len(encoded))
-        self._data += encoded
+        self.buffer += encoded
         return self
 
-    def numbers(self, code: str, values: Sequence[float]) -> Writer:
+    def numbers(self: W, code: str, values: Sequence[float]) -> W:
         """Append a sequence of numbers, after its length. `code` is a type code of `array`, e.g. "f"."""
         numbers = array(code, values)
         if sys.byteorder == "big":
             numbers.byteswap()
         self.put("I", len(numbers))
         if numbers:
-            self._align(numbers.itemsize)
-            self._data += numbers.tobytes()
+            self.align(numbers.itemsize)
+            self.buffer += numbers.tobytes()
+        return self
+
+    def align(self: W, width: int) -> W:
+        """Append padding up to a multiple of `width` bytes."""
+        self.buffer += bytes(-(len(self.buffer) + self._alignment_offset) % width)
         return self
 
     def done(self) -> bytes:
         """Return the serialized message."""
-        return bytes(self._data)
-
-    def _align(self, width: int) -> None:
-        """Append padding up to a multiple of `width` bytes."""
-        self._data += bytes(-(len(self._data) - len(HEADER)) % width)
+        return bytes(self.buffer)
 
 
 class Reader:

@@ -12,7 +12,7 @@ from simscen.record import log_header
 from simscen.record.log_file import LogFile
 from simscen.record.log_header import LogHeader, scenery_from_header
 from simscen.record.mcap_writer import McapWriter, Sink
-from simscen.record.publishers.message_sinks import LogPublisher, NamespacedPublisher
+from simscen.record.publishers.message_sinks import LogPublisher
 from simscen.record.publishers.robot import RobotPublisher
 
 
@@ -29,21 +29,13 @@ class Recorder:
         sink = self._file if self._file is not None else target
         assert not isinstance(sink, str | Path)
         self._writer = McapWriter(sink, profile="ros2", library="simscen")
-        out, time = LogPublisher(self._writer), SimTime(clock.rate)
         self._writer.add_metadata("simscen", log_header.run_metadata(header, clock))
         for name, data in log_header.attachments(header).items():
             self._writer.add_attachment(name, log_header.media_type(name), data)
-        headers, scenery = header.robots or {"": header}, scenery_from_header(header)
+        headers, scenery, time = header.robots or {"": header}, scenery_from_header(header), SimTime(clock.rate)
         first = next(iter(headers))
         self.robots = {
-            name: RobotPublisher(
-                NamespacedPublisher(out, name) if name else out,
-                time,
-                robot,
-                scenery,
-                name,
-                publishes_clock=name == first,
-            )
+            name: RobotPublisher(LogPublisher(self._writer, name), time, robot, scenery, name, name == first)
             for name, robot in headers.items()
         }
         """Publishers by robot name ("" for a single robot). The first one also publishes /clock."""
@@ -56,7 +48,7 @@ class Recorder:
 
     def flush_if_due(self) -> None:
         """Write the buffered messages to the file if there are enough."""
-        next(iter(self.robots.values())).flush_if_due()
+        self._writer.flush_if_due()
 
     def close(self, end_tick: int, result: str = "", stack: Mapping[str, str] | None = None) -> None:
         """Write the last records, and give the file its final name.

@@ -1,6 +1,7 @@
 """Topics of a log, their quality of service, and the definitions of their message types."""
 
 import json
+from functools import cache
 from importlib.resources import files
 from typing import NamedTuple
 
@@ -77,6 +78,7 @@ class MessageType(NamedTuple):
     hash: str
 
 
+@cache
 def load_message_types() -> dict[str, MessageType]:
     """Return all message types of a log by name, from schemas.json (definitions of ROS 2 Humble)."""
     table = json.loads(files(__package__).joinpath("schemas.json").read_text("utf-8"))

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.clock import Stamp
+from simscen.peer.cdr import Writer
 from simscen.record.messages.template import Template
 
 _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
@@ -122,7 +123,7 @@ def _stamped(frame: str) -> Template:
 
 def boolean(value: bool) -> bytes:
     """Return the bytes of a std_msgs/msg/Bool."""
-    return bytes(Template().put("B", value).buffer)
+    return Writer().put("B", value).done()
 
 
 def image(frame: str, stamp: Stamp, pixels: "npt.NDArray[np.uint8] | npt.NDArray[np.float32]") -> bytes:
@@ -134,7 +135,7 @@ def image(frame: str, stamp: Stamp, pixels: "npt.NDArray[np.uint8] | npt.NDArray
     encoding, kind = ("rgb8", "u1") if pixels.ndim == 3 else ("32FC1", "<f4")
     content = pixels.astype(kind).tobytes()
     head = (
-        Template()
+        Writer()
         .put("iI", *stamp)
         .string(frame)
         .put("2I", height, width)
@@ -142,4 +143,4 @@ def image(frame: str, stamp: Stamp, pixels: "npt.NDArray[np.uint8] | npt.NDArray
         .put("B", 0)
         .put("2I", len(content) // height if height else 0, len(content))
     )
-    return bytes(head.buffer) + content
+    return head.done() + content

@@ -5,7 +5,7 @@ numpy serializes the arrays without slow Python loops.
 
 import struct
 from collections.abc import Callable, Sequence
-from struct import calcsize
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from simscen.core.clock import Stamp
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
 from simscen.core.messages.sensor_data import Scan
-from simscen.peer.cdr import HEADER
+from simscen.peer.cdr import HEADER, Writer
 from simscen.record.messages.template import Template
 
 Link = tuple[str, str, Stamp, Pose3]
@@ -29,114 +29,65 @@ def planar_poses(points: Array) -> Array:
     return poses
 
 
-class LaserScanPacker:
-    """Callable encoder of sensor_msgs/msg/LaserScan without intensities."""
-
-    def __init__(self, frame: str) -> None:
-        self._pack = Template().slot("iI", "*stamp").string(frame).slot("7fI", "*numbers").packer()
-
-    def __call__(self, stamp: Stamp, scan: Scan) -> bytes:
-        """Return the bytes of a scan that was measured at `stamp`."""
-        n = len(scan.ranges)
-        last = scan.angle_min + scan.angle_increment * (n - 1)
-        angles = scan.angle_min, last, scan.angle_increment
-        head = self._pack(stamp, (*angles, 0.0, 0.0, scan.range_min, scan.range_max, n))
-        return head + scan.ranges.astype("<f4").tobytes() + b"\0\0\0\0"
+def laser_scan(frame: str, stamp: Stamp, scan: Scan) -> bytes:
+    """Return the bytes of a sensor_msgs/msg/LaserScan without intensities, which was measured at `stamp`."""
+    n = len(scan.ranges)
+    last = scan.angle_min + scan.angle_increment * (n - 1)
+    angles = scan.angle_min, last, scan.angle_increment
+    head = _header_packer(frame, "7fI")(stamp, (*angles, 0.0, 0.0, scan.range_min, scan.range_max, n))
+    return head + scan.ranges.astype("<f4").tobytes() + b"\0\0\0\0"
 
 
-class PathPacker:
-    """Callable encoder of nav_msgs/msg/Path. Every pose has the header of the path."""
-
-    def __init__(self, frame: str) -> None:
-        head = Template().slot("iI", "*stamp").string(frame).slot("I", "count")
-        self._pack = head.packer()
-        self._first = self._frame_bytes(frame, len(head.buffer) - len(HEADER))
-        self._following = self._frame_bytes(frame, 0)
-
-    @staticmethod
-    def _frame_bytes(frame: str, start: int) -> bytes:
-        """Return the bytes of the frame name in a geometry_msgs/msg/PoseStamped, padded to a multiple of eight bytes.
-
-        `start` is the number of bytes of the message before the stamp.
-        """
-        pose = Template(prefix=b"", start=start).put("iI", 0, 0).string(frame).align(8)
-        return bytes(pose.buffer[8:])
-
-    def __call__(self, stamp: Stamp, points: Array) -> bytes:
-        """Return the bytes of the path through `points` (n, 3) x, y, yaw."""
-        head = self._pack(stamp, len(points))
-        if not len(points):
-            return head
-        poses, stamp_bytes = planar_poses(points).astype("<f8"), struct.pack("<iI", *stamp)
-        first, following = stamp_bytes + self._first, stamp_bytes + self._following
-        rest = np.empty((len(points) - 1, len(following) + 56), dtype=np.uint8)
-        rest[:, : len(following)] = np.frombuffer(following, dtype=np.uint8)
-        rest[:, len(following) :] = poses[1:].view(np.uint8).reshape(-1, 56)
-        return b"".join((head, first, poses[0].tobytes(), rest.tobytes()))
+def path(frame: str, stamp: Stamp, points: Array) -> bytes:
+    """Return the bytes of a nav_msgs/msg/Path of `points` (n, 3) x, y, yaw. Every pose has the header of the path."""
+    head = _header_packer(frame, "I")(stamp, (len(points),))
+    if not len(points):
+        return head
+    poses = planar_poses(points).astype("<f8")
+    first = Template(prefix=b"", start=len(head) - len(HEADER)).put("iI", *stamp).string(frame).align(8).buffer
+    following = Template(prefix=b"").put("iI", *stamp).string(frame).align(8).buffer
+    rest = np.empty((len(points) - 1, len(following) + 56), dtype=np.uint8)
+    rest[:, : len(following)] = np.frombuffer(following, dtype=np.uint8)
+    rest[:, len(following) :] = poses[1:].view(np.uint8).reshape(-1, 56)
+    return b"".join((head, first, poses[0].tobytes(), rest.tobytes()))
 
 
-class ParticleCloudPacker:
-    """Callable encoder of nav2_msgs/msg/ParticleCloud."""
-
-    def __init__(self, frame: str) -> None:
-        self._pack = Template().slot("iI", "*stamp").string(frame).slot("I", "count").align(8).packer()
-
-    def __call__(self, stamp: Stamp, particles: Array) -> bytes:
-        """Return the bytes of `particles` (n, 4) x, y, yaw, weight; n > 0."""
-        cloud = np.empty((len(particles), 8), dtype="<f8")
-        cloud[:, :7] = planar_poses(particles)
-        cloud[:, 7] = particles[:, 3]
-        return self._pack(stamp, len(particles)) + cloud.tobytes()
+def particle_cloud(frame: str, stamp: Stamp, particles: Array) -> bytes:
+    """Return the bytes of a nav2_msgs/msg/ParticleCloud of `particles` (n, 4) x, y, yaw, weight; n > 0."""
+    cloud = np.empty((len(particles), 8), dtype="<f8")
+    cloud[:, :7] = planar_poses(particles)
+    cloud[:, 7] = particles[:, 3]
+    head = Writer().put("iI", *stamp).string(frame).put("I", len(particles)).align(8)
+    return head.done() + cloud.tobytes()
 
 
-class TransformsPacker:
-    """Callable encoder of tf2_msgs/msg/TFMessage."""
-
-    def __init__(self) -> None:
-        self._first_packers: dict[tuple[str, str, int], Callable[[Stamp, Pose3], bytes]] = {}
-        self._following_packers: dict[tuple[str, str], Callable[[Stamp, Pose3], bytes]] = {}
-
-    def __call__(self, links: list[Link]) -> bytes:
-        """Return the bytes of one message with a transform for each link."""
-        if not links:
-            return HEADER + bytes(4)
-        frame, child, stamp, pose = links[0]
-        key = frame, child, len(links)
-        pack = self._first_packers.get(key)
-        if pack is None:
-            pack = self._first_packers[key] = _transform_packer(frame, child, HEADER + struct.pack("<I", len(links)), 4)
-        message = pack(stamp, pose)
-        return message if len(links) == 1 else b"".join((message, *map(self._pack_following, links[1:])))
-
-    def _pack_following(self, link: Link) -> bytes:
-        """Return the bytes of a transform that is not the first one of its message."""
-        frame, child, stamp, pose = link
-        pack = self._following_packers.get((frame, child))
-        if pack is None:
-            pack = self._following_packers[frame, child] = _transform_packer(frame, child, b"", 0)
-        return pack(stamp, pose)
+@lru_cache(maxsize=256)
+def _header_packer(frame: str, codes: str) -> Callable[..., bytes]:
+    """Return a function (stamp, numbers) that packs a std_msgs/msg/Header and numbers with the given `struct` codes."""
+    return Template().slot("iI", "*stamp").string(frame).slot(codes, "*numbers").packer()
 
 
-def _transform_packer(frame: str, child: str, prefix: bytes, start: int) -> Callable[[Stamp, Pose3], bytes]:
-    """Return a function (stamp, pose) that packs a geometry_msgs/msg/TransformStamped after the bytes `prefix`.
+def tf_message(links: Sequence[Link]) -> bytes:
+    """Return the bytes of a tf2_msgs/msg/TFMessage with a transform for each link."""
+    parts, start = [HEADER, struct.pack("<I", len(links))], 4
+    for frame, child, stamp, pose in links:
+        parts.append(_transform_packer(frame, child, start)(stamp, pose))
+        start = 0
+    return b"".join(parts)
 
-    The transform starts `start` bytes after a multiple of eight bytes.
-    """
-    return (
-        Template(prefix=prefix, start=start)
-        .slot("iI", "*stamp")
-        .string(frame)
-        .string(child)
-        .slot("7d", "*pose")
-        .packer()
-    )
+
+@lru_cache(maxsize=1024)
+def _transform_packer(frame: str, child: str, start: int) -> Callable[[Stamp, Pose3], bytes]:
+    """Return a function (stamp, pose) that packs a transform, which starts `start` bytes after a multiple of eight."""
+    transform = Template(prefix=b"", start=start).slot("iI", "*stamp").string(frame).string(child)
+    return transform.slot("7d", "*pose").packer()
 
 
 def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:
     """Return the bytes of a nav_msgs/msg/OccupancyGrid."""
     height, width = grid.shape
     head = (
-        Template()
+        Writer()
         .put("iI", *stamp)
         .string(frame)
         .put("iI", *stamp)
@@ -145,7 +96,7 @@ def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:
         .put("7d", *Pose3.planar(grid.origin))
         .put("I", grid.cells.size)
     )
-    return bytes(head.buffer) + grid.cells.astype(np.int8).tobytes()
+    return head.done() + grid.cells.astype(np.int8).tobytes()
 
 
 def pose_array(frame: str, stamp: Stamp, points: Array) -> bytes:
@@ -153,8 +104,8 @@ def pose_array(frame: str, stamp: Stamp, points: Array) -> bytes:
 
     The numbers are rounded to 32-bit precision.
     """
-    head = Template().put("iI", *stamp).string(frame).put("I", len(points)).align(8)
-    return bytes(head.buffer) + planar_poses(points).astype("<f4").astype("<f8").tobytes()
+    head = Writer().put("iI", *stamp).string(frame).put("I", len(points)).align(8)
+    return head.done() + planar_poses(points).astype("<f4").astype("<f8").tobytes()
 
 
 Bytes = npt.NDArray[np.uint8]
@@ -193,4 +144,4 @@ def _reserve(message: Template, codes: str) -> slice:
     """Append a slot, and return the slice of its bytes in the message."""
     message.slot(codes, "*numbers")
     end = len(message.buffer)
-    return slice(end - calcsize(f"<{codes}"), end)
+    return slice(end - struct.calcsize(f"<{codes}"), end)

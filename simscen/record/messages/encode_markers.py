@@ -1,12 +1,12 @@
 """Encoder of visualization_msgs/msg/MarkerArray, and points of its shapes."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from simscen.core.geometry import Array, Pose3
-from simscen.record.messages.template import Template
+from simscen.peer.cdr import Writer
 
 Color = tuple[float, float, float, float]
 """Red, green, blue, and opacity, from 0 to 1."""
@@ -42,14 +42,14 @@ def marker_array(markers: Iterable[Marker]) -> bytes:
     Each marker moves with its frame.
     """
     markers = list(markers)
-    message = Template().put("I", len(markers) + 1)
+    message = Writer().put("I", len(markers) + 1)
     _put(message, Marker("map", "", ARROW, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 0, _DELETE_ALL)
     for number, marker in enumerate(markers):
         _put(message, marker, number, _ADD)
-    return bytes(message.buffer)
+    return message.done()
 
 
-def _put(message: Template, marker: Marker, number: int, action: int) -> None:
+def _put(message: Writer, marker: Marker, number: int, action: int) -> None:
     """Append a visualization_msgs/msg/Marker with the ID `number` to a message."""
     message.put("iI", 0, 0).string(marker.frame).string(marker.group).put("3i", number, marker.kind, action)
     message.put("7d", *marker.pose).put("3d", *marker.scale).put("4f", *marker.color)
@@ -66,8 +66,12 @@ def _put(message: Template, marker: Marker, number: int, action: int) -> None:
 
 def outline_edges(outlines: Iterable[Sequence[Sequence[float]]], height: float = 0.0) -> Array:
     """Return the edges of polygons as points (n, 3) of a LINE_LIST, all at `height` in m."""
-    edges = [edge for outline in outlines for edge in _edges(np.array(outline, dtype=np.float64), height)]
-    return np.concatenate(edges) if edges else np.empty((0, 3))
+    edges = [np.empty((0, 3))]
+    for outline in outlines:
+        corners = np.array(outline, dtype=np.float64)[:, :2]
+        raised = np.column_stack((corners, np.full(len(corners), height)))
+        edges.append(np.stack((raised, np.roll(raised, -1, axis=0)), axis=1).reshape(-1, 3))
+    return np.concatenate(edges)
 
 
 def rectangle_triangles(corners: Array, height: float = 0.0) -> Array:
@@ -78,8 +82,3 @@ def rectangle_triangles(corners: Array, height: float = 0.0) -> Array:
     points = np.full((len(corners), 6, 3), height)
     points[:, :, :2] = corners[:, [[0, 1], [2, 1], [2, 3], [0, 1], [2, 3], [0, 3]]]
     return points.reshape(-1, 3)
-
-
-def _edges(outline: Array, height: float) -> Iterator[Array]:
-    raised = np.column_stack((outline[:, :2], np.full(len(outline), height)))
-    yield np.stack((raised, np.roll(raised, -1, axis=0)), axis=1).reshape(-1, 3)

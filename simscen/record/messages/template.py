@@ -9,7 +9,7 @@ from functools import lru_cache
 from itertools import groupby
 from typing import Any, NamedTuple
 
-from simscen.peer.cdr import HEADER
+from simscen.peer.cdr import HEADER, Writer
 
 
 class Slot(NamedTuple):
@@ -22,18 +22,17 @@ class Slot(NamedTuple):
     field: str
 
 
-class Template:
+class Template(Writer):
     """Layout of a message of fixed size: constants, and slots for variable fields. `buffer` has zeros in the slots.
-
-    Methods append aligned fields in the order of the message definition, and return the template.
 
     prefix:  bytes before the message, such as the CDR header, which do not count for the alignment
     start:   for the template of a part of a message, number of bytes of the message before this part
     """
 
     def __init__(self, prefix: bytes = HEADER, start: int = 0) -> None:
+        super().__init__()
         self.buffer = bytearray(prefix)
-        self._shift = start - len(prefix)
+        self._alignment_offset = start - len(prefix)
         self._slots: list[tuple[int, Slot]] = []
 
     def slot(self, codes: str, field: str) -> "Template":
@@ -41,24 +40,6 @@ class Template:
         self.align(max(struct.calcsize("<" + code) for code in codes if code.isalpha()))
         self._slots.append((len(self.buffer), Slot(codes, field)))
         self.buffer += bytes(struct.calcsize("<" + codes))
-        return self
-
-    def put(self, codes: str, *values: float) -> "Template":
-        """Append constant numbers of equal width. `codes` are their codes of `struct`."""
-        self.align(struct.calcsize("<" + codes[-1]))
-        self.buffer += struct.pack("<" + codes, *values)
-        return self
-
-    def string(self, text: str) -> "Template":
-        """Append a constant string: its length with the terminating NUL, then its UTF-8 bytes."""
-        encoded = text.encode() + b"\0"
-        self.put("I", len(encoded))
-        self.buffer += encoded
-        return self
-
-    def align(self, width: int) -> "Template":
-        """Append zeros up to a multiple of `width` bytes."""
-        self.buffer += bytes(-(len(self.buffer) + self._shift) % width)
         return self
 
     @property

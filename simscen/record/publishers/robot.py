@@ -16,14 +16,8 @@ from simscen.record import frame_names, topics
 from simscen.record.frame_names import RobotFrames
 from simscen.record.log_header import LogHeader
 from simscen.record.messages import encode, encode_arrays, event_text
-from simscen.record.messages.encode_arrays import (
-    Bytes,
-    ParticleCloudPacker,
-    PathPacker,
-    TransformBatchPacker,
-    TransformsPacker,
-)
-from simscen.record.publishers.message_sinks import BatchWriter, LogPublisher, MessageSink, NamespacedPublisher
+from simscen.record.messages.encode_arrays import Bytes, TransformBatchPacker
+from simscen.record.publishers.message_sinks import BatchWriter, LogPublisher, MessageSink
 from simscen.record.publishers.scene import ScenePublisher
 from simscen.record.publishers.sensors import SensorPublisher
 from simscen.record.trace_thinning import Thinning, Throttle
@@ -64,12 +58,12 @@ class RobotPublisher:
 
     def __init__(
         self,
-        out: LogPublisher | NamespacedPublisher,
+        out: LogPublisher,
         time: SimTime,
         header: LogHeader,
         scenery: Scenery,
-        robot: str = "",
-        publishes_clock: bool = True,
+        robot: str,
+        publishes_clock: bool,
     ) -> None:
         self._time, frames = time, RobotFrames(robot)
         self.thinning = thinning = Thinning(time.rate)
@@ -92,7 +86,7 @@ class RobotPublisher:
         if truth is not None:
             self._truth.write(now, tick, truth)
         if decision.belief is not None:
-            self._sensors.set_map_from_odom(Pose3.planar(decision.belief.map_from_odom))
+            self._sensors.map_from_odom = Pose3.planar(decision.belief.map_from_odom)
         for odometry in decision.odometry:
             self._sensors.write_filtered(now, odometry)
         self._sensors.write(now, moment.readings)
@@ -117,8 +111,6 @@ class StackPublisher:
 
     def __init__(self, out: MessageSink, time: SimTime, thinning: Thinning, frames: RobotFrames) -> None:
         self._out, self._time, self._thinning, self._frames = out, time, thinning, frames
-        self._particles = ParticleCloudPacker(frame_names.MAP)
-        self._path = PathPacker(frame_names.MAP)
         self._command = out.batch_writer([(topics.COMMAND, encode.twist())])
         self._belief = out.batch_writer([(topics.BELIEF, encode.pose_with_covariance(frame_names.MAP))])
         self._particle_times = Throttle(time.rate, PARTICLE_RATE_HZ)
@@ -131,10 +123,10 @@ class StackPublisher:
             self._write_belief(now, tick, decision.belief)
         if decision.plan is not None:
             stamp = self._time.stamp(decision.plan.tick)
-            self._out.publish(topics.PLAN, now, self._path(stamp, decision.plan.points))
+            self._out.publish(topics.PLAN, now, encode_arrays.path(frame_names.MAP, stamp, decision.plan.points))
         if decision.local_plan is not None and self._local_plan_times.passes(tick):
-            stamp = self._time.stamp(tick)
-            self._out.publish(topics.LOCAL_PLAN, now, self._path(stamp, decision.local_plan.points))
+            path = encode_arrays.path(frame_names.MAP, self._time.stamp(tick), decision.local_plan.points)
+            self._out.publish(topics.LOCAL_PLAN, now, path)
         for costmap in decision.costmaps:
             topic = topics.GLOBAL_COSTMAP if costmap.name == "global" else topics.LOCAL_COSTMAP
             stamp, frame = self._time.stamp(tick), self._frames.log_frame(costmap.frame)
@@ -149,7 +141,8 @@ class StackPublisher:
         pose = Pose3.planar(belief.pose)
         self._belief.write(now, stamp, pose, belief.covariance.ravel().tolist())
         if len(belief.particles) and self._particle_times.passes(tick):
-            self._out.publish(topics.PARTICLES, now, self._particles(stamp, belief.particles))
+            cloud = encode_arrays.particle_cloud(frame_names.MAP, stamp, belief.particles)
+            self._out.publish(topics.PARTICLES, now, cloud)
         if len(belief.particles) and self._pose_array_times.passes(tick):
             subset = belief.particles[:: -(-len(belief.particles) // MAX_ARRAY_POSES)]
             self._out.publish(topics.PARTICLE_POSES, now, encode_arrays.pose_array(frame_names.MAP, stamp, subset))
@@ -166,14 +159,13 @@ class TruthPublisher:
     """
 
     def __init__(
-        self, out: MessageSink, time: SimTime, thinning: Thinning, frames: RobotFrames, publishes_clock: bool = True
+        self, out: MessageSink, time: SimTime, thinning: Thinning, frames: RobotFrames, publishes_clock: bool
     ) -> None:
         self._out, self._time, self._thinning, self._frame = out, time, thinning, frames.truth
         truth = (topics.TRUTH, encode.odometry(frame_names.MAP, frames.truth)), (topics.CLEARANCE, encode.float64())
         self._common_layouts = ((topics.CLOCK, encode.clock()), *truth) if publishes_clock else truth
         self._without_tf = out.batch_writer(self._common_layouts)
         self._writers: dict[tuple[str, ...], BatchWriter] = {}
-        self._pack_transforms, self._tf_writer = TransformsPacker(), out.topic_writer(topics.TF)
         self._precomputed: _PrecomputedBatch | None = None
 
     def write(self, now: int, tick: int, truth: Truth) -> None:
@@ -195,7 +187,8 @@ class TruthPublisher:
             return
         self._without_tf.write(now, stamp, *fields)
         links = [(frame_names.MAP, frame_names.object_frame(name), stamp, pose) for name, pose in poses.items()]
-        self._tf_writer.write(now, self._pack_transforms([(frame_names.MAP, self._frame, stamp, truth.pose), *links]))
+        robot = frame_names.MAP, self._frame, stamp, truth.pose
+        self._out.publish(topics.TF, now, encode_arrays.tf_message([robot, *links]))
 
     def _precompute(self, predicted: PredictedPoses) -> "_PrecomputedBatch":
         """Serialize the transforms of all objects for all ticks with predicted poses."""

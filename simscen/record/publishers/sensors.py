@@ -8,9 +8,8 @@ from simscen.core.clock import SimTime, Stamp
 from simscen.core.geometry import Pose3
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Readings, Scan
 from simscen.record import frame_names, topics
-from simscen.record.messages import encode
-from simscen.record.messages.encode_arrays import LaserScanPacker, TransformsPacker
-from simscen.record.publishers.message_sinks import BatchWriter, MessageSink, TopicWriter
+from simscen.record.messages import encode, encode_arrays
+from simscen.record.publishers.message_sinks import BatchWriter, MessageSink
 from simscen.record.topics import Topic
 from simscen.record.trace_thinning import Thinning
 
@@ -22,7 +21,7 @@ _DEFAULT_TOPICS = {
     "Imu": ("imu", topics.IMU_TYPE),
     "Bump": ("bumper", topics.BUMPER_TYPE),
 }
-"""Default topic and message type, by the class name of a reading."""
+"""Default topic (without the slash) and message type, by the class name of a reading."""
 
 
 class SensorPublisher:
@@ -38,6 +37,7 @@ class SensorPublisher:
 
     Attributes:
         sensor_topics: Pairs of sensor name and topic for all `sensors`.
+        map_from_odom: Transform that is published on /tf with each odometry; None while it is unknown.
     """
 
     def __init__(
@@ -46,12 +46,11 @@ class SensorPublisher:
         time: SimTime,
         thinning: Thinning,
         mounts: Mapping[str, Pose3],
-        sensors: Mapping[str, str] | None = None,
-        frames: frame_names.RobotFrames | None = None,
+        sensors: Mapping[str, str],
+        frames: frame_names.RobotFrames,
     ) -> None:
         self._out, self._time, self._thinning = out, time, thinning
         self._topics: dict[tuple[str, str], Topic] = {}
-        self._topic_writers: dict[tuple[str, str], TopicWriter] = {}
         self._imu_writers: dict[str, BatchWriter] = {}
         self._wheel_odometry: _OdometryWriters | None = None
         self._filtered_odometry: _OdometryWriters | None = None
@@ -63,19 +62,12 @@ class SensorPublisher:
             Image: self._write_image,
         }
         self._used_defaults: set[str] = set()
-        self._scan_packers: dict[str, LaserScanPacker] = {}
-        self._frames = frames or frame_names.RobotFrames()
+        self._frames = frames
         self._pack_odometry = encode.odometry_with_covariance(self._frames.odom, self._frames.base).packer()
-        self._pack_transforms = TransformsPacker()
         self._mounts = dict(mounts)
-        self._map_from_odom: Pose3 | None = None
-        kinds = sensors or {}
-        self.sensor_topics = [(name, topic) for name, kind in kinds.items() for topic in self._topics_of(name, kind)]
+        self.map_from_odom: Pose3 | None = None
+        self.sensor_topics = [(name, topic) for name, kind in sensors.items() for topic in self._topics_of(name, kind)]
         self._publish_mounts(0)
-
-    def set_map_from_odom(self, map_from_odom: Pose3) -> None:
-        """Set the transform from map to odom, which is published on /tf with each odometry from now on."""
-        self._map_from_odom = map_from_odom
 
     def write_filtered(self, now: int, odometry: Odometry) -> None:
         """Publish the filtered odometry of the stack. `now` is simulated time in ns.
@@ -93,17 +85,16 @@ class SensorPublisher:
 
     def topic_of(self, reading: Odometry | Scan) -> Topic:
         """Return the topic on which a reading is published."""
-        return self._topic(reading.sensor, *_DEFAULT_TOPICS[type(reading).__name__])
+        return self._topic(reading.sensor, type(reading).__name__)
 
     def _topics_of(self, sensor: str, kind: str) -> list[Topic]:
         if kind == "Image":
             return [image for image, _ in _image_topics(sensor)]
-        return [self._topic(sensor, *_DEFAULT_TOPICS[kind])] if kind in _DEFAULT_TOPICS else []
+        return [self._topic(sensor, kind)] if kind in _DEFAULT_TOPICS else []
 
     def _write_odometry(self, now: int, odometry: Odometry) -> None:
         if not self._thinning.keeps_odometry(odometry) or self._filtered_odometry is not None:
-            message = self._pack_odometry(*self._odometry_fields(odometry))
-            self._topic_writer("Odometry", odometry.sensor).write(now, message)
+            self._out.publish(self.topic_of(odometry), now, self._pack_odometry(*self._odometry_fields(odometry)))
             return
         if self._wheel_odometry is None:
             self._wheel_odometry = self._odometry_writers(self.topic_of(odometry))
@@ -115,10 +106,10 @@ class SensorPublisher:
 
     def _write_with_transforms(self, writers: "_OdometryWriters", now: int, odometry: Odometry) -> None:
         fields = self._odometry_fields(odometry)
-        if self._map_from_odom is None:
+        if self.map_from_odom is None:
             writers.without_map.write(now, *fields)
         else:
-            writers.with_map.write(now, *fields, self._map_from_odom)
+            writers.with_map.write(now, *fields, self.map_from_odom)
 
     def _odometry_writers(self, topic: Topic) -> "_OdometryWriters":
         odom, base = self._frames.odom, self._frames.base
@@ -130,19 +121,16 @@ class SensorPublisher:
         )
 
     def _write_scan(self, now: int, scan: Scan) -> None:
-        packer = self._scan_packers.get(scan.sensor)
-        if packer is None:
-            frame = self._frames.sensor_frame(scan.sensor)
-            packer = self._scan_packers[scan.sensor] = LaserScanPacker(frame)
         if scan.sensor not in self._mounts:
             self._mounts[scan.sensor] = scan.tilted_mount or Pose3.planar(scan.mount)
             self._publish_mounts(now)
-        self._topic_writer("Scan", scan.sensor).write(now, packer(self._time.stamp(scan.tick), scan))
+        data = encode_arrays.laser_scan(self._frames.sensor_frame(scan.sensor), self._time.stamp(scan.tick), scan)
+        self._out.publish(self.topic_of(scan), now, data)
 
     def _write_imu(self, now: int, imu: Imu) -> None:
         writer = self._imu_writers.get(imu.sensor)
         if writer is None:
-            topic = self._topic(imu.sensor, *_DEFAULT_TOPICS["Imu"])
+            topic = self._topic(imu.sensor, "Imu")
             frame = self._frames.sensor_frame(imu.sensor) if imu.sensor in self._mounts else self._frames.base
             writer = self._imu_writers[imu.sensor] = self._out.batch_writer([(topic, encode.imu(frame))])
         writer.write(
@@ -152,7 +140,7 @@ class SensorPublisher:
         )  # fmt: skip
 
     def _write_bump(self, now: int, bump: Bump) -> None:
-        self._topic_writer("Bump", bump.sensor).write(now, _PRESSED if bump.pressed else _FREE)
+        self._out.publish(self._topic(bump.sensor, "Bump"), now, _PRESSED if bump.pressed else _FREE)
 
     def _write_image(self, now: int, image: Image) -> None:
         frame, stamp = self._frames.sensor_frame(image.sensor), self._time.stamp(image.tick)
@@ -166,22 +154,16 @@ class SensorPublisher:
         base = self._frames.base
         links = [(base, self._frames.sensor_frame(name), _START, pose) for name, pose in self._mounts.items()]
         if links:
-            self._out.publish(topics.TF_STATIC, now, self._pack_transforms(links))
+            self._out.publish(topics.TF_STATIC, now, encode_arrays.tf_message(links))
 
-    def _topic_writer(self, kind: str, sensor: str) -> TopicWriter:
-        writer = self._topic_writers.get((kind, sensor))
-        if writer is None:
-            topic = self._topic(sensor, *_DEFAULT_TOPICS[kind])
-            writer = self._topic_writers[kind, sensor] = self._out.topic_writer(topic)
-        return writer
-
-    def _topic(self, sensor: str, default: str, message_type: str) -> Topic:
-        """Return the topic of a sensor: `/default` for the first sensor, `/NAME/default` for the others."""
-        topic = self._topics.get((sensor, default))
+    def _topic(self, sensor: str, kind: str) -> Topic:
+        """Return the topic of a sensor: `/default` for the first sensor of a kind, `/NAME/default` for the others."""
+        topic = self._topics.get((sensor, kind))
         if topic is None:
+            default, message_type = _DEFAULT_TOPICS[kind]
             name = f"/{_ros_name(sensor)}/{default}" if default in self._used_defaults else f"/{default}"
             self._used_defaults.add(default)
-            topic = self._topics[sensor, default] = Topic(name, message_type)
+            topic = self._topics[sensor, kind] = Topic(name, message_type)
         return topic
 
 

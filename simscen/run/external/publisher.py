@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Collection, Mapping
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,8 +15,9 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry, Reading, Readings, Scan
 from simscen.peer import messages
 from simscen.record import frame_names, topics
+from simscen.record.frame_names import RobotFrames
 from simscen.record.messages import encode, encode_arrays
-from simscen.record.publishers.message_sinks import BatchWriter, Layouts, TopicWriter
+from simscen.record.publishers.message_sinks import BatchWriter, Layouts
 from simscen.record.publishers.sensors import SensorPublisher
 from simscen.record.topics import Topic
 from simscen.record.trace_thinning import Thinning
@@ -41,7 +41,7 @@ class StepPublisher:
         self._requested_sensors: set[str] = set()
         self._latched: list[tuple[Topic, bytes]] = []
         self._time = SimTime(tick_rate)
-        self._sensors = SensorPublisher(self, self._time, Thinning(tick_rate), mounts, sensors)
+        self._sensors = SensorPublisher(self, self._time, Thinning(tick_rate), mounts, sensors, RobotFrames())
         self.sensor_topics = self._sensors.sensor_topics
         """Pairs of a sensor name and a topic with readings of that sensor."""
 
@@ -104,10 +104,6 @@ class StepPublisher:
         """Return all queued messages, and empty the queue."""
         messages, self._queue = self._queue, []
         return messages
-
-    def topic_writer(self, topic: Topic) -> TopicWriter:
-        """Return a writer for the messages of one topic."""
-        return TopicWriter(lambda: partial(self.publish, topic))
 
     def batch_writer(self, layouts: Layouts) -> BatchWriter:
         """Return a writer for messages that are always published together."""
