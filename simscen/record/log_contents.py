@@ -54,7 +54,7 @@ class LogContents:
         self._mounts: dict[str, Pose3] = {}
         self._types: dict[int, str] = {}
         self._counts = MessageCounts()
-        self._handlers: dict[int, Handler] = {}
+        self._handlers: dict[int, list[Handler]] = {}
         self._robot_of_channel: dict[int, str] = {}
         self.robots: dict[str, LogContents] = {}
 
@@ -86,34 +86,26 @@ class LogContents:
 
     def header(self) -> LogHeader:
         """Return the header of the log. Raises NotSimscenLog if the log has none."""
+        scenario = str(self._files.get(log_header.SCENARIO_FILE, b""), "utf-8")
+        files = {name: data for name, data in self._files.items() if name not in log_header.RESERVED_FILES}
         if self.robots:
             if unknown := [name for name in self._files if name.endswith(f"/{log_header.CASE_FILE}")]:
                 raise ValueError(f"it has {unknown[0]}, but its list of robots is {', '.join(self.robots)}")
-            return self._joint_header({name: contents.header() for name, contents in self.robots.items()})
+            robots = {name: replace(one.header(), scenario=scenario) for name, one in self.robots.items()}
+            return replace(next(iter(robots.values())), files=files, robots=robots)
         if not self._metadata or log_header.CASE_FILE not in self._files:
             raise NotSimscenLog("it has no description of its run")
         return LogHeader(
             name=self._metadata["scenario"],
             seed=int(self._metadata["seed"]),
             case=log_header.case_from_json(self._files[log_header.CASE_FILE]),
-            scenario=str(self._files.get(log_header.SCENARIO_FILE, b""), "utf-8"),
+            scenario=scenario,
             map=self._map,
             robot_description=self._robot_description,
             mounts=self._mounts,
-            files=self._other_files(),
+            files=files,
             facts=log_header.extra_facts(self._metadata),
         )
-
-    def _joint_header(self, robots: dict[str, LogHeader]) -> LogHeader:
-        """Return the header of a log of several robots, from the headers of the single robots."""
-        first = next(iter(robots.values()))
-        text = str(self._files.get(log_header.SCENARIO_FILE, b""), "utf-8")
-        headers = {name: replace(header, scenario=text) for name, header in robots.items()}
-        return replace(first, scenario=text, files=self._other_files(), robots=headers)
-
-    def _other_files(self) -> dict[str, bytes]:
-        """Return the attachments without the RESERVED_FILES."""
-        return {name: data for name, data in self._files.items() if name not in log_header.RESERVED_FILES}
 
     def trace(self) -> Trace:
         """Return the Trace of the only or first robot. If the run was aborted, the Trace ends with the last message."""
@@ -180,8 +172,7 @@ class LogContents:
         if message.channel_id in self._robot_of_channel:
             self.robots[self._robot_of_channel[message.channel_id]]._add_message(message)
             return
-        handler = self._handlers.get(message.channel_id)
-        if handler is not None:
+        for handler in self._handlers.get(message.channel_id, ()):
             handler(self._last_tick, message.data)
 
     def _add_channel(self, channel: records.Channel) -> None:
@@ -194,7 +185,7 @@ class LogContents:
         self._counts.add_channel(channel.id, channel.topic, message_type)
         by_topic: dict[tuple[str, str], Handler] = {
             topics.TRUTH[:2]: self._add_truth,
-            topics.CLEARANCE[:2]: lambda tick, data: self._rows.clearance.add(tick, *MessageReader(data).take("d")),
+            topics.CLEARANCE[:2]: self._add_clearance,
             topics.BELIEF[:2]: self._add_belief,
             topics.COMMAND[:2]: self._add_command,
             topics.PLAN[:2]: self._add_plan,
@@ -205,22 +196,20 @@ class LogContents:
             topics.ROBOT_DESCRIPTION[:2]: self._set_robot_description,
             ("/odom", topics.ODOMETRY_TYPE): self._add_odometry,
         }
-        handler = self._add_scan if message_type == topics.SCAN_TYPE else by_topic.get((channel.topic, message_type))
-        sensor_handler = self._sensor_handler(channel.topic, message_type) if self._with_sensors else None
-        if handlers := [one for one in (handler, sensor_handler) if one is not None]:
-            self._handlers[channel.id] = handlers[0] if len(handlers) == 1 else _call_all(handlers)
-
-    def _sensor_handler(self, topic: str, message_type: str) -> Handler | None:
-        """Return the handler that stores the messages of a topic in `sensors`; None if they are not stored."""
-        if (topic, message_type) == topics.ROSOUT[:2]:
-            return lambda tick, data: self.sensors.lines.append((tick, data))
-        return self.sensors.handler(topic, message_type)
+        key = channel.topic, message_type
+        handlers = [self._add_scan if message_type == topics.SCAN_TYPE else by_topic.get(key)]
+        if self._with_sensors:
+            handlers.append(self._add_log_line if key == topics.ROSOUT[:2] else self.sensors.handler(*key))
+        self._handlers[channel.id] = [handler for handler in handlers if handler is not None]
 
     def _add_truth(self, tick: int, data: bytes) -> None:
         odometry = decode.odometry(MessageReader(data))
         if self._time.tick(odometry.stamp) != tick:
             raise ValueError(f"the log time of a message of {topics.TRUTH.name} differs from its stamp")
         self._rows.truth.add(tick, *odometry.pose, *(odometry.twist or ()))
+
+    def _add_clearance(self, tick: int, data: bytes) -> None:
+        self._rows.clearance.add(tick, *MessageReader(data).take("d"))
 
     def _add_odometry(self, tick: int, data: bytes) -> None:
         self._rows.odometry.add(tick, *decode.odometry(MessageReader(data)).pose)
@@ -250,6 +239,9 @@ class LogContents:
             if (name := frame_names.object_in_frame(link.child)) is not None:
                 self._rows.object(name).add(tick, *link.pose)
 
+    def _add_log_line(self, tick: int, data: bytes) -> None:
+        self.sensors.lines.append((tick, data))
+
     def _set_mounts(self, _: int, data: bytes) -> None:
         self._mounts = self.sensors.mounts = {
             self.sensors.frames.stack_frame(link.child): Pose3(*link.pose)
@@ -263,13 +255,3 @@ class LogContents:
 
     def _set_robot_description(self, _: int, data: bytes) -> None:
         self._robot_description = MessageReader(data).string()
-
-
-def _call_all(handlers: list[Handler]) -> Handler:
-    """Return a handler that calls several handlers."""
-
-    def handle(tick: int, data: bytes) -> None:
-        for handler in handlers:
-            handler(tick, data)
-
-    return handle

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -111,17 +111,11 @@ class SensorMessageCollector:
         if (message.topic, message.type) == topics.MAP[:2]:
             self.map = self._sensors.decode_costmap(message.data)[1]
         elif self._sensors.handler(message.topic, message.type) is not None:
-            self._check(message)
+            checks: dict[str, Callable[[bytes], object]] = {
+                topics.SCAN_TYPE: self._sensors.decode_scan,
+                topics.PARTICLES.type: self._sensors.decode_particles,
+                topics.LOCAL_PLAN.type: self._sensors.decode_path,
+                topics.MAP.type: self._sensors.decode_costmap,
+            }
+            checks[message.type](message.data)  # raises ValueError for an invalid message
             self._messages.append(message)
-
-    def _check(self, message: RawMessage) -> None:
-        """Raise ValueError for an invalid message."""
-        match message.type:
-            case topics.SCAN_TYPE:
-                self._sensors.decode_scan(message.data)
-            case topics.PARTICLES.type:
-                self._sensors.decode_particles(message.data)
-            case topics.LOCAL_PLAN.type:
-                self._sensors.decode_path(message.data)
-            case _:
-                self._sensors.decode_costmap(message.data)
