@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +14,7 @@ from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry.shapes import Mesh
 from simscen.loading.loaded import CriterionMask, LoadedMap, LoadedRobot, LoadedScenario, LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.yaml.textfile import with_source_line
 from simscen.loading.yaml.tree import Keys, MappingNode, key_position, value_position
 from simscen.model.robot import RobotSpec
 from simscen.model.world import WorldSpec
@@ -35,26 +36,23 @@ def world_from_file(source: LoadedWorld, root: Path, world_path: Sequence[Path] 
     elements of an SDF file become warnings in the `notes` of the world. Raises InvalidInput for an unusable map image
     or SDF file.
     """
-    base: World | None = None
+    base, grid, notes = None, None, tuple[str, ...]()
     if source.sdf is not None:
         from simscen.worlds.sdf import load_sdf
 
         base = load_sdf(source.sdf, search=world_path, root=root, lenient=lenient)
-    spec = source.spec or WorldSpec(simscen=1)
-    grid, notes = _map_and_notes(source.map) if source.map else (None, ())
-    return world_from_spec(spec, source.name, grid, base, notes)
+    if source.map is not None:
+        from simscen.worlds.maps import ros_map
+
+        grid, notes = ros_map.load_map(source.map.spec, source.map.image)
+    return world_from_spec(source.spec or WorldSpec(simscen=1), source.name, grid, base, notes)
 
 
 def load_map(source: LoadedMap) -> OccupancyGrid:
     """Load the occupancy grid of a ROS map. Raises InvalidInput for an unusable image."""
-    return _map_and_notes(source)[0]
+    from simscen.worlds.maps import ros_map
 
-
-def _map_and_notes(source: LoadedMap) -> tuple[OccupancyGrid, tuple[str, ...]]:
-    """Return the grid of a ROS map, and warnings about its image."""
-    from simscen.worlds.maps.ros_map import load_map
-
-    return load_map(source.spec, source.image)
+    return ros_map.load_map(source.spec, source.image)[0]
 
 
 def read_mesh(path: Path) -> Mesh:
@@ -133,53 +131,46 @@ SPEED_MASK_KEYS: Keys = ("stack", "speed_mask", "file")
 """Keys that lead to the speed mask of the stack in a scenario."""
 MAX_RECTANGLES = 100_000
 """Largest number of rectangles of equal cells in the mask of a criterion. Every log contains all these rectangles."""
-AddSourceLine = Callable[[Problem], Problem]
-"""Function that returns a copy of a problem with the text of its source line."""
 
 
 def load_masks(loaded: LoadedScenario) -> FilterMasks:
     """Load the costmap filter masks of the stack. Raises InvalidInput at the line of an unusable mask."""
-    keepout = _stack_mask_grid(loaded, KEEPOUT_MASK_KEYS, loaded.keepout_mask)
-    grid, spec = _stack_mask_grid(loaded, SPEED_MASK_KEYS, loaded.speed_mask), loaded.spec.stack.speed_mask
-    if grid is None or spec is None:
-        return FilterMasks(keepout)
-    return FilterMasks(keepout, spec.speed_limits(grid))
+    keepout, limits, speed_mask = None, None, loaded.spec.stack.speed_mask
+    if loaded.keepout_mask is not None:
+        keepout = _mask_grid(loaded.keepout_mask, KEEPOUT_MASK_KEYS, loaded.tree, loaded.sources)
+    if loaded.speed_mask is not None and speed_mask is not None:
+        limits = speed_mask.speed_limits(_mask_grid(loaded.speed_mask, SPEED_MASK_KEYS, loaded.tree, loaded.sources))
+    return FilterMasks(keepout, limits)
 
 
 def load_criterion_masks(
-    masks: Mapping[str, CriterionMask], tree: MappingNode, with_source_line: AddSourceLine
+    masks: Mapping[str, CriterionMask], tree: MappingNode, texts: Mapping[str, str]
 ) -> dict[str, MaskBlocks]:
-    """Load the filter masks of criteria. Return them by path as written in the scenario.
+    """Load the filter masks of criteria, divided into rectangles of equal cells, by path as written in the scenario.
 
-    `tree` is the YAML tree of the scenario. Raises InvalidInput at the line of an unusable mask.
+    `tree` is the YAML tree of the scenario, and `texts` are the texts of its files, by path as in messages. Raises
+    InvalidInput at the line of an unusable mask, and of a mask with too many rectangles.
     """
-    return {name: _criterion_mask_blocks(mask, tree, with_source_line) for name, mask in masks.items()}
+    found = {}
+    for name, mask in masks.items():
+        found[name] = mask_blocks(_mask_grid(mask.map, mask.keys, tree, texts))
+        count = len(found[name].blocks)
+        if count > MAX_RECTANGLES:
+            message = f"mask image {mask.map.image.name} falls into {count} rectangles of equal cells"
+            hint = f"criteria judge by masks of {MAX_RECTANGLES} at most; is it a photograph, or a map with noise?"
+            problem = Problem(*value_position(tree, mask.keys), "SC320", message, hint)
+            raise InvalidInput([with_source_line(problem, texts)])
+    return found
 
 
-def _criterion_mask_blocks(mask: CriterionMask, tree: MappingNode, with_source_line: AddSourceLine) -> MaskBlocks:
-    """Return a mask divided into rectangles of equal cells. Raises InvalidInput if there are too many."""
-    mask_rectangles = mask_blocks(_mask_grid(mask.map, mask.keys, tree, with_source_line))
-    if len(mask_rectangles.blocks) > MAX_RECTANGLES:
-        message = f"mask image {mask.map.image.name} falls into {len(mask_rectangles.blocks)} rectangles of equal cells"
-        hint = f"criteria judge by masks of {MAX_RECTANGLES} at most; is it a photograph, or a map with noise?"
-        raise InvalidInput([with_source_line(Problem(*value_position(tree, mask.keys), "SC320", message, hint))])
-    return mask_rectangles
-
-
-def _stack_mask_grid(loaded: LoadedScenario, keys: Keys, source: LoadedMap | None) -> OccupancyGrid | None:
-    """Return the grid of the mask of the stack at `keys` of the scenario; None if `source` is None."""
-    return None if source is None else _mask_grid(source, keys, loaded.tree, loaded.with_source_line)
-
-
-def _mask_grid(source: LoadedMap, keys: Keys, tree: MappingNode, with_source_line: AddSourceLine) -> OccupancyGrid:
+def _mask_grid(source: LoadedMap, keys: Keys, tree: MappingNode, texts: Mapping[str, str]) -> OccupancyGrid:
     """Return the grid of the mask at `keys` of the scenario. Raises InvalidInput with the position of `keys`."""
     try:
         return load_map(source)
     except InvalidInput as error:
-        position, image = value_position(tree, keys), source.image.name
+        position = value_position(tree, keys)._asdict()
         moved = [
-            replace(problem, path=position.path, line=position.line, col=position.col) for problem in error.problems
+            replace(problem, **position, message=f"mask image {source.image.name}: {problem.message}")
+            for problem in error.problems
         ]
-        raise InvalidInput(
-            [with_source_line(replace(problem, message=f"mask image {image}: {problem.message}")) for problem in moved]
-        ) from error
+        raise InvalidInput([with_source_line(problem, texts) for problem in moved]) from error

@@ -1,12 +1,9 @@
-"""Parts of a scenario that its logs contain: its text, from which criteria are read, and its events and faults."""
+"""Text of a scenario for logs and copies, and the criteria in such a text."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
-import yaml
-
 from simscen.core.errors import InvalidInput
-from simscen.core.records.events import Disturbance
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.multirobot import split_by_robot
@@ -16,7 +13,7 @@ from simscen.loading.schema.validate import Model, check
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.scalars import to_yaml
-from simscen.loading.yaml.tree import Key, MappingNode, Node, node_at
+from simscen.loading.yaml.tree import MappingNode, Node
 from simscen.model.scenario import CriteriaSpec, ScenarioSpec
 
 JUDGING_PLUGINS = frozenset({"criterion", "metric"})
@@ -89,37 +86,3 @@ def _validated(model: type[Model], tree: Node) -> Model:
     if isinstance(spec, list):
         raise InvalidInput(spec)
     return spec
-
-
-def disturbances_of(loaded: LoadedScenario) -> tuple[Disturbance, ...]:
-    """Return the events of a scenario, each followed by the steps of its sequence, then its faults."""
-    return (*_events(loaded), *_faults(loaded))
-
-
-def _events(loaded: LoadedScenario) -> Iterator[Disturbance]:
-    """Yield the events of a scenario, each followed by the steps of its sequence."""
-    for step in loaded.spec.steps:
-        when = "" if step.when is None else _one_line_yaml(loaded, *step.keys, "when")
-        yield Disturbance(step.name, "event", when, step.required, _line(loaded, *step.keys), step.after)
-
-
-def _faults(loaded: LoadedScenario) -> Iterator[Disturbance]:
-    """Yield the faults of a scenario."""
-    for index, entry in enumerate(loaded.spec.faults):
-        keys = ("faults", index)
-        when = "" if entry.when is None else _one_line_yaml(loaded, *keys, "when")
-        yield Disturbance(entry.label, "fault", when, entry.required, _line(loaded, *keys))
-
-
-def _one_line_yaml(loaded: LoadedScenario, *keys: Key) -> str:
-    """Return the mapping at `keys` as one line of YAML without braces."""
-    text = yaml.safe_dump(
-        node_at(loaded.tree, keys).plain, default_flow_style=True, sort_keys=False, allow_unicode=True, width=10**9
-    )
-    return text.strip().removeprefix("{").removesuffix("}")
-
-
-def _line(loaded: LoadedScenario, *keys: Key) -> int:
-    """Return the line of the value at `keys`; 0 if the value is not in the scenario file itself."""
-    position = loaded.position_of(*keys)
-    return position.line if position.path == loaded.path else 0

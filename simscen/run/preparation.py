@@ -7,7 +7,6 @@ from pathlib import Path
 from simscen.core.environment.costmap_filters import FilterMasks, MaskBlocks
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import BuiltWorld, World
-from simscen.core.errors import Problem
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.messages.navigation import Estimate, Goal
@@ -22,13 +21,13 @@ from simscen.loading.builders import (
     robot_from_file,
     world_from_file,
 )
+from simscen.loading.disturbances import disturbances_of
 from simscen.loading.files.criteria_file import LoadedCriteria
 from simscen.loading.goals import event_goals, expected_failures, scenario_goals
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.open_ground import with_stops_in_bounds
 from simscen.loading.plugins import plugins_of
 from simscen.loading.robot_size import blocking_solids, inscribed_radius
-from simscen.loading.scenario_text import disturbances_of
 from simscen.model.localizers import OdometryOnly
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, initial_estimate
@@ -148,8 +147,8 @@ def _prepare_robot(loaded: LoadedScenario, build: BuildWorld, find_legs: FindLeg
         inscribed_radius=inscribed_radius(body.radius, body.footprint),
         time_limit=spec.time_limit,
         clearance_range=_clearance_range(spec),
-        disturbances=disturbances_of(loaded),
-        masks=load_criterion_masks(loaded.criterion_masks, loaded.tree, loaded.with_source_line),
+        disturbances=tuple(disturbances_of(loaded)),
+        masks=load_criterion_masks(loaded.criterion_masks, loaded.tree, loaded.sources),
     )
     return PreparedScenario(
         loaded=loaded,
@@ -245,8 +244,4 @@ def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()
 
 def masks_from_criteria(criteria: LoadedCriteria) -> dict[str, MaskBlocks]:
     """Load the filter masks that the criteria of a criteria file use, by path. Raises InvalidInput."""
-
-    def sourced(problem: Problem) -> Problem:
-        return criteria.library.with_source([problem])[0]
-
-    return load_criterion_masks(criteria.masks, criteria.tree, sourced)
+    return load_criterion_masks(criteria.masks, criteria.tree, criteria.library.texts)

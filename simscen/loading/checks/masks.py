@@ -41,7 +41,7 @@ def stack_masks(scene: Scene) -> FilterMasks:
 
 def criterion_masks(scene: Scene) -> Mapping[str, MaskBlocks]:
     """Load the filter masks of criteria, by path as in the scenario. Raises InvalidInput for an unusable mask."""
-    return load_criterion_masks(scene.loaded.criterion_masks, scene.loaded.tree, scene.loaded.with_source_line)
+    return load_criterion_masks(scene.loaded.criterion_masks, scene.loaded.tree, scene.loaded.sources)
 
 
 @WORLD.check("SC302")
