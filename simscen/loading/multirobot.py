@@ -1,7 +1,5 @@
 """Scenarios of several robots (`robots`): splitting of the YAML tree into one scenario per robot, and key checks."""
 
-from collections.abc import Iterator
-
 from simscen.core.errors import Problem
 from simscen.loading.stacks.choice import EXTERNAL, StackChoice, replace_stack
 from simscen.loading.yaml.library import merge_mappings
@@ -54,10 +52,9 @@ def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
 
     The tree is unchanged if one of several robots already uses the external stack that `choice` starts.
     """
-    robots = child(tree, ROBOTS)
-    if robots is None:
+    if ROBOTS not in tree.entries:
         return replace_stack(tree, choice)
-    if not isinstance(robots, MappingNode) or not has_multiple_robots(tree):
+    if not has_multiple_robots(tree):
         return tree  # validation reports the wrong type
     parts = split_by_robot(tree)
     if choice.external_command is not None and choice.name in map(external_stack_name, parts.values()):
@@ -65,22 +62,11 @@ def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
     chosen = {name: replace_stack(part, choice) for name, part in parts.items()}
     if all(chosen[name] is part for name, part in parts.items()):
         return tree
-    own = {
-        name: Entry(entry.key, _with_complete_stack(entry.value, chosen[name]))
-        for name, entry in robots.entries.items()
-    }
-    rest = tree.without_keys(STACK)
-    return MappingNode(
-        tree.position, {**rest.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, MappingNode(robots.position, own))}
-    )
-
-
-def _with_complete_stack(robot: Node, robot_scenario: MappingNode) -> MappingNode:
-    """Return a robot's mapping under `robots`, with the `stack` of its single-robot scenario."""
-    assert isinstance(robot, MappingNode)
-    return MappingNode(
-        robot.position, robot.entries | {key: entry for key, entry in robot_scenario.entries.items() if key == STACK}
-    )
+    changed = tree.without_keys(STACK)
+    for name, part in chosen.items():
+        if (stack := part.entries.get(STACK)) is not None:
+            changed = changed.with_value((ROBOTS, name, STACK), stack.value, stack.key)
+    return changed
 
 
 def external_stack_name(tree: MappingNode) -> str | None:
@@ -97,46 +83,34 @@ def _items(node: Node | None) -> tuple[Node, ...]:
 
 def scenario_robot_problems(tree: MappingNode) -> list[Problem]:
     """Return problems of a scenario: missing `robot` or criteria, and keys that exclude `robots`."""
-    return [*(_multi_robot_problems(tree) if ROBOTS in tree.entries else _single_robot_problems(tree))]
+    problems = criteria_robot_problems(tree)
+    if ROBOTS not in tree.entries and ROBOT not in tree.entries:
+        problems.append(Problem(*tree.position, "SC010", f"missing key `{ROBOT}`"))
+    return problems
 
 
 def criteria_robot_problems(tree: MappingNode) -> list[Problem]:
     """Return problems of a criteria file: missing criteria, and keys that exclude `robots`."""
-    return [*(_multi_robot_problems(tree) if ROBOTS in tree.entries else _missing_criteria(tree))]
-
-
-def _single_robot_problems(tree: MappingNode) -> Iterator[Problem]:
-    """Yield the problems of missing keys `robot` and `pass`."""
-    if ROBOT not in tree.entries:
-        yield Problem(*tree.position, "SC010", f"missing key `{ROBOT}`")
-    yield from _missing_criteria(tree)
-
-
-def _missing_criteria(tree: MappingNode) -> Iterator[Problem]:
-    """Yield the problem of a missing or empty `pass` at top level."""
-    criteria = child(tree, PASS)
-    if criteria is None and ROBOTS not in tree.entries:
-        yield Problem(*tree.position, "SC010", f"missing key `{PASS}`")
+    problems: list[Problem] = []
+    criteria, robots = child(tree, PASS), child(tree, ROBOTS)
     if isinstance(criteria, SequenceNode) and not criteria.items:
-        yield Problem(*criteria.position, "SC017", "expected 1 or more values, got 0")
-
-
-def _multi_robot_problems(tree: MappingNode) -> Iterator[Problem]:
-    """Yield the problems of top-level keys that exclude `robots`, and of robots without criteria."""
+        problems.append(Problem(*criteria.position, "SC017", "expected 1 or more values, got 0"))
+    if robots is None:
+        if criteria is None:
+            problems.append(Problem(*tree.position, "SC010", f"missing key `{PASS}`"))
+        return problems
     if ROBOT in tree.entries:
+        message = "`robot` and `robots` exclude each other"
         hint = "use `robot` for one robot; for several, list each under its name in `robots`"
-        yield Problem(*tree.entries[ROBOT].key, "SC016", "`robot` and `robots` exclude each other", hint)
+        problems.append(Problem(*tree.entries[ROBOT].key, "SC016", message, hint))
     for key in ROBOT_KEYS:
         if key in tree.entries:
             message = f"`{key}` belong to one robot, but the scenario has several"
-            yield Problem(*tree.entries[key].key, "SC016", message, f"move them to each robot in `{ROBOTS}`")
-    yield from _missing_criteria(tree)
-    robots = child(tree, ROBOTS)
+            hint = f"move them to each robot in `{ROBOTS}`"
+            problems.append(Problem(*tree.entries[key].key, "SC016", message, hint))
     for name, entry in robots.entries.items() if isinstance(robots, MappingNode) else ():
-        if (
-            isinstance(entry.value, MappingNode)
-            and not _items(child(tree, PASS))
-            and not _items(child(entry.value, PASS))
-        ):
+        if isinstance(entry.value, MappingNode) and not _items(criteria) and not _items(child(entry.value, PASS)):
+            message = f"missing key `{PASS}` in `{ROBOTS}.{name}`"
             hint = "add criteria for this robot, or for all robots at top level"
-            yield Problem(*entry.key, "SC010", f"missing key `{PASS}` in `{ROBOTS}.{name}`", hint)
+            problems.append(Problem(*entry.key, "SC010", message, hint))
+    return problems

@@ -15,9 +15,9 @@ from simscen.loading.yaml.tree import (
     ScalarNode,
     SequenceNode,
     dotted_path,
+    key_position,
     node_at,
     nodes_with_keys,
-    replace_at,
 )
 from simscen.spec.quantities import NUMBER_AND_UNIT_PATTERN
 
@@ -69,9 +69,7 @@ def with_values(tree: MappingNode, values: Mapping[Keys, Node | None]) -> Mappin
     changed = tree
     for keys, value in values.items():
         if value is not None:
-            result = replace_at(changed, keys, value, value.position)
-            assert isinstance(result, MappingNode), "the keys of a part are not empty"
-            changed = result
+            changed = changed.with_value(keys, value, value.position)
     return without_parts(changed, removed) if removed else changed
 
 
@@ -93,9 +91,9 @@ def with_roundings(tree: MappingNode, roundings: Sequence[Rounding]) -> MappingN
 
 def with_seed(tree: MappingNode, seed: int) -> MappingNode:
     """Return the scenario with this seed, without `acceptance`, `expected`, and `variations`."""
-    position = tree.entries["seed"].key if "seed" in tree.entries else tree.position
+    position = key_position(tree, ("seed",))
     rest = tree.without_keys("acceptance", "expected", "variations")
-    return replace(rest, entries={**rest.entries, "seed": Entry(position, ScalarNode(position, seed))})
+    return rest.with_value(("seed",), ScalarNode(position, seed), position)
 
 
 def removed_parts(before: MappingNode, after: MappingNode) -> list[str]:

@@ -70,10 +70,9 @@ def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
     if own is not None and not isinstance(own, MappingNode):
         return tree  # validation reports the wrong type
     own = own or MappingNode(tree.position, {})
-    if choice.section is None and stack_type(own) == choice.type:
+    if choice.section is None and _has_type(own, choice.type):
         return tree
-    key = tree.entries["stack"].key if "stack" in tree.entries else tree.position
-    return MappingNode(tree.position, {**tree.entries, "stack": Entry(key, _replaced_section(own, choice))})
+    return tree.with_value(("stack",), _replaced_section(own, choice), tree.position)
 
 
 def _replaced_section(own: MappingNode, choice: StackChoice) -> MappingNode:
@@ -103,17 +102,15 @@ def _with_goal_tolerances(section: MappingNode, own: MappingNode) -> MappingNode
     if not tolerances:
         return section
     merged = MappingNode(checker.position, {**(replaced.entries if replaced else {}), **tolerances})
-    return MappingNode(
-        section.position, {**section.entries, GOAL_CHECKER: Entry(own.entries[GOAL_CHECKER].key, merged)}
-    )
+    entry = Entry(own.entries[GOAL_CHECKER].key, merged)
+    return MappingNode(section.position, {**section.entries, GOAL_CHECKER: entry})
 
 
-def stack_type(section: Node) -> str | None:
-    """Return the type of the stack in a section `stack`; None for an external stack or an invalid type."""
-    if child(section, EXTERNAL) is not None:
-        return None
+def _has_type(section: MappingNode, stack_type: str) -> bool:
+    """Return whether a section `stack` selects this type of stack; False for an external stack."""
     written = child(section, "type")
-    return REFERENCE if written is None else written.value if isinstance(written, ScalarNode) else None  # type: ignore[return-value]
+    selected = REFERENCE if written is None else written.plain
+    return EXTERNAL not in section.entries and selected == stack_type
 
 
 def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: Sequence[Path] = ()) -> StackChoice:

@@ -1,16 +1,16 @@
 """Expansion of `stack: {nav2_params: FILE}`: the translated parameters of the Nav2 file replace its path."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from simscen.core.clock import Clock
 from simscen.core.errors import Problem
 from simscen.loading.files.paths import PathProblem
-from simscen.loading.stacks.nav2_mapping import KnownParameters, Translation
-from simscen.loading.stacks.nav2_nodes import translate, unknown_nodes
+from simscen.loading.stacks.nav2_mapping import Translation
+from simscen.loading.stacks.nav2_nodes import is_unknown, translate
 from simscen.loading.stacks.nav2_parameters import Nav2Parameters, ignored_note, read_nav2_parameters
 from simscen.loading.yaml.library import Library, merge_mappings
 from simscen.loading.yaml.tree import (
@@ -21,6 +21,8 @@ from simscen.loading.yaml.tree import (
     ScalarNode,
     SequenceNode,
     child,
+    existing_keys,
+    node_at,
     value_position,
 )
 
@@ -47,25 +49,12 @@ def with_nav2_parameters(tree: MappingNode, library: Library) -> ExpandedTree:
     """
     result = ExpandedTree(tree)
     robots = child(tree, ROBOTS)
-    if isinstance(robots, MappingNode):
-        own = {
-            name: Entry(entry.key, _with_expanded_stack(entry.value, library, result))
-            for name, entry in robots.entries.items()
-        }
-        tree = MappingNode(
-            tree.position, {**tree.entries, ROBOTS: Entry(tree.entries[ROBOTS].key, MappingNode(robots.position, own))}
-        )
-    result.tree = _with_expanded_stack(tree, library, result)
+    names = robots.entries if isinstance(robots, MappingNode) else ()
+    for keys in (*((ROBOTS, name, STACK) for name in names), (STACK,)):
+        stack = node_at(tree, keys)
+        if existing_keys(tree, keys) == keys and isinstance(stack, MappingNode) and NAV2_PARAMS in stack.entries:
+            result.tree = result.tree.with_value(keys, _merge_parameters(stack, library, result), stack.position)
     return result
-
-
-def _with_expanded_stack(tree: Node, library: Library, result: ExpandedTree) -> Any:
-    """Return a scenario, or a robot under `robots`, with an expanded `stack`. Add problems and notes to `result`."""
-    stack = child(tree, STACK)
-    if not isinstance(tree, MappingNode) or not isinstance(stack, MappingNode) or NAV2_PARAMS not in stack.entries:
-        return tree
-    expanded = _merge_parameters(stack, library, result)
-    return MappingNode(tree.position, {**tree.entries, STACK: Entry(tree.entries[STACK].key, expanded)})
 
 
 def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree) -> MappingNode:
@@ -86,13 +75,16 @@ def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree
         result.problems += parameters
         return stack
     library.add({display_name: parameters.text}, {display_name: file})
-    profile = MappingNode(position, {"profile": Entry(position, ScalarNode(position, "nav2"))})
+    merged = MappingNode(position, {"profile": Entry(position, ScalarNode(position, "nav2"))})
     clock = _clock(result.tree)
-    translations = [_with_valid_frequency(each, clock) for each in translate(parameters.nodes, _known_parameters())]
-    merged = profile
-    for translation in translations:
-        if translation.keys:
-            merged = merge_mappings(merged, _translated_tree(translation, parameters))
+    translations = {
+        node: [_with_valid_frequency(one, clock) for one in translate(node, own)]
+        for node, own in parameters.nodes.items()
+    }
+    for node, translated in translations.items():
+        for one in translated:
+            if one.keys:
+                merged = merge_mappings(merged, _translated_tree(one, parameters.positions[node, one.parameter]))
     result.notes += sorted({*parameters.notes, *_notes(translations, parameters)})
     return merge_mappings(stack, merged)
 
@@ -124,14 +116,10 @@ def _with_valid_frequency(translation: Translation, clock: Clock) -> Translation
     return translation
 
 
-def _translated_tree(translation: Translation, parameters: Nav2Parameters) -> MappingNode:
+def _translated_tree(translation: Translation, position: Position) -> MappingNode:
     """Return the YAML tree of a section `stack` with one parameter. All nodes have the position of the parameter."""
-    position = parameters.positions[translation.node, translation.parameter]
-    node: Node = _parameter_node(translation.value, position)
-    for key in reversed(translation.keys):
-        node = MappingNode(position, {key: Entry(position, node)})
-    assert isinstance(node, MappingNode)
-    return node
+    value = _parameter_node(translation.value, position)
+    return MappingNode(position, {}).with_value(translation.keys, value, position)
 
 
 def _parameter_node(value: Any, position: Position) -> Node:
@@ -141,65 +129,24 @@ def _parameter_node(value: Any, position: Position) -> Node:
     return ScalarNode(position, value)
 
 
-def _notes(translations: Sequence[Translation], parameters: Nav2Parameters) -> Iterator[Problem]:
-    """Yield warnings about ignored and changed parameters, and about unknown nodes.
+def _notes(translations: Mapping[str, list[Translation]], parameters: Nav2Parameters) -> Iterator[Problem]:
+    """Yield warnings about ignored and changed parameters, and about nodes without a counterpart.
 
-    Each parameter with a note has its own warning. Other ignored parameters share one warning for each node.
+    `translations` are the translations by node. Each parameter with a note has its own warning. Other ignored
+    parameters share one warning for each node.
     """
-    for translation in translations:
-        if translation.note:
-            yield ignored_note(
-                parameters.positions[translation.node, translation.parameter],
-                f"{translation.node}: `{translation.parameter}`: {translation.note}",
-                translation.hint,
-            )
-    used = {
-        parameters.positions[translation.node, translation.parameter]
-        for translation in translations
-        if translation.keys
-    }
-    for node in parameters.nodes:
-        positions = [
-            (parameters.positions[node, translation.parameter], translation.parameter)
-            for translation in translations
-            if translation.node == node
-            and not translation.keys
-            and not translation.note
-            and parameters.positions[node, translation.parameter]
-            not in used  # parameters of `/**` may be used by another node
-        ]
-        if positions:
-            names = ", ".join(f"{name} ({position.line})" for position, name in sorted(positions))
-            yield ignored_note(min(positions)[0], f"{node}: simscen has no {names}")
-    for node in unknown_nodes(parameters.nodes):
-        node_positions = [position for (name, _), position in parameters.positions.items() if name == node]
-        yield ignored_note(min(node_positions), f"simscen has no node like {node}")
-
-
-def _known_parameters() -> KnownParameters:
-    """Return the names of the parameters of the reference stack, by section or type."""
-    from simscen.model import controllers, costmaps, localizers, mppi, planners, recovery
-
-    models: dict[str, type[BaseModel]] = {
-        "amcl": localizers.Amcl,
-        "progress_checker": controllers.ProgressChecker,
-        "simple": controllers.SimpleGoalChecker,
-        "regulated_pure_pursuit": controllers.RegulatedPurePursuit,
-        "dwb": controllers.DynamicWindow,
-        "mppi": mppi.Mppi,
-        "navfn": planners.Navfn,
-        "smac_2d": planners.Smac2d,
-        "costmap": costmaps.Costmap,
-        "local_costmap": costmaps.LocalCostmap,
-        "denoise_layer": costmaps.DenoiseLayer,
-        "recovery": recovery.Recovery,
-    }
-    return {name: tuple(_field_names(model)) for name, model in models.items()}
-
-
-def _field_names(model: type[BaseModel]) -> Iterator[str]:
-    """Yield the names of the fields of a model, and `field.part` for the fields of nested models."""
-    for name, model_field in model.model_fields.items():
-        yield name
-        if isinstance(model_field.annotation, type) and issubclass(model_field.annotation, BaseModel):
-            yield from (f"{name}.{part}" for part in model_field.annotation.model_fields)
+    used = {parameters.positions[node, one.parameter] for node, own in translations.items() for one in own if one.keys}
+    for node, own in translations.items():
+        ignored = []
+        for one in own:
+            position = parameters.positions[node, one.parameter]
+            if one.note:
+                yield ignored_note(position, f"{node}: `{one.parameter}`: {one.note}", one.hint)
+            elif position not in used:  # another node may use a parameter of `/**`
+                ignored.append((position, one.parameter))
+        if ignored:
+            names = ", ".join(f"{name} ({position.line})" for position, name in sorted(ignored))
+            yield ignored_note(min(ignored)[0], f"{node}: simscen has no {names}")
+        if is_unknown(node, parameters.nodes[node]):
+            positions = [position for (name, _), position in parameters.positions.items() if name == node]
+            yield ignored_note(min(positions), f"simscen has no node like {node}")

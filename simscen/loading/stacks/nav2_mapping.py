@@ -1,8 +1,11 @@
 """Tables and types for the translation of Nav2's parameters to parameters of simscen's reference stack."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
+
+from pydantic import BaseModel
 
 CONTROLLERS = {
     "RegulatedPurePursuitController": "regulated_pure_pursuit",
@@ -88,18 +91,12 @@ StackKeys = tuple[str, ...]
 """Keys of a value under `stack`, e.g. ("controller", "type")."""
 Parameters = Mapping[str, Any]
 """Parameters of one node by dotted name, e.g. `obstacle_layer.scan.topic`."""
-KnownParameters = Mapping[str, Sequence[str]]
-"""Names of simscen's parameters, by section of `stack`, e.g. "costmap", or by type, e.g. "dwb".
-
-The name `a.b` stands for the parameter `b` in the mapping `a`.
-"""
 
 
 @dataclass(frozen=True)
 class Translation:
     """Translation of a parameter of a Nav2 node to a value in simscen, to a note for the user, or to both."""
 
-    node: str
     parameter: str
     """Dotted name of the parameter."""
     keys: StackKeys
@@ -115,16 +112,46 @@ class Translation:
 
 
 def translate_same_name(
-    node: str, name: str, value: Any, section: StackKeys, known: Sequence[str], simscen_name: str = ""
+    name: str, value: Any, section: StackKeys, kind: str, simscen_name: str = ""
 ) -> Iterator[Translation]:
-    """Yield the translation of a parameter to the same value in `section`; nothing if its name is not in `known`.
+    """Yield the translation of a parameter to the same value in `section`; nothing if simscen has no such parameter.
 
-    `known` are the names of simscen's parameters in the section. `simscen_name` is the name in simscen; "" for the same
-    name as in Nav2.
+    `kind` is an argument of `simscen_parameters`. `simscen_name` is the name in simscen; "" for the same name as in
+    Nav2.
     """
     target = simscen_name or name
-    if target in known:
-        yield Translation(node, name, (*section, *target.split(".")), value)
+    if target in simscen_parameters(kind):
+        yield Translation(name, (*section, *target.split(".")), value)
+
+
+@cache
+def simscen_parameters(kind: str) -> frozenset[str]:
+    """Return the names of simscen's parameters, by section of `stack`, e.g. "costmap", or by type, e.g. "dwb".
+
+    The name `a.b` stands for the parameter `b` in the mapping `a`.
+    """
+    from simscen.model import controllers, costmaps, localizers, mppi, planners, recovery
+
+    models: dict[str, type[BaseModel]] = {
+        "amcl": localizers.Amcl,
+        "progress_checker": controllers.ProgressChecker,
+        "goal_checker": controllers.SimpleGoalChecker,
+        "regulated_pure_pursuit": controllers.RegulatedPurePursuit,
+        "dwb": controllers.DynamicWindow,
+        "mppi": mppi.Mppi,
+        "navfn": planners.Navfn,
+        "smac_2d": planners.Smac2d,
+        "costmap": costmaps.Costmap,
+        "local_costmap": costmaps.LocalCostmap,
+        "denoise_layer": costmaps.DenoiseLayer,
+        "recovery": recovery.Recovery,
+    }
+    names = set()
+    for name, model_field in models[kind].model_fields.items():
+        names.add(name)
+        if isinstance(model_field.annotation, type) and issubclass(model_field.annotation, BaseModel):
+            names |= {f"{name}.{part}" for part in model_field.annotation.model_fields}
+    return frozenset(names)
 
 
 def strings(value: Any) -> list[str]:

@@ -1,12 +1,14 @@
 """Translation of the parameters of Nav2's nodes to parameters of simscen's reference stack.
 
-There is one function for each kind of node. `node` is the name of the node, `parameters` are its parameters in the Nav2
-file, and `known` are the names of simscen's parameters. `section` is a key under `stack`, such as "controller".
+There is one function for each kind of node. `parameters` are the parameters of the node in the Nav2 file. `section` is
+a key under `stack`, such as "controller".
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
+from simscen.loading.stacks.nav2_costmaps import translate_costmap
 from simscen.loading.stacks.nav2_mapping import (
     CONTROLLERS,
     DWB_CRITICS,
@@ -21,7 +23,6 @@ from simscen.loading.stacks.nav2_mapping import (
     PLANNERS,
     RENAMED_PARAMETERS,
     SCENARIO_PARAMETERS,
-    KnownParameters,
     Parameters,
     Translation,
     class_of,
@@ -31,26 +32,26 @@ from simscen.loading.stacks.nav2_mapping import (
 )
 
 
-def _translate_controller_server(node: str, parameters: Parameters, known: KnownParameters) -> Iterator[Translation]:
+def _translate_controller_server(parameters: Parameters) -> Iterator[Translation]:
     """Translate the parameters of the first progress checker, goal checker, and controller."""
     for name in ("controller_frequency", "failure_tolerance"):
         if name in parameters:
-            yield Translation(node, name, (name,), parameters[name])
-    for kind, model in (("progress_checker", "progress_checker"), ("goal_checker", "simple")):
+            yield Translation(name, (name,), parameters[name])
+    for kind in ("progress_checker", "goal_checker"):
         chosen = _first_plugin(parameters, kind, kind)
-        yield from _note_unused_plugins(node, parameters, kind, chosen)
+        yield from _note_unused_plugins(parameters, kind, chosen)
         for key, value in parameters_below(parameters, chosen):
-            yield from translate_same_name(node, f"{chosen}.{key}", value, (kind,), known[model], key)
+            yield from translate_same_name(f"{chosen}.{key}", value, (kind,), kind, key)
     controller = _first_plugin(parameters, "controller", "FollowPath")
-    yield from _note_unused_plugins(node, parameters, "controller", controller)
-    yield from _translate_plugin(node, parameters, controller, "controller", CONTROLLERS, known)
+    yield from _note_unused_plugins(parameters, "controller", controller)
+    yield from _translate_plugin(parameters, controller, "controller", CONTROLLERS)
 
 
-def _translate_planner_server(node: str, parameters: Parameters, known: KnownParameters) -> Iterator[Translation]:
+def _translate_planner_server(parameters: Parameters) -> Iterator[Translation]:
     """Translate the parameters of the first planner."""
     planner = _first_plugin(parameters, "planner", "GridBased")
-    yield from _note_unused_plugins(node, parameters, "planner", planner)
-    yield from _translate_plugin(node, parameters, planner, "planner", PLANNERS, known)
+    yield from _note_unused_plugins(parameters, "planner", planner)
+    yield from _translate_plugin(parameters, planner, "planner", PLANNERS)
 
 
 def _first_plugin(parameters: Parameters, kind: str, default: str) -> str:
@@ -62,15 +63,15 @@ def _first_plugin(parameters: Parameters, kind: str, default: str) -> str:
     return next(iter(strings(named)), "") if isinstance(named, list) else str(named)
 
 
-def _note_unused_plugins(node: str, parameters: Parameters, kind: str, chosen: str) -> Iterator[Translation]:
+def _note_unused_plugins(parameters: Parameters, kind: str, chosen: str) -> Iterator[Translation]:
     """Yield a note for each plugin of a kind that is not used. Only the first one, `chosen`, is used."""
     listed = f"{kind}_plugins"
     for other in strings(parameters.get(listed))[1:]:
-        yield Translation(node, listed, (), None, f"only the first {kind} is used: {chosen}, not {other}", f"{other}.")
+        yield Translation(listed, (), None, f"only the first {kind} is used: {chosen}, not {other}", f"{other}.")
 
 
 def _translate_plugin(
-    node: str, parameters: Parameters, name: str, section: str, types: Mapping[str, str], known: KnownParameters
+    parameters: Parameters, name: str, section: str, types: Mapping[str, str]
 ) -> Iterator[Translation]:
     """Translate the type and the parameters of the plugin `name`. `types` are the types in simscen, by class in Nav2.
 
@@ -84,15 +85,13 @@ def _translate_plugin(
     if kind is None:
         if plugin:
             why = f"{plugin} is not supported; the default {section} is used"
-            yield Translation(node, plugin_key, (), plugin, why, covers=f"{name}.")
+            yield Translation(plugin_key, (), plugin, why, covers=f"{name}.")
         return
     if plugin_key != f"{name}.plugin":
-        shim = parameters.get(f"{name}.plugin")
-        yield Translation(
-            node, plugin_key, (section, "type"), kind, f"{shim} is not supported; {plugin} is used without it"
-        )
+        why = f"{parameters.get(f'{name}.plugin')} is not supported; {plugin} is used without it"
+        yield Translation(plugin_key, (section, "type"), kind, why)
     else:
-        yield Translation(node, plugin_key, (section, "type"), kind)
+        yield Translation(plugin_key, (section, "type"), kind)
     prefix = inner if shimmed else name
     model = _motion_model(parameters, prefix) if kind == "mppi" else ""
     for key, written in parameters_below(parameters, prefix):
@@ -102,9 +101,9 @@ def _translate_plugin(
         elif key.rpartition(".")[2] == "min_turning_r":
             own = key if model != "Ackermann" else "min_turning_r"
         elif key == "critics" and kind in ("mppi", "dwb"):
-            yield from _translate_critics(node, f"{prefix}.{key}", written, kind)
+            yield from _translate_critics(f"{prefix}.{key}", written, kind)
             continue
-        yield from translate_same_name(node, f"{prefix}.{key}", value, (section,), known[kind], own)
+        yield from translate_same_name(f"{prefix}.{key}", value, (section,), kind, own)
 
 
 def _motion_model(parameters: Parameters, prefix: str) -> str:
@@ -113,7 +112,7 @@ def _motion_model(parameters: Parameters, prefix: str) -> str:
     return class_of(parameters.get(f"{prefix}.{written}.plugin", written)).removesuffix("MotionModel")
 
 
-def _translate_critics(node: str, name: str, written: Any, kind: str) -> Iterator[Translation]:
+def _translate_critics(name: str, written: Any, kind: str) -> Iterator[Translation]:
     """Translate the list of critics `written` of an "mppi" or "dwb" controller. Unknown critics get a note.
 
     MPPI gets the list. DWB gets the weight 0 for each critic that is not in the list.
@@ -126,120 +125,15 @@ def _translate_critics(node: str, name: str, written: Any, kind: str) -> Iterato
     unknown = [critic for critic in listed if names[critic] not in supported]
     used = [names[critic] for critic in listed if names[critic] in supported]
     if kind == "mppi" and used:
-        yield Translation(node, name, ("controller", "critics"), used)
+        yield Translation(name, ("controller", "critics"), used)
     for critic, weight in DWB_CRITICS.items() if kind == "dwb" and listed else ():
         if critic not in used:
-            yield Translation(node, name, ("controller", weight), 0.0)
+            yield Translation(name, ("controller", weight), 0.0)
     if unknown:
-        yield Translation(node, name, (), written, f"not supported: {', '.join(unknown)}")
+        yield Translation(name, (), written, f"not supported: {', '.join(unknown)}")
 
 
-DEFAULT_LAYERS = {
-    "static_layer": "StaticLayer",
-    "obstacle_layer": "ObstacleLayer",
-    "inflation_layer": "InflationLayer",
-}
-"""Classes of the layers of a costmap without `plugins`, by name of the layer."""
-OBSERVATION_LAYERS = ("ObstacleLayer", "VoxelLayer")
-"""Classes of layers that mark and clear obstacles by sensor data."""
-
-
-def _translate_costmap(node: str, parameters: Parameters, known: KnownParameters) -> Iterator[Translation]:
-    """Translate the parameters of the global or local costmap."""
-    section = "local_costmap" if node == "local_costmap" else "costmap"
-    layers = _layer_classes(parameters)
-    handled = {*layers, *strings(parameters.get("filters"))}
-    for name, value in parameters.items():
-        layer, _, rest = name.partition(".")
-        if not rest:
-            yield from _translate_costmap_parameter(node, name, value, section, known[section])
-        elif layers.get(layer) in OBSERVATION_LAYERS:
-            continue  # _translate_observation_sources translates all of them together
-        elif layer in layers:
-            yield from _translate_layer_parameter(node, name, value, layers, section, known)
-        elif layer not in handled:
-            handled.add(layer)
-            yield Translation(node, name, (), value, f"`plugins` does not list {layer}", covers=f"{layer}.")
-    yield from _translate_observation_sources(node, parameters, layers, section, known[section])
-    for zones in strings(parameters.get("filters")):
-        yield Translation(node, "filters", (), None, covers=f"{zones}.")  # the scenario defines zones
-
-
-def _layer_classes(parameters: Parameters) -> Mapping[str, str]:
-    """Return the classes of the layers of a costmap, by name of the layer."""
-    if not isinstance(parameters.get("plugins"), list):
-        return DEFAULT_LAYERS
-    return {layer: class_of(parameters.get(f"{layer}.plugin", "")) for layer in strings(parameters["plugins"])}
-
-
-def _translate_costmap_parameter(
-    node: str, name: str, value: object, section: str, known: Sequence[str]
-) -> Iterator[Translation]:
-    """Translate a parameter of the costmap itself."""
-    if name == "rolling_window":
-        rolls = section == "local_costmap"
-        why = "" if bool(value) == rolls else "the local costmap always rolls, the global one with `map: none`"
-        yield Translation(node, name, (), value, why)
-    yield from translate_same_name(node, name, value, (section,), known)
-
-
-def _translate_layer_parameter(
-    node: str, name: str, value: Any, layers: Mapping[str, str], section: str, known: KnownParameters
-) -> Iterator[Translation]:
-    """Translate a parameter of an inflation or denoise layer. `layers` are the classes of all layers by name."""
-    kind, last = layers[name.partition(".")[0]], name.rpartition(".")[2]
-    if kind == "InflationLayer":
-        yield from translate_same_name(node, name, value, (section,), known[section], last)
-    elif kind == "DenoiseLayer":
-        yield from translate_same_name(node, name, value, (section, "denoise_layer"), known["denoise_layer"], last)
-
-
-LASER_SCAN = "LaserScan"
-"""Data type of laser scans, and of an observation source without `data_type`."""
-HEIGHT_PARAMETERS = ("min_obstacle_height", "max_obstacle_height")
-"""Parameters of observation sources that simscen applies only to camera data. All other parameters are ranges."""
-
-
-def _translate_observation_sources(
-    node: str, parameters: Parameters, layers: Mapping[str, str], section: str, known: Sequence[str]
-) -> Iterator[Translation]:
-    """Translate the parameters of all observation sources to the parameters that apply to all sensors in simscen.
-
-    Ranges are taken from the first laser scan source. Heights are taken from the first point cloud source, or else from
-    the first laser scan source.
-    """
-    types = {
-        source: parameters.get(f"{source}.data_type", LASER_SCAN) for source in _observation_sources(parameters, layers)
-    }
-    first: dict[str, str] = {}
-    for source in sorted(types, key=lambda source: types[source] == LASER_SCAN):  # point clouds first
-        is_scan = types[source] == LASER_SCAN
-        ignored = "" if is_scan else f"{types[source]} data does not set the ranges of the lidar"
-        for key, value in parameters_below(parameters, source):
-            name = f"{source}.{key}"
-            if key not in known:
-                continue
-            if not is_scan and key not in HEIGHT_PARAMETERS:
-                yield Translation(node, name, (), value, ignored, covers=f"{source}.")
-                ignored = ""  # one note for all ranges of a source
-            elif first.setdefault(key, source) == source:
-                yield Translation(node, name, (section, key), value)
-            else:
-                differs = types[first[key]] == types[source] and parameters[f"{first[key]}.{key}"] != value
-                note = f"only the value of the first source is used: {first[key]}" if differs else ""
-                yield Translation(node, name, (), value, note)
-
-
-def _observation_sources(parameters: Parameters, layers: Mapping[str, str]) -> Iterator[str]:
-    """Yield the names `layer.source` of the observation sources of all layers."""
-    for layer, kind in layers.items():
-        if kind in OBSERVATION_LAYERS:
-            found = [name.partition(".")[0] for name, _ in parameters_below(parameters, layer) if "." in name]
-            listed = str(parameters.get(f"{layer}.observation_sources", " ".join(found))).split()
-            yield from (f"{layer}.{source}" for source in listed)
-
-
-def _translate_velocity_smoother(node: str, parameters: Parameters, _: KnownParameters) -> Iterator[Translation]:
+def _translate_velocity_smoother(parameters: Parameters) -> Iterator[Translation]:
     """Translate the limits of velocity and acceleration.
 
     In simscen, lateral and backward motion have the limits of forward motion. Different limits get a note.
@@ -249,24 +143,24 @@ def _translate_velocity_smoother(node: str, parameters: Parameters, _: KnownPara
         limits = _xy_and_rotation(parameters.get(name))
         for simscen_name, limit in zip((name, turning), limits[::2], strict=True) if limits else ():
             if simscen_name and limit:
-                yield Translation(node, name, ("velocity_smoother", simscen_name), abs(limit))
+                yield Translation(name, ("velocity_smoother", simscen_name), abs(limit))
         if limits and limits[1] and abs(limits[1]) != abs(limits[0]):
-            yield Translation(node, name, (), limits, "lateral motion has the same limit as forward motion")
+            yield Translation(name, (), limits, "lateral motion has the same limit as forward motion")
     lowest, highest = _xy_and_rotation(parameters.get("min_velocity")), _xy_and_rotation(parameters.get("max_velocity"))
     if lowest:
         is_same = bool(highest) and all(low in (-high, 0) for low, high in zip(lowest, highest, strict=True))
         why = "" if is_same else "backward motion has the same limit as forward motion"
-        yield Translation(node, "min_velocity", (), lowest, why)
+        yield Translation("min_velocity", (), lowest, why)
     faster, slower = _xy_and_rotation(parameters.get("max_accel")), _xy_and_rotation(parameters.get("max_decel"))
     if faster and slower and abs(slower[2]) != abs(faster[2]):
         why = "angular deceleration has the same limit as angular acceleration"
-        yield Translation(node, "max_decel", (), slower, why)
+        yield Translation("max_decel", (), slower, why)
 
 
-def _translate_collision_monitor(node: str, parameters: Parameters, _: KnownParameters) -> Iterator[Translation]:
+def _translate_collision_monitor(parameters: Parameters) -> Iterator[Translation]:
     """Translate the first enabled `approach` polygon. Other enabled polygons get a note."""
     if "source_timeout" in parameters:
-        yield Translation(node, "source_timeout", ("collision_monitor", "source_timeout"), parameters["source_timeout"])
+        yield Translation("source_timeout", ("collision_monitor", "source_timeout"), parameters["source_timeout"])
     on = parameters.get("enabled", True)
     actions = {polygon: parameters.get(f"{polygon}.action_type") for polygon in strings(parameters.get("polygons"))}
     enabled = {polygon: parameters.get(f"{polygon}.enabled", True) for polygon in actions}
@@ -274,23 +168,23 @@ def _translate_collision_monitor(node: str, parameters: Parameters, _: KnownPara
     used = max(approaching, key=lambda polygon: bool(approaching[polygon]), default="")  # the first enabled one, if any
     for polygon, action in actions.items():
         if polygon == used:
-            yield from (Translation(node, f"{polygon}.{setting}", (), None) for setting in ("action_type", "enabled"))
-            yield from _translate_approach(node, parameters, polygon)
+            yield from (Translation(f"{polygon}.{setting}", (), None) for setting in ("action_type", "enabled"))
+            yield from _translate_approach(parameters, polygon)
         elif enabled[polygon]:
             why = f"action_type {action} of {polygon} is not supported"
             if polygon in approaching:
                 why = f"only the first polygon that approaches is used: {used}, not {polygon}"
-            yield Translation(node, "polygons", (), action, why, covers=f"{polygon}.")
+            yield Translation("polygons", (), action, why, covers=f"{polygon}.")
         else:
-            yield Translation(node, "polygons", (), action, covers=f"{polygon}.")  # disabled
+            yield Translation("polygons", (), action, covers=f"{polygon}.")  # disabled
     on = on and (any(approaching.values()) or not approaching)
     for name in ("enabled", "polygons"):
         if name in parameters:
-            yield Translation(node, name, ("collision_monitor", "enabled"), on)
+            yield Translation(name, ("collision_monitor", "enabled"), on)
             break
 
 
-def _translate_approach(node: str, parameters: Parameters, polygon: str) -> Iterator[Translation]:
+def _translate_approach(parameters: Parameters, polygon: str) -> Iterator[Translation]:
     """Translate the parameters of a polygon with the `action_type` approach."""
     for nav2_name, simscen_name, offset in (
         ("time_before_collision", "time_before_collision", 0),
@@ -301,7 +195,7 @@ def _translate_approach(node: str, parameters: Parameters, polygon: str) -> Iter
         value = parameters.get(f"{polygon}.{nav2_name}")
         if value is not None:
             value = value + offset if isinstance(value, int) and not isinstance(value, bool) else value
-            yield Translation(node, f"{polygon}.{nav2_name}", ("collision_monitor", simscen_name), value)
+            yield Translation(f"{polygon}.{nav2_name}", ("collision_monitor", simscen_name), value)
 
 
 def _xy_and_rotation(value: Any) -> list[float]:
@@ -310,34 +204,61 @@ def _xy_and_rotation(value: Any) -> list[float]:
     return value if fits else []
 
 
-def translate(nodes: Mapping[str, Parameters], known: KnownParameters) -> Iterator[Translation]:
-    """Yield the translations of the parameters of all nodes. `nodes` are the parameters by name of the node.
+def _translate_amcl(parameters: Parameters) -> Iterator[Translation]:
+    """Translate the parameters of AMCL."""
+    for name, value in parameters.items():
+        if name == "robot_model_type":
+            model = MOTION_MODELS.get(class_of(value))
+            keys = ("localizer", "robot_model") if model else ()
+            yield Translation(name, keys, model, "" if model else f"{value} is not supported")
+        else:
+            yield from translate_same_name(name, value, ("localizer",), "amcl")
 
-    Irrelevant parameters and unknown nodes are left out. A parameter that simscen does not have gets a translation
-    without keys.
+
+def _translate_behavior_server(parameters: Parameters) -> Iterator[Translation]:
+    """Translate the parameters of the recovery behaviors."""
+    for name, value in parameters.items():
+        # A negative minimum has no effect in Nav2.
+        no_minimum = name == "min_rotational_vel" and isinstance(value, float | int) and value < 0
+        yield from translate_same_name(name, 0.0 if no_minimum else value, ("recovery",), "recovery")
+
+
+TRANSLATORS: dict[str, Callable[[Parameters], Iterator[Translation]]] = {
+    "amcl": _translate_amcl,
+    "controller_server": _translate_controller_server,
+    "planner_server": _translate_planner_server,
+    "local_costmap": partial(translate_costmap, section="local_costmap"),
+    "global_costmap": partial(translate_costmap, section="costmap"),
+    "behavior_server": _translate_behavior_server,
+    "velocity_smoother": _translate_velocity_smoother,
+    "collision_monitor": _translate_collision_monitor,
+}
+"""Functions that translate the parameters of a node, by name of the node."""
+
+
+def translate(node: str, parameters: Parameters) -> list[Translation]:
+    """Return the translations of the parameters of a node; [] for an unknown node.
+
+    Irrelevant parameters are left out. A parameter that simscen does not have gets a translation without keys.
     """
-    for node, parameters in nodes.items():
-        translator = TRANSLATORS.get(OLD_NODE_NAMES.get(node, node))
-        if translator is None:
-            continue
-        translations = list(translator(node, parameters, known))
-        yield from (translation for translation in translations if translation.keys or translation.note)
-        translated = {translation.parameter for translation in translations}
-        covered = tuple(translation.covers for translation in translations if translation.covers)
-        for name, value in parameters.items():
-            if name not in translated and not name.startswith(covered) and _is_relevant(name, value):
-                yield Translation(node, name, (), value, SCENARIO_PARAMETERS.get(name.partition(".")[0], ""))
-
-
-def unknown_nodes(nodes: Mapping[str, Parameters]) -> list[str]:
-    """Return the names of the nodes that have relevant parameters, but no counterpart in simscen."""
-    return [
-        node
-        for node, parameters in nodes.items()
-        if OLD_NODE_NAMES.get(node, node) not in TRANSLATORS
-        and node not in IGNORED_NODES
-        and any(_is_relevant(name, value) for name, value in parameters.items())
+    translator = TRANSLATORS.get(OLD_NODE_NAMES.get(node, node))
+    if translator is None:
+        return []
+    translations = list(translator(parameters))
+    translated = {translation.parameter for translation in translations}
+    covered = tuple(translation.covers for translation in translations if translation.covers)
+    untranslated = [
+        Translation(name, (), value, SCENARIO_PARAMETERS.get(name.partition(".")[0], ""))
+        for name, value in parameters.items()
+        if name not in translated and not name.startswith(covered) and _is_relevant(name, value)
     ]
+    return [translation for translation in translations if translation.keys or translation.note] + untranslated
+
+
+def is_unknown(node: str, parameters: Parameters) -> bool:
+    """Return whether a node has relevant parameters, but no counterpart in simscen."""
+    has_counterpart = OLD_NODE_NAMES.get(node, node) in TRANSLATORS or node in IGNORED_NODES
+    return not has_counterpart and any(_is_relevant(name, value) for name, value in parameters.items())
 
 
 def _is_relevant(parameter: str, value: object) -> bool:
@@ -346,35 +267,3 @@ def _is_relevant(parameter: str, value: object) -> bool:
     if last in IGNORED_PARAMETERS or any(part in last for part in IGNORED_NAME_PARTS):
         return False
     return last not in EQUIVALENT_VALUES or value not in EQUIVALENT_VALUES[last]
-
-
-def _translate_amcl(node: str, parameters: Parameters, known: KnownParameters) -> Iterator[Translation]:
-    """Translate the parameters of AMCL."""
-    for name, value in parameters.items():
-        if name == "robot_model_type":
-            model = MOTION_MODELS.get(class_of(value))
-            keys = ("localizer", "robot_model") if model else ()
-            yield Translation(node, name, keys, model, "" if model else f"{value} is not supported")
-        else:
-            yield from translate_same_name(node, name, value, ("localizer",), known["amcl"])
-
-
-def _translate_behavior_server(node: str, parameters: Parameters, known: KnownParameters) -> Iterator[Translation]:
-    """Translate the parameters of the recovery behaviors."""
-    for name, value in parameters.items():
-        # A negative minimum has no effect in Nav2.
-        no_minimum = name == "min_rotational_vel" and isinstance(value, float | int) and value < 0
-        yield from translate_same_name(node, name, 0.0 if no_minimum else value, ("recovery",), known["recovery"])
-
-
-TRANSLATORS = {
-    "amcl": _translate_amcl,
-    "controller_server": _translate_controller_server,
-    "planner_server": _translate_planner_server,
-    "local_costmap": _translate_costmap,
-    "global_costmap": _translate_costmap,
-    "behavior_server": _translate_behavior_server,
-    "velocity_smoother": _translate_velocity_smoother,
-    "collision_monitor": _translate_collision_monitor,
-}
-"""Functions that translate the parameters of a node, by name of the node."""

@@ -15,7 +15,7 @@ from simscen.loading.variations.axes import AxisBuilder
 from simscen.loading.variations.conditions import Condition, ConditionError, all_hold, plain_values
 from simscen.loading.variations.naming import derive_name, make_unique, name_error, numbered_name, short_names
 from simscen.loading.variations.options import Change, Option, typical_options
-from simscen.loading.variations.paths import Target, set_value
+from simscen.loading.variations.paths import Target
 from simscen.loading.yaml.tree import MappingNode, Node, Position, SequenceNode
 
 VARIATIONS, ACCEPTANCE = "variations", "acceptance"
@@ -43,7 +43,7 @@ class Variation:
     def with_changes(cls, name: str, tree: MappingNode, changes: Sequence[Change]) -> "Variation":
         """Return the variation of the scenario `tree` with these changes."""
         for change in changes:
-            tree = set_value(tree, change.target, change.value)
+            tree = tree.with_value(change.target.keys, change.value, change.target.position)
         return cls(name, tree, tuple(changes))
 
     @property

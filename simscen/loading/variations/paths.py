@@ -18,7 +18,6 @@ from simscen.loading.yaml.tree import (
     SequenceNode,
     child,
     dotted_path,
-    replace_at,
 )
 
 LIST_KEYS = frozenset({"goals", "events", "faults", "pass", "metrics", "tags"})
@@ -65,13 +64,6 @@ def resolve_path(path: str, position: Position, tree: MappingNode) -> Target:
     if parts[0] in FIXED_KEYS:
         raise PathError(f"a variation cannot change `{parts[0]}`", FIXED_KEYS[parts[0]])
     return Target(path, position, _resolve_keys(path, parts, tree))
-
-
-def set_value(tree: MappingNode, target: Target, value: Node) -> MappingNode:
-    """Return a copy of the scenario with `value` at the target. Missing mappings get the position of the path."""
-    changed = replace_at(tree, target.keys, value, target.position)
-    assert isinstance(changed, MappingNode)
-    return changed
 
 
 def split_path(path: str) -> list[str]:

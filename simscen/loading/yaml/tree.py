@@ -72,6 +72,12 @@ class MappingNode:
         """Return the mapping without these keys."""
         return MappingNode(self.position, {key: entry for key, entry in self.entries.items() if key not in keys})
 
+    def with_value(self, keys: "Keys", value: "Node", position: Position) -> "MappingNode":
+        """Return a copy with `value` at `keys`, which are not empty. Added keys and mappings get `position`."""
+        changed = _with_value(self, keys, value, position)
+        assert isinstance(changed, MappingNode), "`keys` are empty"
+        return changed
+
 
 Node = ScalarNode | SequenceNode | MappingNode
 Key = str | int
@@ -101,18 +107,18 @@ def nodes_with_keys(node: Node, keys: Keys = ()) -> Iterator[tuple[Keys, Node]]:
             yield from nodes_with_keys(item, (*keys, index))
 
 
-def replace_at(node: Node | None, keys: Keys, value: Node, position: Position) -> Node:
-    """Return a copy of the tree `node` with `value` at `keys`. Missing mappings are added; they get `position`."""
+def _with_value(node: Node | None, keys: Keys, value: Node, position: Position) -> Node:
+    """Return a copy of a tree with `value` at `keys`; missing mappings are added."""
     if not keys:
         return value
     key, rest = keys[0], keys[1:]
     if isinstance(node, SequenceNode) and isinstance(key, int):
         items = list(node.items)
-        items[key] = replace_at(items[key], rest, value, position)
+        items[key] = _with_value(items[key], rest, value, position)
         return SequenceNode(node.position, tuple(items))
     mapping = node if isinstance(node, MappingNode) else MappingNode(position, {})
     old = mapping.entries.get(str(key))
-    entry = Entry(old.key if old else position, replace_at(old.value if old else None, rest, value, position))
+    entry = Entry(old.key if old else position, _with_value(old.value if old else None, rest, value, position))
     return MappingNode(mapping.position, {**mapping.entries, str(key): entry})
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.loading.variations.paths import PathError, resolve_path, set_value
+from simscen.loading.variations.paths import PathError, resolve_path
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.tree import MappingNode, Position, ScalarNode, node_at
 
@@ -50,11 +50,12 @@ def test_a_path_leads_to_the_value_that_a_user_means(tree: MappingNode, path: st
     target = resolve_path(path, HERE, tree)
     assert target.keys == keys
     value = ScalarNode(HERE, 7)
-    assert node_at(set_value(tree, target, value), keys) is value
+    assert node_at(tree.with_value(target.keys, value, target.position), keys) is value
 
 
 def test_position_of_a_missing_value_is_that_of_the_path(tree: MappingNode) -> None:
-    changed = set_value(tree, resolve_path("stack.controller.x", HERE, tree), ScalarNode(HERE, 7))
+    keys = resolve_path("stack.controller.x", HERE, tree).keys
+    changed = tree.with_value(keys, ScalarNode(HERE, 7), HERE)
     assert changed.plain["stack"] == {"controller": {"x": 7}}
     assert changed.entries["stack"].key == HERE
     assert {**changed.plain, "stack": None} == {**tree.plain, "stack": None}

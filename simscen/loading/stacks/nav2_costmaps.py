@@ -1,0 +1,102 @@
+"""Translation of the parameters of Nav2's costmaps and of their layers to parameters of simscen's costmaps.
+
+`parameters` are the parameters of a costmap in the Nav2 file. `section` is the key of the costmap under `stack`.
+"""
+
+from collections.abc import Iterator, Mapping
+
+from simscen.loading.stacks.nav2_mapping import (
+    Parameters,
+    Translation,
+    class_of,
+    parameters_below,
+    simscen_parameters,
+    strings,
+    translate_same_name,
+)
+
+DEFAULT_LAYERS = {
+    "static_layer": "StaticLayer",
+    "obstacle_layer": "ObstacleLayer",
+    "inflation_layer": "InflationLayer",
+}
+"""Classes of the layers of a costmap without `plugins`, by name of the layer."""
+OBSERVATION_LAYERS = ("ObstacleLayer", "VoxelLayer")
+"""Classes of layers that mark and clear obstacles by sensor data."""
+
+
+def translate_costmap(parameters: Parameters, section: str) -> Iterator[Translation]:
+    """Translate the parameters of the global or local costmap and of its layers."""
+    layers = _layer_classes(parameters)
+    handled = {*layers, *strings(parameters.get("filters"))}
+    for name, value in parameters.items():
+        layer, _, rest = name.partition(".")
+        if name == "rolling_window":
+            rolls = section == "local_costmap"
+            why = "" if bool(value) == rolls else "the local costmap always rolls, the global one with `map: none`"
+            yield Translation(name, (), value, why)
+        if not rest:
+            yield from translate_same_name(name, value, (section,), section)
+        elif layers.get(layer) == "InflationLayer":
+            yield from translate_same_name(name, value, (section,), section, name.rpartition(".")[2])
+        elif layers.get(layer) == "DenoiseLayer":
+            keys = (section, "denoise_layer")
+            yield from translate_same_name(name, value, keys, "denoise_layer", name.rpartition(".")[2])
+        elif layer not in handled:
+            handled.add(layer)
+            yield Translation(name, (), value, f"`plugins` does not list {layer}", covers=f"{layer}.")
+    yield from _translate_observation_sources(parameters, layers, section)
+    for zones in strings(parameters.get("filters")):
+        yield Translation("filters", (), None, covers=f"{zones}.")  # the scenario defines zones
+
+
+def _layer_classes(parameters: Parameters) -> Mapping[str, str]:
+    """Return the classes of the layers of a costmap, by name of the layer."""
+    if not isinstance(parameters.get("plugins"), list):
+        return DEFAULT_LAYERS
+    return {layer: class_of(parameters.get(f"{layer}.plugin", "")) for layer in strings(parameters["plugins"])}
+
+
+LASER_SCAN = "LaserScan"
+"""Data type of laser scans, and of an observation source without `data_type`."""
+HEIGHT_PARAMETERS = ("min_obstacle_height", "max_obstacle_height")
+"""Parameters of observation sources that simscen applies only to camera data. All other parameters are ranges."""
+
+
+def _translate_observation_sources(
+    parameters: Parameters, layers: Mapping[str, str], section: str
+) -> Iterator[Translation]:
+    """Translate the parameters of all observation sources to the parameters that apply to all sensors in simscen.
+
+    Ranges are taken from the first laser scan source. Heights are taken from the first point cloud source, or else from
+    the first laser scan source.
+    """
+    types = {
+        source: parameters.get(f"{source}.data_type", LASER_SCAN) for source in _observation_sources(parameters, layers)
+    }
+    first: dict[str, str] = {}
+    for source in sorted(types, key=lambda source: types[source] == LASER_SCAN):  # point clouds first
+        is_scan = types[source] == LASER_SCAN
+        ignored = "" if is_scan else f"{types[source]} data does not set the ranges of the lidar"
+        for key, value in parameters_below(parameters, source):
+            name = f"{source}.{key}"
+            if key not in simscen_parameters(section):
+                continue
+            if not is_scan and key not in HEIGHT_PARAMETERS:
+                yield Translation(name, (), value, ignored, covers=f"{source}.")
+                ignored = ""  # one note for all ranges of a source
+            elif first.setdefault(key, source) == source:
+                yield Translation(name, (section, key), value)
+            else:
+                differs = types[first[key]] == types[source] and parameters[f"{first[key]}.{key}"] != value
+                note = f"only the value of the first source is used: {first[key]}" if differs else ""
+                yield Translation(name, (), value, note)
+
+
+def _observation_sources(parameters: Parameters, layers: Mapping[str, str]) -> Iterator[str]:
+    """Yield the names `layer.source` of the observation sources of all layers."""
+    for layer, kind in layers.items():
+        if kind in OBSERVATION_LAYERS:
+            found = [name.partition(".")[0] for name, _ in parameters_below(parameters, layer) if "." in name]
+            listed = str(parameters.get(f"{layer}.observation_sources", " ".join(found))).split()
+            yield from (f"{layer}.{source}" for source in listed)
