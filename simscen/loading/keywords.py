@@ -2,11 +2,10 @@
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from typing import Protocol, TypeVar
 
 from simscen.core.errors import NothingSelected, UsageError
+from simscen.loading.loaded import LoadedScenario
 from simscen.loading.schema.messages import quoted, suggestion
-from simscen.model.scenario import ScenarioSpec
 
 _TOKEN_PATTERN = re.compile(r"[()]|[^\s()]+")
 MAX_DEPTH = 50
@@ -16,24 +15,7 @@ Matcher = Callable[[str], bool]
 """Function that returns whether the title of a scenario matches an expression."""
 
 
-class Selectable(Protocol):
-    """Object with a title and tags, such as a loaded scenario."""
-
-    @property
-    def title(self) -> str:
-        """The scenario id with the name of the variation, e.g. `aisle[speed=0.5]`."""
-        ...
-
-    @property
-    def spec(self) -> ScenarioSpec:
-        """The specification of the scenario, which contains its tags."""
-        ...
-
-
-Item = TypeVar("Item", bound=Selectable)
-
-
-def select(scenarios: Iterable[Item], keyword: str = "", tags: Sequence[str] = ()) -> list[Item]:
+def select(scenarios: Iterable[LoadedScenario], keyword: str, tags: Sequence[str]) -> list[LoadedScenario]:
     """Return the scenarios whose title matches `keyword` and that have at least one of `tags`.
 
     `keyword` is an expression of parts of titles, `and`, `or`, `not`, and parentheses; "" matches all titles. Case is
@@ -109,7 +91,7 @@ class _Parser:
         return UsageError(f"cannot read -k {quoted(self._expression)}: {why}")
 
 
-def _no_match_message(candidates: Sequence[Selectable], keyword: str, tags: Sequence[str]) -> str:
+def _no_match_message(candidates: Sequence[LoadedScenario], keyword: str, tags: Sequence[str]) -> str:
     """Return the message that no scenario is selected, with a hint for an unknown tag."""
     known = sorted({tag for scenario in candidates for tag in scenario.spec.tags})
     unknown = [tag for tag in tags if tag not in known]
