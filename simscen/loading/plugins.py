@@ -19,19 +19,14 @@ _HEADER_PREFIX = "plugin."
 
 def plugins_of(loaded: LoadedScenario) -> tuple[RegisteredType, ...]:
     """Return the types of plug-ins that a scenario and its robots use, sorted by group and name."""
-    return _plugins_of_specs(loaded.spec, *(view.robot.spec for view in loaded.robot_views.values()))
+    specs = [loaded.spec, *(view.robot.spec for view in loaded.robot_views.values())]
+    return _sorted({entry for spec in specs for keys, part in walk(spec) for entry in _plugins_of_part(keys, part)})
 
 
 def plugins_of_all(scenarios: Iterable[LoadedScenario]) -> tuple[RegisteredType, ...]:
     """Return the types of plug-ins that at least one of the scenarios uses, sorted by group and name."""
     different = {id(scenario): scenario for scenario in scenarios}.values()
     return _sorted({entry for scenario in different for entry in plugins_of(scenario)})
-
-
-def _plugins_of_specs(*specs: Any) -> tuple[RegisteredType, ...]:
-    """Return the types of plug-ins that the specifications use, sorted by group and name."""
-    found = {entry for spec in specs for keys, part in walk(spec) for entry in _plugins_of_part(keys, part)}
-    return _sorted(found)
 
 
 def log_header_key(entry: RegisteredType) -> str:

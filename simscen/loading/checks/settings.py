@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from simscen.core.clock import Clock
 from simscen.loading.checks.registry import MEANING, NAMES, CheckProblem, NameScope
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.spec_walk import quantities_of
+from simscen.loading.spec_walk import angles_of
 from simscen.loading.yaml.tree import Keys, MappingNode, ScalarNode, existing_keys, node_at
 from simscen.model.localizers import Amcl
 from simscen.model.navigation import expected_failure_name
@@ -97,7 +97,7 @@ def degrees_as_radians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     if not loaded.robot.is_shipped:
         files.append((loaded.robot.spec, loaded.robot.tree))
     for spec, tree in files:
-        for keys, value in quantities_of(spec, "angle") if spec is not None and tree is not None else ():
+        for keys, value in angles_of(spec) if spec is not None and tree is not None else ():
             node = node_at(tree or loaded.tree, keys)
             without_unit = isinstance(node, ScalarNode) and isinstance(node.value, int | float)
             if without_unit and abs(value) > FULL_TURN_RAD + 1e-3:
