@@ -1,15 +1,18 @@
-"""Goals of a scenario: listed under `goals`, or sent by events during the run."""
+"""Goals of a scenario, listed under `goals` or sent by events, and their expected failures."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from simscen.actions.robot import NewGoal
-from simscen.core.messages.navigation import Goal, loop_goal_name
+from simscen.core.messages.navigation import ErrorCode, Goal, loop_goal_name, matches_goal_name
+from simscen.criteria.result import ErrorCodeIs, Result
 from simscen.loading.yaml.tree import Keys
 from simscen.model.navigation import expected_failure_name
 from simscen.model.scenario import GoalEntry, ScenarioSpec
-from simscen.model.stack_base import StackBase
+
+START_FAILURES = ErrorCode.START_OCCUPIED, ErrorCode.START_OUTSIDE_MAP
+"""Error codes of Nav2 for a failure because of the start pose."""
 
 
 def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
@@ -18,17 +21,42 @@ def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
     The names in the second loop end in `#2`, in the third in `#3`, and so on. Missing tolerances are taken from the
     goal checker.
     """
-    goals = [_goal(name, entry, spec.stack) for name, entry in zip(spec.goal_names, spec.goals, strict=True)]
-    if spec.navigation.mode == "navigate_through_poses":
-        intermediate = [
-            _intermediate_goal(goal, entry, spec.navigation.radius)
-            for goal, entry in zip(goals, spec.goals, strict=True)
-        ]
-        goals = [*intermediate[:-1], *goals[-1:]]
+    goals = []
+    for number, (name, entry) in enumerate(zip(spec.goal_names, spec.goals, strict=True), start=1):
+        goal = replace(_goal(name, entry, spec), wait=entry.on_reached.wait)
+        if spec.navigation.mode == "navigate_through_poses" and number < len(spec.goals):
+            tolerance = entry.xy_tolerance or spec.navigation.radius
+            goal = replace(goal, via=True, xy_tolerance=tolerance, yaw_tolerance=math.pi)  # passed at any heading
+        goals.append(goal)
     return tuple(
         replace(goal, name=loop_goal_name(goal.name, loop))
         for loop in range(1, spec.navigation.loops + 1)
         for goal in goals
+    )
+
+
+def event_goals(spec: ScenarioSpec, includes_robot: Callable[[str | None], bool]) -> dict[Keys, Goal]:
+    """Return the goals that events send, by the keys of their `new_goal` actions in the scenario.
+
+    `includes_robot` selects actions: it is called with the robot that an action names, or None.
+    """
+    return {
+        (*keys, "new_goal"): _goal(action.chosen.name, action.chosen, spec)
+        for step in spec.steps
+        for keys, action in step.located_actions()
+        if isinstance(action.chosen, NewGoal) and includes_robot(action.robot)
+    }
+
+
+def _goal(name: str, entry: GoalEntry | NewGoal, spec: ScenarioSpec) -> Goal:
+    """Return a goal. Missing tolerances are taken from the goal checker of the stack."""
+    checker = spec.stack.goal_checker
+    return Goal(
+        name=name,
+        pose=entry.pose.pose,
+        xy_tolerance=entry.xy_tolerance or checker.xy_goal_tolerance,
+        yaw_tolerance=entry.yaw_tolerance or checker.yaw_goal_tolerance,
+        timeout=entry.timeout,
     )
 
 
@@ -47,38 +75,34 @@ def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, 
     return found
 
 
-def _intermediate_goal(goal: Goal, entry: GoalEntry, radius: float) -> Goal:
-    """Return `goal` as a via pose: to pass at any heading, within `radius` m unless `entry` sets a tolerance."""
-    return replace(goal, via=True, xy_tolerance=entry.xy_tolerance or radius, yaw_tolerance=math.pi)
+def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
+    """Return whether a scenario expects that the goal with this name fails.
 
-
-def event_goals(spec: ScenarioSpec, includes_robot: Callable[[str | None], bool]) -> dict[Keys, Goal]:
-    """Return the goals that events send, by the keys of their `new_goal` actions in the scenario.
-
-    `includes_robot` selects actions: it is called with the robot that an action names, or None.
+    A scenario states this by `expect` at the goal, or by a criterion `result` or `error_code`.
     """
-    checker = spec.stack.goal_checker
-    found: dict[Keys, Goal] = {}
-    for keys, action in (located for step in spec.steps for located in step.located_actions()):
-        if isinstance(sent := action.chosen, NewGoal) and includes_robot(action.robot):
-            where = (*keys, "new_goal")
-            found[where] = Goal(
-                name=sent.name,
-                pose=sent.pose.pose,
-                xy_tolerance=sent.xy_tolerance or checker.xy_goal_tolerance,
-                yaw_tolerance=sent.yaw_tolerance or checker.yaw_goal_tolerance,
-                timeout=sent.timeout,
-            )
-    return found
+    through = spec.navigation.mode == "navigate_through_poses"
+    entries = zip(spec.goal_names, [spec.goals[-1]] * len(spec.goals) if through else spec.goals, strict=True)
+    if any(matches_goal_name(goal, name) and expected_failure_name(entry.expect) for name, entry in entries):
+        return True
+    results = [entry.chosen for entry in spec.pass_ if entry.severity == "fail"]
+    failing = any(isinstance(result, Result) and result.status == "FAILED" for result in results)
+    return failing or any(code != ErrorCode.NONE and name in (None, goal) for code, name in _required_codes(spec))
 
 
-def _goal(name: str, entry: GoalEntry, stack: StackBase) -> Goal:
-    """Return a listed goal. Missing tolerances are taken from the goal checker of the stack."""
-    return Goal(
-        name=name,
-        pose=entry.pose.pose,
-        xy_tolerance=entry.xy_tolerance or stack.goal_checker.xy_goal_tolerance,
-        yaw_tolerance=entry.yaw_tolerance or stack.goal_checker.yaw_goal_tolerance,
-        timeout=entry.timeout,
-        wait=entry.on_reached.wait,
-    )
+def expects_start_failure(spec: ScenarioSpec) -> bool:
+    """Return whether a scenario requires that navigation fails because of the start pose."""
+    return any(code in START_FAILURES for code, _ in _required_codes(spec))
+
+
+def _required_codes(spec: ScenarioSpec) -> Iterator[tuple[ErrorCode, str | None]]:
+    """Yield the error codes that criteria require, with the name of the goal, or None for the whole navigation."""
+    for entry in spec.pass_:
+        if entry.severity != "fail":
+            continue
+        match entry.chosen:
+            case ErrorCodeIs(code=code, goal=goal):
+                yield code, goal
+            case Result(error_code=ErrorCode() as code):
+                yield code, None
+            case _:
+                pass

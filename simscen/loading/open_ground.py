@@ -6,8 +6,7 @@ from dataclasses import replace
 from simscen.actions.robot import Kidnap
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2
-from simscen.loading.checks.scene import expects_failure
-from simscen.loading.goals import event_goals, scenario_goals
+from simscen.loading.goals import event_goals, expects_failure, scenario_goals
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.world_cache import Bounds
 

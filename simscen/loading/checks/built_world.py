@@ -12,6 +12,7 @@ from simscen.loading.checks.scene import TOUCH_M
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.tree import MappingNode
+from simscen.model.world import WorldSpec
 from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
 BLOCKING_HEIGHTS_M = 0.02, 0.4
@@ -21,32 +22,29 @@ RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_MAX_SLOPE_RAD, RAMP_ROBOT_MAX_STEP_M = 0.1
 
 
 class BuiltWorldFile(NamedTuple):
-    """World file, and the world that was built from it."""
+    """Specification and YAML tree of a world file, and the world that was built from it."""
 
     world: World
-    source: LoadedWorld
-
-    @property
-    def tree(self) -> MappingNode | None:
-        """YAML tree of the world file; None for a ROS map or SDF file."""
-        return self.source.tree
+    spec: WorldSpec
+    tree: MappingNode
 
 
-BUILT_WORLD: CheckStage[BuiltWorldFile] = CheckStage("built world")
+BUILT_WORLD: CheckStage[BuiltWorldFile] = CheckStage()
 """Checks of a world file in its built world."""
 
 
 def check_built_world(world: World, source: LoadedWorld) -> list[Problem]:
     """Return warnings about the world file `source`, without source lines; [] for a ROS map or SDF file."""
-    return [] if source.spec is None else BUILT_WORLD.problems(BuiltWorldFile(world, source))
+    if source.spec is None or source.tree is None:
+        return []
+    return BUILT_WORLD.problems(BuiltWorldFile(world, source.spec, source.tree))
 
 
 @BUILT_WORLD.check("SC314", severity="warning")
 def places_in_obstacles(built: BuiltWorldFile) -> Iterator[CheckProblem]:
     """Find places inside obstacles."""
-    assert built.source.spec is not None
-    world = _without_platforms(built.world) if built.source.spec.ramps else built.world
-    for name, place in built.source.spec.places.items():
+    world = _without_platforms(built.world) if built.spec.ramps else built.world
+    for name, place in built.spec.places.items():
         solid = first_solid_in_disc(world.solids, (place.x, place.y), TOUCH_M, BLOCKING_HEIGHTS_M)
         if solid is not None:
             message = f'place {quoted(name)} is inside obstacle "{solid}"'
@@ -56,8 +54,7 @@ def places_in_obstacles(built: BuiltWorldFile) -> Iterator[CheckProblem]:
 @BUILT_WORLD.check("SC304", severity="warning")
 def motions_into_obstacles(built: BuiltWorldFile) -> Iterator[CheckProblem]:
     """Find motions of objects with keyframes or waypoints inside obstacles."""
-    assert built.source.spec is not None
-    for index, thing in enumerate(built.source.spec.objects):
+    for index, thing in enumerate(built.spec.objects):
         for keys, what, (x, y) in motion_stops(thing.move) if thing.move is not None else ():
             if solid := first_solid_in_disc(built.world.solids, (x, y), TOUCH_M, BLOCKING_HEIGHTS_M):
                 message = f'{what} of {quoted(thing.name)} ({x:g}, {y:g}) is inside obstacle "{solid}"'
@@ -67,9 +64,8 @@ def motions_into_obstacles(built: BuiltWorldFile) -> Iterator[CheckProblem]:
 @BUILT_WORLD.check("SC315", severity="warning")
 def regions_outside_the_world(built: BuiltWorldFile) -> Iterator[CheckProblem]:
     """Find regions outside the bounds of the world."""
-    assert built.source.spec is not None
     left, bottom, right, top = built.world.bounds
-    for name, corners in built.source.spec.regions.items():
+    for name, corners in built.spec.regions.items():
         xs, ys = [x for x, _ in corners], [y for _, y in corners]
         if max(xs) < left or min(xs) > right or max(ys) < bottom or min(ys) > top:
             message = f"region {quoted(name)} is outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"

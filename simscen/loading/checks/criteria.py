@@ -1,9 +1,10 @@
 """Checks for criteria that no run can pass, and for criteria that hardly any run can fail."""
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Iterator
 from typing import Any
 
-from simscen.loading.checks.events import why_no_recovery
+from simscen.loading.checks.possible_run import why_no_recovery
 from simscen.loading.checks.registry import MEANING, CheckProblem
 from simscen.loading.known_names import goal_names
 from simscen.loading.loaded import LoadedScenario
@@ -20,9 +21,14 @@ LOOSE_PATH_RATIO = 10.0
 """Bounds on the path length above this multiple of the shortest path are loose."""
 LOOSE_COLLISION_COUNT = 1000
 """Bounds on the number of collisions of at least this number are loose."""
-
-LooseBounds = Iterator[tuple[str, str]]
-"""Key and reason of each loose bound of a criterion. A bound is loose if hardly any run can violate it."""
+TIME_BOUNDS = {
+    "goals_reached": "within",
+    "time_to_goal": "max",
+    "stuck": "max",
+    "stopped_within": "time",
+    "relocalized_within": "time",
+}
+"""Keys of bounds that are times, by kind of the criterion. They are loose if they are not below the time limit."""
 
 
 @MEANING.check("SC036")
@@ -49,37 +55,27 @@ def runs_without_motion(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 def impossible_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find criteria that no run can pass."""
     for index, entry in enumerate(loaded.spec.pass_):
-        check = _WHY_IMPOSSIBLE.get(entry.kind)
-        reason = _why_no_goals(loaded, entry.kind, entry.chosen) or (check(loaded, entry.chosen) if check else None)
-        if reason:
+        if reason := _why_impossible(loaded, entry.kind, entry.chosen):
             yield CheckProblem(("pass", index, entry.kind), f"{entry.kind} can never hold: {reason}", at_key=True)
 
 
-def _why_no_goals(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:
-    """Return a reason if a criterion of this kind needs a goal and the robot gets none; else None."""
+def _why_impossible(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:
+    """Return the reason why no run can pass a criterion of this kind; None if a run can."""
     needs_goal = kind in GOAL_CRITERIA or (kind == "path_length" and criterion.max_ratio is not None)
-    return "the robot gets no goal" if needs_goal and not goal_names(loaded) else None
-
-
-def _why_impossible_result(loaded: LoadedScenario, result: Any) -> str | None:
-    """Return the reason why no run can have the required result; None if a run can."""
+    if needs_goal and not goal_names(loaded):
+        return "the robot gets no goal"
+    if kind == "recoveries" and criterion.min:
+        return why_no_recovery(loaded, criterion.name)
+    if kind != "result":
+        return None
     cancels = any(action.may_do("cancel_goal") for step in loaded.spec.steps for action in step.actions)
-    if result.status == "CANCELED" and not cancels:
+    if criterion.status == "CANCELED" and not cancels:
         return "no event cancels a goal"
-    if result.status == "SUCCEEDED" and result.error_code not in (None, NO_ERROR):
-        return f"a result that SUCCEEDED has no error code such as {result.error_code.name}"
-    if result.status == "FAILED" and result.error_code == NO_ERROR:
+    if criterion.status == "SUCCEEDED" and criterion.error_code not in (None, NO_ERROR):
+        return f"a result that SUCCEEDED has no error code such as {criterion.error_code.name}"
+    if criterion.status == "FAILED" and criterion.error_code == NO_ERROR:
         return "a result that FAILED has an error code other than NONE"
     return None
-
-
-def _why_no_recoveries(loaded: LoadedScenario, recoveries: Any) -> str | None:
-    """Return the reason why no run can have the required recoveries; None if a run can."""
-    return why_no_recovery(loaded, recoveries.name) if recoveries.min else None
-
-
-_WHY_IMPOSSIBLE = {"result": _why_impossible_result, "recoveries": _why_no_recoveries}
-"""Functions that return the reason why a criterion is impossible, or None, by kind of the criterion."""
 
 
 @MEANING.check("SC051")
@@ -121,66 +117,39 @@ def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 @MEANING.check("SC052", severity="warning")
 def loose_bounds(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find bounds that hardly any run can violate, because of physics or the time limit."""
+    limit = loaded.spec.time_limit
     for index, entry in enumerate(loaded.spec.pass_):
-        check = _LOOSE_BOUNDS.get(entry.kind)
-        for key, reason in check(loaded, entry.chosen) if check else ():
+        found = list(_loose_bounds_of(loaded, entry.kind, entry.chosen))
+        time_key = TIME_BOUNDS.get(entry.kind, "")
+        time = getattr(entry.chosen, time_key, None)
+        if time is not None and time >= limit:
+            found.append((time_key, f"the time limit ends the run after {limit:g} s"))
+        for key, reason in found:
             yield CheckProblem(("pass", index, entry.kind, key), f"{entry.kind} can hardly fail: {reason}")
 
 
-def _loose_speed(loaded: LoadedScenario, speed: Any) -> LooseBounds:
+def _loose_bounds_of(loaded: LoadedScenario, kind: str, criterion: Any) -> Iterator[tuple[str, str]]:
+    """Yield the key and the reason of each loose bound of a criterion, except of bounds beyond the time limit."""
     robot = loaded.robot.spec
-    if robot is None:
-        return
-    if speed.max is not None and speed.max > LOOSE_SPEED_RATIO * robot.top_speed:
-        yield "max", f"the robot's top speed is {robot.top_speed:g} m/s"
-    if speed.max_turn_rate is not None and speed.max_turn_rate > LOOSE_SPEED_RATIO * robot.limits.angular:
-        yield "max_turn_rate", f"the robot's maximum turn rate is {robot.limits.angular:g} rad/s"
-
-
-def _loose_path_length(loaded: LoadedScenario, length: Any) -> LooseBounds:
-    robot, limit = loaded.robot.spec, loaded.spec.time_limit
-    if length.max_ratio is not None and length.max_ratio > LOOSE_PATH_RATIO:
-        yield "max_ratio", f"that is {length.max_ratio:g} times the shortest path"
-    if robot is not None and length.max is not None and length.max > robot.top_speed * limit:
-        yield "max", f"at its top speed the robot drives {robot.top_speed * limit:g} m within the time limit"
-
-
-def _loose_collisions(_: LoadedScenario, collisions: Any) -> LooseBounds:
-    if collisions.max is not None and collisions.max >= LOOSE_COLLISION_COUNT:
-        yield "max", f"no run has {collisions.max} collisions"
-
-
-def _loose_goals_reached(loaded: LoadedScenario, reached: Any) -> LooseBounds:
-    yield from _beyond_limit(loaded, reached, "within")
-    timeouts = [goal.timeout for goal in loaded.spec.goals]
-    own = [timeout for timeout in timeouts if timeout is not None]
-    if reached.within is not None and own and len(own) == len(timeouts) and reached.within > max(own):
-        yield "within", f"the goals' own timeouts end after at most {max(own):g} s"
-
-
-def _beyond_limit(loaded: LoadedScenario, criterion: Any, key: str) -> LooseBounds:
-    """Yield the bound `key` of a criterion, a time, if it is not below the time limit of the run."""
-    value, limit = getattr(criterion, key), loaded.spec.time_limit
-    if value is not None and value >= limit:
-        yield key, f"the time limit ends the run after {limit:g} s"
-
-
-def _time_bound(key: str) -> Callable[[LoadedScenario, Any], LooseBounds]:
-    """Return a function that yields the bound `key` of a criterion, a time, if it is loose."""
-    return lambda loaded, criterion: _beyond_limit(loaded, criterion, key)
-
-
-_LOOSE_BOUNDS: dict[str, Callable[[LoadedScenario, Any], LooseBounds]] = {
-    "speed": _loose_speed,
-    "path_length": _loose_path_length,
-    "collisions": _loose_collisions,
-    "goals_reached": _loose_goals_reached,
-    "time_to_goal": _time_bound("max"),
-    "stuck": _time_bound("max"),
-    "stopped_within": _time_bound("time"),
-    "relocalized_within": _time_bound("time"),
-}
-"""Functions that yield the loose bounds of a criterion, by kind of the criterion."""
+    match kind:
+        case "speed" if robot is not None:
+            if criterion.max is not None and criterion.max > LOOSE_SPEED_RATIO * robot.top_speed:
+                yield "max", f"the robot's top speed is {robot.top_speed:g} m/s"
+            turn_rate = criterion.max_turn_rate
+            if turn_rate is not None and turn_rate > LOOSE_SPEED_RATIO * robot.limits.angular:
+                yield "max_turn_rate", f"the robot's maximum turn rate is {robot.limits.angular:g} rad/s"
+        case "path_length":
+            if criterion.max_ratio is not None and criterion.max_ratio > LOOSE_PATH_RATIO:
+                yield "max_ratio", f"that is {criterion.max_ratio:g} times the shortest path"
+            longest = math.inf if robot is None else robot.top_speed * loaded.spec.time_limit
+            if criterion.max is not None and criterion.max > longest:
+                yield "max", f"at its top speed the robot drives {longest:g} m within the time limit"
+        case "collisions" if criterion.max is not None and criterion.max >= LOOSE_COLLISION_COUNT:
+            yield "max", f"no run has {criterion.max} collisions"
+        case "goals_reached" if criterion.within is not None:
+            timeouts = [goal.timeout for goal in loaded.spec.goals if goal.timeout is not None]
+            if timeouts and len(timeouts) == len(loaded.spec.goals) and criterion.within > max(timeouts):
+                yield "within", f"the goals' own timeouts end after at most {max(timeouts):g} s"
 
 
 @MEANING.check("SC052", severity="warning")

@@ -17,9 +17,9 @@ from simscen.loading.checks.scene import (
     WORLD,
     Scene,
     expected_failure_hint,
-    expects_start_failure,
     required_failure_hint,
 )
+from simscen.loading.goals import expects_start_failure
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.tree import Keys
 
@@ -133,7 +133,7 @@ def keepout_masks_on_goals(scene: Scene) -> Iterator[CheckProblem]:
         if not len(mask.occupied_boxes):
             continue
         start = mask.to_mask_frame(np.array([scene.start]))
-        if separation_from_boxes(start, scene.outline, mask.occupied_boxes)[0] < 0:
+        if separation_from_boxes(start, scene.size.footprint, mask.occupied_boxes)[0] < 0:
             yield CheckProblem(keys, f"keepout can never hold: the robot starts in an area that {quoted(name)} forbids")
             continue
         forbids = _mask_test(mask.grid)

@@ -21,8 +21,8 @@ from simscen.loading.checks.scene import (
     WORLD,
     Scene,
     expected_failure_hint,
-    expects_start_failure,
 )
+from simscen.loading.goals import expects_start_failure
 from simscen.loading.yaml.tree import Keys, MappingNode
 from simscen.sim.body.outline import radius_and_height
 from simscen.spec.moving_objects import Motion
@@ -65,7 +65,7 @@ def _blocked_start(scene: Scene) -> Iterator[CheckProblem]:
 def _blocked_goals(scene: Scene) -> Iterator[CheckProblem]:
     """Yield an error for each goal that fixed solids block, and a warning for each goal inside an unmoved body."""
     for keys, goal in scene.expected_goals:
-        code = "GOAL_OUTSIDE_MAP" if scene.area.why_outside(goal.pose) else "GOAL_OCCUPIED"
+        code = "GOAL_OUTSIDE_MAP" if scene.why_outside(goal.pose) else "GOAL_OCCUPIED"
         hint = f"move it, or {expected_failure_hint(keys, code)}"
         found = list(_pose_problem(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, hint))
         if found and not _fits_nearby(scene, goal):
@@ -81,7 +81,7 @@ def _fits_nearby(scene: Scene, goal: Goal) -> bool:
 
     Poses are only tried for a footprint that is not round, and if its inscribed circle is free at the goal.
     """
-    outside = scene.area.why_outside(goal.pose)
+    outside = scene.why_outside(goal.pose)
     if outside or scene.size.radius is not None or scene.circle_conflict(goal.pose, scene.world.solids):
         return False
     x, y, yaw = goal.pose
@@ -107,7 +107,7 @@ def _pose_problem(
     scene: Scene, keys: Keys, what: str, pose: Pose2, solids: tuple[Solid, ...], hint: str
 ) -> Iterator[CheckProblem]:
     """Yield a problem if a pose overlaps `solids`, or is outside the area. `what` describes the pose in the message."""
-    conflict = scene.area.why_outside(pose) or scene.footprint_conflict(pose, solids)
+    conflict = scene.why_outside(pose) or scene.footprint_conflict(pose, solids)
     if conflict:
         if scene.loaded.world.sdf is not None:
             hint = _hint_in_gazebo_world(scene, pose, solids, hint)
@@ -116,7 +116,7 @@ def _pose_problem(
 
 def _hint_in_gazebo_world(scene: Scene, pose: Pose2, solids: tuple[Solid, ...], hint: str) -> str:
     """Return `hint`, or a better hint for a pose outside the world or inside an obstacle that could be the floor."""
-    if scene.area.why_outside(pose):
+    if scene.why_outside(pose):
         return f"{hint}; or drive with `map: none`"
     position = pose.x, pose.y
     solid = next((each for each in solids if first_solid_in_disc([each], position, TOUCH_M, scene.z_range)), None)
@@ -164,7 +164,7 @@ def _on_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
         corners = place_polygon(_outline(spawn), scene.start.inverse().compose(spawn.pose.pose))
     else:
         return None
-    return "on the robot" if polygons_overlap(scene.outline, corners) else None
+    return "on the robot" if polygons_overlap(scene.size.footprint, corners) else None
 
 
 def _outline(spawn: Spawn) -> Polygon:
@@ -256,7 +256,8 @@ def overlapping_start_problems(scenes: Sequence[Scene]) -> Iterator[Problem]:
     `scenes` are the scenes of all robots of a scenario.
     """
     for one, other in combinations(scenes, 2):
-        if polygons_overlap(place_polygon(one.outline, one.start), place_polygon(other.outline, other.start)):
+        outlines = [place_polygon(scene.size.footprint, scene.start) for scene in (one, other)]
+        if polygons_overlap(*outlines):
             first, second = one.loaded.robot_name, other.loaded.robot_name
             where = f"({other.start.x:g}, {other.start.y:g}) and ({one.start.x:g}, {one.start.y:g})"
             message = f"robot `{second}` overlaps robot `{first}` at the start: {where}"

@@ -8,8 +8,8 @@ from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.polygons import depth_inside_polygon
 from simscen.criteria.keepout import Keepout
 from simscen.criteria.localization import LocalizationError
-from simscen.loading.checks.events import MAX_SPEED_RATIO
 from simscen.loading.checks.placement import blocked_poses
+from simscen.loading.checks.possible_run import MAX_SPEED_RATIO
 from simscen.loading.checks.registry import CheckProblem
 from simscen.loading.checks.route_search import robot_routes, trigger_areas
 from simscen.loading.checks.scene import START, WORLD, Scene
@@ -46,7 +46,7 @@ def keepout_regions_on_goals(scene: Scene) -> Iterator[CheckProblem]:
             continue
         region, keys = entry.chosen.region, ("pass", index, "keepout", "region")
         corners = scene.world.regions[region]
-        if polygons_overlap(corners, place_polygon(scene.outline, scene.start)):
+        if polygons_overlap(corners, place_polygon(scene.size.footprint, scene.start)):
             yield CheckProblem(keys, f"keepout can never hold: the robot starts in `{region}`")
             continue
         inside = [

@@ -25,9 +25,10 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from simscen.core.environment.world_model import World
 from simscen.core.errors import Problem
-from simscen.loading.loaded import LoadedScenario, LoadedWorld
+from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import Keys, MappingNode, key_position, value_position
 from simscen.model.scenario import ScenarioSpec
+from simscen.model.world import WorldSpec
 
 
 class CheckProblem(NamedTuple):
@@ -57,8 +58,8 @@ class Subject(Protocol):
     """Object that the checks of a stage examine, such as a loaded scenario."""
 
     @property
-    def tree(self) -> MappingNode | None:
-        """YAML tree in which problems are reported; None if the subject is not checked."""
+    def tree(self) -> MappingNode:
+        """YAML tree in which problems are reported."""
         ...
 
 
@@ -72,7 +73,6 @@ CheckFunction = TypeVar("CheckFunction", bound=Callable[..., Any])
 class CheckStage(Generic[AnySubject]):
     """Checks that run together, in the order of their registration."""
 
-    name: str
     checks: list[tuple[str, str, Check[AnySubject]]] = field(default_factory=list)
     """Error code, severity, and function of each check."""
 
@@ -86,12 +86,9 @@ class CheckStage(Generic[AnySubject]):
         return register
 
     def problems(self, subject: AnySubject) -> list[Problem]:
-        """Return the problems of a subject, without source lines; [] for a subject without a tree."""
-        tree = subject.tree
-        if tree is None:
-            return []
+        """Return the problems of a subject, without source lines."""
         return [
-            found.problem(code, tree, severity)
+            found.problem(code, subject.tree, severity)
             for code, severity, function in self.checks
             for found in function(subject)
         ]
@@ -101,6 +98,13 @@ class WrittenScenario(NamedTuple):
     """Scenario with all its robots, before it is split into views."""
 
     spec: ScenarioSpec
+    tree: MappingNode
+
+
+class WorldFile(NamedTuple):
+    """Specification of a world in a `*.world.yaml` or a scenario, and its YAML tree."""
+
+    spec: WorldSpec
     tree: MappingNode
 
 
@@ -116,8 +120,8 @@ class NameScope(NamedTuple):
         return self.loaded.tree
 
 
-ROBOT_NAMES: CheckStage[WrittenScenario] = CheckStage("robot names")
-WORLD_FILE: CheckStage[LoadedWorld] = CheckStage("world file")
-NAMES: CheckStage[NameScope] = CheckStage("names")
-MEANING: CheckStage[LoadedScenario] = CheckStage("meaning")
+ROBOT_NAMES: CheckStage[WrittenScenario] = CheckStage()
+WORLD_FILE: CheckStage[WorldFile] = CheckStage()
+NAMES: CheckStage[NameScope] = CheckStage()
+MEANING: CheckStage[LoadedScenario] = CheckStage()
 """Stages of the table above. The module `runner` runs them."""

@@ -3,6 +3,7 @@
 A fast approximate search runs first. If it finds no route, an exact search decides.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,7 +18,7 @@ from simscen.loading.open_ground import extend_bounds
 from simscen.loading.yaml.tree import Keys
 from simscen.triggers.base import AnyCondition
 from simscen.triggers.robot_state import RobotIn, RobotWithin
-from simscen.worlds.routes.simple_paths import SimplePaths, simple_paths_between
+from simscen.worlds.routes.simple_paths import SimplePaths
 
 if TYPE_CHECKING:
     from simscen.worlds.routes.shortest_paths import ShortestPaths
@@ -40,8 +41,7 @@ class RobotRoutes:
 
     def is_reachable(self, starts: Sequence[Pose2], goal: Pose2, solids: tuple[Solid, ...]) -> bool:
         """Return whether there may be a route from one of `starts` to the goal; False proves that there is none."""
-        approximate = self._approximate_paths(solids)
-        if approximate is not None and any(approximate.length(start[:2], goal[:2]) < float("inf") for start in starts):
+        if any(self.length_upper_bound(start, goal, solids) < math.inf for start in starts):
             return True
         exact_paths = self._exact_paths(solids)
         return any(exact_paths.may_reach(start, goal) for start in starts)
@@ -63,10 +63,10 @@ class RobotRoutes:
             return True
         return self._exact_paths(self.scene.world.solids).may_enter(starts, distance)
 
-    def length_upper_bound(self, start: Pose2, goal: Pose2) -> float:
+    def length_upper_bound(self, start: Pose2, goal: Pose2, solids: tuple[Solid, ...]) -> float:
         """Return an upper bound on the length of the shortest route in m, or inf if the fast search finds no route."""
-        approximate = self._paths_around_fixed
-        return float("inf") if approximate is None else approximate.length(start[:2], goal[:2])
+        approximate = self._approximate_paths(solids)
+        return math.inf if approximate is None else approximate.length(start[:2], goal[:2])
 
     def length(self, start: Pose2, goal: Pose2) -> float:
         """Return the length of the shortest route in m; inf if there is none."""
@@ -82,16 +82,9 @@ class RobotRoutes:
         """Bounds of the world extended to all stops: (min x, min y, max x, max y) in m."""
         return extend_bounds(self.scene.world.bounds, list(self.stops))
 
-    @cached_property
-    def _paths_around_fixed(self) -> SimplePaths | None:
-        """Fast path search between the fixed solids of the world; None if a solid is too complex for it."""
-        return self.scene.cache.simple_paths(self.scene.world.solids, self.scene.size.inscribed, self.z_range)
-
     def _approximate_paths(self, solids: tuple[Solid, ...]) -> SimplePaths | None:
         """Return the fast path search between `solids`; None if a solid is too complex for it."""
-        if solids is self.scene.world.solids:
-            return self._paths_around_fixed
-        return simple_paths_between(solids, self.scene.size.inscribed, self.z_range)
+        return self.scene.cache.simple_paths(solids, self.scene.size.inscribed, self.z_range)
 
     def _exact_paths(self, solids: tuple[Solid, ...]) -> "ShortestPaths":
         """Return the exact path search between `solids`."""

@@ -14,8 +14,8 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.loading.checks.placement import blocked_poses
 from simscen.loading.checks.registry import CheckProblem
 from simscen.loading.checks.route_search import robot_routes
-from simscen.loading.checks.scene import START, TIMING, WORLD, Scene, expected_failure_hint, expects_failure
-from simscen.loading.goals import scenario_goals
+from simscen.loading.checks.scene import START, TIMING, WORLD, Scene, expected_failure_hint
+from simscen.loading.goals import expects_failure, scenario_goals
 from simscen.model.robot import RobotSpec
 from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
@@ -146,7 +146,7 @@ def impossible_time_bounds(scene: Scene) -> Iterator[CheckProblem]:
         return
     routes, stops = scene.cached(robot_routes), (scene.start, *(goal.pose for goal in goals))
     # Upper bounds on the lengths are cheap. If a drive of these lengths meets all bounds, so does the shortest drive.
-    upper = [routes.length_upper_bound(a, b) for a, b in pairwise(stops)]
+    upper = [routes.length_upper_bound(a, b, scene.world.solids) for a, b in pairwise(stops)]
     if all(map(math.isfinite, upper)) and not list(_violated_bounds(scene, Drive(goals, robot, upper))):
         return
     exact = [routes.length(a, b) for a, b in pairwise(stops)]

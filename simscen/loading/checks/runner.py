@@ -5,7 +5,15 @@ from collections.abc import Iterable
 from simscen.core.environment.world_model import World
 from simscen.core.errors import Problem
 from simscen.loading.checks import actions, criteria, events, faults, names, settings, world_file
-from simscen.loading.checks.registry import MEANING, NAMES, ROBOT_NAMES, WORLD_FILE, NameScope, WrittenScenario
+from simscen.loading.checks.registry import (
+    MEANING,
+    NAMES,
+    ROBOT_NAMES,
+    WORLD_FILE,
+    NameScope,
+    WorldFile,
+    WrittenScenario,
+)
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.loading.yaml.tree import MappingNode
 from simscen.model.scenario import ScenarioSpec
@@ -30,7 +38,9 @@ def check_scenario(
 
 def check_world_file(world: LoadedWorld) -> list[Problem]:
     """Return the errors and warnings of a world file, without source lines; [] for a ROS map or SDF file."""
-    return [] if world.spec is None else WORLD_FILE.problems(world)
+    if world.spec is None or world.tree is None:
+        return []
+    return WORLD_FILE.problems(WorldFile(world.spec, world.tree))
 
 
 def check_robot_names(spec: ScenarioSpec, tree: MappingNode) -> list[Problem]:

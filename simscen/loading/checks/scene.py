@@ -10,20 +10,17 @@ from pydantic import BaseModel
 
 from simscen.actions.robot import Kidnap
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.environment.world_model import Polygon, World
+from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import Body, Solid
-from simscen.core.messages.navigation import ErrorCode, Goal, matches_goal_name
-from simscen.criteria.result import ErrorCodeIs, Result
+from simscen.core.messages.navigation import Goal
 from simscen.loading.builders import load_map
 from simscen.loading.checks.registry import CheckStage
-from simscen.loading.goals import event_goals, scenario_goals
+from simscen.loading.goals import event_goals, expects_failure, scenario_goals
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.robot_size import RobotSize
 from simscen.loading.world_cache import WorldCache
 from simscen.loading.yaml.tree import Keys, MappingNode
-from simscen.model.navigation import expected_failure_name
-from simscen.model.scenario import ScenarioSpec
 from simscen.worlds.geometry.overlaps import first_solid_in_disc, first_solid_in_footprint
 from simscen.worlds.geometry.prisms import upright_prism
 
@@ -39,41 +36,6 @@ MOVING_ACTIONS = frozenset({"open", "close", "move", "remove", "teleport", "push
 """Kinds of actions that can move or remove a body."""
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class DrivableArea:
-    """Area in which the robot can be: the map `grid`, the rectangle `bounds`, or unlimited if both are None.
-
-    `bounds` is (min x, min y, max x, max y) in m.
-    """
-
-    bounds: tuple[float, float, float, float] | None = None
-    grid: OccupancyGrid | None = None
-
-    def why_outside(self, pose: Pose2) -> str | None:
-        """Return text such as "outside the map (…)" for a pose outside the area; None for a pose inside."""
-        if self.grid is not None and not self.grid.inside(self.grid.cell_of(np.array([[pose.x, pose.y]])))[0]:
-            rows, columns = self.grid.shape
-            size = f"{columns * self.grid.resolution:g} m x {rows * self.grid.resolution:g} m"
-            return f"outside the map ({size} from ({self.grid.origin.x:g}, {self.grid.origin.y:g}))"
-        if self.bounds is None:
-            return None
-        left, bottom, right, top = self.bounds
-        if left <= pose.x <= right and bottom <= pose.y <= top:
-            return None
-        return f"outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"
-
-
-def drivable_area(loaded: LoadedScenario, world: World) -> DrivableArea:
-    """Return the area in which the robot of a scenario can be.
-
-    This is the map of the robot, or the bounds of a world without a map. With `map: none`, it is unlimited.
-    """
-    if loaded.map == "none":
-        return DrivableArea()
-    grid = world.grid if loaded.map is None else load_map(loaded.map)
-    return DrivableArea(world.bounds if grid is None else None, grid)
 
 
 @dataclass(frozen=True)
@@ -126,9 +88,29 @@ class Scene:
         return [self.start, *(action.pose.pose for _, _, action in self.actions if isinstance(action, Kidnap))]
 
     @cached_property
-    def area(self) -> DrivableArea:
-        """Area in which the robot can be."""
-        return drivable_area(self.loaded, self.world)
+    def _map(self) -> OccupancyGrid | None:
+        """Map of the robot; None for a drive without a map, and for a map that will be made of the world."""
+        if self.loaded.map == "none":
+            return None
+        return self.world.grid if self.loaded.map is None else load_map(self.loaded.map)
+
+    def why_outside(self, pose: Pose2) -> str | None:
+        """Return text such as "outside the map (…)" for a pose at which the robot cannot be; None for other poses.
+
+        The robot can be on its map, or within the bounds of a world without a map. With `map: none`, it can be
+        anywhere.
+        """
+        grid = self._map
+        if grid is not None:
+            if grid.inside(grid.cell_of(np.array([[pose.x, pose.y]])))[0]:
+                return None
+            rows, columns = grid.shape
+            size = f"{columns * grid.resolution:g} m x {rows * grid.resolution:g} m"
+            return f"outside the map ({size} from ({grid.origin.x:g}, {grid.origin.y:g}))"
+        left, bottom, right, top = self.world.bounds
+        if self.loaded.map == "none" or (left <= pose.x <= right and bottom <= pose.y <= top):
+            return None
+        return f"outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"
 
     @cached_property
     def bodies(self) -> tuple[Solid, ...]:
@@ -138,23 +120,19 @@ class Scene:
     @cached_property
     def unmoved_bodies(self) -> tuple[Solid, ...]:
         """Solids of movable bodies that have no scripted motion, and that no event moves or removes."""
-        return tuple(_at_initial_pose(b for b in self.world.bodies if b.path is None and b.name not in self._moved))
+        return tuple(_at_initial_pose(self._unmoved))
 
     @cached_property
     def immovable_bodies(self) -> tuple[Solid, ...]:
         """Solids of unmoved bodies without mass, which the robot cannot push."""
-        return tuple(
-            _at_initial_pose(
-                b for b in self.world.bodies if b.mass == 0 and b.path is None and b.name not in self._moved
-            )
-        )
+        return tuple(_at_initial_pose(body for body in self._unmoved if body.mass == 0))
 
     @cached_property
-    def _moved(self) -> set[str]:
-        """Names of the bodies that an event can move or remove."""
+    def _unmoved(self) -> list[Body]:
         if self.may_do():
-            return {body.name for body in self.world.bodies}
-        return {getattr(action, "name", "") for _, kind, action in self.actions if kind in MOVING_ACTIONS}
+            return []
+        moved = {getattr(action, "name", "") for _, kind, action in self.actions if kind in MOVING_ACTIONS}
+        return [body for body in self.world.bodies if body.path is None and body.name not in moved]
 
     @cached_property
     def certain_walls(self) -> tuple[Solid, ...]:
@@ -195,18 +173,14 @@ class Scene:
         if solid := self.circle_conflict(pose, solids):
             radius = "radius" if self.size.radius is not None else "inscribed radius"
             return f'closer to obstacle "{solid}" than the robot\'s {radius} of {self.size.inscribed:.2f} m'
-        if self.size.radius is None and (solid := first_solid_in_footprint(solids, self.outline, pose, self.z_range)):
+        size = self.size
+        if size.radius is None and (solid := first_solid_in_footprint(solids, size.footprint, pose, self.z_range)):
             return f'so close to obstacle "{solid}" that the robot\'s footprint overlaps it at this heading'
         return None
 
     def circle_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
         """Return the name of a solid that overlaps the robot's inscribed circle at a pose; None if there is none."""
         return first_solid_in_disc(solids, (pose.x, pose.y), self.size.inscribed, self.z_range)
-
-    @property
-    def outline(self) -> Polygon:
-        """Footprint in the base frame of the robot."""
-        return self.size.footprint
 
 
 def _at_initial_pose(bodies: Iterable[Body]) -> Iterator[Solid]:
@@ -216,27 +190,10 @@ def _at_initial_pose(bodies: Iterable[Body]) -> Iterator[Solid]:
             yield Solid(solid.shape, body.pose.compose(solid.pose), body.name)
 
 
-WORLD: CheckStage[Scene] = CheckStage("world")
+WORLD: CheckStage[Scene] = CheckStage()
 """Checks of a scenario in its built world, except of time bounds."""
-TIMING: CheckStage[Scene] = CheckStage("timing")
+TIMING: CheckStage[Scene] = CheckStage()
 """Checks of time bounds. They run only if WORLD finds no errors."""
-
-START_FAILURES = ErrorCode.START_OCCUPIED, ErrorCode.START_OUTSIDE_MAP
-"""Error codes of Nav2 for a failure because of the start pose."""
-
-
-def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
-    """Return whether a scenario expects that the goal with this name fails.
-
-    A scenario states this by `expect` at the goal, or by a criterion `result` or `error_code`.
-    """
-    through = spec.navigation.mode == "navigate_through_poses"
-    entries = zip(spec.goal_names, [spec.goals[-1]] * len(spec.goals) if through else spec.goals, strict=True)
-    if any(matches_goal_name(goal, name) and expected_failure_name(entry.expect) for name, entry in entries):
-        return True
-    results = [entry.chosen for entry in spec.pass_ if entry.severity == "fail"]
-    failing = any(isinstance(result, Result) and result.status == "FAILED" for result in results)
-    return failing or any(code != ErrorCode.NONE and name in (None, goal) for code, name in _required_codes(spec))
 
 
 def expected_failure_hint(keys: Keys, code: str) -> str:
@@ -249,22 +206,3 @@ def expected_failure_hint(keys: Keys, code: str) -> str:
 def required_failure_hint(code: str) -> str:
     """Return a hint on how to require that the whole navigation fails with the error code `code`."""
     return f"replace `goals_reached` in `pass` by `result: {{status: FAILED, error_code: {code}}}`"
-
-
-def expects_start_failure(spec: ScenarioSpec) -> bool:
-    """Return whether a scenario requires that navigation fails because of the start pose."""
-    return any(code in START_FAILURES for code, _ in _required_codes(spec))
-
-
-def _required_codes(spec: ScenarioSpec) -> Iterator[tuple[ErrorCode, str | None]]:
-    """Yield the error codes that criteria require, with the name of the goal, or None for the whole navigation."""
-    for entry in spec.pass_:
-        if entry.severity != "fail":
-            continue
-        match entry.chosen:
-            case ErrorCodeIs(code=code, goal=goal):
-                yield code, goal
-            case Result(error_code=ErrorCode() as code):
-                yield code, None
-            case _:
-                pass

@@ -1,6 +1,6 @@
 """Runner of the checks that need the built world, but no physics engine: stages BUILT_WORLD, WORLD, and TIMING."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -52,9 +52,19 @@ def _check_robot(loaded: LoadedScenario, world: World, cache: WorldCache, pictur
     """Return the problems of a scenario of one robot, or of the view of one of several robots."""
     loaded = _with_robot_spec(loaded)
     blocking = blocking_world(loaded, world)
-    problems = [*_check_names_again(loaded, world), *_oversized_map(loaded, world)]
-    problems += [loaded.with_source_line(problem) for problem in check_built_world(blocking, loaded.world)]
-    problems += _robot_file_mismatches(loaded)
+    problems: list[Problem] = []
+    is_urdf = loaded.robot.path == loaded.robot.urdf
+    if is_urdf or loaded.world.map is not None or loaded.world.sdf is not None:
+        problems += sorted(check_scenario(loaded, world))  # the names in these files were not known before
+    if world.grid is None and loaded.map is None and (message := map_size_error(world.bounds)):
+        hint = f"{oversize_hint(world)}, or drive with `map: none`"
+        problems.append(loaded.problem(("world",), "SC330", message, hint))
+    file_problems = check_built_world(blocking, loaded.world)
+    if loaded.robot.urdf is not None:
+        from simscen.loading.checks.robot_geometry import dimension_warnings
+
+        file_problems += dimension_warnings(loaded.robot, load_robot(loaded)[1])
+    problems += [loaded.with_source_line(problem) for problem in file_problems]
     if not _has_errors(problems):
         problems += _check_scene(Scene(loaded, blocking, robot_size(loaded), cache), pictures)
     return [*problems, *world_reader_notes(world, loaded.world, loaded.root)]
@@ -85,9 +95,8 @@ def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path
     low, high = scene.z_range
     height = (low + high) / 2
     poses = [scene.start, *(goal.pose for _, goal in scene.expected_goals)]
-    image = draw_world(
-        build_world_and_map(scene.world, height), height, [place_polygon(scene.outline, pose) for pose in poses], gaps
-    )
+    outlines = [place_polygon(scene.size.footprint, pose) for pose in poses]
+    image = draw_world(build_world_and_map(scene.world, height), height, outlines, gaps)
     file = folder / f"{scene.loaded.title}.png"
     try:
         require_regular_file(file)
@@ -105,32 +114,6 @@ def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Pr
         Problem(display_name, 0, 0, "SC311", note.removeprefix(f"{display_name}: "), severity="warning")
         for note in world.notes
     ]
-
-
-def _check_names_again(loaded: LoadedScenario, world: World) -> list[Problem]:
-    """Return the problems of `check_scenario` with names that are only known after world and robot have been built.
-
-    These are names in a ROS map, an SDF file, or a URDF. Return [] if the scenario has none of these files.
-    """
-    is_urdf = loaded.robot.path == loaded.robot.urdf
-    if is_urdf or loaded.world.map is not None or loaded.world.sdf is not None:
-        return sorted(check_scenario(loaded, world))
-    return []
-
-
-def _oversized_map(loaded: LoadedScenario, world: World) -> Iterator[Problem]:
-    """Yield a problem if the map of the world would be too large."""
-    if world.grid is None and loaded.map is None and (message := map_size_error(world.bounds)):
-        yield loaded.problem(("world",), "SC330", message, f"{oversize_hint(world)}, or drive with `map: none`")
-
-
-def _robot_file_mismatches(loaded: LoadedScenario) -> Iterator[Problem]:
-    """Yield a warning for each dimension in the robot file that differs from its URDF."""
-    if loaded.robot.urdf is None:
-        return
-    from simscen.loading.checks.robot_geometry import dimension_warnings
-
-    yield from map(loaded.with_source_line, dimension_warnings(loaded.robot, load_robot(loaded)[1]))
 
 
 def _with_robot_spec(loaded: LoadedScenario) -> LoadedScenario:
