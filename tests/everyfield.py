@@ -12,6 +12,7 @@ from simscen.model.scenario import CriteriaSpec
 from simscen.model.world import RosMapSpec
 from simscen.spec.base import LazySpec
 from simscen.spec.extensible_union import ExtensibleUnion
+from simscen.spec.registry import installed_specs
 
 
 class Written(NamedTuple):
@@ -49,7 +50,10 @@ def _inside(kind: Any, marks: tuple[Any, ...]) -> Iterator[tuple[Any, tuple[Any,
     found = next((mark for mark in marks if isinstance(mark, LazySpec | ExtensibleUnion)), None)
     if found is not None:
         rest = tuple(mark for mark in marks if mark is not found)
-        yield from _inside(found.load() if isinstance(found, LazySpec) else found.shipped_union, rest)
+        yield from _inside(found.load() if isinstance(found, LazySpec) else found.built_in_union, rest)
+        if isinstance(found, ExtensibleUnion):
+            for advanced in installed_specs(found.group, with_plugins=False).values():
+                yield from _inside(advanced, rest)
     elif get_origin(kind) is Annotated:
         inner, *more = get_args(kind)
         yield from _inside(inner, (*marks, *_flat(more)))

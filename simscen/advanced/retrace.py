@@ -6,10 +6,10 @@ from itertools import product
 
 import numpy as np
 
+from simscen.advanced.spec import Retrace as RetraceSpec
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
-from simscen.model import recovery as model
 from simscen.stack.footprint import Mask, distance_at, lethal_near
 from simscen.stack.kinematics import poses_along
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
@@ -246,7 +246,7 @@ class Retrace:
 
     name = "retrace"
 
-    def __init__(self, spec: model.Retrace, setting: Setting) -> None:
+    def __init__(self, spec: RetraceSpec, setting: Setting) -> None:
         """Take the parameters and the setting of the behavior."""
         self._spec, self._footprint = spec, setting.footprint
         self._follower = TrailFollower(setting, spec.backup_speed)

@@ -1,4 +1,7 @@
-"""Parameters of the advanced localizers and of the advanced planner."""
+"""Specifications of the advanced localizers, the advanced planner, and the advanced recovery behavior.
+
+pyproject.toml registers them as entry points, as a plug-in does.
+"""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
@@ -7,7 +10,8 @@ from pydantic import Field, model_validator
 
 from simscen.model.localizers import AmclParameters, EkfParameters
 from simscen.model.planners import OmplParameters
-from simscen.spec.quantities import Length, NonNegativeLength, Probability
+from simscen.model.recovery import BehaviorSpec
+from simscen.spec.quantities import Length, NonNegativeLength, PositiveDuration, PositiveSpeed, Probability
 
 PARAMETER_SETS: Mapping[str, Mapping[str, object]] = {
     "default": {},
@@ -83,3 +87,22 @@ class MedialAxisPlanner(OmplParameters):
 
     component: ClassVar[str] = "simscen.advanced.planners.medial_axis_planner:medial_axis_planner"
     type: Literal["medial_axis"]
+
+
+class Retrace(BehaviorSpec):
+    """Drive back along the path that the robot has driven, until there is room to turn. Nav2 has no such behavior.
+
+    The robot backs up straight if this path is not known.
+    """
+
+    component: ClassVar[str] = "simscen.advanced.retrace:Retrace"
+    type: Literal["retrace"] = "retrace"
+    backup_dist: NonNegativeLength = 0.30
+    """Minimum distance to drive back."""
+    retrace_dist: NonNegativeLength = 1.0
+    """Maximum distance to drive back. After `backup_dist`, the behavior ends once there is room to turn in place."""
+    backup_speed: PositiveSpeed = 0.15
+    """Speed of driving back."""
+    time_allowance: PositiveDuration = 10.0
+    """Time after which the behavior fails with BACKUP_TIMEOUT. If 1.5 times the duration of driving `retrace_dist` at
+    `backup_speed` is longer, that time applies."""

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from simscen.spec.base import LazySpec, Ranged, Spec, Typed, type_discriminator
+from simscen.spec.base import Ranged, Spec, Typed, type_discriminator
 from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.quantities import (
     Frequency,
@@ -173,9 +173,7 @@ _Localizers = Annotated[
     Annotated[Amcl, Tag(DEFAULT_TYPE)]
     | Annotated[Ekf, Tag("ekf")]
     | Annotated[GroundTruth, Tag("ground_truth")]
-    | Annotated[OdometryOnly, Tag("odometry")]
-    | Annotated[LocalizerSpec, LazySpec("simscen.advanced.spec", "ScanMatchingAmcl"), Tag("scan_matching_amcl")]
-    | Annotated[LocalizerSpec, LazySpec("simscen.advanced.spec", "SlipEkf"), Tag("slip_ekf")],
+    | Annotated[OdometryOnly, Tag("odometry")],
     Discriminator(type_discriminator(DEFAULT_TYPE)),
 ]
 
@@ -190,10 +188,8 @@ LOCALIZERS = {
     "ekf": _MODULE + "Ekf",
     "ground_truth": _MODULE + "GroundTruth",
     "odometry": _MODULE + "OdometryOnly",
-    "scan_matching_amcl": "simscen.advanced.spec:ScanMatchingAmcl",
-    "slip_ekf": "simscen.advanced.spec:SlipEkf",
 }
-"""Specifications of the shipped localizers as `module:Class`, by type."""
+"""Specifications of the localizers of the reference stack as `module:Class`, by type."""
 
 
 Variance = Annotated[float, Field(ge=0, le=1e6)]

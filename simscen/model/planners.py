@@ -1,10 +1,10 @@
-"""Specifications of planners (`planner:`): OMPL planners, two planners of Nav2, and the advanced `medial_axis`."""
+"""Specifications of planners (`planner:`): OMPL planners, and two planners of Nav2."""
 
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag
 
-from simscen.spec.base import LazySpec, Typed
+from simscen.spec.base import Typed
 from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.quantities import Frequency, NonNegativeLength, PositiveLength, Quantity
 
@@ -114,14 +114,11 @@ class Smac2d(PlannerSpec):
 def _planner_tag(value: Any) -> str | None:
     """Return the union tag of a planner specification: its `type`, or "ompl" for all types of OmplPlanner."""
     kind = value.get("type", "bit_star") if isinstance(value, dict) else getattr(value, "type", None)
-    return kind if kind in ("navfn", "smac_2d", "medial_axis") else "ompl"
+    return kind if kind in ("navfn", "smac_2d") else "ompl"
 
 
 _Planners = Annotated[
-    Annotated[OmplPlanner, Tag("ompl")]
-    | Annotated[Navfn, Tag("navfn")]
-    | Annotated[Smac2d, Tag("smac_2d")]
-    | Annotated[PlannerSpec, LazySpec("simscen.advanced.spec", "MedialAxisPlanner"), Tag("medial_axis")],
+    Annotated[OmplPlanner, Tag("ompl")] | Annotated[Navfn, Tag("navfn")] | Annotated[Smac2d, Tag("smac_2d")],
     Discriminator(_planner_tag),
 ]
 
@@ -135,6 +132,5 @@ PLANNERS = {
     **dict.fromkeys(get_args(OmplPlanner.model_fields["type"].annotation), _MODULE + "OmplPlanner"),
     "navfn": _MODULE + "Navfn",
     "smac_2d": _MODULE + "Smac2d",
-    "medial_axis": "simscen.advanced.spec:MedialAxisPlanner",
 }
-"""Specifications of the shipped planners as `module:Class`, by type."""
+"""Specifications of the planners of the reference stack as `module:Class`, by type."""

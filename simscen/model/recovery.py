@@ -83,25 +83,6 @@ class BackUp(BehaviorSpec):
     """Whether to back up a shorter distance if there is not enough room. Nav2 fails instead."""
 
 
-class Retrace(BehaviorSpec):
-    """Drive back along the path that the robot has driven, until there is room to turn. Nav2 has no such behavior.
-
-    The robot backs up straight if this path is not known.
-    """
-
-    component: ClassVar[str] = "simscen.advanced.retrace:Retrace"
-    type: Literal["retrace"] = "retrace"
-    backup_dist: NonNegativeLength = 0.30
-    """Minimum distance to drive back."""
-    retrace_dist: NonNegativeLength = 1.0
-    """Maximum distance to drive back. After `backup_dist`, the behavior ends once there is room to turn in place."""
-    backup_speed: PositiveSpeed = 0.15
-    """Speed of driving back."""
-    time_allowance: PositiveDuration = 10.0
-    """Time after which the behavior fails with BACKUP_TIMEOUT. If 1.5 times the duration of driving `retrace_dist` at
-    `backup_speed` is longer, that time applies."""
-
-
 class ClearCostmap(BehaviorSpec):
     """Remove the obstacles that sensors have seen from the costmaps, except those in current readings. The map
     remains."""
@@ -116,7 +97,6 @@ _Behaviors = Annotated[
     Annotated[Spin, Tag("spin")]
     | Annotated[Wait, Tag("wait")]
     | Annotated[BackUp, Tag("backup")]
-    | Annotated[Retrace, Tag("retrace")]
     | Annotated[ClearCostmap, Tag("clear_costmap")],
     Field(discriminator="type"),
 ]
@@ -202,10 +182,9 @@ _SHIPPED: dict[str, type[BehaviorSpec]] = {
     "spin": Spin,
     "wait": Wait,
     "backup": BackUp,
-    "retrace": Retrace,
 }
-"""Specifications of the shipped behaviors, by type."""
+"""Specifications of the behaviors of the reference stack, by type."""
 
 
 BEHAVIORS = {name: f"{model.__module__}:{model.__name__}" for name, model in _SHIPPED.items()}
-"""Specifications of the shipped behaviors as `module:Class`, by type."""
+"""Specifications of the behaviors of the reference stack as `module:Class`, by type."""

@@ -12,7 +12,7 @@ from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, Val
 
 from simscen.core.messages.navigation import RecoveryBehavior
 from simscen.spec.base import LazySpec, Typed
-from simscen.spec.registry import BrokenPlugin, RegisteredType, find_type, installed_types, shipped_types
+from simscen.spec.registry import BrokenPlugin, RegisteredType, built_in_types, find_type, installed_types
 
 GROUP_KEY = "simscen group"
 """Key in the metadata of a pydantic schema: the value is the name of the registry group."""
@@ -26,28 +26,31 @@ MAPPINGS_ALLOWED_KEY = "simscen mappings"
 class ExtensibleUnion:
     """Annotation of a field with a specification of a registry group, which the key `type` selects.
 
-    `shipped_union` is the union of the shipped specifications. With `allows_names`, the name of a type alone is also
+    `built_in_union` is the union of the built-in specifications. With `allows_names`, the name of a type alone is also
     valid.
     """
 
     group: str
-    shipped_union: Any
+    built_in_union: Any
     allows_names: bool = False
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        inner = handler.generate_schema(self.shipped_union)
+        inner = handler.generate_schema(self.built_in_union)
         metadata = {GROUP_KEY: self.group, NAMES_ALLOWED_KEY: self.allows_names, MAPPINGS_ALLOWED_KEY: True}
-        return core_schema.no_info_wrap_validator_function(self._validate, inner, metadata=metadata)
+        serialization = core_schema.simple_ser_schema("any")  # specifications of plug-ins are no members of the union
+        return core_schema.no_info_wrap_validator_function(
+            self._validate, inner, metadata=metadata, serialization=serialization
+        )
 
-    def _validate(self, value: Any, validate_shipped: core_schema.ValidatorFunctionWrapHandler) -> Any:
-        """Return the specification of a value, validated by the shipped union or by a plug-in."""
-        if isinstance(value, Typed) and not type(value).__module__.startswith("simscen."):
+    def _validate(self, value: Any, validate_built_in: core_schema.ValidatorFunctionWrapHandler) -> Any:
+        """Return the specification of a value, validated by the built-in union or by a plug-in."""
+        if isinstance(value, Typed) and value.type not in _built_in_names(self.group):
             return value
-        if self.allows_names and isinstance(value, str) and value not in _shipped_names(self.group):
+        if self.allows_names and isinstance(value, str) and value not in _built_in_names(self.group):
             return validate_plugin_spec(_find_or_raise(self.group, value), {"type": value})
         name = value.get("type") if isinstance(value, dict) else None
-        if not isinstance(name, str) or name in _shipped_names(self.group):
-            return validate_shipped(value)
+        if not isinstance(name, str) or name in _built_in_names(self.group):
+            return validate_built_in(value)
         entry = find_type(self.group, name)
         if entry is not None:
             return validate_plugin_spec(entry, value)
@@ -57,7 +60,7 @@ class ExtensibleUnion:
 
 @dataclass(frozen=True)
 class TypeName:
-    """Annotation of a string that names a type of a registry group, shipped or from a plug-in."""
+    """Annotation of a string that names a type of a registry group, built-in or from an installed package."""
 
     group: str
 
@@ -65,19 +68,19 @@ class TypeName:
         metadata = {GROUP_KEY: self.group, NAMES_ALLOWED_KEY: True, MAPPINGS_ALLOWED_KEY: False}
         return core_schema.no_info_wrap_validator_function(self._validate, handler(source), metadata=metadata)
 
-    def _validate(self, value: Any, validate_shipped: core_schema.ValidatorFunctionWrapHandler) -> Any:
+    def _validate(self, value: Any, validate_built_in: core_schema.ValidatorFunctionWrapHandler) -> Any:
         """Return the name. Raises PydanticCustomError if there is no such type."""
-        if isinstance(value, str) and value not in _shipped_names(self.group):
+        if isinstance(value, str) and value not in _built_in_names(self.group):
             return _find_or_raise(self.group, value).name
-        return validate_shipped(value)
+        return validate_built_in(value)
 
 
 BehaviorName = Annotated[RecoveryBehavior, TypeName("behavior")]
-"""Name of a recovery behavior, shipped or from a plug-in."""
+"""Name of a recovery behavior, built-in or from an installed package."""
 
 
-def _shipped_names(group: str) -> frozenset[str]:
-    return frozenset(entry.name for entry in shipped_types(group))
+def _built_in_names(group: str) -> frozenset[str]:
+    return frozenset(entry.name for entry in built_in_types(group))
 
 
 def _find_or_raise(group: str, name: str) -> RegisteredType:
@@ -88,7 +91,7 @@ def _find_or_raise(group: str, name: str) -> RegisteredType:
 
 
 def _unknown_type_error(group: str, name: str) -> PydanticCustomError:
-    names = [*(entry.name for entry in shipped_types(group)), *(entry.name for entry in installed_types(group))]
+    names = [*(entry.name for entry in built_in_types(group)), *(entry.name for entry in installed_types(group))]
     return PydanticCustomError("unknown_type", "no such type", {"value": name, "names": ", ".join(names)})
 
 

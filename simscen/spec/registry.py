@@ -1,12 +1,13 @@
 """Registry of types that YAML files select by name: planners, criteria, faults, sensors, and so on.
 
-simscen ships types. An installed package (a plug-in) adds a type by an entry point. The value of the entry point is the
-address of a specification class (a pydantic model of the YAML):
+An installed package (a plug-in) adds a type by an entry point. The value of the entry point is the address of a
+specification class (a pydantic model of the YAML):
 
     [project.entry-points."simscen.criterion"]
     headway = "my_package.headway:Headway"
 
-A package is imported when a file uses one of its types.
+A package is imported when a file uses one of its types. simscen's advanced components are registered in this way, too.
+All other types of simscen are built in: reading entry points takes 35 ms, which only files that need them should cost.
 """
 
 from __future__ import annotations
@@ -42,8 +43,8 @@ class Group:
 
     base: str
     """Address "module:Class" of the base class of all specifications of the group."""
-    shipped: str
-    """Address "module:name" of the shipped types: a Choice class, or a dict of addresses by name."""
+    built_in: str
+    """Address "module:name" of the built-in types: a Choice class, or a dict of addresses by name."""
     reserved: tuple[str, ...] = ()
     """Names that types of plug-ins cannot have, because YAML files use them as keys."""
 
@@ -75,29 +76,29 @@ GROUPS: dict[str, Group] = {
 
 @dataclass(frozen=True)
 class RegisteredType:
-    """Registered type, shipped or from an installed package."""
+    """Registered type, built-in or from an installed package."""
 
     group: str
     name: str
     value: str
     """Address "module:Class" of the specification class."""
     distribution: str = ""
-    """Name of the package that adds the type; "" for a shipped type."""
+    """Name of the package that adds the type; "" for a built-in type."""
     version: str = ""
-    """Version of this package; "" for a shipped type."""
+    """Version of this package; "" for a built-in type."""
     problem: str = ""
     """Reason why the type cannot be used, as far as it is known without an import; "" if there is none."""
     folder: str = ""
-    """Folder in which the package is installed; "" for a shipped type."""
+    """Folder in which the package is installed; "" for a built-in type."""
 
     @property
     def is_shipped(self) -> bool:
-        """Whether simscen ships this type."""
-        return not self.distribution
+        """Whether simscen ships this type, built-in or advanced."""
+        return self.distribution in ("", "simscen")
 
     @property
     def origin(self) -> str:
-        """Package and version for messages, e.g. "headway 1.2"; "simscen" for a shipped type."""
+        """Package and version for messages, e.g. "headway 1.2"; "simscen" for a built-in type."""
         return f"{self.distribution} {self.version}".strip() or "simscen"
 
     def load(self) -> type[BaseModel]:
@@ -116,37 +117,50 @@ class BrokenPlugin(Exception):
         super().__init__(f"{entry.group} `{entry.name}` of {entry.origin} cannot be used: {why}")
 
 
-def shipped_types(group: str) -> tuple[RegisteredType, ...]:
-    """Return the shipped types of a group."""
-    types = _import_address(GROUPS[group].shipped)
+def built_in_types(group: str) -> tuple[RegisteredType, ...]:
+    """Return the built-in types of a group."""
+    types = _import_address(GROUPS[group].built_in)
     values: dict[str, str] = types if isinstance(types, dict) else types.addresses()
     return tuple(RegisteredType(group, name, value) for name, value in values.items())
 
 
 def installed_types(group: str) -> tuple[RegisteredType, ...]:
-    """Return the types that installed packages add to a group, sorted by name, including unusable ones."""
+    """Return the types that installed packages, including simscen, add to a group by entry points, sorted by name.
+
+    The result includes types that cannot be used.
+    """
     return tuple(entry for entry in _all_installed_types() if entry.group == group)
 
 
-def installed_specs(group: str) -> dict[str, type[BaseModel]]:
-    """Return the usable specification classes that installed packages add to a group, by name of the type."""
+def plugin_types(group: str) -> tuple[RegisteredType, ...]:
+    """Return the types that installed packages except simscen add to a group, including unusable ones."""
+    return tuple(entry for entry in installed_types(group) if not entry.is_shipped)
+
+
+def installed_specs(group: str, with_plugins: bool = True) -> dict[str, type[BaseModel]]:
+    """Return the usable specification classes that entry points add to a group, by name of the type.
+
+    If `with_plugins` is false, only those of simscen itself are returned.
+    """
     specs = {}
     for entry in installed_types(group):
+        if not (entry.is_shipped or with_plugins):
+            continue
         with contextlib.suppress(BrokenPlugin):
             specs[entry.name] = entry.load()
     return specs
 
 
 def all_types(group: str) -> tuple[RegisteredType, ...]:
-    """Return all types of a group: shipped types, then types of installed packages with other names."""
-    own = shipped_types(group)
+    """Return all types of a group: built-in types, then types of installed packages with other names."""
+    own = built_in_types(group)
     names = {entry.name for entry in own}
     return (*own, *(entry for entry in installed_types(group) if entry.name not in names))
 
 
 def find_type(group: str, name: str) -> RegisteredType | None:
-    """Return the type with this name; None if there is none. A shipped type has priority."""
-    own = next((entry for entry in shipped_types(group) if entry.name == name), None)
+    """Return the type with this name; None if there is none. A built-in type has priority."""
+    own = next((entry for entry in built_in_types(group) if entry.name == name), None)
     return own or next((entry for entry in installed_types(group) if entry.name == name), None)
 
 
@@ -178,8 +192,11 @@ def _has_spec(entry: RegisteredType, spec: type) -> bool:
 
 @cache
 def _all_installed_types() -> tuple[RegisteredType, ...]:
-    """Return all types of installed packages, sorted by group, name, and package."""
-    found = sorted(set(_read_installed_types()), key=lambda e: (e.group, e.name, e.distribution, e.version, e.value))
+    """Return all types of installed packages, sorted by group, name, and package. Those of simscen come first."""
+    found = sorted(
+        set(_read_installed_types()),
+        key=lambda e: (e.group, e.name, not e.is_shipped, e.distribution, e.version, e.value),
+    )
     return tuple(replace(entry, problem=entry.problem or _type_problem(entry, found)) for entry in found)
 
 
@@ -238,9 +255,12 @@ def _type_problem(entry: RegisteredType, installed: list[RegisteredType]) -> str
         return "its name must start with a lowercase letter and consist of lowercase letters, digits, and `_`"
     if entry.name in group.reserved:
         return f"the name `{entry.name}` is reserved"
-    if any(own.name == entry.name for own in shipped_types(entry.group)):
-        return "simscen ships a type with the same name, which takes precedence"
     others = [other for other in installed if (other.group, other.name) == (entry.group, entry.name)]
+    if not entry.is_shipped and any(
+        own.is_shipped and own.name == entry.name for own in (*built_in_types(entry.group), *others)
+    ):
+        return "simscen ships a type with the same name, which takes precedence"
+    others = [other for other in others if other.is_shipped == entry.is_shipped]
     if len(others) > 1:
         return "added by " + " and by ".join(f"{other.origin} ({other.value})" for other in others)
     if not _ADDRESS_PATTERN.fullmatch(entry.value):

@@ -14,9 +14,10 @@ from pydantic_core import PydanticUndefined
 from simscen.core.messages.navigation import ErrorCode
 from simscen.spec.base import field_docs
 from simscen.spec.choice import Choice
-from simscen.spec.extensible_union import ExtensibleUnion
+from simscen.spec.extensible_union import ExtensibleUnion, TypeName
 from simscen.spec.places import PlaceAllowed, PlaceShorthand
 from simscen.spec.quantities import UNITS, Amount, Quantity
+from simscen.spec.registry import all_types
 
 OPTIONAL = "–"
 """Text for the default of an optional key without a default value."""
@@ -57,8 +58,10 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
     """
     if isinstance(kind, FieldInfo):
         return kind_of(kind.annotation, tuple(kind.metadata))
-    if mark := next((mark for mark in metadata if isinstance(mark, ExtensibleUnion)), None):
-        return kind_of(mark.shipped_union)
+    if mark := next((mark for mark in metadata if isinstance(mark, ExtensibleUnion | TypeName)), None):
+        if isinstance(mark, TypeName):
+            return _type_names(mark.group)
+        return f"{_type_names(mark.group)} or mapping" if mark.allows_names else kind_of(mark.built_in_union)
     if get_origin(kind) is Annotated:
         return kind_of(get_args(kind)[0], (*get_args(kind)[1:], *metadata))
     if place := next((mark for mark in metadata if isinstance(mark, PlaceAllowed | PlaceShorthand)), None):
@@ -75,6 +78,11 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
     if isinstance(kind, type) and issubclass(kind, RootModel):
         return kind_of(kind.model_fields["root"])
     return _simple_kind(kind, metadata)
+
+
+def _type_names(group: str) -> str:
+    """Return the names of the types of a group that simscen ships."""
+    return " | ".join(f"`{entry.name}`" for entry in all_types(group) if entry.is_shipped)
 
 
 _NOUN = re.compile(r"(?P<noun>[a-z ]+?)(?P<unit> in [^,]+)?(?P<range>, .+)?")

@@ -79,6 +79,11 @@ _GROUPS = {
         "external stacks.",
     ),
     "localizer": ("Localizers", "Value of `stack.localizer`, selected by `type`; the default is `amcl`."),
+    "planner": (
+        "Planners",
+        "Value of `stack.planner`, selected by `type`; the default is `bit_star`. `planner` describes all planners of "
+        "OMPL.",
+    ),
     "controller": (
         "Controllers",
         "Value of `stack.controller`, selected by `type`. The critics and the validator at the end are keys of `mppi`.",

@@ -4,7 +4,7 @@ A Choice is a model of a mapping with exactly one main key, such as the kind of 
 """
 
 import json
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import BaseModel, RootModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
@@ -118,7 +118,13 @@ _EXTENDS: Schema = {
 
 
 class _Generator(GenerateJsonSchema):
-    """Schema generator that also requires exactly one main key of a Choice, and describes models of single values."""
+    """Schema generator that also requires exactly one main key of a Choice, and describes models of single values.
+
+    It adds simscen's types that are registered as entry points.
+    """
+
+    with_plugins = False
+    """Whether to add the types of other packages, too."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         result, model = super().model_schema(schema), schema["cls"]
@@ -128,9 +134,29 @@ class _Generator(GenerateJsonSchema):
             result.update(_exactly_one(model, list(model.choices())))
         return result
 
+    def function_wrap_schema(self, schema: core_schema.WrapValidatorFunctionSchema) -> JsonSchemaValue:
+        result, metadata = super().function_wrap_schema(schema), schema.get("metadata", {})
+        if GROUP_KEY not in metadata:
+            return result
+        models = installed_specs(metadata[GROUP_KEY], self.with_plugins)
+        names = list(models) if metadata[NAMES_ALLOWED_KEY] else []
+        members: list[Schema] = []
+        others: list[Schema] = []
+        for name, model in models.items() if metadata[MAPPINGS_ALLOWED_KEY] else ():
+            model.model_rebuild()
+            member = self.generate_inner(model.__pydantic_core_schema__)
+            if get_args(model.model_fields["type"].annotation) == (name,):
+                members.append(member)
+            else:
+                others.append({"allOf": [member, {"properties": {"type": {"const": name}}, "required": ["type"]}]})
+        extended = _extend_union(result, names, members)
+        return {"anyOf": [extended, *others]} if others else extended
+
 
 class _InstalledTypesGenerator(_Generator):
     """Schema generator that also adds the types of installed packages."""
+
+    with_plugins = True
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         result, model = super().model_schema(schema), schema["cls"]
@@ -143,21 +169,16 @@ class _InstalledTypesGenerator(_Generator):
             )
         return {**result, **_exactly_one(model, [*model.choices(), *added])}
 
-    def function_wrap_schema(self, schema: core_schema.WrapValidatorFunctionSchema) -> JsonSchemaValue:
-        result, metadata = super().function_wrap_schema(schema), schema.get("metadata", {})
-        models = installed_specs(metadata[GROUP_KEY]) if GROUP_KEY in metadata else {}
-        more: list[Schema] = [
-            self._typed_mapping(name, model) for name, model in models.items() if metadata[MAPPINGS_ALLOWED_KEY]
-        ]
-        if models and metadata[NAMES_ALLOWED_KEY]:
-            more.append({"enum": list(models)})
-        return {"anyOf": [result, *more]} if more else result
 
-    def _typed_mapping(self, name: str, model: type[BaseModel]) -> JsonSchemaValue:
-        """Return the schema of a mapping with the keys of the model, and with `name` as its `type`."""
-        typed: Schema = {"properties": {"type": {"const": name}}, "required": ["type"]}
-        model.model_rebuild()
-        return {"allOf": [self.generate_inner(model.__pydantic_core_schema__), typed]}
+def _extend_union(union: Schema, names: list[str], members: list[Schema]) -> Schema:
+    """Return the schema of a union of names and mappings with further names and further references to mappings."""
+    if "enum" in union:
+        return {**union, "enum": [*union["enum"], *names]}
+    options = union.get("oneOf", [union])
+    if all("$ref" in option for option in options):
+        rest = union if "oneOf" in union else {}
+        return {**rest, "oneOf": [*options, *members]} if members else union
+    return {**union, "oneOf": [_extend_union(option, names, members) for option in options]}
 
 
 def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
@@ -206,9 +227,9 @@ def _by_type(node: Schema, definitions: Schema) -> Schema:
         return _by_key(node, {ref: required[0] for ref, required in untyped.items()}, definitions)
     rest = {key: value for key, value in node.items() if key not in ("oneOf", "discriminator")}
     cases = []
-    for ref, kind in types.items():
+    for index, (ref, kind) in enumerate(types.items()):
         condition: Schema = {"properties": {"type": {"const": kind}}}
-        if "type" in members[ref].get("required", []):
+        if index > 0 or "type" in members[ref].get("required", []):  # the first one can be the default
             condition["required"] = ["type"]
         cases.append({"if": condition, "then": {"$ref": ref}})
     needed = {"required": ["type"]} if all("required" in case["if"] for case in cases) else {}

@@ -14,7 +14,6 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel, RootModel
 
 from simscen.actions.base import AnyAction
-from simscen.advanced.spec import MedialAxisPlanner
 from simscen.cli.catalog.fields import Field, fields_of, kind_of
 from simscen.criteria import error_codes
 from simscen.criteria.registry import AnyCriterion
@@ -108,6 +107,7 @@ def topics(installed: bool = False) -> list[Topic]:
         *(_topic("stack file", name, model) for name, model in _STACK_FILES.items()),
         *(_topic("localizer", kind, model) for kind, model in members_by_type(localizers.Localizer)),
         *_installed_types("localizer", installed),
+        *(_topic("planner", name, model) for name, model in _PLANNERS.items()),
         *_installed_types("planner", installed),
         *(_topic("controller", kind, model) for kind, model in members_by_type(controllers.Controller)),
         *(_topic("controller", name, annotation_of(mppi.Mppi.model_fields[name])) for name in _MPPI_SECTIONS),
@@ -156,7 +156,6 @@ _STACK: dict[str, type[BaseModel]] = {
     "odometry_filter": localizers.OdometryFilter,
     "costmap": costmaps.Costmap,
     "local_costmap": costmaps.LocalCostmap,
-    "planner": planners.OmplPlanner,
     "goal_checker": controllers.SimpleGoalChecker,
     "progress_checker": controllers.ProgressChecker,
     "recovery": recovery.Recovery,
@@ -165,9 +164,11 @@ _STACK: dict[str, type[BaseModel]] = {
     "prediction": guards.Prediction,
     "denoise_layer": costmaps.DenoiseLayer,
     "latency": stack_base.Latency,
+}
+_PLANNERS: dict[str, type[BaseModel]] = {
+    "planner": planners.OmplPlanner,
     "navfn": planners.Navfn,
     "smac_2d": planners.Smac2d,
-    "medial_axis": MedialAxisPlanner,
 }
 _MPPI_SECTIONS = [name for name in mppi.Mppi.model_fields if name[0].isupper()]
 """Keys of `mppi` that are mappings: its critics and its validator."""
@@ -176,7 +177,6 @@ _BEHAVIORS: dict[str, type[BaseModel]] = {
     "spin": recovery.Spin,
     "wait": recovery.Wait,
     "backup": recovery.BackUp,
-    "retrace": recovery.Retrace,
 }
 _STACK_FILES: dict[str, type[BaseModel]] = {
     "stack file": stack_files.StackFileSpec,
@@ -199,13 +199,13 @@ _ROBOT: dict[str, type[BaseModel]] = {
     "limits": robot.Limits,
     "mount": robot.Mount,
 }
-"""Models of the topics of six groups by name of the topic."""
+"""Models of the topics of seven groups by name of the topic."""
 
 
 def members_by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
     """Yield the `type` and the model of each shipped member of a union that `type` discriminates."""
     mark = next((mark for mark in get_args(union)[1:] if isinstance(mark, ExtensibleUnion)), None)
-    members = get_args(get_args(union if mark is None else mark.shipped_union)[0])
+    members = get_args(get_args(union if mark is None else mark.built_in_union)[0])
     for member in members:
         lazy = next((mark for mark in get_args(member)[1:] if isinstance(mark, LazySpec)), None)
         model = lazy.load() if lazy else get_args(member)[0] if get_origin(member) is Annotated else member
@@ -231,11 +231,10 @@ def added_topics(choice: type[Choice], installed: bool = True) -> Iterator[Topic
 
 
 def _installed_types(group: str, installed: bool) -> Iterator[Topic]:
-    """Yield the topics of the types that installed packages add to a group; nothing if `installed` is false."""
-    if installed:
-        origins = {entry.name: entry.origin for entry in registry.installed_types(group)}
-        for name, model in registry.installed_specs(group).items():
-            yield replace(_topic(group, name, model), origin=origins[name])
+    """Yield the topics of the types with an entry point; only those of simscen itself if `installed` is false."""
+    origins = {entry.name: entry.origin for entry in registry.plugin_types(group)}
+    for name, model in registry.installed_specs(group, with_plugins=installed).items():
+        yield replace(_topic(group, name, model), origin=origins.get(name, ""))
 
 
 _SECTION_EXAMPLES = {

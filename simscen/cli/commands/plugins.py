@@ -18,7 +18,7 @@ from simscen.spec.registry import (
     GROUPS,
     BrokenPlugin,
     RegisteredType,
-    installed_types,
+    plugin_types,
     unknown_groups,
 )
 
@@ -49,7 +49,7 @@ def command(format_: Annotated[Format, typer.Option("--format", help="Output for
 
 def _entries_by_package() -> list[RegisteredType]:
     """Return the entry points of installed packages, sorted by package, then by GROUPS. Unknown groups come last."""
-    found = [entry for kind in GROUPS for entry in installed_types(kind)]
+    found = [entry for kind in GROUPS for entry in plugin_types(kind)]
     return sorted([*found, *unknown_groups()], key=lambda entry: (entry.distribution.lower(), entry.distribution))
 
 
@@ -79,7 +79,7 @@ def _first_paragraph(text: str) -> str:
 
 def _text(listed: list[dict[str, Any]]) -> str:
     if not listed:
-        return f"no plug-ins: no installed package has entry points in a group `{ENTRY_POINT_PREFIX}…`"
+        return f"no plug-ins: no other package has entry points in a group `{ENTRY_POINT_PREFIX}…`"
     lines = []
     for (package, version, folder), rows in groupby(
         listed, lambda row: (row["package"], row["version"], row["folder"])

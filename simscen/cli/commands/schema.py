@@ -9,7 +9,7 @@ import typer
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.user_files import save
 from simscen.core.version import PACKAGE
-from simscen.spec.registry import GROUPS, installed_types
+from simscen.spec.registry import GROUPS, plugin_types
 
 
 class SchemaKind(str, Enum):
@@ -44,7 +44,7 @@ def command(
 
 def schema_text(kind: str) -> str:
     """Return the schema of a kind of file, with the types of installed packages. `kind` is a value of SchemaKind."""
-    if any(installed_types(group) for group in GROUPS):
+    if any(plugin_types(group) for group in GROUPS):
         from simscen.cli.catalog.json_schema import as_text, schema_of
 
         return as_text(schema_of(kind, installed=True))

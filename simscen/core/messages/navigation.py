@@ -12,8 +12,8 @@ import numpy as np
 from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Array, Pose2
 
-RecoveryBehavior = Literal["clear_costmap", "spin", "wait", "backup", "retrace"]
-"""Recovery behavior with Nav2's name; except `retrace`, which drives back along the robot's own path."""
+RecoveryBehavior = Literal["clear_costmap", "spin", "wait", "backup"]
+"""Recovery behavior of the reference stack, with Nav2's name."""
 
 ReplanReason = Literal["blocked", "missed", "tight", "better", "window", "recovery", "rate", "moving"]
 """Reason for a new plan to the same goal.

@@ -77,7 +77,7 @@ def _union_members(kind: Any) -> list[Any]:
     """Return the members of a union; for any other type, the type itself."""
     if mark := _extensible_union(kind):
         return [
-            *_union_members(mark.shipped_union),
+            *_union_members(mark.built_in_union),
             *(Annotated[model, Tag(name)] for name, model in installed_specs(mark.group).items()),
         ]
     unwrapped = _unwrapped(kind)

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from simscen.advanced import spec as model
 from simscen.advanced.retrace import Retrace, Trail
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
 from simscen.core.messages.sensor_data import Scan
-from simscen.model import recovery as model
+from simscen.model import recovery
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.guards import CollisionMonitor as MonitorSpec
 from simscen.stack.behaviors import BackUp, Spin
@@ -69,7 +70,10 @@ def run(behavior: Behavior, view: CostmapView, slip: float = 1.0, allowed: Limit
 def test_retrace_frees_a_robot_wedged_between_posts(slip: float) -> None:
     world = Flatland(discs=list(POSTS))
     view = view_of(LONG, world)
-    for nav2_behavior in (Spin(model.Spin(), setting(LONG)), BackUp(model.BackUp(backup_partial=False), setting(LONG))):
+    for nav2_behavior in (
+        Spin(recovery.Spin(), setting(LONG)),
+        BackUp(recovery.BackUp(backup_partial=False), setting(LONG)),
+    ):
         with pytest.raises(NavigationFailure):
             run(nav2_behavior, view)
     poses = run(behavior(LONG, ENTRY), view, slip)

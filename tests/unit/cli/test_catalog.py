@@ -1,6 +1,5 @@
 """Every topic of the language is documented and has a valid example."""
 
-from importlib import import_module
 from typing import Any
 
 import pytest
@@ -123,9 +122,9 @@ def test_every_section_of_a_stack_and_every_shipped_component_is_a_topic() -> No
         if isinstance(field.annotation, type) and issubclass(field.annotation, Spec)
     }
     shipped = {
-        getattr(import_module(module), name)
+        entry.load()
         for group in ("localizer", "planner", "controller", "goal_checker", "behavior")
-        for module, name in (entry.value.split(":") for entry in registry.shipped_types(group))
+        for entry in registry.all_types(group)
     }
     bases = {LocalizerSpec, PlannerSpec, ControllerSpec, GoalCheckerSpec, GoalTolerances}
     assert (sections | shipped | {Latency}) - bases <= output

@@ -24,7 +24,7 @@ class Hello(Spec, Criterion):
 def test_no_installed_types_gives_a_message(simscen) -> None:
     done = simscen("plugins")
     assert (done.code, done.err) == (0, "")
-    assert done.out == "no plug-ins: no installed package has entry points in a group `simscen.…`\n"
+    assert done.out == "no plug-ins: no other package has entry points in a group `simscen.…`\n"
 
 
 def test_types_are_listed_with_package_and_first_sentence(simscen, yardwork) -> None:

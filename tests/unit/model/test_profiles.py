@@ -85,7 +85,7 @@ def test_advanced_profile_selects_the_advanced_components() -> None:
         "medial_axis",
         True,
     )
-    assert "retrace" in spec.recovery.behaviors and spec.prediction.enabled
+    assert "retrace" in spec.recovery.names and spec.prediction.enabled
     own = StackSpec(profile="advanced", planner={"type": "navfn"}, localizer={"type": "amcl"})
     assert (own.planner.type, own.planner.cautious, own.localizer.type) == ("navfn", True, "amcl")
 

@@ -4,6 +4,7 @@ import sys
 import pytest
 
 import simscen.plugin
+from simscen.advanced.spec import MedialAxisPlanner
 from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import Sensor
 from simscen.spec.choice import Choice
@@ -11,25 +12,27 @@ from simscen.spec.registry import (
     GROUPS,
     BrokenPlugin,
     all_types,
+    built_in_types,
     find_type,
+    installed_specs,
     installed_types,
-    shipped_types,
+    plugin_types,
     unknown_groups,
 )
 from simscen.triggers.base import Trigger
 
 
-def test_shipped_types_are_listed_first_and_installed_ones_by_name(packages, calm_module) -> None:
+def test_built_in_types_are_listed_first_and_installed_ones_by_name(packages, calm_module) -> None:
     packages("zeta", "2.0", {"criterion": {"zen": "calm:Calm"}}, calm=calm_module)
     packages("alpha", "1.0", {"criterion": {"calm": "calm:Calm"}})
     names = [entry.name for entry in all_types("criterion")]
-    own = [entry.name for entry in shipped_types("criterion")]
+    own = [entry.name for entry in built_in_types("criterion")]
     assert own[:3] == ["goals_reached", "result", "error_code"]
     assert names == [*own, "calm", "zen"]
     assert [entry.origin for entry in installed_types("criterion")] == ["alpha 1.0", "zeta 2.0"]
 
 
-def test_shipped_and_installed_types_are_loaded_the_same_way(packages, calm_module) -> None:
+def test_built_in_and_installed_types_are_loaded_the_same_way(packages, calm_module) -> None:
     packages("calm", "1.0", {"criterion": {"calm": "calm:Calm"}}, calm=calm_module)
     for name, wanted in (("calm", "Calm"), ("speed", "Speed")):
         entry = find_type("criterion", name)
@@ -40,8 +43,8 @@ def test_shipped_and_installed_types_are_loaded_the_same_way(packages, calm_modu
 
 
 @pytest.mark.parametrize("group", sorted(GROUPS.keys() - {"metric"}))  # what simscen measures has no parameters
-def test_shipped_types_are_valid_members_of_their_group(group: str) -> None:
-    for entry in shipped_types(group):
+def test_built_in_types_are_valid_members_of_their_group(group: str) -> None:
+    for entry in built_in_types(group):
         if (group, entry.name) != ("criterion", "whenever"):  # half of one, `then` is the other
             assert entry.load() is not None, entry
 
@@ -91,6 +94,17 @@ def test_packages_cannot_redefine_shipped_names(packages, calm_module) -> None:
     assert [entry.name for entry in all_types("criterion")].count("speed") == 1
 
 
+def test_advanced_components_are_entry_points_of_simscen_that_packages_cannot_redefine(packages, calm_module) -> None:
+    packages("calm", "1.0", {"planner": {"medial_axis": "calm:Calm"}}, calm=calm_module)
+    own, other = installed_types("planner")
+    assert (own.distribution, own.is_shipped, own.problem) == ("simscen", True, "")
+    assert find_type("planner", "medial_axis") == own
+    assert own.load() is MedialAxisPlanner and installed_specs("planner") == {"medial_axis": MedialAxisPlanner}
+    assert other.problem == "simscen ships a type with the same name, which takes precedence"
+    assert plugin_types("planner") == (other,)
+    assert "medial_axis" not in [entry.name for entry in built_in_types("planner")]
+
+
 def test_unknown_groups_are_reported(packages, calm_module) -> None:
     packages("calm", "1.0", {"criteria": {"calm": "calm:Calm"}}, calm=calm_module)
     assert [entry.problem for entry in unknown_groups()] == ["there is no group `simscen.criteria`"]
@@ -104,7 +118,7 @@ def test_output_of_a_module_during_import_goes_to_stderr(packages, capsys, calm_
 
 @pytest.mark.parametrize(("group", "choice"), [("trigger", Trigger), ("fault", FaultEntry), ("sensor", Sensor)])
 def test_modifiers_are_reserved_names(group: str, choice: type[Choice]) -> None:
-    beside = choice.known_keys() - {entry.name for entry in shipped_types(group)}
+    beside = choice.known_keys() - {entry.name for entry in built_in_types(group)}
     assert beside == set(GROUPS[group].reserved)
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from simscen.advanced.spec import Retrace
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
@@ -170,7 +171,7 @@ def test_recovery_passes_its_parameters_to_behaviors_that_do_not_set_them() -> N
     spin, backup, retrace = model.Recovery(
         behaviors=entries, time_allowance=7.0, min_rotational_vel=0.2, rotational_acc_lim=2.0
     ).behavior_specs()
-    assert isinstance(spin, model.Spin) and isinstance(backup, model.BackUp) and isinstance(retrace, model.Retrace)
+    assert isinstance(spin, model.Spin) and isinstance(backup, model.BackUp) and isinstance(retrace, Retrace)
     assert (spin.time_allowance, spin.min_rotational_vel, spin.rotational_acc_lim) == (7.0, 0.2, 2.0)
     assert (backup.time_allowance, retrace.time_allowance) == (3.0, 7.0)
 

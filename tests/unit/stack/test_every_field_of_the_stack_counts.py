@@ -5,7 +5,6 @@ Those of controllers are tried in test_every_field_of_a_controller_counts.py, co
 
 import re
 from collections.abc import Iterator
-from importlib import import_module
 from itertools import zip_longest
 from pathlib import Path
 from types import UnionType
@@ -17,13 +16,14 @@ import scenes
 from pydantic import BaseModel, ValidationError
 from scenes import Scene
 
-from simscen.advanced.spec import MedialAxisPlanner, ScanMatchingAmcl, SlipEkf
+from simscen.advanced.spec import MedialAxisPlanner, Retrace, ScanMatchingAmcl, SlipEkf
 from simscen.model import controllers, costmaps, guards, localizers, planners
 from simscen.model import recovery as behaviors
 from simscen.model.localizers import OdometryFilter
 from simscen.model.stack import StackSpec
 from simscen.model.stack_base import ControllerSpec, Latency, SpeedZone
 from simscen.spec.places import SpeedMask
+from simscen.spec.registry import all_types
 
 Said = dict[str, Any]
 TRUTH: Said = {"localizer": {"type": "ground_truth"}, "planner": {"type": "navfn"}}
@@ -161,7 +161,7 @@ PARTS = [
         (recovery({"type": "backup"}), scenes.shut),
         (recovery({"type": "backup", "backup_partial": False}), scenes.shut),
     )),
-    Part(("recovery", "behaviors", 0), behaviors.Retrace, ((recovery({"type": "retrace"}), scenes.in_a_corridor),), {
+    Part(("recovery", "behaviors", 0), Retrace, ((recovery({"type": "retrace"}), scenes.in_a_corridor),), {
         "backup_dist": ((recovery({"type": "retrace"}), scenes.shut),)}),
     Part(("velocity_smoother",), guards.VelocitySmoother, ((TRUTH, scenes.through), (TRUTH, scenes.arriving))),
     Part(("collision_monitor",), guards.CollisionMonitor, (
@@ -358,9 +358,8 @@ def test_every_field_is_tried(part: Part) -> None:
 
 def test_every_model_is_tried() -> None:
     """Those that a stack holds, and those of the shipped components."""
-    registries = (localizers.LOCALIZERS, planners.PLANNERS, behaviors.BEHAVIORS, controllers.GOAL_CHECKERS)
-    shipped = [where.split(":") for each in registries for where in each.values()]
-    roots = [StackSpec, *(getattr(import_module(module), name) for module, name in shipped)]
+    groups = ("localizer", "planner", "behavior", "goal_checker")
+    roots = [StackSpec, *(entry.load() for group in groups for entry in all_types(group))]
     holding = {
         kind for root in roots for kind in models_in(root) if any(not left_out(kind, n) for n in kind.model_fields)
     }
