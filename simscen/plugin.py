@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from simscen.core.geometry.kinematics import STOP, Twist
     from simscen.core.geometry.polygons import distance_to_polygon
     from simscen.core.geometry.shapes import Body, MotionPath
-    from simscen.core.messages.navigation import Belief, ErrorCode, Estimate, Goal, Path, TaskResult
+    from simscen.core.messages.goals import Goal
+    from simscen.core.messages.navigation import Belief, ErrorCode, Estimate, Path, TaskResult
     from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Reading, Readings, Scan
     from simscen.core.random_streams import Streams
     from simscen.core.records.case import Case
@@ -156,7 +157,8 @@ _NAMES_BY_MODULE = {
     "simscen.core.geometry": ("Array", "Pose2", "Pose3", "wrap"),
     "simscen.core.environment.occupancy_grid": ("OccupancyGrid",),
     "simscen.core.geometry.kinematics": ("STOP", "Twist"),
-    "simscen.core.messages.navigation": ("Belief", "ErrorCode", "Estimate", "Goal", "Path", "TaskResult"),
+    "simscen.core.messages.goals": ("Goal",),
+    "simscen.core.messages.navigation": ("Belief", "ErrorCode", "Estimate", "Path", "TaskResult"),
     "simscen.core.geometry.polygons": ("distance_to_polygon",),
     "simscen.core.messages.sensor_data": ("Bump", "Image", "Imu", "Odometry", "Reading", "Readings", "Scan"),
     "simscen.core.geometry.shapes": ("Body", "MotionPath"),

@@ -11,7 +11,8 @@ import numpy.typing as npt
 from simscen.advanced.prediction.avoidance import MIN_DISTANCE_M
 from simscen.advanced.prediction.rollouts import HORIZON_S
 from simscen.core.geometry import Array, Pose2
-from simscen.core.messages.navigation import Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Path
 from simscen.core.records.events import Event
 from simscen.model.planners import PlannerSpec
 from simscen.stack.costmap.layered_costmap import LayeredCostmap

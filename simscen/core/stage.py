@@ -14,7 +14,8 @@ from simscen.core.environment.world_model import Patch, Polygon, WalkingPedestri
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, MotionPath
-from simscen.core.messages.navigation import Belief, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Belief, Path
 from simscen.core.records.events import Event
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from pydantic import model_validator
 
-from simscen.core.messages.navigation import matches_goal_name
+from simscen.core.messages.goals import matches_goal_name
 from simscen.core.records.events import EventKind
 from simscen.core.records.verdict import Evidence, Finding
 from simscen.criteria.base import Criterion

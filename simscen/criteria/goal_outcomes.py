@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.messages.navigation import FAILED, Goal
+from simscen.core.messages.goals import FAILED, Goal
 from simscen.core.records.events import Event, EventKind
 from simscen.criteria.error_codes import error_code_name
 from simscen.criteria.trace_signals.ground_truth import truth

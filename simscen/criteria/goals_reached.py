@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from simscen.core.geometry import wrap
-from simscen.core.messages.navigation import FAILED, matches_goal_name
+from simscen.core.messages.goals import FAILED, matches_goal_name
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, held, missed, undecided

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from simscen.core.messages.navigation import matches_goal_name
+from simscen.core.messages.goals import matches_goal_name
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Protocol
 from pydantic import BaseModel
 
 from simscen.core.clock import Clock
-from simscen.core.records.events import FAULT_TARGET_KINDS
+from simscen.core.records.disturbances import FAULT_TARGET_KINDS
 from simscen.spec.base import LazySpec
 from simscen.spec.choice import Choice
 

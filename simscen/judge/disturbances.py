@@ -8,7 +8,8 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from simscen.core.records.case import Case
-from simscen.core.records.events import Disturbance, DisturbanceOutcome, Event, EventKind
+from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
+from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Finding, Verdict
 from simscen.criteria.findings import missed, undecided

@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from simscen.core.records.case import Case
-from simscen.core.records.events import BELIEF, WHEELS, Event, EventKind
+from simscen.core.records.disturbances import BELIEF, WHEELS
+from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.goal_failure_causes import Diagnosis, MovableObject, diagnose_goal_failure, movable_objects

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from math import isfinite
 
-from simscen.core.records.events import DisturbanceOutcome
+from simscen.core.records.disturbances import DisturbanceOutcome
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.polygons import distance_to_segment, signed_double_area
-from simscen.core.messages.navigation import ErrorCode, Goal
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import ErrorCode
 from simscen.core.records.case import Case, Passage
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TypeVar
 
-from simscen.core.records.events import DisturbanceOutcome, Event
+from simscen.core.records.disturbances import DisturbanceOutcome
+from simscen.core.records.events import Event
 from simscen.core.records.run_result import Outcome, RunFailure, RunResult
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import ExpectedFailure, Verdict

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import yaml
 
-from simscen.core.records.events import Disturbance
+from simscen.core.records.disturbances import Disturbance
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import Key, node_at
 

@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from simscen.actions.robot import NewGoal
-from simscen.core.messages.navigation import ErrorCode, Goal, loop_goal_name, matches_goal_name
+from simscen.core.messages.goals import Goal, loop_goal_name, matches_goal_name
+from simscen.core.messages.navigation import ErrorCode
 from simscen.criteria.result import ErrorCodeIs, Result
 from simscen.loading.yaml.tree import Keys
 from simscen.model.navigation import expected_failure_name

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from simscen.core.environment.world_model import World
-from simscen.core.messages.navigation import loop_goal_name
+from simscen.core.messages.goals import loop_goal_name
 from simscen.criteria.registry import verdict_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.model.world import WorldSpec

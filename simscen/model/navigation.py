@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from simscen.core.messages.navigation import FAILED, Mode
+from simscen.core.messages.goals import FAILED, Mode
 from simscen.spec.base import LazySpec, Spec
 from simscen.spec.quantities import Duration, PositiveLength
 

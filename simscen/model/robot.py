@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.kinematics import MecanumWheels
-from simscen.core.records.events import READING_KINDS
+from simscen.core.records.disturbances import READING_KINDS
 from simscen.model.stack_base import RobotLatency
 from simscen.spec.base import Component, LanguageVersion, Ranged, Spec, by_default
 from simscen.spec.choice import Choice

@@ -9,7 +9,8 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import TriangleMesh
-from simscen.core.messages.navigation import Estimate, Goal
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Estimate
 from simscen.core.records.case import CLEARANCE_RANGE_M, ROBOT_NAME, Case
 from simscen.criteria.base import Criterion
 from simscen.loading.builders import (

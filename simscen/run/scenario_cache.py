@@ -20,7 +20,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import TriangleMesh
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.loading.builders import load_world
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.open_ground import with_stops_in_bounds

@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from simscen.core.clock import Clock
-from simscen.core.messages.navigation import Mode
+from simscen.core.messages.goals import Mode
 from simscen.core.random_streams import Streams
 from simscen.model.recovery import Recovery
 from simscen.model.stack import InProcessStack, StackSpec

@@ -11,7 +11,8 @@ import numpy.typing as npt
 from simscen.core.errors import BROKEN_COMPONENT, RunError
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import Belief, ErrorCode, Estimate, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Belief, ErrorCode, Estimate, Path
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.controllers import GoalCheckerSpec
 from simscen.model.localizers import LocalizerSpec

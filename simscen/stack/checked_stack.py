@@ -5,7 +5,8 @@ import numpy as np
 from simscen.core.environment.costmap_filters import Zones
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import Belief, Estimate, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Belief, Estimate, Path
 from simscen.core.messages.sensor_data import Odometry, Readings
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import CostGrid, Decision

@@ -4,7 +4,7 @@ import math
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.model.controllers import ProgressChecker as ProgressSpec
 from simscen.model.controllers import SimpleGoalChecker as GoalSpec
 from simscen.stack.setting import Setting

@@ -5,7 +5,8 @@ import math
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.messages.navigation import Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Path
 from simscen.stack.controllers.path_handler import PathTracker
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.footprint import distances

@@ -11,7 +11,8 @@ not fit there on the map.
 from typing import NamedTuple, Protocol
 
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.navigation import ErrorCode, Goal
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import ErrorCode
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.stack.behaviors import BehaviorSequence
 from simscen.stack.checkers import ProgressChecker

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2
-from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.model.planners import PlannerSpec
 from simscen.stack.costmap.layered_costmap import LayeredCostmap

@@ -21,7 +21,8 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import Belief, ErrorCode, Estimate, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Belief, ErrorCode, Estimate, Path
 from simscen.core.messages.sensor_data import Imu, Odometry, Readings, Scan
 from simscen.core.records.trace import Decision
 from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.navigation import ErrorCode, Estimate, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import ErrorCode, Estimate, Path
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Readings, Scan, imu_in_base_frame, level_scan
 from simscen.core.records.events import Event
 from simscen.core.records.trace import Decision

@@ -10,7 +10,8 @@ from simscen.core.clock import Clock
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import Estimate, Mode
+from simscen.core.messages.goals import Mode
+from simscen.core.messages.navigation import Estimate
 from simscen.core.random_streams import Streams
 from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import Localizer, RobotModel, Surroundings

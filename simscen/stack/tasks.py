@@ -1,7 +1,8 @@
 """Goals of a navigation task and their progress, with the events that the client of a Nav2 action would see."""
 
 from simscen.core.clock import Clock
-from simscen.core.messages.navigation import ErrorCode, Goal, Mode, TaskResult
+from simscen.core.messages.goals import Goal, Mode
+from simscen.core.messages.navigation import ErrorCode, TaskResult
 from simscen.core.records.events import Event, EventKind, Value
 
 Events = tuple[Event, ...]

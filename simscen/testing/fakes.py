@@ -14,7 +14,8 @@ from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.geometry.ray_fans import RayCaster
 from simscen.core.geometry.shapes import Body, MotionPath
-from simscen.core.messages.navigation import Belief, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Belief, Path
 from simscen.core.random_streams import Streams
 from simscen.core.records.events import Event
 from simscen.model.robot import Differential

@@ -13,7 +13,8 @@ from simscen.core.clock import Clock
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.navigation import Estimate, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Estimate, Path
 from simscen.core.messages.sensor_data import Odometry, Reading, Scan
 from simscen.core.random_streams import Streams
 from simscen.core.records.events import Event

@@ -7,9 +7,11 @@ import numpy as np
 
 from simscen.core.environment.costmap_filters import MaskBlocks
 from simscen.core.geometry import Array, Pose2, wrap_array
-from simscen.core.messages.navigation import Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Path
 from simscen.core.records.case import CLEARANCE_RANGE_M, Case, Passage
-from simscen.core.records.events import Disturbance, Event, EventKind
+from simscen.core.records.disturbances import Disturbance
+from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Samples, Ticks, Trace
 
 TICK_RATE_HZ, TRUTH_PERIOD_TICKS, SCAN_PERIOD_TICKS, BELIEF_PERIOD_TICKS = 240, 6, 24, 24

@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from simscen.core.messages.navigation import matches_goal_name
+from simscen.core.messages.goals import matches_goal_name
 from simscen.core.records.events import EventKind
 from simscen.core.stage import Situation
 from simscen.spec.base import Spec

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from simscen.core.records.events import Disturbance, DisturbanceOutcome
+from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.core.records.verdict import Finding, Status, Verdict

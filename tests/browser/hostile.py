@@ -1,7 +1,7 @@
 """A log with HTML and escape sequences in every name."""
 
 from simscen.core.geometry import Pose2
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.core.records.case import Case
 from simscen.core.records.run_result import RunKey, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict

@@ -3,7 +3,7 @@
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.model.controllers import DynamicWindow, Mppi, RegulatedPurePursuit
 from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec

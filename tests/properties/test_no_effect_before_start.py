@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from simscen.actions.base import AnyAction
-from simscen.core.records.events import KIND_BY_TARGET_NAME, MAP, EventKind
+from simscen.core.records.disturbances import KIND_BY_TARGET_NAME, MAP
+from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Moment
 from simscen.faults.base import AnyFault
 from simscen.loading.checks.faults import fault_targets, unknown_sensors, unsuitable_faults

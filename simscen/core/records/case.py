@@ -9,8 +9,8 @@ from typing import Any
 from simscen.core.environment.costmap_filters import MaskBlocks
 from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose2
-from simscen.core.messages.navigation import Goal
-from simscen.core.records.events import Disturbance
+from simscen.core.messages.goals import Goal
+from simscen.core.records.disturbances import Disturbance
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Status, Verdict

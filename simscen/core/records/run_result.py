@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import total_ordering
 
-from simscen.core.records.events import DisturbanceOutcome
+from simscen.core.records.disturbances import DisturbanceOutcome
 from simscen.core.records.verdict import Verdict
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.geometry.polygons import points_in_polygon
-from simscen.core.messages.navigation import matches_goal_name
+from simscen.core.messages.goals import matches_goal_name
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Samples, Ticks
 from simscen.criteria.timeline import spans

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from simscen.core.records.events import BELIEF, COMMAND, KIND_BY_TARGET_NAME, MAP, WHEELS
+from simscen.core.records.disturbances import BELIEF, COMMAND, KIND_BY_TARGET_NAME, MAP, WHEELS
 from simscen.faults.base import FaultTarget
 from simscen.loading.checks.registry import MEANING, NAMES, CheckProblem, NameScope
 from simscen.loading.codes import UNSUPPORTED_BY_STACK

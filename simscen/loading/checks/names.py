@@ -4,7 +4,7 @@ from collections.abc import Container, Iterator
 from dataclasses import replace
 
 from simscen.actions.base import Action, AnyAction
-from simscen.core.messages.navigation import LOOP_GOAL_NAME
+from simscen.core.messages.goals import LOOP_GOAL_NAME
 from simscen.criteria.registry import verdict_names
 from simscen.loading.checks.registry import NAMES, ROBOT_NAMES, CheckProblem, NameScope, WrittenScenario
 from simscen.loading.known_names import KIND_NAMES, event_names, known_names, listed_goal_names, world_object_names

@@ -12,7 +12,7 @@ from simscen.core.errors import Problem
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.motion_paths import MAX_STEP_M, largest_step, too_fast_message
 from simscen.core.geometry.shapes import MotionPath, Solid
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.loading.checks.registry import CheckProblem
 from simscen.loading.checks.scene import (
     SILL_M,

@@ -9,7 +9,7 @@ from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
-from simscen.core.messages.navigation import matches_goal_name
+from simscen.core.messages.goals import matches_goal_name
 from simscen.loading.known_names import listed_goal_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import Keys

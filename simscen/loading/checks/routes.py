@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import Solid
-from simscen.core.messages.navigation import Goal
-from simscen.core.messages.navigation import matches_goal_name as is_named
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.goals import matches_goal_name as is_named
 from simscen.criteria.registry import AnyCriterion
 from simscen.loading.checks.placement import blocked_poses
 from simscen.loading.checks.registry import CheckProblem

@@ -13,7 +13,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import Body, Solid
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.loading.builders import load_map
 from simscen.loading.checks.registry import CheckStage
 from simscen.loading.goals import event_goals, expects_failure, scenario_goals

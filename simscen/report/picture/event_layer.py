@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.core.messages.navigation import Goal, matches_goal_name
+from simscen.core.messages.goals import Goal, matches_goal_name
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.verdict import Status
 from simscen.judge.finding_text import comparison, subject

@@ -7,7 +7,8 @@ events for preempted goals and for the end of the task.
 from typing import Any
 
 from simscen.core.clock import Clock
-from simscen.core.messages.navigation import ErrorCode, Goal, Mode, error_code
+from simscen.core.messages.goals import Goal, Mode
+from simscen.core.messages.navigation import ErrorCode, error_code
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.run.external.protocol import ProtocolViolation
 from simscen.stack.tasks import Task

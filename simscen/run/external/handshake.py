@@ -10,7 +10,8 @@ from typing import Any
 from simscen.core.environment.costmap_filters import Zones
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose3
-from simscen.core.messages.navigation import Estimate, Goal, Mode
+from simscen.core.messages.goals import Goal, Mode
+from simscen.core.messages.navigation import Estimate
 from simscen.core.version import __version__
 from simscen.peer import wire
 from simscen.record.topics import Topic

@@ -19,8 +19,9 @@ from simscen.core.environment.costmap_filters import FilterMasks, SpeedLimits
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import Estimate, Mode
-from simscen.core.messages.navigation import Goal as CoreGoal
+from simscen.core.messages.goals import Goal as CoreGoal
+from simscen.core.messages.goals import Mode
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Reading, Scan
 from simscen.core.random_streams import Streams
 from simscen.core.records.events import EventKind, Value

@@ -12,7 +12,8 @@ from simscen.core.errors import InvalidInput, RunError
 from simscen.core.external_command import ExternalCommand
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
-from simscen.core.messages.navigation import Estimate, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Estimate, Path
 from simscen.core.messages.sensor_data import Odometry, Readings
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Decision

@@ -18,7 +18,8 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Odometry, Reading, Readings
 from simscen.core.random_streams import Streams
-from simscen.core.records.events import BELIEF, COMMAND, WHEELS, Event, EventKind
+from simscen.core.records.disturbances import BELIEF, COMMAND, WHEELS
+from simscen.core.records.events import Event, EventKind
 from simscen.faults.base import FaultEffect, FaultSetting
 from simscen.model.disturbances import FaultEntry
 from simscen.run.faults.interfaces import CommandLink

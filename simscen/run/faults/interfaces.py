@@ -12,7 +12,7 @@ from simscen.core.geometry.ray_fans import RayCaster
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Image, Imu, Odometry, Scan
-from simscen.core.records.events import KIND_BY_TARGET_NAME
+from simscen.core.records.disturbances import KIND_BY_TARGET_NAME
 from simscen.faults.base import FaultSetting, SensorSimulator
 from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import Camera, Mount, RobotSpec

@@ -8,7 +8,7 @@ from simscen.core.clock import Clock
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.errors import BROKEN_COMPONENT, RunError
 from simscen.core.random_streams import Streams
-from simscen.core.records.events import KIND_BY_TARGET_NAME, MAP
+from simscen.core.records.disturbances import KIND_BY_TARGET_NAME, MAP
 from simscen.faults.base import FaultSetting
 from simscen.model.disturbances import FaultEntry
 from simscen.run.preparation import PreparedScenario

@@ -11,7 +11,8 @@ from simscen.core.environment.costmap_filters import ZoneSwitch
 from simscen.core.environment.world_model import Patch, Polygon, WalkingPedestrian, World
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, MotionPath, Shape, Sphere
-from simscen.core.messages.navigation import Belief, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Belief, Path
 from simscen.core.messages.sensor_data import Readings, Scan
 from simscen.core.random_streams import Streams
 from simscen.core.records.events import Event, EventKind, Value

@@ -4,7 +4,8 @@ import math
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.stack_base import PathFollowerSpec
 from simscen.stack.controllers.path_handler import PathTracker
 from simscen.stack.protocols import NavigationFailure, RobotModel

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.controllers import RegulatedPurePursuit as RppSpec
 from simscen.stack.controllers.collision_checker import CollisionChecker, RotationClearance
 from simscen.stack.controllers.path_follower import BRAKING_FACTOR, GoalRotation, PathFollower

@@ -8,7 +8,8 @@ import numpy as np
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.stack.footprint import Footprint
 from simscen.stack.kinematics import poses_along
 from simscen.stack.protocols import Controller, CostmapView, GoalChecker, NavigationFailure, RobotModel

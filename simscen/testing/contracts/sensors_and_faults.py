@@ -16,7 +16,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages import sensor_data
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Reading, Scan
-from simscen.core.records.events import BELIEF, COMMAND, FAULT_TARGET_KINDS, MAP, WHEELS
+from simscen.core.records.disturbances import BELIEF, COMMAND, FAULT_TARGET_KINDS, MAP, WHEELS
 from simscen.faults.base import Fault, FaultEffect, FaultSetting
 from simscen.sensors.sensor import Sensor, SensorSetting
 from simscen.testing.contracts.base import Contract, call_component, promise, require

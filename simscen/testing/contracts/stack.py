@@ -10,7 +10,8 @@ import numpy as np
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
-from simscen.core.messages.navigation import Estimate, Goal
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Readings, Scan
 from simscen.core.random_streams import Streams
 from simscen.core.records.events import Event, EventKind

@@ -4,7 +4,7 @@ import pytest
 
 from simscen.advanced.replanning import ClearingBackoff
 from simscen.core.geometry import Pose2
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.model.localizers import GroundTruth
 from simscen.model.recovery import Recovery
 from simscen.model.stack import StackSpec

@@ -6,7 +6,8 @@ import pytest
 from simscen.advanced.replanning import AdvancedPlanManager
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.core.messages.sensor_data import Scan
 from simscen.core.records.events import Event
 from simscen.model.costmaps import Costmap as CostmapSpec

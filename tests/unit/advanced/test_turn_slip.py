@@ -10,7 +10,7 @@ from simscen.advanced.spec import SlipEkf
 from simscen.advanced.stack import MAX_TURN_SLIP_RAD_PER_M, TurnSlipObserver
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.core.messages.sensor_data import Imu, Odometry, Readings
 from simscen.core.records.trace import Decision
 from simscen.model.stack import StackSpec

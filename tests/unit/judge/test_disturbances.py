@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from simscen.core.records.events import Disturbance
+from simscen.core.records.disturbances import Disturbance
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.verdict import Status
 from simscen.criteria.registry import AnyCriterion

@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import pytest
 
-from simscen.core.records.events import Disturbance, DisturbanceOutcome
+from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.finding_text import (

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from simscen.core.records.events import Disturbance, DisturbanceOutcome
+from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.result_json import from_json, read_key, result_data, to_json

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from simscen.core.records.events import Disturbance, DisturbanceOutcome
+from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import ExpectedFailure, Finding, Status, Verdict

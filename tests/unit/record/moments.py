@@ -8,7 +8,8 @@ from simscen.core.clock import Clock
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import Belief, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Belief, Path
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Reading, Scan
 from simscen.core.records.case import Case
 from simscen.core.records.events import Event

@@ -24,7 +24,7 @@ from rosbags.rosbag2 import StoragePlugin
 
 from simscen.cli.main import main
 from simscen.core.geometry import Pose2
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.core.records.case import Case
 from simscen.core.records.verdict import Evidence, LogCoverage, Status
 from simscen.criteria.registry import AnyCriterion

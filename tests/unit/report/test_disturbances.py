@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from simscen.core.records.events import Disturbance, DisturbanceOutcome
+from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.report.console_reporter import text_reporter
 from simscen.report.github import annotations

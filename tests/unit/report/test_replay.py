@@ -16,7 +16,7 @@ import pytest
 from simscen.core.clock import SimTime
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.core.records.case import Case
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict

@@ -7,7 +7,7 @@ import pytest
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Solid
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.loading.scenario import load_scenario
 from simscen.run import scenario_cache
 from simscen.run.scenario_cache import CachedWorldBuilder, DiskCache, ScenarioCache

@@ -10,7 +10,8 @@ import numpy as np
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import Estimate, Goal
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Image, Imu, Odometry, Reading, Readings
 from simscen.core.records.trace import Decision
 from simscen.model.stack import StackSpec

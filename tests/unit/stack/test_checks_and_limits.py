@@ -8,7 +8,8 @@ from simscen.core.environment.costmap_filters import FilterMasks, SpeedLimits
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.controllers import ProgressChecker as ProgressSpec
 from simscen.model.controllers import SimpleGoalChecker as CheckerSpec
 from simscen.model.costmaps import Costmap as CostmapSpec

@@ -13,7 +13,8 @@ from pydantic import BaseModel, ValidationError
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Path
 from simscen.model.controllers import CONTROLLERS, ControllerSpec, DynamicWindow, RegulatedPurePursuit
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.mppi import Mppi

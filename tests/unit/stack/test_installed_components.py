@@ -14,7 +14,8 @@ from simscen.core.clock import Clock
 from simscen.core.errors import InvalidInput, RunError
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import ErrorCode, Goal
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import ErrorCode
 from simscen.core.random_streams import Streams
 from simscen.loading.scenario import load_scenario
 from simscen.model.stack import StackSpec

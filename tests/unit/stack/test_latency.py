@@ -8,7 +8,7 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.core.messages.sensor_data import Readings, Scan
 from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec

@@ -8,7 +8,7 @@ import pytest
 
 from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.core.messages.sensor_data import Odometry, Readings
 from simscen.core.records.trace import Decision
 from simscen.model.costmaps import Costmap, LocalCostmap

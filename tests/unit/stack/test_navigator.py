@@ -6,7 +6,8 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.controllers import ProgressChecker
 from simscen.model.costmaps import Costmap
 from simscen.model.localizers import GroundTruth

@@ -12,7 +12,8 @@ from scipy import stats
 from simscen.core.clock import Clock
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import Estimate, Goal
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.core.random_streams import Streams
 from simscen.model import robot as robots

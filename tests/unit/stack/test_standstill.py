@@ -3,7 +3,7 @@
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.core.records.events import Event
 from simscen.model.stack import StackSpec
 from simscen.model.stack_base import Latency

@@ -6,7 +6,8 @@ import pytest
 
 from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
-from simscen.core.messages.navigation import ErrorCode, Goal, error_code, loop_goal_name, matches_goal_name
+from simscen.core.messages.goals import Goal, loop_goal_name, matches_goal_name
+from simscen.core.messages.navigation import ErrorCode, error_code
 from simscen.core.records.events import Event
 from simscen.stack.tasks import Task
 

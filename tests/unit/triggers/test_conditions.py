@@ -9,7 +9,8 @@ from pydantic import ValidationError
 from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import Belief, Goal
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Belief
 from simscen.core.records.events import Event, EventKind
 from simscen.triggers.base import Condition, Trigger
 from simscen.triggers.events import EventStatus, PedestrianStatus

@@ -9,7 +9,7 @@ import yaml
 
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED
 from simscen.core.geometry import Pose2
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.model.world import RosMapSpec
 from simscen.worlds.built_world import build_world_and_map
 from simscen.worlds.geometry.triangulation import merge_solids

@@ -4,7 +4,8 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.controllers import DynamicWindow as DwbSpec
 from simscen.stack.controllers.dwb.critics import (
     ObstacleCritic,

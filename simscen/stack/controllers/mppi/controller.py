@@ -12,7 +12,8 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import ErrorCode, Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.mppi import Mppi as MppiSpec
 from simscen.stack.controllers.collision_checker import CollisionChecker
 from simscen.stack.controllers.mppi.critic_data import CriticData

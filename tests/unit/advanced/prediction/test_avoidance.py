@@ -11,7 +11,7 @@ from simscen.advanced.prediction.avoidance import Avoidance
 from simscen.advanced.prediction.rollouts import FollowedPath
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.model.controllers import DynamicWindow, RegulatedPurePursuit
 from simscen.model.costmaps import Costmap
 from simscen.model.guards import CollisionMonitor as CollisionMonitorSpec

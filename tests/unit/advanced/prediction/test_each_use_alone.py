@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.model.stack import StackSpec
 from simscen.stack.frames import Frames
 from simscen.stack.moving_obstacles import no_moving_obstacles

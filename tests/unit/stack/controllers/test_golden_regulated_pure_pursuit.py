@@ -9,7 +9,8 @@ import yaml
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import ErrorCode, Goal
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import ErrorCode
 from simscen.core.messages.navigation import Path as Plan
 from simscen.model.controllers import RegulatedPurePursuit as Spec
 from simscen.model.costmaps import Costmap as CostmapSpec

@@ -8,7 +8,8 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.messages.navigation import Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Path
 from simscen.model import mppi as model
 from simscen.model.controllers import DynamicWindow, RegulatedPurePursuit
 from simscen.model.mppi import Mppi

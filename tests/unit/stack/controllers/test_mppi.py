@@ -9,7 +9,8 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.core.messages.navigation import Goal, Path
+from simscen.core.messages.goals import Goal
+from simscen.core.messages.navigation import Path
 from simscen.model import mppi as model
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.controllers.mppi import critics

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.model.stack import StackSpec
 from simscen.testing.flatland import Drive, Flatland, drive, round_robot
 

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import dijkstra
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Solid, Sphere
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.worlds.built_world import build_world_and_map
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.routes.shortest_paths import ShortestPaths, legs_between

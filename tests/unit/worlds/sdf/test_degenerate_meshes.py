@@ -12,7 +12,7 @@ import pytest
 from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2
-from simscen.core.messages.navigation import Goal
+from simscen.core.messages.goals import Goal
 from simscen.worlds.built_world import build_world_and_map, inspect_world
 from simscen.worlds.geometry.drive_obstacles import drive_obstacles
 from simscen.worlds.geometry.overlaps import first_solid_in_disc, first_solid_in_footprint

@@ -1,0 +1,56 @@
+"""Goals of navigation: pose and tolerances, the navigation action that they belong to, and names of repeated goals."""
+
+from __future__ import annotations
+
+import re
+from typing import Literal
+
+from simscen.core.decorators import fast_dataclass
+from simscen.core.geometry import Pose2
+
+Mode = Literal["navigate_to_pose", "navigate_through_poses", "follow_waypoints"]
+"""Navigation action of Nav2: one goal at a time, all goals without a stop, or a list of waypoints with stops."""
+FAILED = "failed"
+"""Value of the YAML key `expect` for a goal that must fail, with any error code."""
+
+
+@fast_dataclass()
+class Goal:
+    """Pose in the map frame that the robot must reach within the tolerances (m, rad).
+
+    `timeout` is the maximum simulated time in s; None for no limit. If `via`, the robot passes the pose with any
+    heading and without a stop, as in Nav2's NavigateThroughPoses. `wait` is the simulated time in s for which the robot
+    stays at the goal, as in Nav2's WaitAtWaypoint.
+    """
+
+    name: str
+    pose: Pose2
+    xy_tolerance: float = 0.25
+    yaw_tolerance: float = 0.25
+    timeout: float | None = None
+    via: bool = False
+    wait: float = 0.0
+
+    def at(self, pose: Pose2) -> Goal:
+        """Return the same goal with another pose."""
+        return Goal(self.name, pose, self.xy_tolerance, self.yaw_tolerance, self.timeout, self.via, self.wait)
+
+
+def loop_goal_name(name: str, loop: int) -> str:
+    """Return the name of a goal in a loop over the list of goals: `shelf` in loop 1, `shelf#2` in loop 2."""
+    return name if loop == 1 else f"{name}#{loop}"
+
+
+LOOP_GOAL_NAME = re.compile(r"(.+)#[0-9]+")
+"""Pattern of the names that `loop_goal_name` returns for loops after the first."""
+
+
+def matches_goal_name(name: str, requested: str | None) -> bool:
+    """Return whether `requested` selects the goal `name`.
+
+    `shelf` selects the goal in every loop, `shelf#2` only in the second loop, and None selects all goals.
+    """
+    if requested is None or name == requested:
+        return True
+    loop = LOOP_GOAL_NAME.fullmatch(name)
+    return loop is not None and loop[1] == requested
