@@ -2,15 +2,25 @@
 
 from dataclasses import dataclass
 
-DEFAULT_TICK_RATE_HZ = 240
-"""Physics ticks per second; the default of PyBullet."""
+NS_PER_SECOND = 1_000_000_000
+
+Stamp = tuple[int, int]
+"""Time as in builtin_interfaces/Time: seconds since the start of the run, and nanoseconds of the current second."""
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Converts between ticks and seconds, and rates to periods. `rate` is the number of physics ticks per second."""
+    """Converts ticks to other units of time and back, and rates to periods.
 
-    rate: int = DEFAULT_TICK_RATE_HZ
+    `rate` is the number of physics ticks per second; 240 is the default of PyBullet. Raises ValueError unless it is in
+    1 … 999,999,999.
+    """
+
+    rate: int = 240
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.rate < NS_PER_SECOND:
+            raise ValueError(f"a clock rate of {self.rate} Hz cannot be expressed in nanoseconds")
 
     def seconds(self, tick: int) -> float:
         """Return the simulated time of a tick in s."""
@@ -19,6 +29,18 @@ class Clock:
     def ticks(self, seconds: float) -> int:
         """Return the number of whole ticks nearest to `seconds`."""
         return round(seconds * self.rate)
+
+    def nanoseconds(self, tick: int) -> int:
+        """Return the nanoseconds from the start of the run to a tick, rounded down."""
+        return tick * NS_PER_SECOND // self.rate
+
+    def stamp(self, tick: int) -> Stamp:
+        """Return the ROS time of a tick, rounded down to whole nanoseconds."""
+        return divmod(tick * NS_PER_SECOND // self.rate, NS_PER_SECOND)
+
+    def tick_at(self, nanoseconds: int) -> int:
+        """Return the first tick at or after a time in nanoseconds since the start of the run."""
+        return -(-nanoseconds * self.rate // NS_PER_SECOND)
 
     def period(self, hertz: float) -> int:
         """Return the period of the rate `hertz` in ticks. Raises ValueError if it is not a whole number of ticks."""
@@ -32,36 +54,3 @@ class Clock:
         """Return the nearest rate in Hz that divides the clock rate or has a period of 1 to 10 whole seconds."""
         periods = [p for p in range(1, 10 * self.rate + 1) if self.rate % p == 0 or p % self.rate == 0]
         return min((self.rate / p for p in periods), key=lambda rate: (abs(rate - hertz), rate))
-
-
-NS_PER_SECOND = 1_000_000_000
-
-Stamp = tuple[int, int]
-"""Time as in builtin_interfaces/Time: seconds since the start of the run, and nanoseconds of the current second."""
-
-
-class SimTime:
-    """Converts ticks to nanoseconds and ROS time, rounded down to whole nanoseconds, and nanoseconds to ticks.
-
-    `rate` is the number of ticks per second. Raises ValueError unless it is in 1 … 999,999,999.
-    """
-
-    def __init__(self, rate: int) -> None:
-        if not 1 <= rate < NS_PER_SECOND:
-            raise ValueError(f"a clock rate of {rate} Hz cannot be expressed in nanoseconds")
-        self.rate = rate
-        self._last: tuple[int, Stamp] = (0, (0, 0))  # most messages of a step have the stamp of that step
-
-    def nanoseconds(self, tick: int) -> int:
-        """Return the nanoseconds from the start of the run to a tick."""
-        return tick * NS_PER_SECOND // self.rate
-
-    def stamp(self, tick: int) -> Stamp:
-        """Return the ROS time of a tick."""
-        if tick != self._last[0]:
-            self._last = tick, divmod(tick * NS_PER_SECOND // self.rate, NS_PER_SECOND)
-        return self._last[1]
-
-    def tick(self, nanoseconds: int) -> int:
-        """Return the first tick at or after a time in nanoseconds since the start of the run."""
-        return -(-nanoseconds * self.rate // NS_PER_SECOND)

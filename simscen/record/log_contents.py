@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from mcap import records
 
-from simscen.core.clock import SimTime
+from simscen.core.clock import Clock
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.records.trace import Trace
@@ -48,7 +48,7 @@ class LogContents:
         self._files: dict[str, bytes] = {}
         self._rows = TraceRows()
         self._last_tick = 0
-        self._time = SimTime(1)
+        self._time = Clock(1)
         self._map: OccupancyGrid | None = None
         self._robot_description = ""
         self._mounts: dict[str, Pose3] = {}
@@ -139,7 +139,7 @@ class LogContents:
         if self._metadata:
             raise ValueError(f"it has two metadata records `simscen`{_MERGED}")
         self._metadata = metadata
-        self._time = self.sensors.time = SimTime(int(metadata["tick_rate"]))
+        self._time = self.sensors.time = Clock(int(metadata["tick_rate"]))
         names = json.loads(metadata.get(log_header.ROBOTS_KEY, "[]"))
         if not isinstance(names, list) or len({name for name in names if isinstance(name, str)}) < len(names):
             raise ValueError(f"its list of robots is {metadata[log_header.ROBOTS_KEY]}")
@@ -167,7 +167,7 @@ class LogContents:
     def _add_message(self, message: records.Message) -> None:
         if not self._metadata:
             raise NotSimscenLog("it has no metadata record `simscen`")
-        self._last_tick = self._time.tick(message.log_time)
+        self._last_tick = self._time.tick_at(message.log_time)
         self._counts.add_message(message.channel_id, message.log_time)
         if message.channel_id in self._robot_of_channel:
             self.robots[self._robot_of_channel[message.channel_id]]._add_message(message)
@@ -204,7 +204,7 @@ class LogContents:
 
     def _add_truth(self, tick: int, data: bytes) -> None:
         odometry = decode.odometry(MessageReader(data))
-        if self._time.tick(odometry.stamp) != tick:
+        if self._time.tick_at(odometry.stamp) != tick:
             raise ValueError(f"the log time of a message of {topics.TRUTH.name} differs from its stamp")
         self._rows.truth.add(tick, *odometry.pose, *(odometry.twist or ()))
 
@@ -226,7 +226,7 @@ class LogContents:
 
     def _add_plan(self, _: int, data: bytes) -> None:
         path = decode.path(MessageReader(data))
-        self._rows.plans.append((self._time.tick(path.stamp), path.poses))
+        self._rows.plans.append((self._time.tick_at(path.stamp), path.poses))
 
     def _add_event(self, tick: int, data: bytes) -> None:
         event = event_text.from_json(MessageReader(data).string())

@@ -5,7 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from simscen.core.clock import Clock, SimTime
+from simscen.core.clock import Clock
 from simscen.core.errors import RunError
 from simscen.core.records.trace import Moment
 from simscen.record import log_header
@@ -32,10 +32,10 @@ class Recorder:
         self._writer.add_metadata("simscen", log_header.run_metadata(header, clock))
         for name, data in log_header.attachments(header).items():
             self._writer.add_attachment(name, log_header.media_type(name), data)
-        headers, scenery, time = header.robots or {"": header}, scenery_from_header(header), SimTime(clock.rate)
+        headers, scenery = header.robots or {"": header}, scenery_from_header(header)
         first = next(iter(headers))
         self.robots = {
-            name: RobotPublisher(LogPublisher(self._writer, name), time, robot, scenery, name, name == first)
+            name: RobotPublisher(LogPublisher(self._writer, name), clock, robot, scenery, name, name == first)
             for name, robot in headers.items()
         }
         """Publishers by robot name ("" for a single robot). The first one also publishes /clock."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from simscen.core.clock import SimTime
+from simscen.core.clock import Clock
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose3
 from simscen.core.messages.sensor_data import Scan, level_scan
@@ -33,7 +33,7 @@ class SensorMessages:
         frames: Names of the robot's frames in the log. Decoded messages have the frame names of the stack instead.
     """
 
-    time: SimTime = field(default_factory=lambda: SimTime(1))
+    time: Clock = field(default_factory=lambda: Clock(1))
     scans: dict[str, LoggedMessages] = field(default_factory=dict)
     particles: LoggedMessages = field(default_factory=list)
     local_plans: LoggedMessages = field(default_factory=list)
@@ -65,7 +65,7 @@ class SensorMessages:
         limits = scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max
         mount = self.mounts.get(frame, Pose3())
         tilted = None if mount.is_level else mount
-        return level_scan(Scan(frame, self.time.tick(scan.stamp), scan.ranges, *limits, mount.plane, tilted))
+        return level_scan(Scan(frame, self.time.tick_at(scan.stamp), scan.ranges, *limits, mount.plane, tilted))
 
     def decode_particles(self, data: bytes) -> Array:
         """Decode a ParticleCloud to poses (n, 3) x, y, yaw."""

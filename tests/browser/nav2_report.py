@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from simscen.core.clock import SimTime
+from simscen.core.clock import Clock
 from simscen.peer.messages import BEHAVIOR_TREE_LOGGER, log, tree_change
 from simscen.record.log_reader import Log
 
@@ -47,7 +47,7 @@ def with_nav2_report(
     log_: Log, parameters: Mapping[str, Mapping[str, Any]] = PARAMETERS, lines: tuple[tuple[int, str], ...] = ()
 ) -> Log:
     """Return the log with what a Nav2 would have reported, and with further (severity, text) lines at its end."""
-    rate, time = log_.trace.tick_rate, SimTime(log_.trace.tick_rate)
+    rate, time = log_.trace.tick_rate, Clock(log_.trace.tick_rate)
     end = log_.trace.end
     messages = [
         (round(seconds * rate), INFO, BEHAVIOR_TREE_LOGGER, tree_change(*change))

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from simscen.core.clock import SimTime
+from simscen.core.clock import Clock
 from simscen.core.environment.scenery import Scenery
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.scripted_poses import PosesAtTick, PredictedPoses
@@ -26,7 +26,7 @@ from simscen.record.trace_thinning import Thinning, Throttle
 class EventPublisher:
     """Publishes events on /simscen/events (JSON) and /rosout (text), and accepted goals on /goal_pose."""
 
-    def __init__(self, out: MessageSink, time: SimTime, case: Case) -> None:
+    def __init__(self, out: MessageSink, time: Clock, case: Case) -> None:
         self._out, self._time = out, time
         self._goals = {goal.name: goal.pose for goal in case.every_goal}
         self._goal = encode.pose_stamped(frame_names.MAP).packer()
@@ -59,7 +59,7 @@ class RobotPublisher:
     def __init__(
         self,
         out: LogPublisher,
-        time: SimTime,
+        time: Clock,
         header: LogHeader,
         scenery: Scenery,
         robot: str,
@@ -109,7 +109,7 @@ LOCAL_PLAN_RATE_HZ = 5
 class StackPublisher:
     """Publishes the decisions of a stack: beliefs, plans, costmaps, commands, and log lines."""
 
-    def __init__(self, out: MessageSink, time: SimTime, thinning: Thinning, frames: RobotFrames) -> None:
+    def __init__(self, out: MessageSink, time: Clock, thinning: Thinning, frames: RobotFrames) -> None:
         self._out, self._time, self._thinning, self._frames = out, time, thinning, frames
         self._command = out.batch_writer([(topics.COMMAND, encode.twist())])
         self._belief = out.batch_writer([(topics.BELIEF, encode.pose_with_covariance(frame_names.MAP))])
@@ -159,7 +159,7 @@ class TruthPublisher:
     """
 
     def __init__(
-        self, out: MessageSink, time: SimTime, thinning: Thinning, frames: RobotFrames, publishes_clock: bool
+        self, out: MessageSink, time: Clock, thinning: Thinning, frames: RobotFrames, publishes_clock: bool
     ) -> None:
         self._out, self._time, self._thinning, self._frame = out, time, thinning, frames.truth
         truth = (topics.TRUTH, encode.odometry(frame_names.MAP, frames.truth)), (topics.CLEARANCE, encode.float64())

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from simscen.core.clock import SimTime, Stamp
+from simscen.core.clock import Clock, Stamp
 from simscen.core.geometry import Pose3
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Readings, Scan
 from simscen.record import frame_names, topics
@@ -43,7 +43,7 @@ class SensorPublisher:
     def __init__(
         self,
         out: MessageSink,
-        time: SimTime,
+        time: Clock,
         thinning: Thinning,
         mounts: Mapping[str, Pose3],
         sensors: Mapping[str, str],

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from simscen.core.clock import NS_PER_SECOND, SimTime
+from simscen.core.clock import NS_PER_SECOND, Clock
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
@@ -85,7 +85,7 @@ def group_by_topic(messages: Messages, topic_names: dict[int, str]) -> MessagesB
 
 
 def decode_answer(
-    messages: MessagesByTopic, tick: int, time: SimTime, correction: Pose2 | None, dead_reckoned: Pose2 | None
+    messages: MessagesByTopic, tick: int, time: Clock, correction: Pose2 | None, dead_reckoned: Pose2 | None
 ) -> Answer:
     """Decode the answer at `tick`. Raises ProtocolViolation for an invalid message.
 
@@ -143,7 +143,7 @@ def _correction(messages: MessagesByTopic) -> Pose2 | None:
     return _to_pose2(found[-1]) if found else None
 
 
-def _filtered_odometry(messages: MessagesByTopic, time: SimTime, now: int) -> Iterator[Odometry]:
+def _filtered_odometry(messages: MessagesByTopic, time: Clock, now: int) -> Iterator[Odometry]:
     """Yield the readings of the stack's odometry filter. `now` is the current tick."""
     name = topics.FILTERED_ODOMETRY.name
     exact = _decode_last(messages, name + EXACT_SUFFIX, lambda data: _decode_table(data, ODOMETRY_COLUMNS))
@@ -157,7 +157,7 @@ def _filtered_odometry(messages: MessagesByTopic, time: SimTime, now: int) -> It
             raise ProtocolViolation(f"odometry on {name} in the frame `{wrong_frame}` instead of `{frame_names.ODOM}`")
         rows = [
             (
-                time.tick(message.stamp[0] * NS_PER_SECOND + message.stamp[1]),
+                time.tick_at(message.stamp[0] * NS_PER_SECOND + message.stamp[1]),
                 list(message.pose),
                 [message.vx, message.vy, message.wz],
                 [message.twist_covariance[i] for i in _PLANAR_DIAGONAL],
@@ -175,13 +175,13 @@ def _filtered_odometry(messages: MessagesByTopic, time: SimTime, now: int) -> It
         yield Odometry("", int(tick), Pose2(*pose), Twist(*twist), (vx, vy, wz), (a, b, c, d, e, f, g, h, i))
 
 
-def _path(messages: MessagesByTopic, name: str, tick: int, time: SimTime) -> Path | None:
+def _path(messages: MessagesByTopic, name: str, tick: int, time: Clock) -> Path | None:
     """Return the last path on the topic `name`, or None. A path that is only on the exact topic gets `tick`."""
     message = _decode_last(messages, name, partial(decode_checked, decode.path))
     exact = _decode_last(messages, name + EXACT_SUFFIX, lambda data: _decode_table(data, 3))
     if message is None and exact is None:
         return None
-    plan_tick = tick if message is None else time.tick(message.stamp)
+    plan_tick = tick if message is None else time.tick_at(message.stamp)
     points = exact if exact is not None else to_planar(message.poses) if message is not None else np.empty((0, 3))
     if not np.isfinite(points).all():
         raise ProtocolViolation(f"a path on {name} that is not finite")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.clock import SimTime
+from simscen.core.clock import Clock
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose3
 from simscen.core.messages.navigation import Estimate
@@ -40,7 +40,7 @@ class StepPublisher:
         self._requested_topics: frozenset[str] = frozenset()
         self._requested_sensors: set[str] = set()
         self._latched: list[tuple[Topic, bytes]] = []
-        self._time = SimTime(tick_rate)
+        self._time = Clock(tick_rate)
         self._sensors = SensorPublisher(self, self._time, Thinning(tick_rate), mounts, sensors, RobotFrames())
         self.sensor_topics = self._sensors.sensor_topics
         """Pairs of a sensor name and a topic with readings of that sensor."""

@@ -14,7 +14,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from simscen.core.clock import NS_PER_SECOND, Clock, SimTime
+from simscen.core.clock import NS_PER_SECOND, Clock
 from simscen.core.environment.costmap_filters import FilterMasks, SpeedLimits
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
@@ -50,7 +50,7 @@ class ReferenceStackPeer(Peer):
         self._had_plan = False
         self._goal_index: Value = 0
         super().__init__("simscen's reference stack", every_beat=True, topics=None, modes=get_args(Mode))
-        self._time = SimTime(self.hello["tick_rate"])
+        self._time = Clock(self.hello["tick_rate"])
         self._sensors = {topic["topic"]: topic.get("sensor", "") for topic in self.hello["says"]}
 
     def serve(self) -> None:
@@ -141,7 +141,7 @@ class ReferenceStackPeer(Peer):
         return Pose3(*(self.hello["sensors"][sensor]["mount"] or ()))
 
     def _tick(self, stamp: messages.Stamp) -> int:
-        return self._time.tick(stamp[0] * NS_PER_SECOND + stamp[1])
+        return self._time.tick_at(stamp[0] * NS_PER_SECOND + stamp[1])
 
     def _send_decision(self, step: Step, decision: Decision, stack: Stack) -> None:
         vx, vy, wz = decision.command

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any, TypeVar
 
-from simscen.core.clock import Clock, SimTime
+from simscen.core.clock import Clock
 from simscen.core.environment.costmap_filters import Zones
 from simscen.core.errors import InvalidInput, RunError
 from simscen.core.external_command import ExternalCommand
@@ -73,7 +73,7 @@ class ExternalStack:
         """
         self._name, self._command, self._log_file = name, command, log_file
         self._surroundings, self._parameters = surroundings, parameters
-        self._time = SimTime(surroundings.tick_rate)
+        self._time = Clock(surroundings.tick_rate)
         self._goals = GoalTracker(parameters.stop_on_failure, surroundings.tick_rate, parameters.mode)
         self._publisher = StepPublisher(surroundings.tick_rate, parameters.sensors, parameters.mounts)
         self._zone_masks = ZoneMasks(surroundings, parameters.switchable_zones)

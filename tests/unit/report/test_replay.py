@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simscen.core.clock import SimTime
+from simscen.core.clock import Clock
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.core.messages.goals import Goal
@@ -197,7 +197,7 @@ def test_local_costmap_is_drawn_at_the_estimated_odom_frame() -> None:
 def test_grids_with_equal_frame_are_stored_as_differences() -> None:
     cells = np.zeros((3, 4), dtype=np.int8)
     near = np.full((2, 2), 50, dtype=np.int8)
-    seen = SensorMessages(SimTime(240))
+    seen = SensorMessages(Clock(240))
     packed = [(0, cells), (240, cells + 7), (480, cells)]
     take = seen.handler(GLOBAL_COSTMAP.name, GLOBAL_COSTMAP.type)
     assert take is not None

@@ -12,7 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2] / "browser"))
 from nav2_report import ERROR, INFO, PARAMETERS, WARNING, with_nav2_report
 
-from simscen.core.clock import SimTime
+from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
 from simscen.core.records.case import Case
 from simscen.peer.messages import BEHAVIOR_TREE_LOGGER, log, tree_change
@@ -30,7 +30,7 @@ RATE = 240
 
 def log_with(*lines: tuple[int, int, str, str], stack: dict[str, str] | None = None) -> Log:
     """Return a log with lines of /rosout: tick, severity, logger, and text."""
-    time = SimTime(RATE)
+    time = Clock(RATE)
     messages = [(tick, log(time.stamp(tick), *line)) for tick, *line in lines]
     trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]})
     sensors = SensorMessages(time, lines=messages)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simscen.core.clock import SimTime
+from simscen.core.clock import Clock
 from simscen.core.geometry import Pose2
 from simscen.peer import messages, wire
 from simscen.peer.cdr import HEADER
@@ -16,7 +16,7 @@ from simscen.run.external.goal_tracker import GoalTracker
 from simscen.run.external.handshake import Welcome
 from simscen.run.external.protocol import STACK_TOPICS, ProtocolViolation, TopicTable
 
-TIME = SimTime(240)
+TIME = Clock(240)
 EXAMPLES = {
     "/cmd_vel": messages.twist(1, 2, 3),
     "/plan": messages.path((1, 0), [(1, 2, 3), (4, 5, 6)]),
