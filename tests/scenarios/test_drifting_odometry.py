@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.bench.navigation.experiments import write_narrow_fields
+from simscen.bench.navigation.obstacle_fields import write_narrow_fields
 from simscen.core.records.events import EventKind
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import PreparedScenario, prepare

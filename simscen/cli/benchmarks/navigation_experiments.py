@@ -7,7 +7,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simscen.bench.navigation import barn, experiments, generated_worlds, random_goals
+from simscen.bench.navigation import (
+    barn,
+    experiments,
+    generated_worlds,
+    localization_drives,
+    moving_cylinders,
+    obstacle_fields,
+    random_goals,
+)
 from simscen.bench.navigation.experiments import Experiment
 from simscen.bench.navigation.generated_worlds import write_office_map
 
@@ -97,9 +105,9 @@ def _other_names(group: str, scenarios: Path) -> list[str]:
         case "BARN":
             return [f"BARN, {variant}" for variant in ("default parameters", *barn.CONTROLLERS)]
         case "narrow fields":
-            return [experiments.narrow_fields_name(margin) for margin in experiments.NARROW_MARGINS_M]
+            return [obstacle_fields.narrow_fields_name(margin) for margin in obstacle_fields.NARROW_MARGINS_M]
         case "dynamic fields":
-            return [experiments.dynamic_fields_name(speed) for speed in barn.SPEEDS_M_S]
+            return [moving_cylinders.dynamic_fields_name(speed) for speed in moving_cylinders.SPEEDS_M_S]
         case "random goals":
             return ["random goals, ROS maps"]
         case "degraded sensing":
@@ -109,9 +117,9 @@ def _other_names(group: str, scenarios: Path) -> list[str]:
         case "tb3_sandbox":
             return ["tb3_sandbox, unmapped box"]
         case "corner cases":
-            return [experiments.corner_case_name(file) for file in experiments.corner_case_files(scenarios)]
+            return [case.name for case in experiments.corner_cases(scenarios, ())]
         case "localization":
-            return [f"localization, {name}" for name in experiments.LOCALIZATION_EXPERIMENTS]
+            return [f"localization, {name}" for name in localization_drives.LOCALIZATION_EXPERIMENTS]
         case _:
             return []
 
@@ -125,17 +133,17 @@ def _groups_without_names(
         ExperimentGroup(
             "generated fields",
             generated,
-            lambda: [experiments.write_generated_fields(generated, sizes.numbers(sizes.fields))],
+            lambda: [obstacle_fields.write_generated_fields(generated, sizes.numbers(sizes.fields))],
         ),
         ExperimentGroup(
             "narrow fields",
             generated,
-            lambda: experiments.write_narrow_fields(generated, sizes.numbers(sizes.fields // 2)),
+            lambda: obstacle_fields.write_narrow_fields(generated, sizes.numbers(sizes.fields // 2)),
         ),
         ExperimentGroup(
             "dynamic fields",
             generated,
-            lambda: experiments.write_dynamic_fields(generated, sizes.numbers(sizes.dynamic)),
+            lambda: moving_cylinders.write_dynamic_fields(generated, sizes.numbers(sizes.dynamic)),
         ),
         ExperimentGroup("random goals", worlds, lambda: list(_random_goals(generated, worlds, sizes))),
         ExperimentGroup("degraded sensing", worlds, lambda: _degraded(generated, worlds, sizes)),
@@ -156,12 +164,12 @@ def _groups_without_names(
         ExperimentGroup(
             "corner cases",
             scenarios,
-            lambda: experiments.corner_cases(scenarios, scenarios.parent, sizes.scenario_seeds(20)),
+            lambda: experiments.corner_cases(scenarios, sizes.scenario_seeds(20)),
         ),
         ExperimentGroup(
             "localization",
             worlds,
-            lambda: experiments.write_localization_experiments(
+            lambda: localization_drives.write_localization_experiments(
                 generated, worlds, sizes.scenario_seeds(20), sizes.numbers(sizes.lost)
             ),
         ),
@@ -171,10 +179,10 @@ def _groups_without_names(
 def _barn(generated: Path, barn_data: Path, sizes: Sizes) -> Iterator[Experiment]:
     """Write the experiments of BARN: the tuned stack at 2 m/s, the default stack, and each controller at 0.5 m/s."""
     seeds = sizes.scenario_seeds(5)
-    yield experiments.write_barn_challenge(generated, barn_data, seeds)
-    yield experiments.write_barn_challenge(generated, barn_data, seeds, "default parameters", barn.DEFAULT_STACK)
+    yield barn.write_barn_challenge(generated, barn_data, seeds)
+    yield barn.write_barn_challenge(generated, barn_data, seeds, "default parameters", barn.DEFAULT_STACK)
     for controller, stack in barn.CONTROLLERS.items():
-        yield experiments.write_barn_challenge(generated, barn_data, seeds, controller, stack)
+        yield barn.write_barn_challenge(generated, barn_data, seeds, controller, stack)
 
 
 def _random_goals(generated: Path, worlds: Path, sizes: Sizes) -> Iterator[Experiment]:

@@ -4,14 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from simscen.bench.navigation.experiments import (
-    Experiment,
-    corner_cases,
-    write_dynamic_fields,
-    write_generated_fields,
-    write_localization_experiments,
-    write_sandbox,
-)
+from simscen.bench.navigation.experiments import Experiment, corner_cases, write_sandbox
+from simscen.bench.navigation.localization_drives import write_localization_experiments
+from simscen.bench.navigation.moving_cylinders import write_dynamic_fields
+from simscen.bench.navigation.obstacle_fields import write_generated_fields
 from simscen.cli.benchmarks.navigation import with_stack
 from simscen.loading.scenario import load_scenario
 
@@ -51,7 +47,7 @@ def test_localization_drives_have_different_wrong_estimates(tmp_path: Path) -> N
 
 
 def test_every_corner_case_that_ships_is_an_experiment() -> None:
-    cases = corner_cases(PROJECT / "scenarios", PROJECT, range(1, 21))
+    cases = corner_cases(PROJECT / "scenarios", range(1, 21))
     assert {"narrow doorway", "dead end", "u trap"} <= {case.name for case in cases}
     for case in cases:
         loads(case)
@@ -77,7 +73,7 @@ def test_every_experiment_accepts_a_nav2_parameter_file(tmp_path: Path) -> None:
     experiments = [
         write_generated_fields(tmp_path / "made", (1,)),
         *write_dynamic_fields(tmp_path / "made", (1,))[:1],
-        *corner_cases(PROJECT / "scenarios", PROJECT, range(1, 2)),
+        *corner_cases(PROJECT / "scenarios", range(1, 2)),
         *write_localization_experiments(tmp_path / "made", PROJECT / "worlds", range(1, 2), range(1, 2)),
     ]
     for other in with_stack(tmp_path / "ours.stack.yaml", experiments, tmp_path / "made", PROJECT):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.bench.navigation.barn import (
+from simscen.bench.navigation.moving_cylinders import (
     ARENA_HALF_WIDTH_M,
     MAX_SPEED_DEVIATION_M_S,
     MOVER_COUNT_RANGE,
