@@ -1,9 +1,5 @@
-"""Benchmark of `simscen bench localization`: runs AMCL with several parameter sets on the same generated logs.
+"""Benchmark of `simscen bench localization`: runs AMCL with several parameter sets on the same generated logs."""
 
-NEES is the normalized estimation error squared of a belief, and ANEES its average over several beliefs.
-"""
-
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -12,14 +8,24 @@ from multiprocessing import get_context
 import numpy as np
 
 from simscen.advanced.spec import ScanMatchingAmcl
+from simscen.bench.localization.consistency import (
+    Consistency,
+    Interval,
+    anees_bounds,
+    fraction_in_ellipsoid,
+    grouped_anees_bounds,
+)
 from simscen.bench.localization.generated_logs import CIRCUMSTANCES, KIDNAPPED_AT_S, Log, generate_log
-from simscen.bench.localization.recorded_drive import compare_with_reference, localize
-from simscen.core.geometry import Array
+from simscen.bench.localization.recorded_drive import (
+    LocalizationResult,
+    PoseErrors,
+    compare_with_reference,
+    localize,
+)
+from simscen.core.geometry import Array, wrap_array
 from simscen.core.random_streams import Streams
-from simscen.core.records.trace import Trace
-from simscen.core.statistics import bootstrap_mean_interval, chi2_quantile, nees_mean_bounds
-from simscen.criteria.trace_signals.estimation_errors import DIMENSIONS, nees_samples
-from simscen.criteria.trace_signals.estimation_errors import nees as nees_of_errors
+from simscen.core.statistics import bootstrap_mean_interval
+from simscen.criteria.trace_signals.estimation_errors import nees
 from simscen.model.localizers import Amcl, AmclParameters, Localizer
 from simscen.model.stack import StackSpec
 from simscen.record.localization_logs.rows import TICK_RATE_HZ
@@ -44,9 +50,6 @@ CHECK_TIMES_S = (15.0, 30.0, 45.0, 60.0, 75.0)
 """Times in a log at which the NEES is computed."""
 ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), None, 0.6, 0.3, 0.0, 1.0, 1.0, 1.0, 2.0)
 """Robot model that AMCL requires. The logs do not depend on the robot model."""
-
-Interval = tuple[float, float] | None
-"""Lower and upper limit of a 95 % confidence interval; None with too few buildings."""
 
 
 @dataclass(frozen=True)
@@ -91,24 +94,6 @@ class SuccessRate:
     count: int
     of: int
     interval: Interval
-
-
-@dataclass(frozen=True)
-class Consistency:
-    """Average NEES (ANEES) of a localizer: 3 if its covariances match its errors.
-
-    anees:         ANEES over all logs and CHECK_TIMES_S
-    bounds:        95 % bounds of `anees` if the covariances are right on average, from `grouped_anees_bounds`
-    inside:        fraction of the errors within the 95 % ellipsoid of the covariance
-    moments:       ANEES over all logs at each of CHECK_TIMES_S
-    moment_bounds: 95 % bounds of each of `moments` if the localizer is consistent, from `anees_bounds`
-    """
-
-    anees: float
-    bounds: Interval
-    inside: float
-    moments: Sequence[float]
-    moment_bounds: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -157,14 +142,12 @@ def run_building(building: int, names: Sequence[str]) -> Mapping[str, Sequence[T
 
 def run_trial(log: Log, localizer: Localizer, seed: int) -> Trial:
     """Run a localizer on a log. Everything except CPU times is deterministic."""
-    spec = StackSpec(localizer=localizer)
-    localized = localize(log.sensed, spec, Surroundings(ROBOT, log.map, TICK_RATE_HZ), log.estimate, seed)
-    errors = compare_with_reference(localized, log.sensed, LOST_M)
-    assert errors is not None  # a generated log has a reference from its first reading to its last
+    localized, errors = localize_in_log(log, localizer, seed)
     truth = log.sensed.truth
     rows = np.searchsorted(localized.times, CHECK_TIMES_S)
     pose_errors = localized.poses[rows] - truth[rows]
-    pose_errors[:, 2] = (pose_errors[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    pose_errors[:, 2] = wrap_array(pose_errors[:, 2])
+    i, k = np.triu_indices(3)
     lost_at = KIDNAPPED_AT_S if log.circumstance == "kidnapped" else 0.0
     return Trial(
         building=log.building,
@@ -174,10 +157,19 @@ def run_trial(log: Log, localizer: Localizer, seed: int) -> Trial:
         median=float(np.median(errors.distance)),
         largest=float(errors.distance.max()),
         found=_time_found(errors.times - lost_at, errors.distance),
-        nees=tuple(nees(*each) for each in zip(pose_errors, localized.covariances[rows], strict=True)),
+        nees=tuple(nees(pose_errors, localized.covariances[rows][:, i, k]).tolist()),
         ms=localized.cpu_s * 1e3 / localized.scan_count,
         slowest_ms=localized.slowest_reading_s * 1e3,
     )
+
+
+def localize_in_log(log: Log, localizer: Localizer, seed: int) -> tuple[LocalizationResult, PoseErrors]:
+    """Run a localizer on a log, and return its beliefs and their errors."""
+    surroundings = Surroundings(ROBOT, log.map, TICK_RATE_HZ)
+    localized = localize(log.sensed, StackSpec(localizer=localizer), surroundings, log.estimate, seed)
+    errors = compare_with_reference(localized, log.sensed, LOST_M)
+    assert errors is not None  # a generated log has a reference from its first reading to its last
+    return localized, errors
 
 
 def _time_found(times: Array, distance: Array) -> float | None:
@@ -232,50 +224,3 @@ def _means_by_building(trials: Sequence[Trial], values: Sequence[float]) -> list
 def _interval(values: Sequence[float]) -> Interval:
     """Return the bootstrap interval of the mean of the values."""
     return bootstrap_mean_interval(values, Streams(1).generator("bootstrap"))
-
-
-MIN_GROUPS = 3
-"""Minimum number of buildings for `grouped_anees_bounds`."""
-
-
-def nees(error: Array, covariance: Array) -> float:
-    """Return the NEES e' P^-1 e of an error e (3,) in m, m, rad with the covariance P (3, 3); inf if P is singular."""
-    return float(nees_of_errors(error[np.newaxis], covariance[np.triu_indices(3)][np.newaxis])[0])
-
-
-def nees_at(trace: Trace, seconds: float) -> float | None:
-    """Return the NEES of the belief at this time of a run; None before the first belief and after the end.
-
-    `trace` has the recorded states of the run.
-    """
-    samples, tick = nees_samples(trace), round(seconds * trace.tick_rate)
-    if not len(samples) or tick < samples.ticks[0] or tick > trace.end:
-        return None
-    return float(samples.at(np.array([tick]))[0, 0])
-
-
-def fraction_in_ellipsoid(values: Sequence[float]) -> float:
-    """Return the fraction of NEES `values` up to the 95 % quantile of the chi-square distribution."""
-    return float(np.mean(np.asarray(values) <= chi2_quantile(0.95, DIMENSIONS)))
-
-
-def anees_bounds(runs: int) -> tuple[float, float]:
-    """Return 95 % bounds of the ANEES of a consistent localizer over this number of independent runs."""
-    return nees_mean_bounds(runs, DIMENSIONS, 0.95)
-
-
-def grouped_anees_bounds(groups: Sequence[float]) -> Interval:
-    """Return 95 % bounds of the mean of `groups` if the covariances are right on average.
-
-    `groups` has the ANEES of each building. NEES values of one building may be correlated. The bounds are Student's t
-    interval for the logarithm of the mean (delta method). Return None with fewer than MIN_GROUPS buildings, or if the
-    mean is infinite or not positive.
-    """
-    count, mean = len(groups), float(np.mean(groups))
-    if count < MIN_GROUPS or not 0.0 < mean < math.inf:
-        return None
-    from scipy.special import stdtrit
-
-    error = float(np.std(groups, ddof=1)) / mean / math.sqrt(count)
-    factor = math.exp(float(stdtrit(count - 1, 0.975)) * error)
-    return DIMENSIONS / factor, DIMENSIONS * factor

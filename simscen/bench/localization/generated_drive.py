@@ -8,7 +8,6 @@ import numpy as np
 
 from simscen.bench.localization.buildings import HEIGHT_M, Building, extruded_mesh
 from simscen.core.geometry import Array, Pose2
-from simscen.core.geometry.shapes import TriangleMesh
 from simscen.model.robot import Lidar, WheelOdometry
 from simscen.worlds.raycasting.ray_scene import RayScene
 from simscen.worlds.routes.shortest_paths import ShortestPaths
@@ -122,19 +121,21 @@ RANDOM_ERRORS_ONLY = OdometryErrors(0.0, 0.0, 0.0, has_slip=False)
 """No systematic errors and no slip, only the random errors of WheelOdometry."""
 
 
-def simulate_odometry(
-    truth: Array, seconds: float, errors: OdometryErrors, spec: WheelOdometry, rng: np.random.Generator
-) -> Array:
-    """Return the odometry poses (k, 3) in the odom frame for true poses `truth` (k, 3) that are `seconds` apart."""
+def simulate_odometry(truth: Array, errors: OdometryErrors, rng: np.random.Generator) -> Array:
+    """Return the odometry poses (k, 3) in the odom frame for true poses `truth` (k, 3) that are STEP_S apart.
+
+    The random errors are those of the default WheelOdometry.
+    """
+    noise = WheelOdometry()
     steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(Pose2(*row) for row in truth))])
     distance = np.hypot(steps[:, 0], steps[:, 1])
     scale, turn, bend = 1 + rng.normal(0, errors.scale), 1 + rng.normal(0, errors.turn), rng.normal(0, errors.bend)
     translation_draws, rotation_draws = rng.standard_normal((2, len(steps)))
-    stretch = scale * _slip_factors(len(steps), seconds, errors.has_slip, rng)
+    stretch = scale * _slip_factors(len(steps), errors.has_slip, rng)
     moving = distance > 0
-    stretch[moving] += spec.translation_noise * translation_draws[moving] / np.sqrt(distance[moving])
-    heading_std = np.sqrt(spec.rotation_noise**2 * np.abs(steps[:, 2]) + spec.drift_noise**2 * distance)
-    turn_slip = _slip_factors(len(steps), seconds, errors.has_slip, rng)
+    stretch[moving] += noise.translation_noise * translation_draws[moving] / np.sqrt(distance[moving])
+    heading_std = np.sqrt(noise.rotation_noise**2 * np.abs(steps[:, 2]) + noise.drift_noise**2 * distance)
+    turn_slip = _slip_factors(len(steps), errors.has_slip, rng)
     turned = steps[:, 2] * turn * turn_slip + bend * distance + heading_std * rotation_draws
     poses = [Pose2(0.0, 0.0, 0.0)]
     for x, y, yaw in np.column_stack((steps[:, 0] * stretch, steps[:, 1] * stretch, turned))[1:].tolist():
@@ -142,19 +143,19 @@ def simulate_odometry(
     return np.array(poses)
 
 
-def _slip_factors(count: int, seconds: float, has_slip: bool, rng: np.random.Generator) -> Array:
-    """Return the ratio of wheel motion to robot motion for `count` steps of `seconds`.
+def _slip_factors(count: int, has_slip: bool, rng: np.random.Generator) -> Array:
+    """Return the ratio of wheel motion to robot motion for `count` steps of STEP_S.
 
     The ratio is 1 without slip, and random between 0.9 and 1.4 during a slip.
     """
     factor = np.ones(count)
     if not has_slip:
         return factor
-    row = int(rng.exponential(MEAN_SLIP_INTERVAL_S) / seconds)
+    row = int(rng.exponential(MEAN_SLIP_INTERVAL_S) / STEP_S)
     while row < count:
-        end = row + max(1, int(rng.uniform(*SLIP_DURATION_S) / seconds))
+        end = row + max(1, int(rng.uniform(*SLIP_DURATION_S) / STEP_S))
         factor[row:end] = rng.uniform(0.9, 1.4)
-        row = end + int(rng.exponential(MEAN_SLIP_INTERVAL_S) / seconds)
+        row = end + int(rng.exponential(MEAN_SLIP_INTERVAL_S) / STEP_S)
     return factor
 
 
@@ -200,9 +201,10 @@ GLASS_TRANSMISSION = 0.8
 class PartlyTransparentScene:
     """Ray caster for a building with glass, which a beam passes with the probability GLASS_TRANSMISSION."""
 
-    def __init__(self, opaque: TriangleMesh, everything: TriangleMesh) -> None:
-        """Take the mesh without glass, and the mesh with glass."""
-        self._opaque, self._everything = RayScene(opaque), RayScene(everything)
+    def __init__(self, floor: Building, furniture: Array) -> None:
+        """Take the floor, and boxes (n, 4) of the furniture that replaces the furniture of the floor."""
+        self._opaque = RayScene(extruded_mesh(floor.walls, furniture))
+        self._everything = RayScene(extruded_mesh(floor.walls, floor.glass, furniture))
 
     def distances(self, poses: Array, angles: Array, max_range: float, rng: np.random.Generator) -> Array:
         """Return true ranges (n, b) for lidar `poses` (n, 3) and beam `angles` (b,); inf beyond `max_range`."""
@@ -218,8 +220,7 @@ class PartlyTransparentScene:
 
 def beam_angles(spec: Lidar) -> Array:
     """Return the angles (b,) in rad of the beams in the lidar frame."""
-    full = spec.field_of_view >= 2 * np.pi - 1e-9
-    increment = spec.field_of_view / (spec.beams if full else spec.beams - 1)
+    increment = spec.field_of_view / (spec.beams - 1)
     angles: Array = -spec.field_of_view / 2 + increment * np.arange(spec.beams, dtype=np.float64)
     return angles
 

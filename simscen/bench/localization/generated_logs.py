@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from simscen.bench.localization.buildings import Building, extruded_mesh, generate_building, rearranged_furniture
+from simscen.bench.localization.buildings import Building, generate_building, rearranged_furniture
 from simscen.bench.localization.generated_drive import (
     RANDOM_ERRORS_ONLY,
     STEP_S,
@@ -27,7 +27,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.random_streams import Streams
-from simscen.model.robot import Lidar, WheelOdometry
+from simscen.model.robot import Lidar
 from simscen.record.localization_logs.read import LocalizationLog
 from simscen.record.localization_logs.rows import TICK_RATE_HZ
 
@@ -60,9 +60,8 @@ def draw_map(poses: Array, angles: Array, ranges: Array, size: tuple[float, floa
     ended = count_per_cell(clipped, np.isfinite(ranges) & (ranges < MAP_RANGE_M))
     passed = np.zeros_like(ended)
     for step in np.arange(0.0, MAP_RANGE_M, 2 * CELL_M):  # neighboring beams pass the cells between
-        along = np.full_like(clipped, step)
         if (selected := clipped - step > CELL_M).any():
-            passed += count_per_cell(along, selected)
+            passed += count_per_cell(np.full_like(clipped, step), selected)
     cells = np.full(height * width, UNKNOWN, dtype=np.int8)
     cells[passed > 0] = FREE
     cells[(ended > 0) & (ended >= OCCUPIED_FRACTION * (ended + passed))] = OCCUPIED
@@ -132,11 +131,11 @@ def generate_log(building: int, number: int, circumstance: str, seconds: float =
     floor = generate_building(building, int(circumstance == "outdated"))
     truth, furniture = _drive_in_furniture(floor, circumstance, seconds, rng)
     errors = RANDOM_ERRORS_ONLY if circumstance == "clean" else OdometryErrors()
-    odometry = simulate_odometry(truth, STEP_S, errors, WheelOdometry(), rng)
+    odometry = simulate_odometry(truth, errors, rng)
     if circumstance == "kidnapped":
         after, _ = _drive_in_furniture(floor, circumstance, seconds, rng, furniture)
         row = int(KIDNAPPED_AT_S / STEP_S)
-        odometry_after = simulate_odometry(after, STEP_S, OdometryErrors(), WheelOdometry(), rng)
+        odometry_after = simulate_odometry(after, OdometryErrors(), rng)
         last = Pose2(*odometry[row])
         continued = [last.compose(Pose2(*pose)) for pose in odometry_after[: len(truth) - row].tolist()]
         odometry = np.vstack((odometry[:row], continued))
@@ -145,10 +144,7 @@ def generate_log(building: int, number: int, circumstance: str, seconds: float =
     poses = truth[::scan_every]
     lidar_poses = np.array([Pose2(*pose).compose(LIDAR_MOUNT) for pose in poses.tolist()])
     angles = beam_angles(lidar)
-    scene = PartlyTransparentScene(
-        extruded_mesh(floor.walls, furniture), extruded_mesh(floor.walls, floor.glass, furniture)
-    )
-    ranges = scene.distances(lidar_poses, angles, lidar.max_range, rng)
+    ranges = PartlyTransparentScene(floor, furniture).distances(lidar_poses, angles, lidar.max_range, rng)
     if circumstance not in UNCHANGED_CIRCUMSTANCES:
         people = simulate_people(floor, len(poses), scan_every * STEP_S, PEOPLE_COUNT, rng)
         ranges = occlude_by_people(people, lidar_poses, angles, ranges)
@@ -190,10 +186,7 @@ def building_map(building: int) -> OccupancyGrid:
     floor, rng = generate_building(building), Streams(building).generator("map")
     poses = mapping_tour(floor)
     angles = np.linspace(-np.pi, np.pi, 480, endpoint=False)
-    scene = PartlyTransparentScene(
-        extruded_mesh(floor.walls, floor.furniture), extruded_mesh(floor.walls, floor.glass, floor.furniture)
-    )
-    ranges = scene.distances(poses, angles, 80.0, rng)
+    ranges = PartlyTransparentScene(floor, floor.furniture).distances(poses, angles, 80.0, rng)
     return draw_map(poses + rng.normal(0, MAPPING_POSE_STD, poses.shape), angles, ranges, floor.size)
 
 

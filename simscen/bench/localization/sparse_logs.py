@@ -3,23 +3,18 @@
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from multiprocessing import get_context
 
 import numpy as np
 
 from simscen.advanced.spec import ScanMatchingAmcl
-from simscen.bench.localization.campaign import LOST_M, ROBOT
+from simscen.bench.localization.campaign import localize_in_log
 from simscen.bench.localization.generated_logs import Log, generate_log
-from simscen.bench.localization.recorded_drive import compare_with_reference, localize
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.random_streams import Streams
 from simscen.model.localizers import Amcl, AmclParameters
-from simscen.model.stack import StackSpec
 from simscen.record.localization_logs.read import LocalizationLog
-from simscen.record.localization_logs.rows import TICK_RATE_HZ
-from simscen.stack.protocols import Surroundings
 
 RECOVERY_PARAMETERS = {"recovery_alpha_slow": 0.001, "recovery_alpha_fast": 0.1}
 """Parameters that let AMCL add random particles. The values are those of nav2_amcl's documentation."""
@@ -62,7 +57,7 @@ class SparseTrial:
     """Result of one localizer with one seed on one log. The names of the fields are keys of the JSON output.
 
     `kind` is a key of KINDS, `localizer` a key of LOCALIZERS. `median` is the median position error in m, and `end` is
-    the last position error in m. `lost` is true if any position error exceeded LOST_M.
+    the last position error in m. `lost` is true if any position error exceeded LOST_M of campaign.py.
     """
 
     kind: str
@@ -74,7 +69,7 @@ class SparseTrial:
     lost: bool
 
 
-def thin_scans(log: Log, ends_after_turn: bool = False) -> Log:
+def thin_scans(log: Log, ends_after_turn: bool) -> Log:
     """Return the log with all odometry messages, but only with scans SCAN_SPACING_M or SCAN_SPACING_RAD apart.
 
     With `ends_after_turn`, the log ends at the last scan after a turn of END_TURN_RAD, if there is such a turn.
@@ -86,8 +81,11 @@ def thin_scans(log: Log, ends_after_turn: bool = False) -> Log:
         if isinstance(reading, Odometry):
             odometry = reading.pose
         elif isinstance(reading, Scan):
-            if selected and not _is_spaced(selected[-1][1], odometry):
-                continue
+            if selected:
+                last = selected[-1][1]
+                turned = abs(wrap(odometry.yaw - last.yaw))
+                if last.distance(odometry) < SCAN_SPACING_M and turned < SCAN_SPACING_RAD:
+                    continue
             selected.append((reading.tick, odometry))
             if len(selected) > 2 and abs(wrap(odometry.yaw - selected[-3][1].yaw)) > END_TURN_RAD:
                 end = reading.tick
@@ -116,12 +114,6 @@ def with_missed_turns(log: Log) -> Log:
     return replace(log, sensed=replace(log.sensed, readings=readings))
 
 
-def _is_spaced(last: Pose2, now: Pose2) -> bool:
-    """Return whether two odometry poses are SCAN_SPACING_M or SCAN_SPACING_RAD apart."""
-    return last.distance(now) >= SCAN_SPACING_M or abs(wrap(now.yaw - last.yaw)) >= SCAN_SPACING_RAD
-
-
-@lru_cache(maxsize=1)
 def generate_sparse_log(kind: str, building: int) -> Log:
     """Generate the sparse log of a kind (a key of KINDS) in a building. The result depends on the arguments only."""
     circumstance, ends_after_turn = KINDS[kind]
@@ -138,17 +130,14 @@ def run_sparse_logs(buildings: Sequence[int], workers: int) -> Iterator[Sequence
 
 def run_sparse_log(kind: str, building: int) -> Sequence[SparseTrial]:
     """Run all LOCALIZERS with all seeds on one sparse log."""
-    return [run_sparse_trial(kind, building, name, seed) for name in LOCALIZERS for seed in range(1, SEED_COUNT + 1)]
-
-
-def run_sparse_trial(kind: str, building: int, name: str, seed: int) -> SparseTrial:
-    """Run the localizer `name` (a key of LOCALIZERS) with one seed on one sparse log."""
-    log, spec = generate_sparse_log(kind, building), StackSpec.model_validate({"localizer": LOCALIZERS[name]})
-    localized = localize(log.sensed, spec, Surroundings(ROBOT, log.map, TICK_RATE_HZ), log.estimate, seed)
-    errors = compare_with_reference(localized, log.sensed, LOST_M)
-    assert errors is not None  # a generated log has a reference from its first reading to its last
-    figures = errors.figures()
-    return SparseTrial(kind, name, building, seed, figures["median"], figures["final"], bool(errors.lost))
+    log = generate_sparse_log(kind, building)
+    trials = []
+    for name, localizer in LOCALIZERS.items():
+        for seed in range(1, SEED_COUNT + 1):
+            _, errors = localize_in_log(log, localizer, seed)
+            figures, lost = errors.figures(), bool(errors.lost)
+            trials.append(SparseTrial(kind, name, building, seed, figures["median"], figures["final"], lost))
+    return trials
 
 
 def sparse_table(trials: Sequence[SparseTrial]) -> list[tuple[str, ...]]:

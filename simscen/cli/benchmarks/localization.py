@@ -17,7 +17,8 @@ from simscen.loading.schema.messages import quoted
 from simscen.report.display_text import detect_style
 
 if TYPE_CHECKING:
-    from simscen.bench.localization.campaign import Consistency, Interval, ParameterSetResults, SuccessRate, Trial
+    from simscen.bench.localization.campaign import ParameterSetResults, SuccessRate, Trial
+    from simscen.bench.localization.consistency import Consistency, Interval
     from simscen.bench.localization.sparse_logs import SparseTrial
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from simscen.bench.localization.campaign import anees_bounds, nees_at
+from simscen.bench.localization.consistency import anees_bounds, nees_at
 from simscen.bench.navigation.experiments import Drive, Experiment
 from simscen.bench.navigation.summary import ExperimentSummary, Trial, mean, summarize
 from simscen.cli.benchmarks.results import print_progress

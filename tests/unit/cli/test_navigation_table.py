@@ -1,7 +1,8 @@
 import json
 from dataclasses import replace
 
-from simscen.bench.localization.campaign import CONSISTENCY_CIRCUMSTANCES, Consistency, ParameterSetResults, SuccessRate
+from simscen.bench.localization.campaign import CONSISTENCY_CIRCUMSTANCES, ParameterSetResults, SuccessRate
+from simscen.bench.localization.consistency import Consistency
 from simscen.bench.navigation.summary import Difference, ExperimentComparison, ExperimentSummary
 from simscen.cli.benchmarks.localization import COLUMN_NAMES
 from simscen.cli.benchmarks.localization import as_text as localization

@@ -1,0 +1,75 @@
+"""Consistency of a localizer: whether its covariances match its errors.
+
+NEES is the normalized estimation error squared of a belief, and ANEES its average over several beliefs.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.records.trace import Trace
+from simscen.core.statistics import chi2_quantile, nees_mean_bounds
+from simscen.criteria.trace_signals.estimation_errors import DIMENSIONS, nees_samples
+
+Interval = tuple[float, float] | None
+"""Lower and upper limit of a 95 % confidence interval; None with too few buildings."""
+MIN_GROUPS = 3
+"""Minimum number of buildings for `grouped_anees_bounds`."""
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """Average NEES (ANEES) of a localizer: 3 if its covariances match its errors.
+
+    anees:         ANEES over all logs and CHECK_TIMES_S
+    bounds:        95 % bounds of `anees` if the covariances are right on average, from `grouped_anees_bounds`
+    inside:        fraction of the errors within the 95 % ellipsoid of the covariance
+    moments:       ANEES over all logs at each of CHECK_TIMES_S
+    moment_bounds: 95 % bounds of each of `moments` if the localizer is consistent, from `anees_bounds`
+    """
+
+    anees: float
+    bounds: Interval
+    inside: float
+    moments: Sequence[float]
+    moment_bounds: tuple[float, float]
+
+
+def nees_at(trace: Trace, seconds: float) -> float | None:
+    """Return the NEES of the belief at this time of a run; None before the first belief and after the end.
+
+    `trace` has the recorded states of the run.
+    """
+    samples, tick = nees_samples(trace), round(seconds * trace.tick_rate)
+    if not len(samples) or tick < samples.ticks[0] or tick > trace.end:
+        return None
+    return float(samples.at(np.array([tick]))[0, 0])
+
+
+def fraction_in_ellipsoid(values: Sequence[float]) -> float:
+    """Return the fraction of NEES `values` up to the 95 % quantile of the chi-square distribution."""
+    return float(np.mean(np.asarray(values) <= chi2_quantile(0.95, DIMENSIONS)))
+
+
+def anees_bounds(runs: int) -> tuple[float, float]:
+    """Return 95 % bounds of the ANEES of a consistent localizer over this number of independent runs."""
+    return nees_mean_bounds(runs, DIMENSIONS, 0.95)
+
+
+def grouped_anees_bounds(groups: Sequence[float]) -> Interval:
+    """Return 95 % bounds of the mean of `groups` if the covariances are right on average.
+
+    `groups` has the ANEES of each building. NEES values of one building may be correlated. The bounds are Student's t
+    interval for the logarithm of the mean (delta method). Return None with fewer than MIN_GROUPS buildings, or if the
+    mean is infinite or not positive.
+    """
+    count, mean = len(groups), float(np.mean(groups))
+    if count < MIN_GROUPS or not 0.0 < mean < math.inf:
+        return None
+    from scipy.special import stdtrit
+
+    error = float(np.std(groups, ddof=1)) / mean / math.sqrt(count)
+    factor = math.exp(float(stdtrit(count - 1, 0.975)) * error)
+    return DIMENSIONS / factor, DIMENSIONS * factor
