@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from simscen.core.geometry.kinematics import Twist
 from simscen.faults.base import Fault, FaultEffect, FaultSetting, FaultTarget
-from simscen.faults.common import OdometryDistortion
+from simscen.faults.common import ChangedCommands, OdometryDistortion
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, PositiveAcceleration, PositiveAngularAcceleration, PositiveSpeed, Quantity
 
@@ -32,12 +32,13 @@ def twist_from_sides(left: float, right: float, lateral: float, wheel_separation
     return Twist((left + right) / 2, lateral, (right - left) / wheel_separation)
 
 
-def inapplicable_side(target: FaultTarget, key: str) -> tuple[str, str] | None:
-    """Return (`key`, reason) if the target has no left and right wheels, otherwise None."""
-    if target.kind != "Wheels":
-        return key, f"`{key}` does not apply there: a command has no sides; set it on `wheels`"
-    if target.spec is not None and not getattr(target.spec, "wheel_separation", 0.0):
-        return key, f"`{key}` does not apply there: this drive has no left and right wheels"
+def inapplicable_side(fault: Gain | Saturation, target: FaultTarget) -> tuple[str, str] | None:
+    """Return (`left` or `right`, reason) if it is set but the target has no left and right wheels, otherwise None."""
+    given = [key for key in ("left", "right") if key in fault.model_fields_set and getattr(fault, key) is not None]
+    if given and target.kind != "Wheels":
+        return given[0], f"`{given[0]}` does not apply there: a command has no sides; set it on `wheels`"
+    if given and target.spec is not None and not getattr(target.spec, "wheel_separation", 0.0):
+        return given[0], f"`{given[0]}` does not apply there: this drive has no left and right wheels"
     return None
 
 
@@ -110,29 +111,19 @@ class Gain(Spec, Fault):
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
         """Return (`left` or `right`, reason) if it is set but the target has no left and right wheels."""
-        for key in ("left", "right"):
-            if key in self.model_fields_set and (finding := inapplicable_side(target, key)):
-                return finding
-        return None
+        return inapplicable_side(self, target)
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to scale velocity commands."""
-        return _ScaledCommands(self, setting.separation)
 
+        def scaled(command: Twist) -> Twist:
+            both = Twist(self.linear * command.vx, self.linear * command.vy, self.angular * command.wz)
+            if not setting.separation or self.left == self.right == 1:
+                return both
+            left, right = side_speeds(both, setting.separation)
+            return twist_from_sides(self.left * left, self.right * right, both.vy, setting.separation)
 
-class _ScaledCommands(FaultEffect):
-    """Effect of `gain`."""
-
-    def __init__(self, gain: Gain, separation: float) -> None:
-        self._gain, self._separation = gain, separation
-
-    def command(self, command: Twist) -> Twist | None:
-        gain, separation = self._gain, self._separation
-        scaled = Twist(gain.linear * command.vx, gain.linear * command.vy, gain.angular * command.wz)
-        if not separation or gain.left == gain.right == 1:
-            return scaled
-        left, right = side_speeds(scaled, separation)
-        return twist_from_sides(gain.left * left, gain.right * right, scaled.vy, separation)
+        return ChangedCommands(scaled)
 
 
 class Saturation(Spec, Fault):
@@ -163,10 +154,7 @@ class Saturation(Spec, Fault):
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
         """Return (`left` or `right`, reason) if it is set but the target has no left and right wheels."""
-        for key in ("left", "right"):
-            if getattr(self, key) is not None and (finding := inapplicable_side(target, key)):
-                return finding
-        return None
+        return inapplicable_side(self, target)
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to limit velocity commands."""
@@ -240,22 +228,11 @@ class LowBattery(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to reduce the maximum speed."""
-        return _DrainingBattery(self, setting)
+        start_tick = setting.now()
 
+        def limited(command: Twist) -> Twist:
+            drained = min(1.0, setting.seconds_since(start_tick) / self.drain) if self.drain > 0 else 1.0
+            speed, max_speed = math.hypot(command.vx, command.vy), self.start + (self.end - self.start) * drained
+            return command if speed <= max_speed else Twist(*(value * max_speed / speed for value in command))
 
-class _DrainingBattery(FaultEffect):
-    """Effect of `low_battery`."""
-
-    def __init__(self, spec: LowBattery, setting: FaultSetting) -> None:
-        self._spec, self._setting, self._start_tick = spec, setting, setting.now()
-
-    def command(self, command: Twist) -> Twist | None:
-        speed, max_speed = math.hypot(command.vx, command.vy), self._max_speed()
-        if speed <= max_speed:
-            return command
-        return Twist(*(value * max_speed / speed for value in command))
-
-    def _max_speed(self) -> float:
-        spec, seconds = self._spec, self._setting.seconds_since(self._start_tick)
-        drained = min(1.0, seconds / spec.drain) if spec.drain > 0 else 1.0
-        return spec.start + (spec.end - spec.start) * drained
+        return ChangedCommands(limited)

@@ -167,7 +167,7 @@ class AnyFault(Choice):
     bias: Annotated[Fault | None, LazySpec("simscen.faults.systematic_errors", "Bias")] = None
     slip: Annotated[Fault | None, LazySpec("simscen.faults.actuation", "Slip")] = None
     glass: Annotated[Fault | None, LazySpec("simscen.faults.lidar_environment", "Glass")] = None
-    extrinsic: Annotated[Fault | None, LazySpec("simscen.faults.systematic_errors", "Extrinsic")] = None
+    extrinsic: Annotated[Fault | None, LazySpec("simscen.faults.extrinsic", "Extrinsic")] = None
     ghost: Annotated[Fault | None, LazySpec("simscen.faults.lidar_beams", "Ghost")] = None
     rain: Annotated[Fault | None, LazySpec("simscen.faults.lidar_environment", "Rain")] = None
     dust: Annotated[Fault | None, LazySpec("simscen.faults.lidar_environment", "Dust")] = None

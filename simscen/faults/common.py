@@ -22,6 +22,11 @@ def apply_correction(belief: Belief, map_from_odom: Pose2) -> Belief:
     return replace(belief, pose=map_from_odom.compose(odometry), map_from_odom=map_from_odom)
 
 
+def apply_pose_error(belief: Belief, error: Pose2) -> Belief:
+    """Return the belief with its pose and its transform displaced by `error`, a transform in the map frame."""
+    return replace(belief, pose=error.compose(belief.pose), map_from_odom=error.compose(belief.map_from_odom))
+
+
 def change_distances(reading: Reading, change: Callable[[Array], Array]) -> Reading:
     """Return a scan or image with its finite ranges or depths changed. Other readings are returned unchanged.
 
@@ -60,6 +65,28 @@ def ranges_with_scan_errors(scan: Scan, new_distances: Array, scan_distances: Ar
     # Rounded, so that rounding errors in the last bits have no effect on the run.
     ranges = np.round(new_distances + np.where(np.isfinite(errors), errors, 0.0), 3)
     return clip_to_sensor_range(scan, ranges)
+
+
+class ChangedRanges(FaultEffect):
+    """Effect that changes only the ranges of scans. `ranges` returns the changed ranges (n,) in m of a scan."""
+
+    def __init__(self, ranges: Callable[[Scan], Array]) -> None:
+        self._ranges = ranges
+
+    def reading(self, reading: Reading) -> Reading:
+        """Return the scan with changed ranges. Other readings are returned unchanged."""
+        return replace(reading, ranges=self._ranges(reading)) if isinstance(reading, Scan) else reading
+
+
+class ChangedCommands(FaultEffect):
+    """Effect that changes only velocity commands. `change` returns the changed command."""
+
+    def __init__(self, change: Callable[[Twist], Twist]) -> None:
+        self._change = change
+
+    def command(self, command: Twist) -> Twist:
+        """Return the changed command."""
+        return self._change(command)
 
 
 class OdometryDistortion(FaultEffect):

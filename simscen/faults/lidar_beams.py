@@ -10,8 +10,10 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
+from simscen.core.geometry import Array
 from simscen.core.messages.sensor_data import Image, Reading, Scan
 from simscen.faults.base import Fault, FaultEffect, FaultSetting, FaultTarget
+from simscen.faults.common import ChangedRanges
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, PositiveAngle, PositiveLength, Probability
 
@@ -29,20 +31,12 @@ class BeamDropout(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to remove beams at random."""
-        return _LostBeams(rng, self.probability)
 
+        def ranges(scan: Scan) -> Array:
+            is_lost = rng.random(len(scan.ranges)) < self.probability
+            return np.where(is_lost, np.nan, scan.ranges)
 
-class _LostBeams(FaultEffect):
-    """Effect of `beam_dropout`."""
-
-    def __init__(self, rng: np.random.Generator, probability: float) -> None:
-        self._rng, self._probability = rng, probability
-
-    def reading(self, reading: Reading) -> Reading | None:
-        if not isinstance(reading, Scan):
-            return reading
-        is_lost = self._rng.random(len(reading.ranges)) < self._probability
-        return replace(reading, ranges=np.where(is_lost, np.nan, reading.ranges))
+        return ChangedRanges(ranges)
 
 
 class Sector(Spec, Fault):
@@ -69,20 +63,12 @@ class Sector(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to remove the beams of the sector from each scan."""
-        return _BlindSector(self.from_, self.width)
 
+        def ranges(scan: Scan) -> Array:
+            offsets = np.remainder(scan.angles() - self.from_ + 1e-9, 2 * math.pi)
+            return np.where(offsets <= self.width + 2e-9, np.nan, scan.ranges)
 
-class _BlindSector(FaultEffect):
-    """Effect of `sector`."""
-
-    def __init__(self, first: float, width: float) -> None:
-        self._first, self._width = first, width
-
-    def reading(self, reading: Reading) -> Reading | None:
-        if not isinstance(reading, Scan):
-            return reading
-        offsets = np.remainder(reading.angles() - self._first + 1e-9, 2 * math.pi)
-        return replace(reading, ranges=np.where(offsets <= self._width + 2e-9, np.nan, reading.ranges))
+        return ChangedRanges(ranges)
 
 
 class RangeLimit(Spec, Fault):
@@ -152,19 +138,10 @@ class Ghost(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to add the ghost to scans at random."""
-        return _GhostHits(rng, self)
 
+        def ranges(scan: Scan) -> Array:
+            offsets = np.remainder(scan.angles() - self.direction + math.pi, 2 * math.pi) - math.pi
+            is_hit = (np.abs(offsets) <= self.width / 2) & (rng.random(len(offsets)) < self.probability)
+            return np.where(is_hit, np.fmin(scan.ranges, self.range), scan.ranges)
 
-class _GhostHits(FaultEffect):
-    """Effect of `ghost`."""
-
-    def __init__(self, rng: np.random.Generator, ghost: Ghost) -> None:
-        self._rng, self._ghost = rng, ghost
-
-    def reading(self, reading: Reading) -> Reading | None:
-        if not isinstance(reading, Scan):
-            return reading
-        ghost = self._ghost
-        offsets = np.remainder(reading.angles() - ghost.direction + math.pi, 2 * math.pi) - math.pi
-        is_hit = (np.abs(offsets) <= ghost.width / 2) & (self._rng.random(len(offsets)) < ghost.probability)
-        return replace(reading, ranges=np.where(is_hit, np.fmin(reading.ranges, ghost.range), reading.ranges))
+        return ChangedRanges(ranges)

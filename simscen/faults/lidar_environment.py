@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from simscen.core.geometry import Array
-from simscen.core.messages.sensor_data import Reading, Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.faults.base import Fault, FaultEffect, FaultSetting
-from simscen.faults.common import clip_to_sensor_range, ranges_with_scan_errors
+from simscen.faults.common import ChangedRanges, clip_to_sensor_range, ranges_with_scan_errors
 from simscen.spec.base import Spec
 from simscen.spec.places import ObjectName
 from simscen.spec.quantities import PositiveLength, Probability, Quantity
@@ -42,23 +41,16 @@ class Glass(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to make the named objects transparent."""
-        return _TransparentObjects(rng, self, setting)
+        simulator = setting.simulator
+        assert simulator is not None  # a lidar has one
 
+        def ranges(scan: Scan) -> Array:
+            passes = rng.random(len(scan.ranges)) < self.probability
+            opaque, transparent = simulator.distances(scan), simulator.distances(scan, without=self.of)
+            changed = ranges_with_scan_errors(scan, transparent, opaque)
+            return np.where(passes & (transparent != opaque), changed, scan.ranges)
 
-class _TransparentObjects(FaultEffect):
-    """Effect of `glass`."""
-
-    def __init__(self, rng: np.random.Generator, glass: Glass, setting: FaultSetting) -> None:
-        self._rng, self._glass, self._simulator = rng, glass, setting.simulator
-
-    def reading(self, reading: Reading) -> Reading | None:
-        if not isinstance(reading, Scan) or self._simulator is None:
-            return reading
-        passes = self._rng.random(len(reading.ranges)) < self._glass.probability
-        opaque = self._simulator.distances(reading)
-        transparent = self._simulator.distances(reading, without=self._glass.of)
-        ranges = ranges_with_scan_errors(reading, transparent, opaque)
-        return replace(reading, ranges=np.where(passes & (transparent != opaque), ranges, reading.ranges))
+        return ChangedRanges(ranges)
 
 
 class Rain(Spec, Fault):
@@ -81,37 +73,19 @@ class Rain(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to attenuate beams and to add range errors."""
-        return _RainAttenuation(rng, self)
+        relative_std = 0.02 * float((1 - np.exp(-self.rate / MM_PER_HOUR)) ** 2)
+        extinction = float(0.01 * (self.rate / MM_PER_HOUR) ** 0.6)
 
-    @property
-    def extinction(self) -> float:
-        """Extinction coefficient α, per meter."""
-        return float(0.01 * (self.rate / MM_PER_HOUR) ** 0.6)
+        def ranges(scan: Scan) -> Array:
+            errors = relative_std * rng.standard_normal(len(scan.ranges))
+            is_finite = np.isfinite(scan.ranges)
+            noisy = np.where(is_finite, np.round(scan.ranges * (1 + errors), 3), scan.ranges)
+            with np.errstate(invalid="ignore"):
+                returned_light = self.reflectivity * np.exp(-2 * extinction * scan.ranges) / scan.ranges**2
+                is_detected = returned_light >= REFERENCE_REFLECTIVITY / scan.range_max**2
+            return np.where(is_finite & ~is_detected, np.inf, clip_to_sensor_range(scan, noisy))
 
-
-class _RainAttenuation(FaultEffect):
-    """Effect of `rain`."""
-
-    def __init__(self, rng: np.random.Generator, rain: Rain) -> None:
-        self._rng, self._rain = rng, rain
-        self._relative_std = 0.02 * float((1 - np.exp(-rain.rate / MM_PER_HOUR)) ** 2)
-
-    def reading(self, reading: Reading) -> Reading | None:
-        if not isinstance(reading, Scan):
-            return reading
-        ranges = reading.ranges
-        errors = self._relative_std * self._rng.standard_normal(len(ranges))
-        noisy = np.where(np.isfinite(ranges), np.round(ranges * (1 + errors), 3), ranges)
-        with np.errstate(invalid="ignore"):
-            is_detected = self._returned_light(ranges) >= REFERENCE_REFLECTIVITY / reading.range_max**2
-        return replace(
-            reading, ranges=np.where(np.isfinite(ranges) & ~is_detected, np.inf, clip_to_sensor_range(reading, noisy))
-        )
-
-    def _returned_light(self, ranges: Array) -> Array:
-        """Return the fraction of the light that surfaces at these ranges (n,) return."""
-        light: Array = self._rain.reflectivity * np.exp(-2 * self._rain.extinction * ranges) / ranges**2
-        return light
+        return ChangedRanges(ranges)
 
 
 class Dust(Spec, Fault):
@@ -130,19 +104,11 @@ class Dust(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to shorten beams at random."""
-        return _Particles(rng, self.mean_free_path)
 
+        def ranges(scan: Scan) -> Array:
+            particles = np.round(rng.exponential(self.mean_free_path, len(scan.ranges)), 3)
+            with np.errstate(invalid="ignore"):
+                is_nearer = particles < np.minimum(scan.ranges, scan.range_max)
+            return np.where(is_nearer, clip_to_sensor_range(scan, particles), scan.ranges)
 
-class _Particles(FaultEffect):
-    """Effect of `dust`."""
-
-    def __init__(self, rng: np.random.Generator, mean_free_path: float) -> None:
-        self._rng, self._mean_free_path = rng, mean_free_path
-
-    def reading(self, reading: Reading) -> Reading | None:
-        if not isinstance(reading, Scan):
-            return reading
-        particles = np.round(self._rng.exponential(self._mean_free_path, len(reading.ranges)), 3)
-        with np.errstate(invalid="ignore"):
-            is_nearer = particles < np.minimum(reading.ranges, reading.range_max)
-        return replace(reading, ranges=np.where(is_nearer, clip_to_sensor_range(reading, particles), reading.ranges))
+        return ChangedRanges(ranges)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Annotated, ClassVar
 
@@ -14,6 +14,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.polygons import points_in_polygon
 from simscen.core.messages.navigation import Belief
 from simscen.faults.base import Fault, FaultEffect, FaultSetting
+from simscen.faults.common import apply_pose_error
 from simscen.spec.base import Spec
 from simscen.spec.places import Ring
 from simscen.spec.quantities import Angle, Length
@@ -54,8 +55,7 @@ class _ShiftedBelief(FaultEffect):
     def belief(self, belief: Belief) -> Belief:
         if self._error is None:
             self._error = belief.pose.compose(self._jump).compose(belief.pose.inverse())
-        error = self._error
-        return replace(belief, pose=error.compose(belief.pose), map_from_odom=error.compose(belief.map_from_odom))
+        return apply_pose_error(belief, self._error)
 
 
 class Shift(Spec, Fault):
@@ -77,17 +77,8 @@ class Shift(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to shift the map that the stack receives."""
-        return _ShiftedMap(Pose2(self.x, self.y, self.yaw))
-
-
-class _ShiftedMap(FaultEffect):
-    """Effect of `shift`."""
-
-    def __init__(self, shift: Pose2) -> None:
-        self._shift = shift
-
-    def map(self, grid: OccupancyGrid) -> OccupancyGrid:
-        return replace(grid, origin=self._shift.compose(grid.origin))
+        shift = Pose2(self.x, self.y, self.yaw)
+        return _ChangedMap(lambda grid: replace(grid, origin=shift.compose(grid.origin)))
 
 
 class Outdated(Spec, Fault):
@@ -105,21 +96,24 @@ class Outdated(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to change the map that the stack receives."""
-        return _EditedMap(self)
+        return _ChangedMap(self._edited)
 
-
-class _EditedMap(FaultEffect):
-    """Effect of `outdated`."""
-
-    def __init__(self, spec: Outdated) -> None:
-        self._spec = spec
-
-    def map(self, grid: OccupancyGrid) -> OccupancyGrid:
+    def _edited(self, grid: OccupancyGrid) -> OccupancyGrid:
         rows, columns = np.indices(grid.shape)
         centers = grid.center_of(np.column_stack((rows.ravel(), columns.ravel())))
         cells = grid.cells.copy()
-        for rings, value in ((self._spec.missing, FREE), (self._spec.extra, OCCUPIED)):
+        for rings, value in ((self.missing, FREE), (self.extra, OCCUPIED)):
             for ring in rings:
                 is_inside = points_in_polygon([(x, y) for x, y in ring], centers).reshape(grid.shape)
                 cells[is_inside] = value
         return replace(grid, cells=cells)
+
+
+class _ChangedMap(FaultEffect):
+    """Effect that changes only the map."""
+
+    def __init__(self, change: Callable[[OccupancyGrid], OccupancyGrid]) -> None:
+        self._change = change
+
+    def map(self, grid: OccupancyGrid) -> OccupancyGrid:
+        return self._change(grid)

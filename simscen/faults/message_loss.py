@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -22,20 +21,25 @@ MESSAGE_KINDS = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command"
 
 
 class _MessageLoss(FaultEffect):
-    """Base class of effects that drop readings and commands. `is_lost` decides for each message."""
+    """Effect that drops messages. If beliefs are lost, the transform from map to odom keeps its last value.
 
-    def __init__(self) -> None:
+    `is_lost` is called once for each message, and returns whether this message is lost.
+    """
+
+    def __init__(self, is_lost: Callable[[], bool]) -> None:
+        self._is_lost = is_lost
         self._correction: Pose2 | None = None
 
-    @abstractmethod
-    def is_lost(self) -> bool:
-        """Return whether the current message is lost. Called once for each message."""
-
     def reading(self, reading: Reading) -> Reading | None:
-        return None if self.is_lost() else reading
+        return None if self._is_lost() else reading
 
     def command(self, command: Twist) -> Twist | None:
-        return None if self.is_lost() else command
+        return None if self._is_lost() else command
+
+    def belief(self, belief: Belief) -> Belief:
+        if not self._is_lost() or self._correction is None:
+            self._correction = belief.map_from_odom
+        return apply_correction(belief, self._correction)
 
 
 class Off(Spec, Fault):
@@ -51,19 +55,7 @@ class Off(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to drop all messages."""
-        return _Silence()
-
-
-class _Silence(_MessageLoss):
-    """Effect of `off`."""
-
-    def is_lost(self) -> bool:
-        return True
-
-    def belief(self, belief: Belief) -> Belief:
-        if self._correction is None:
-            self._correction = belief.map_from_odom
-        return apply_correction(belief, self._correction)
+        return _MessageLoss(lambda: True)
 
 
 class Dropout(Spec, Fault):
@@ -81,18 +73,7 @@ class Dropout(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to drop messages at random."""
-        return _RandomLoss(rng, self.probability)
-
-
-class _RandomLoss(_MessageLoss):
-    """Effect of `dropout`."""
-
-    def __init__(self, rng: np.random.Generator, probability: float) -> None:
-        super().__init__()
-        self._rng, self._probability = rng, probability
-
-    def is_lost(self) -> bool:
-        return bool(self._rng.random() < self._probability)
+        return _MessageLoss(lambda: bool(rng.random() < self.probability))
 
 
 class Intermittent(Spec, Fault):
@@ -112,29 +93,24 @@ class Intermittent(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start with a gap of random length."""
-        return _GilbertChannel(rng, self, setting)
+        return _MessageLoss(_GilbertChannel(rng, self, setting).is_down)
 
 
-class _GilbertChannel(_MessageLoss):
-    """Effect of `intermittent`."""
+class _GilbertChannel:
+    """Channel whose periods and gaps have exponentially distributed lengths."""
 
     def __init__(self, rng: np.random.Generator, spec: Intermittent, setting: FaultSetting) -> None:
-        super().__init__()
         self._rng, self._spec, self._setting = rng, spec, setting
         self._is_down = True
         self._until = setting.clock.seconds(setting.now()) + rng.exponential(spec.down)
 
-    def is_lost(self) -> bool:
+    def is_down(self) -> bool:
+        """Return whether the channel is in a gap now."""
         now = self._setting.clock.seconds(self._setting.now())
         while self._until <= now:
             self._is_down = not self._is_down
             self._until += self._rng.exponential(self._spec.down if self._is_down else self._spec.up)
         return self._is_down
-
-    def belief(self, belief: Belief) -> Belief:
-        if self._correction is None or not self.is_lost():
-            self._correction = belief.map_from_odom
-        return apply_correction(belief, self._correction)
 
 
 class Slow(Spec, Fault):
@@ -158,20 +134,20 @@ class Slow(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to drop messages, except the first message in each period."""
-        return _RateLimit(self.rate, setting)
+        return _MessageLoss(_RateLimit(self.rate, setting).exceeds)
 
 
-class _RateLimit(_MessageLoss):
-    """Effect of `slow`."""
+class _RateLimit:
+    """Limit of the rate of messages to the first message in each period."""
 
     def __init__(self, rate: float, setting: FaultSetting) -> None:
-        super().__init__()
         self._period_ticks, self._now = setting.clock.rate / rate, setting.now
         self._first_tick: int | None = None
         self._periods = 0
         """Number of periods, since the first message, in which no further message may arrive."""
 
-    def is_lost(self) -> bool:
+    def exceeds(self) -> bool:
+        """Return whether a message now exceeds the rate, because an earlier one arrived in the same period."""
         now = self._now()
         if self._first_tick is None:
             self._first_tick = now
@@ -179,8 +155,3 @@ class _RateLimit(_MessageLoss):
             return True
         self._periods = int((now - self._first_tick) / self._period_ticks + 1e-6) + 1
         return False
-
-    def belief(self, belief: Belief) -> Belief:
-        if not self.is_lost() or self._correction is None:
-            self._correction = belief.map_from_odom
-        return apply_correction(belief, self._correction)

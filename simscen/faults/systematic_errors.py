@@ -1,4 +1,4 @@
-"""Systematic measurement errors: `bias`, `scale`, `drift`, and the wrong mounting pose of a sensor, `extrinsic`."""
+"""Systematic measurement errors: `bias`, `scale`, and `drift`."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief
-from simscen.core.messages.sensor_data import Image, Imu, Reading, Scan
+from simscen.core.messages.sensor_data import Image, Imu, Reading
 from simscen.faults.base import Fault, FaultEffect, FaultSetting
-from simscen.faults.common import OdometryDistortion, change_distances, ranges_with_scan_errors
+from simscen.faults.common import OdometryDistortion, apply_pose_error, change_distances
 from simscen.spec.base import Spec
 from simscen.spec.quantities import (
     Acceleration,
@@ -214,66 +214,4 @@ class _DriftingValues(FaultEffect):
             self._start_pose = belief.pose
         drift = Pose2(self._drift.linear * elapsed, 0.0, self._drift.angular * elapsed)
         error = self._start_pose.compose(drift).compose(self._start_pose.inverse())
-        return replace(belief, pose=error.compose(belief.pose), map_from_odom=error.compose(belief.map_from_odom))
-
-
-ROTATION_KEYS = ("roll", "pitch", "yaw")
-
-
-class Extrinsic(Spec, Fault):
-    """The mounting pose of a sensor is wrong: it was knocked out of place or never calibrated.
-
-    The keys are the true pose of the sensor in the frame of its nominal pose; the stack assumes the nominal pose. A
-    lidar that is pitched down sees the floor as a wall. A tilted IMU measures a part of gravity as acceleration.
-
-    Example: `{sensor: lidar, extrinsic: {yaw: 3 deg, x: 1 cm}}`
-    """
-
-    affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Image", "Imu"})
-    neutral_values: ClassVar[Mapping[str, object]] = dict.fromkeys(("x", "y", "z", *ROTATION_KEYS), 0.0)
-    keys_by_kind: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "Scan": ("x", "y", "z", *ROTATION_KEYS),
-        "Image": ("x", "y", "z", *ROTATION_KEYS),
-        "Imu": ROTATION_KEYS,
-    }
-    x: Length = 0.0
-    """Forward."""
-    y: Length = 0.0
-    """To the left."""
-    z: Length = 0.0
-    """Up."""
-    roll: Angle = 0.0
-    """Right side down."""
-    pitch: Angle = 0.0
-    """Front down."""
-    yaw: Angle = 0.0
-    """Counterclockwise."""
-
-    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to measure from the wrong pose."""
-        return _WrongPose(Pose3.from_rpy(self.x, self.y, self.z, self.roll, self.pitch, self.yaw), setting)
-
-
-class _WrongPose(FaultEffect):
-    """Effect of `extrinsic`."""
-
-    def __init__(self, error: Pose3, setting: FaultSetting) -> None:
-        self._error, self._simulator = error, setting.simulator
-
-    def reading(self, reading: Reading) -> Reading | None:
-        match reading:
-            case Scan() if self._simulator is not None:
-                nominal, actual = (
-                    self._simulator.distances(reading),
-                    self._simulator.distances(reading, self._error),
-                )
-                return replace(reading, ranges=ranges_with_scan_errors(reading, actual, nominal))
-            case Image() if self._simulator is not None:
-                image = self._simulator.image(self._error)
-                return replace(reading, rgb=image.rgb, depth=image.depth)
-            case Imu(angular_velocity=angular, linear_acceleration=linear):
-                rotated = np.array([angular, linear]) @ self._error.rotation()
-                (x, y, z), (a, b, c) = rotated.tolist()
-                return replace(reading, angular_velocity=(x, y, z), linear_acceleration=(a, b, c))
-            case _:
-                return reading
+        return apply_pose_error(belief, error)

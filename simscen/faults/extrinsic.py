@@ -1,0 +1,75 @@
+"""The fault `extrinsic`: a sensor whose mounting pose is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from simscen.core.geometry import Pose3
+from simscen.core.messages.sensor_data import Image, Imu, Reading, Scan
+from simscen.faults.base import Fault, FaultEffect, FaultSetting
+from simscen.faults.common import ranges_with_scan_errors
+from simscen.spec.base import Spec
+from simscen.spec.quantities import Angle, Length
+
+ROTATION_KEYS = ("roll", "pitch", "yaw")
+
+
+class Extrinsic(Spec, Fault):
+    """The mounting pose of a sensor is wrong: it was knocked out of place or never calibrated.
+
+    The keys are the true pose of the sensor in the frame of its nominal pose; the stack assumes the nominal pose. A
+    lidar that is pitched down sees the floor as a wall. A tilted IMU measures a part of gravity as acceleration.
+
+    Example: `{sensor: lidar, extrinsic: {yaw: 3 deg, x: 1 cm}}`
+    """
+
+    affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Image", "Imu"})
+    neutral_values: ClassVar[Mapping[str, object]] = dict.fromkeys(("x", "y", "z", *ROTATION_KEYS), 0.0)
+    keys_by_kind: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "Scan": ("x", "y", "z", *ROTATION_KEYS),
+        "Image": ("x", "y", "z", *ROTATION_KEYS),
+        "Imu": ROTATION_KEYS,
+    }
+    x: Length = 0.0
+    """Forward."""
+    y: Length = 0.0
+    """To the left."""
+    z: Length = 0.0
+    """Up."""
+    roll: Angle = 0.0
+    """Right side down."""
+    pitch: Angle = 0.0
+    """Front down."""
+    yaw: Angle = 0.0
+    """Counterclockwise."""
+
+    def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
+        """Start to measure from the wrong pose."""
+        return _WrongPose(Pose3.from_rpy(self.x, self.y, self.z, self.roll, self.pitch, self.yaw), setting)
+
+
+class _WrongPose(FaultEffect):
+    """Effect of `extrinsic`."""
+
+    def __init__(self, error: Pose3, setting: FaultSetting) -> None:
+        self._error, self._simulator = error, setting.simulator
+
+    def reading(self, reading: Reading) -> Reading | None:
+        match reading:
+            case Scan() if self._simulator is not None:
+                nominal = self._simulator.distances(reading)
+                actual = self._simulator.distances(reading, self._error)
+                return replace(reading, ranges=ranges_with_scan_errors(reading, actual, nominal))
+            case Image() if self._simulator is not None:
+                image = self._simulator.image(self._error)
+                return replace(reading, rgb=image.rgb, depth=image.depth)
+            case Imu(angular_velocity=angular, linear_acceleration=linear):
+                rotated = np.array([angular, linear]) @ self._error.rotation()
+                (x, y, z), (a, b, c) = rotated.tolist()
+                return replace(reading, angular_velocity=(x, y, z), linear_acceleration=(a, b, c))
+            case _:
+                return reading
