@@ -98,9 +98,9 @@ class AnyCondition(Choice):
         """
         now = self.situation_of_robot(now)
         if self.all is not None:
-            return all_hold(self.all, now)
+            return all(condition.holds(now) for condition in self.all)
         if self.any is not None:
-            return any_holds(self.any, now)
+            return any(condition.holds(now) for condition in self.any)
         if self.not_ is not None:
             return not self.not_.holds(now)
         condition = self.chosen
@@ -110,17 +110,6 @@ class AnyCondition(Choice):
             message = f"a condition returned {result!r} instead of True or False{self.plugin_suffix}"
             raise RunError(BROKEN_COMPONENT, message)
         return bool(result)
-
-
-# `all` and `any` are fields of AnyCondition, so that its methods cannot call the built-in functions by these names.
-def all_hold(conditions: list[AnyCondition], now: Situation) -> bool:
-    """Return whether all conditions are true in the current situation."""
-    return all(condition.holds(now) for condition in conditions)
-
-
-def any_holds(conditions: list[AnyCondition], now: Situation) -> bool:
-    """Return whether at least one condition is true in the current situation."""
-    return any(condition.holds(now) for condition in conditions)
 
 
 class Trigger(AnyCondition):
