@@ -59,8 +59,8 @@ class AnyAction(Choice):
     move: Annotated[Action | None, LazySpec("simscen.actions.objects", "Move")] = None
     teleport: Annotated[Action | None, LazySpec("simscen.actions.objects", "Teleport")] = None
     stop: Annotated[Action | None, LazySpec("simscen.actions.objects", "Stop")] = None
-    open: Annotated[Action | None, LazySpec("simscen.actions.objects", "OpenDoor")] = None
-    close: Annotated[Action | None, LazySpec("simscen.actions.objects", "CloseDoor")] = None
+    open: Annotated[Action | None, LazySpec("simscen.actions.doors", "OpenDoor")] = None
+    close: Annotated[Action | None, LazySpec("simscen.actions.doors", "CloseDoor")] = None
     kidnap: Annotated[Action | None, LazySpec("simscen.actions.robot", "Kidnap")] = None
     push: Annotated[Action | None, LazySpec("simscen.actions.robot", "Push")] = None
     new_goal: Annotated[Action | None, LazySpec("simscen.actions.robot", "NewGoal")] = None

@@ -1,4 +1,4 @@
-"""Actions on objects and doors: `spawn`, `remove`, `move`, `teleport`, `stop`, `open`, and `close`."""
+"""Actions on objects: `spawn`, `remove`, `move`, `teleport`, and `stop`."""
 
 from __future__ import annotations
 
@@ -9,19 +9,14 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from simscen.actions.base import Action, WorldAction, is_same_pose
-from simscen.core.geometry import Pose2, Pose3, wrap
-from simscen.core.geometry.shapes import Body, MotionPath
+from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry.shapes import Body
 from simscen.core.messages.navigation import Path
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
 from simscen.spec.moving_objects import Motion, ShapedObject
-from simscen.spec.places import DoorName, MovableName, Name, PlaceOrPose
-from simscen.spec.quantities import Angle, Length, Mass, NonNegativeLength, PositiveDuration, Ratio
-
-SWING_SEGMENTS = 16
-"""Number of straight segments that approximate the arc of a swinging door."""
-TRAVEL_TOLERANCE = 1e-6
-"""Remaining fraction of a door's full travel below which the door counts as at its target."""
+from simscen.spec.places import MovableName, Name, PlaceOrPose
+from simscen.spec.quantities import Angle, Length, Mass, NonNegativeLength, PositiveDuration
 
 
 class Spawn(ShapedObject, Action):
@@ -59,25 +54,18 @@ class Spawn(ShapedObject, Action):
 
     def perform(self, stage: Stage) -> Effect:
         """Add the object. The effect counts as failed if `on_plan` is set and the robot has no plan."""
-        is_as_requested = self.on_plan is None or _has_plan(stage)
-        pose = self._spawn_pose(stage)
-        stage.spawn(Body(self.name, (self.solid(self.name),), Pose3.planar(pose), self.mass))
-        what = f"spawned {self.name} at ({pose.x:.2f}, {pose.y:.2f})"
-        return Effect(is_as_requested, what if is_as_requested else f"{what}, because the robot had no plan")
-
-    def _spawn_pose(self, stage: Stage) -> Pose2:
+        plan, remark = stage.plan, ""
         if self.pose is not None:
-            return self.pose.pose
-        if self.ahead is not None:
-            return stage.robot.compose(Pose2(self.ahead[0], self.ahead[1], self.yaw))
-        assert self.on_plan is not None
-        if stage.plan is None or not _has_plan(stage):
-            return stage.robot.compose(Pose2(self.on_plan, 0.0, self.yaw))
-        return pose_on_plan(stage.plan, stage.robot, self.on_plan).compose(Pose2(0.0, 0.0, self.yaw))
-
-
-def _has_plan(stage: Stage) -> bool:
-    return stage.plan is not None and len(stage.plan.points) > 1
+            pose = self.pose.pose
+        elif self.ahead is not None:
+            pose = stage.robot.compose(Pose2(self.ahead[0], self.ahead[1], self.yaw))
+        elif plan is not None and len(plan.points) > 1:
+            pose = pose_on_plan(plan, stage.robot, self.on_plan or 0.0).compose(Pose2(0.0, 0.0, self.yaw))
+        else:
+            pose = stage.robot.compose(Pose2(self.on_plan or 0.0, 0.0, self.yaw))
+            remark = ", because the robot had no plan"
+        stage.spawn(Body(self.name, (self.solid(self.name),), Pose3.planar(pose), self.mass))
+        return Effect(not remark, f"spawned {self.name} at ({pose.x:.2f}, {pose.y:.2f}){remark}")
 
 
 def pose_on_plan(plan: Path, robot: Pose2, distance: float) -> Pose2:
@@ -192,80 +180,3 @@ class Stop(Spec, WorldAction):
         delay = self.for_ + max(0.0, path.start - elapsed)
         stage.move(self.name, replace(path, phase=path.elapsed(elapsed), start=delay))
         return Effect(True, f"stopped {self.name} for {self.for_:g} s")
-
-
-class OpenDoor(Spec, WorldAction):
-    """Swing or slide a door of the world open, from its current position.
-
-    Example: `do: {open: {name: door meeting room}}`
-    """
-
-    name: DoorName
-    """A door of the world."""
-    duration: PositiveDuration = 1.5
-    """Time from fully closed to fully open. A partial motion takes proportionally less time."""
-    to: Annotated[Ratio, Field(gt=0, le=1)] = 1.0
-    """Fraction of the full travel: 100 % is fully open, 30 % ajar."""
-
-    def perform(self, stage: Stage) -> Effect:
-        """Start the motion. Has no effect if the door is at the target or already moves to it."""
-        closed, opened = stage.door(self.name)
-        target = opened if self.to == 1 else _interpolate(closed, opened, self.to)
-        state = "open" if self.to == 1 else f"{self.to:.0%} open"
-        return _move_door(stage, self.name, target, self.duration, state)
-
-
-class CloseDoor(Spec, WorldAction):
-    """Close a door of the world from its current position. The door does not stop for the robot.
-
-    Example: `do: {close: {name: door meeting room}}`
-    """
-
-    name: DoorName
-    """A door of the world."""
-    duration: PositiveDuration = 1.5
-    """Time from fully open to fully closed. A partial motion takes proportionally less time."""
-
-    def perform(self, stage: Stage) -> Effect:
-        """Start the motion. Has no effect if the door is closed or already closing."""
-        return _move_door(stage, self.name, stage.door(self.name)[0], self.duration, "shut")
-
-
-def _move_door(stage: Stage, name: str, target: Pose2, full_duration: float, state: str) -> Effect:
-    """Start the motion of a door to `target` and return the effect.
-
-    `full_duration` is the time in s for the full travel. `state` is the name of the target in messages, e.g. "open".
-    """
-    pose = stage.object(name)
-    if pose is None:
-        return Effect(False, f"{name} does not exist any more")
-    closed, opened = stage.door(name)
-    remaining = _travel_fraction(pose, target, closed, opened)
-    if remaining < TRAVEL_TOLERANCE:
-        return Effect(False, f"{name} was already {state}")
-    motion, verb = stage.motion(name), "swings" if wrap(opened.yaw - closed.yaw) else "slides"
-    if motion is not None and _travel_fraction(motion[0].poses[-1], target, closed, opened) < TRAVEL_TOLERANCE:
-        return Effect(False, f"{name} already {verb} {state}")
-    duration = full_duration if remaining > 1 - TRAVEL_TOLERANCE else full_duration * remaining
-    stage.move(name, panel_path(pose, target, duration))
-    return Effect(True, f"{name} {verb} {state}")
-
-
-def panel_path(start: Pose2, target: Pose2, duration: float) -> MotionPath:
-    """Return the path of a door panel from `start` to `target` in `duration` seconds."""
-    segments = SWING_SEGMENTS if wrap(target.yaw - start.yaw) else 1
-    fractions = [segment / segments for segment in range(segments + 1)]
-    times = tuple(fraction * duration for fraction in fractions)
-    return MotionPath(times, tuple(_interpolate(start, target, fraction) for fraction in fractions))
-
-
-def _travel_fraction(start: Pose2, end: Pose2, closed: Pose2, opened: Pose2) -> float:
-    """Return the travel of a door from `start` to `end` as a fraction of the travel from `closed` to `opened`."""
-    turn, slide = abs(wrap(opened.yaw - closed.yaw)), opened.distance(closed)
-    return abs(wrap(end.yaw - start.yaw)) / turn if turn else start.distance(end) / slide
-
-
-def _interpolate(start: Pose2, end: Pose2, fraction: float) -> Pose2:
-    """Return the pose at `fraction` (0 to 1) of the straight way from `start` to `end`, with the shorter rotation."""
-    x, y = start.x + fraction * (end.x - start.x), start.y + fraction * (end.y - start.y)
-    return Pose2(x, y, wrap(start.yaw + fraction * wrap(end.yaw - start.yaw)))

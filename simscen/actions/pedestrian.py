@@ -17,8 +17,6 @@ from simscen.spec.places import Name, PlaceOrPoint, PlaceOrPose, RegionName
 from simscen.spec.quantities import PositiveDuration, PositiveLength, PositiveSpeed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     import numpy as np
 
 Point = tuple[float, float]
@@ -183,10 +181,7 @@ class Crowd(_WalkSettings, WorldAction):
             area = _bounding_rectangle(corners)
         else:
             area = _Rectangle(*group_start, GROUP_HALF_WIDTH_M, GROUP_HALF_WIDTH_M)
-        for point in area.random_points(rng):
-            if polygon_contains(corners, point) and stage.has_room(point, self.radius + INITIAL_CLEARANCE_M):
-                return point
-        return None
+        return _draw_point(stage, rng, area, corners, self.radius)
 
     def _add(self, stage: Stage, index: int, start: Point) -> bool:
         """Add the person with this index at `start`; return False if a goal region has no free space."""
@@ -194,14 +189,17 @@ class Crowd(_WalkSettings, WorldAction):
         if self.group_size > 1:
             group = f"{self.name} group {index // self.group_size + 1}"
         rng = stage.rng(f"{_stream_prefix(name, group)}, goals")
-        drawn = [_draw_goal(stage, rng, stage.region(region), self.radius) for region in self.goals]
-        goals = tuple(goal for goal in drawn if goal is not None)
-        if len(goals) < len(drawn):
-            return False
+        goals: list[Point] = []
+        for region in self.goals:
+            corners = stage.region(region)
+            goal = _draw_point(stage, rng, _bounding_rectangle(corners), corners, self.radius, walls_only=True)
+            if goal is None:
+                return False
+            goals.append(goal)
         yaw = float(rng.uniform(-math.pi, math.pi))
         if goals:
             yaw = math.atan2(goals[0][1] - start[1], goals[0][0] - start[0])
-        stage.add_pedestrian(self.to_pedestrian(stage, name, Pose2(*start, yaw), goals, group))
+        stage.add_pedestrian(self.to_pedestrian(stage, name, Pose2(*start, yaw), tuple(goals), group))
         return True
 
 
@@ -213,12 +211,6 @@ class _Rectangle(NamedTuple):
     half_width: float
     half_height: float
 
-    def random_points(self, rng: np.random.Generator) -> Iterator[Point]:
-        """Yield MAX_DRAWS uniformly distributed points."""
-        for _ in range(MAX_DRAWS):
-            x, y = rng.uniform(-1.0, 1.0, 2).tolist()
-            yield self.x + x * self.half_width, self.y + y * self.half_height
-
 
 def _bounding_rectangle(corners: Polygon) -> _Rectangle:
     """Return the smallest axis-aligned rectangle that contains a polygon."""
@@ -228,15 +220,19 @@ def _bounding_rectangle(corners: Polygon) -> _Rectangle:
     )
 
 
-def _draw_goal(stage: Stage, rng: np.random.Generator, corners: Polygon, radius: float) -> Point | None:
-    """Return a random point inside the polygon `corners` that is clear of walls; None if none was found.
+def _draw_point(
+    stage: Stage, rng: np.random.Generator, area: _Rectangle, corners: Polygon, radius: float, walls_only: bool = False
+) -> Point | None:
+    """Return a random point of `area` inside the polygon `corners`; None if there is no room for a pedestrian.
 
-    `radius` is the radius of the pedestrian in m.
+    `radius` is the radius of the pedestrian in m. If `walls_only`, only walls count as obstacles.
     """
-    inside = (point for point in _bounding_rectangle(corners).random_points(rng) if polygon_contains(corners, point))
-    return next(
-        (point for point in inside if stage.has_room(point, radius + INITIAL_CLEARANCE_M, walls_only=True)), None
-    )
+    for _ in range(MAX_DRAWS):
+        x, y = rng.uniform(-1.0, 1.0, 2).tolist()
+        point = area.x + x * area.half_width, area.y + y * area.half_height
+        if polygon_contains(corners, point) and stage.has_room(point, radius + INITIAL_CLEARANCE_M, walls_only):
+            return point
+    return None
 
 
 def _draw_speed(rng: np.random.Generator) -> float:

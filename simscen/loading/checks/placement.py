@@ -4,7 +4,8 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations, product
 
-from simscen.actions.objects import CloseDoor, Move, OpenDoor, Spawn, Teleport, panel_path
+from simscen.actions.doors import CloseDoor, OpenDoor, panel_path
+from simscen.actions.objects import Move, Spawn, Teleport
 from simscen.actions.pedestrian import Pedestrian
 from simscen.actions.robot import Kidnap
 from simscen.core.environment.world_model import Polygon
