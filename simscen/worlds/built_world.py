@@ -7,7 +7,8 @@ import numpy as np
 
 from simscen.core.environment.occupancy_grid import OCCUPIED, UNKNOWN
 from simscen.core.environment.world_model import BuiltWorld, World
-from simscen.core.geometry.shapes import Solid, TriangleMesh
+from simscen.core.geometry.shapes import Solid
+from simscen.worlds.extent import placed_solids
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.map_size import MAP_RESOLUTION_M
 from simscen.worlds.maps.occupancy_map import draw_map
@@ -79,16 +80,11 @@ def inspect_world(built: BuiltWorld) -> WorldSummary:
     world, cells = built.world, built.map.cells
     occupied = float(np.mean(cells == OCCUPIED)) if cells.size else 0.0
     unknown = float(np.mean(cells == UNKNOWN)) if cells.size else 0.0
-    bodies = []
-    for body in world.bodies:
-        solids = tuple(Solid(s.shape, body.pose.compose(s.pose), s.name) for s in body.solids)
-        kinds = "+".join(dict.fromkeys(_shape_kind(solid) for solid in solids))
-        bodies.append(_summarize_item(body.name, kinds, solids, body.mass))
     return WorldSummary(
         name=world.name,
         bounds=world.bounds,
-        solids=tuple(_summarize_item(solid.name, _shape_kind(solid), (solid,)) for solid in world.solids),
-        bodies=tuple(bodies),
+        solids=tuple(_summarize_item(solid.name, [solid]) for solid in world.solids),
+        bodies=tuple(_summarize_item(body.name, placed_solids([], [body]), body.mass) for body in world.bodies),
         map_size=built.map.shape,
         map_resolution=built.map.resolution,
         map_shares=(occupied, 1.0 - occupied - unknown, unknown),
@@ -98,18 +94,13 @@ def inspect_world(built: BuiltWorld) -> WorldSummary:
     )
 
 
-def _shape_kind(solid: Solid) -> str:
-    return type(solid.shape).__name__.lower()
-
-
-def _summarize_item(name: str, kind: str, solids: tuple[Solid, ...], mass: float | None = None) -> WorldItem:
+def _summarize_item(name: str, solids: list[Solid], mass: float | None = None) -> WorldItem:
+    """Return the summary of a static solid, or of the solids of a body in the world frame."""
+    kinds = "+".join(dict.fromkeys(type(solid.shape).__name__.lower() for solid in solids))
     mesh = merge_solids(solids)
-    return WorldItem(name, kind, len(mesh.faces), _extent(mesh), mass)
-
-
-def _extent(mesh: TriangleMesh) -> Extent:
-    if not len(mesh.vertices):
-        return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    x0, y0, z0 = mesh.vertices.min(axis=0).tolist()
-    x1, y1, z1 = mesh.vertices.max(axis=0).tolist()
-    return x0, y0, z0, x1, y1, z1
+    extent: Extent = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if len(mesh.vertices):
+        x0, y0, z0 = mesh.vertices.min(axis=0).tolist()
+        x1, y1, z1 = mesh.vertices.max(axis=0).tolist()
+        extent = x0, y0, z0, x1, y1, z1
+    return WorldItem(name, kinds, len(mesh.faces), extent, mass)

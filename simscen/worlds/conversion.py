@@ -18,11 +18,11 @@ from simscen.core.geometry.motion_paths import pose_at
 from simscen.core.geometry.shapes import Body, Box, Cylinder, Extrusion, MotionPath, Solid
 from simscen.model.world import Movable, Obstacle, Travel, WorldSpec
 from simscen.spec.places import PoseSpec
-from simscen.worlds.geometry.cross_section import (
+from simscen.worlds.geometry.cross_section import cross_section
+from simscen.worlds.geometry.section_polygons import (
     MAX_CORNERS,
     OpenCrossSection,
     rings_from_segments,
-    section_segments,
     signed_area,
     simple_polygons,
 )
@@ -127,7 +127,7 @@ def _cross_section_prisms(solid: Solid, height: float, changes: list[str]) -> It
     low, high = float(mesh.vertices[:, 2].min()), float(mesh.vertices[:, 2].max())
     section_height = height if low < height <= high else (low + high) / 2
     try:
-        pieces = simple_polygons(rings_from_segments(section_segments(mesh, section_height)))
+        pieces = simple_polygons(rings_from_segments(cross_section(mesh, section_height).segments))
     except OpenCrossSection:
         changes.append(
             f"{solid.name}: {kind} whose cross section at {section_height:g} m is not closed; it is left out"

@@ -45,17 +45,7 @@ def top_height(solid: Solid) -> float:
 def oversize_hint(world: World) -> str:
     """Return a hint for a world whose map is too large: move or remove the model that enlarges the world most.
 
-    If all models fit on a map, the hint is to move the start and the goals.
-    """
-    if name := _largest_model(world):
-        return f'"{name}" makes it large; move or remove it'
-    return "move the start and the goals closer together"
-
-
-def _largest_model(world: World) -> str:
-    """Return the name of the model whose removal shrinks the world most; "" if all models fit on a map.
-
-    Floors do not count as models.
+    If all models fit on a map, the hint is to move the start and the goals. Floors do not count as models.
     """
     rectangles: dict[str, list[Bounds]] = {}
     for solid in placed_solids(world.solids, world.bodies):
@@ -63,12 +53,12 @@ def _largest_model(world: World) -> str:
             rectangles.setdefault(model_name(solid), []).append(bounding_rectangle(solid))
     extents = {name: union(parts) for name, parts in rectangles.items()}
     if map_size_error(union(extents.values())) is None:
-        return ""
+        return "move the start and the goals closer together"
+
+    def area_without(name: str) -> float:
+        left, bottom, right, top = union(rest for other, rest in extents.items() if other != name)
+        return (right - left) * (top - bottom)
+
     # Only a model at an edge of the world can make the world larger.
     edges = [choose(extents, key=lambda name: extents[name][side]) for side, choose in enumerate((min, min, max, max))]
-    return min(edges, key=lambda name: _area(union(rest for other, rest in extents.items() if other != name)))
-
-
-def _area(bounds: Bounds) -> float:
-    left, bottom, right, top = bounds
-    return (right - left) * (top - bottom)
+    return f'"{min(edges, key=area_without)}" makes it large; move or remove it'

@@ -1,7 +1,6 @@
 """Build the world that a world file specifies: walls with mitered corners, obstacles, ramps, objects, and doors."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,9 +11,9 @@ from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.motion_paths import pose_at
 from simscen.core.geometry.shapes import Body, Box, Extrusion, Mesh, Solid
-from simscen.model.world import Door, Movable, Obstacle, Ramp, Wall, WorldSpec
+from simscen.model.world import Door, Movable, Obstacle, WorldSpec
+from simscen.worlds.extent import union
 from simscen.worlds.geometry.prisms import bounding_rectangle
-from simscen.worlds.maps.map_size import Bounds
 
 Point = tuple[float, float]
 """(x, y) in m."""
@@ -48,22 +47,30 @@ def world_from_spec(
 
         solids += walls_from_map(grid, spec.map_height)
     for number, wall in enumerate(spec.walls, start=1):
-        solids += wall_solids(_wall_points(wall), wall.thickness, wall.height, wall.label(number))
+        points = [(x, y) for x, y in wall.points]
+        solids += wall_solids(points, wall.thickness, wall.height, wall.label(number))
     solids += [_obstacle_solid(obstacle) for obstacle in spec.obstacles]
-    solids += [_solid_of_ramp(ramp) for ramp in spec.ramps]
-    bodies = (*base.bodies, *map(_object_body, spec.objects), *map(_door_body, spec.doors))
+    for ramp in spec.ramps:
+        (start_x, start_y), (end_x, end_y) = ramp.start, ramp.end
+        solids.append(ramp_solid((start_x, start_y), (end_x, end_y), ramp.width, ramp.height, ramp.name, ramp.friction))
+    own_bodies = (*map(_object_body, spec.objects), *map(_door_body, spec.doors))
     places = {**base.places, **{key: place.pose for key, place in spec.places.items()}}
     regions = {key: tuple((x, y) for x, y in corners) for key, corners in spec.regions.items()}
+    rectangles = [(place.x, place.y, place.x, place.y) for place in places.values()]
+    rectangles += [bounding_rectangle(solid) for solid in solids[len(base.solids) :]]
+    rectangles += [bounding_rectangle(solid, body.pose) for body in own_bodies for solid in body.solids]
+    rectangles += [base.bounds] if any(base.bounds) else []
+    rectangles += [(x, y, x, y) for x, y in grid.corners] if grid is not None else []
     return replace(
         base,
         name=spec.name or name,
         solids=tuple(solids),
-        bodies=bodies,
+        bodies=(*base.bodies, *own_bodies),
         places=places,
         regions={**base.regions, **regions},
         friction=spec.friction,
         doors={door.name: _panel_poses(door) for door in spec.doors},
-        bounds=_bounds(solids[len(base.solids) :], bodies[len(base.bodies) :], places.values(), grid, base.bounds),
+        bounds=union(rectangles),
         grid=grid or base.grid,
         notes=(*base.notes, *notes),
     )
@@ -82,18 +89,9 @@ def _panel_poses(door: Door) -> tuple[Pose2, Pose2]:
     return closed, closed.compose(Pose2(-(door.travel or math.hypot(px - hx, py - hy)), 0.0))
 
 
-def _wall_points(wall: Wall) -> list[Point]:
-    return [(x, y) for x, y in wall.points]
-
-
 def _obstacle_solid(obstacle: Obstacle) -> Solid:
     solid = obstacle.solid(obstacle.name)
     return replace(solid, pose=Pose3.planar(obstacle.pose.pose, solid.pose.z), friction=obstacle.friction)
-
-
-def _solid_of_ramp(ramp: Ramp) -> Solid:
-    (ax, ay), (bx, by) = ramp.start, ramp.end
-    return ramp_solid((ax, ay), (bx, by), ramp.width, ramp.height, ramp.name, ramp.friction)
 
 
 def _object_body(thing: Movable) -> Body:
@@ -110,33 +108,6 @@ def _door_body(door: Door) -> Body:
     width = math.hypot(post_x - hinge_x, post_y - hinge_y)
     panel = Solid(Box((width, door.thickness, door.height)), Pose3(x=width / 2, z=door.height / 2), door.name)
     return Body(door.name, (panel,), Pose3.planar(closed if door.closed else opened))
-
-
-def _bounds(
-    solids: Iterable[Solid],
-    bodies: Iterable[Body],
-    places: Iterable[Pose2],
-    grid: OccupancyGrid | None,
-    base: Bounds,
-) -> Bounds:
-    """Return the bounds of all arguments; zeros for an empty world. `base` are the bounds of an imported world."""
-    corners = [(place.x, place.y) for place in places]
-    rectangles = [bounding_rectangle(solid) for solid in solids]
-    rectangles += [bounding_rectangle(solid, body.pose) for body in bodies for solid in body.solids]
-    rectangles += [base] if any(base) else []
-    corners += [corner for left, bottom, right, top in rectangles for corner in ((left, bottom), (right, top))]
-    if grid is not None:
-        corners += _grid_corners(grid)
-    if not corners:
-        return (0.0, 0.0, 0.0, 0.0)
-    xs, ys = zip(*corners, strict=True)
-    return min(xs), min(ys), max(xs), max(ys)
-
-
-def _grid_corners(grid: OccupancyGrid) -> list[Point]:
-    height, width = (cells * grid.resolution for cells in grid.shape)
-    local = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
-    return [grid.origin.compose(Pose2(x, y))[:2] for x, y in local]
 
 
 def wall_solids(points: list[Point], thickness: float, height: float, name: str) -> list[Solid]:

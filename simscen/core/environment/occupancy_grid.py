@@ -38,6 +38,13 @@ class OccupancyGrid:
         """(height, width) in cells."""
         return self.cells.shape[0], self.cells.shape[1]
 
+    @property
+    def corners(self) -> list[tuple[float, float]]:
+        """The corners (x, y) in m of the grid in the map frame, counterclockwise from the corner of cell (0, 0)."""
+        height, width = (cells * self.resolution for cells in self.shape)
+        local = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
+        return [self.origin.compose(Pose2(x, y))[:2] for x, y in local]
+
     def refined(self, max_cell_size: float) -> OccupancyGrid:
         """Split the cells so that they are at most `max_cell_size` m wide, or as small as MAX_CELLS allows.
 

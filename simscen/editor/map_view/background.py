@@ -10,7 +10,6 @@ import numpy as np
 
 from simscen.core.environment.occupancy_grid import FREE, OccupancyGrid
 from simscen.core.errors import InvalidInput
-from simscen.core.geometry.shapes import Solid
 from simscen.loading.builders import load_map, world_from_file
 from simscen.loading.loaded import LoadedWorld
 
@@ -71,19 +70,15 @@ class Backgrounds:
 
     def _segments_part(self, source: LoadedWorld) -> dict[str, Any]:
         """Return `bounds` and `segments` of an SDF world; {} for a world without solids."""
-        from simscen.worlds.geometry.cross_section import section_segments
+        from simscen.worlds.extent import placed_solids
+        from simscen.worlds.geometry.cross_section import cross_section
         from simscen.worlds.geometry.triangulation import merge_solids
 
         world = world_from_file(replace(source, spec=None), self.root, self.world_path, lenient=True)
-        bodies = [
-            Solid(solid.shape, body.pose.compose(solid.pose), body.name)
-            for body in world.bodies
-            for solid in body.solids
-        ]
-        solids = (*world.solids, *bodies)
+        solids = placed_solids(world.solids, world.bodies)
         if not solids:
             return {}
-        segments = section_segments(merge_solids(solids), SECTION_HEIGHT_M)[:MAX_SEGMENTS]
+        segments = cross_section(merge_solids(solids), SECTION_HEIGHT_M).segments[:MAX_SEGMENTS]
         rounded = np.round(segments.reshape(-1, 4), 3).tolist()
         return {"bounds": list(world.bounds), "segments": rounded}
 
@@ -99,10 +94,9 @@ def _image_part(grid: OccupancyGrid) -> dict[str, Any]:
     data = BytesIO()
     image.save(data, "PNG")
     height, width = (cells * grid.resolution for cells in grid.shape)
-    corners = grid.origin.apply(np.array([[0, 0], [width, 0], [width, height], [0, height]]))
-    (left, low), (right, high) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    xs, ys = zip(*grid.corners, strict=True)
     return {
-        "bounds": [left, low, right, high],
+        "bounds": [min(xs), min(ys), max(xs), max(ys)],
         "image": {
             "url": "data:image/png;base64," + base64.b64encode(data.getvalue()).decode("ascii"),
             "origin": [grid.origin.x, grid.origin.y, grid.origin.yaw],

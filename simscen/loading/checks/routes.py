@@ -79,10 +79,12 @@ def _ramp_hint(scene: Scene) -> str:
 def _widest_gap(scene: Scene, goal: Pose2, solids: tuple[Solid, ...]) -> Gap:
     """Return the gap between `solids` that is too narrow, on the widest way to the goal."""
     from simscen.worlds.geometry.triangulation import merge_solids
+    from simscen.worlds.routes.clearance import clearance_field, search_grid
     from simscen.worlds.routes.narrow_gaps import narrowest_gap
 
-    routes = scene.cached(robot_routes)
-    gap = narrowest_gap(merge_solids(solids), routes.bounds, (scene.start, goal), scene.size.inscribed, routes.z_range)
+    routes, radius = scene.cached(robot_routes), scene.size.inscribed
+    field = clearance_field(merge_solids(solids), search_grid(routes.bounds, radius), routes.z_range)
+    gap = narrowest_gap(field, (scene.start, goal), radius)
     position = f"({gap.x:.2f}, {gap.y:.2f})"
     sides = gap.sides or ((gap.x, gap.y), (gap.x, gap.y))
     names = [first_solid_in_disc(solids, side, GAP_EDGE_M, routes.z_range) for side in sides]
@@ -90,7 +92,7 @@ def _widest_gap(scene: Scene, goal: Pose2, solids: tuple[Solid, ...]) -> Gap:
         what = f"`{names[0]}`" if names[0] else "a wall"
         return Gap(f"{what} closes the last route at {position}", (gap.x, gap.y))
     between = f" between `{names[0]}` and `{names[1]}`" if names[0] and names[1] else ""
-    robot_width = f"the robot is at least {2 * scene.size.inscribed:.2f} m wide"
+    robot_width = f"the robot is at least {2 * radius:.2f} m wide"
     return Gap(f"the widest gap is {gap.width:.2f} m wide at {position}{between}, but {robot_width}", (gap.x, gap.y))
 
 

@@ -41,7 +41,7 @@ def _horizontal_distance(solid: Solid, point: tuple[float, float], z_range: ZRan
     prism = upright_prism(solid)
     if prism is not None:
         return prism.distance(point, z_range)
-    from simscen.worlds.geometry.cross_section import horizontal_distance
+    from simscen.worlds.geometry.mesh_overlaps import horizontal_distance
     from simscen.worlds.geometry.triangulation import merge_solids
 
     return horizontal_distance(merge_solids([solid]), point, z_range, within)
@@ -108,6 +108,6 @@ def _overlaps(solid: Solid, corners: Polygon, z_range: ZRange) -> bool:
     if prism is not None:
         low, high = z_range
         return prism.bottom < high and prism.top > low and polygons_overlap(prism.base, corners)
-    from simscen.worlds.routes.clearance import footprint_overlaps_solid
+    from simscen.worlds.geometry.mesh_overlaps import footprint_overlaps_solid
 
     return footprint_overlaps_solid(solid, corners, z_range)

@@ -11,7 +11,7 @@ from simscen.core.environment.occupancy_grid import FREE, OccupancyGrid
 from simscen.core.environment.world_model import BuiltWorld, Polygon
 from simscen.core.geometry import Array
 from simscen.core.geometry.shapes import Body
-from simscen.worlds.geometry.cross_section import section_segments
+from simscen.worlds.geometry.cross_section import cross_section
 from simscen.worlds.geometry.triangulation import merge_solids
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def draw_world(
         pen.polygon(
             view.pixels(np.array(polygon)), fill=(*REGION_COLOR[:3], 40), outline=REGION_COLOR, width=SUPERSAMPLING
         )
-    _draw_segments(pen, view, section_segments(built.mesh, height), WALL_COLOR)
+    _draw_segments(pen, view, cross_section(built.mesh, height).segments, WALL_COLOR)
     for body in built.world.bodies:
         _draw_segments(pen, view, _body_outline(body, height), BODY_COLOR)
     for outline in footprints:
@@ -91,16 +91,8 @@ def draw_world(
         )
     _draw_names(pen, view, built)
     for x, y in view.pixels(np.array(gaps).reshape(-1, 2)):
-        pen.ellipse(
-            (
-                x - GAP_RING_RADIUS_PIXELS,
-                y - GAP_RING_RADIUS_PIXELS,
-                x + GAP_RING_RADIUS_PIXELS,
-                y + GAP_RING_RADIUS_PIXELS,
-            ),
-            outline=MARKER_COLOR,
-            width=2 * SUPERSAMPLING,
-        )
+        radius = GAP_RING_RADIUS_PIXELS
+        pen.ellipse((x - radius, y - radius, x + radius, y + radius), outline=MARKER_COLOR, width=2 * SUPERSAMPLING)
     _draw_scale_bar(pen, view)
     canvas.alpha_composite(overlay)
     width, rows = view.size
@@ -108,16 +100,11 @@ def draw_world(
 
 
 def _viewport(grid: OccupancyGrid) -> Viewport:
-    corners = grid.origin.apply(_corners_in_grid_frame(grid))
-    (left, low), (right, top) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    xs, ys = zip(*grid.corners, strict=True)
+    left, right, low, top = min(xs), max(xs), min(ys), max(ys)
     scale = SUPERSAMPLING * MAX_SIDE_PIXELS / max(right - left, top - low)
     size = (max(SUPERSAMPLING, math.ceil((right - left) * scale)), max(SUPERSAMPLING, math.ceil((top - low) * scale)))
     return Viewport(left, top, scale, size)
-
-
-def _corners_in_grid_frame(grid: OccupancyGrid) -> Array:
-    height, width = (cells * grid.resolution for cells in grid.shape)
-    return np.array([[0, 0], [width, 0], [width, height], [0, height]])
 
 
 def _map_layer(grid: OccupancyGrid, view: Viewport) -> "Image.Image":
@@ -144,11 +131,11 @@ def _body_outline(body: Body, height: float) -> Array:
     """
     mesh = merge_solids(body.solids)
     placed = type(mesh)(body.pose.apply(mesh.vertices), mesh.faces, mesh.owners, mesh.names)
-    cut = section_segments(placed, height)
+    cut = cross_section(placed, height).segments
     if len(cut) or not len(placed.vertices):
         return cut
     low, high = placed.vertices[:, 2].min(), placed.vertices[:, 2].max()
-    return section_segments(placed, float(low + high) / 2)
+    return cross_section(placed, float(low + high) / 2).segments
 
 
 def _draw_segments(pen: "ImageDraw.ImageDraw", view: Viewport, segments: Array, color: Color) -> None:
@@ -165,8 +152,8 @@ def _draw_names(pen: "ImageDraw.ImageDraw", view: Viewport, built: BuiltWorld) -
     for name, place in built.world.places.items():
         tip = place.apply(np.array([[0.0, 0.0], [0.3, 0.0]]))
         (x, y), end = view.pixels(tip)
-        radius = 4 * SUPERSAMPLING
         pen.line(((x, y), end), fill=PLACE_COLOR, width=2 * SUPERSAMPLING)
+        radius = 4 * SUPERSAMPLING
         pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=PLACE_COLOR)
         _draw_text(pen, (x, y), name, PLACE_COLOR)
 

@@ -1,4 +1,4 @@
-"""Compute the clearance (distance to the nearest static solid), and test whether a footprint overlaps a solid."""
+"""Compute the clearance: the distance to the nearest static solid."""
 
 import math
 from dataclasses import dataclass
@@ -8,12 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Array
-from simscen.core.geometry.polygons import polygon_contains
-from simscen.core.geometry.shapes import Solid, TriangleMesh
-from simscen.worlds.geometry.cross_section import CrossSection, cross_section, winds_around
-from simscen.worlds.geometry.triangulation import merge_solids
+from simscen.core.geometry.shapes import TriangleMesh
+from simscen.worlds.geometry.cross_section import CrossSection, sections_between
 from simscen.worlds.maps.map_size import MAP_MARGIN_M, Bounds
 from simscen.worlds.maps.occupancy_map import empty_grid
 from simscen.worlds.maps.rasterization import CellMask, expand_ranges, filled_cells, touched_cells
@@ -25,8 +22,6 @@ MIN_RESOLUTION_M = 0.05
 """Minimum size of the cells of a grid on which paths or gaps are searched."""
 MAX_CELLS = 1_000_000
 """Approximate maximum number of cells of a grid. The cells of larger worlds are larger."""
-MAX_SECTIONS = 12
-"""Maximum number of cross sections over the height of the robot. Walls and boxes need only one."""
 OUTLINE_SPACING_M = 0.02
 """Distance between the points of an outline. The error of a clearance of 0.2 m is then at most 0.25 mm."""
 CLEARANCE_WITHOUT_SOLIDS_M = 1e6
@@ -134,20 +129,6 @@ def clearance_field(mesh: TriangleMesh, grid: OccupancyGrid, z_range: tuple[floa
     return ClearanceField(grid, cell_clearance, inside, spatial.cKDTree(samples), owners, mesh.names)
 
 
-def sections_between(mesh: TriangleMesh, z_range: tuple[float, float]) -> list[CrossSection]:
-    """Return at most MAX_SECTIONS cross sections of a mesh between two heights.
-
-    There is one between any two neighboring heights of vertices, or evenly spaced ones if these would be too many.
-    """
-    low, high = z_range
-    z = np.unique(np.round(mesh.vertices[:, 2], 3))
-    levels = np.concatenate(([low], z[(z > low) & (z < high)], [high]))
-    middles = (levels[:-1] + levels[1:]) / 2
-    if len(middles) > MAX_SECTIONS:
-        middles = np.linspace(low, high, MAX_SECTIONS + 2)[1:-1]
-    return [cross_section(mesh, height) for height in middles.tolist()]
-
-
 def _sample_segments(segments: Array, owners: npt.NDArray[np.int32]) -> tuple[Array, npt.NDArray[np.int32]]:
     """Return points (n, 2) along segments (m, 2, 2), at most OUTLINE_SPACING_M apart, without duplicates.
 
@@ -163,41 +144,3 @@ def _sample_segments(segments: Array, owners: npt.NDArray[np.int32]) -> tuple[Ar
     new[1:] = np.any(np.diff(keys[order], axis=0) != 0, axis=1)
     distinct: Array = points[order[new]]
     return distinct, owners[which][order[new]]
-
-
-def footprint_overlaps_solid(solid: Solid, corners: Polygon, z_range: tuple[float, float]) -> bool:
-    """Return whether a footprint overlaps the part of a solid between two heights.
-
-    `corners` are the corners of the footprint. They and the pose of the solid are in the same frame.
-    """
-    return any(_overlaps_outline(cut.segments, corners) for cut in sections_between(merge_solids([solid]), z_range))
-
-
-def _overlaps_outline(segments: Array, corners: Polygon) -> bool:
-    """Return whether a footprint overlaps the cross section of a solid, given by its segments (n, 2, 2)."""
-    if not len(segments):
-        return False
-    if winds_around(segments, corners[0]):
-        return True
-    ends = (*corners[1:], corners[0])
-    if any(_crosses_segment(segments, np.array(a), np.array(b)) for a, b in zip(corners, ends, strict=True)):
-        return True
-    return _starts_inside(segments, corners)
-
-
-def _starts_inside(segments: Array, corners: Polygon) -> bool:
-    """Return whether any segment starts inside the footprint. This finds solids that the footprint contains."""
-    (left, low), (right, high) = np.min(corners, axis=0), np.max(corners, axis=0)
-    x, y = segments[:, 0].T
-    starts = segments[(x >= left) & (x <= right) & (y >= low) & (y <= high), 0]
-    return any(polygon_contains(corners, (px, py)) for px, py in starts.tolist())
-
-
-def _crosses_segment(segments: Array, a: Array, b: Array) -> bool:
-    """Return whether any of the segments (n, 2, 2) properly crosses the segment from a to b."""
-    edge, along = b - a, segments[:, 1] - segments[:, 0]
-    side = edge[0] * (segments[:, :, 1] - a[1]) - edge[1] * (segments[:, :, 0] - a[0])
-    from_start, from_end = a - segments[:, 0], b - segments[:, 0]
-    first = along[:, 0] * from_start[:, 1] - along[:, 1] * from_start[:, 0]
-    last = along[:, 0] * from_end[:, 1] - along[:, 1] * from_end[:, 0]
-    return bool(np.any((side[:, 0] * side[:, 1] < 0) & (first * last < 0)))

@@ -10,9 +10,7 @@ import numpy.typing as npt
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.core.geometry.shapes import TriangleMesh
-from simscen.worlds.maps.map_size import Bounds
-from simscen.worlds.routes.clearance import ClearanceField, clearance_field, search_grid
+from simscen.worlds.routes.clearance import ClearanceField
 
 MIN_CLEARANCE_CELLS = 0.71
 """Clearance below which a gap cannot be distinguished from a thin wall: half of the diagonal of a cell."""
@@ -37,23 +35,11 @@ class Gap:
     sides: tuple[tuple[float, float], ...] = ()
 
 
-def narrowest_gap(
-    mesh: TriangleMesh,
-    bounds: Bounds,
-    ends: tuple[Pose2, Pose2],
-    radius: float,
-    z_range: tuple[float, float],
-) -> Gap:
+def narrowest_gap(field: ClearanceField, ends: tuple[Pose2, Pose2], radius: float) -> Gap:
     """Return the gap that blocks a disc of `radius` m on its way between the two positions `ends`.
 
-    The width of the gap is exact to about 2 cm. Only the part of `mesh` between the heights `z_range` counts. `bounds`
-    are the bounds of the world.
+    The width of the gap is exact to about 2 cm.
     """
-    return narrowest_gap_in(clearance_field(mesh, search_grid(bounds, radius), z_range), ends, radius)
-
-
-def narrowest_gap_in(field: ClearanceField, ends: tuple[Pose2, Pose2], radius: float) -> Gap:
-    """Return the gap as `narrowest_gap` does, but from an existing clearance field."""
     grid = field.grid
     clearance = _clearances(field, 2 * radius)
     cell = _bottleneck(clearance, grid.cell_of(np.array([ends[0][:2], ends[1][:2]])))

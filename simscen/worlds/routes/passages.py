@@ -55,13 +55,11 @@ def passage_between(sides: tuple[Point, ...], goal: str, field: ClearanceField) 
 
 
 def _passage(goal: str, pair: tuple[int, int], field: ClearanceField) -> Passage:
-    """Return the passage between two points of the outline, given by their indices."""
-    one, other = pair
-    return Passage(
-        goal,
-        (_outline_point(one, field), _outline_point(other, field)),
-        (_name_of_solid(one, field), _name_of_solid(other, field)),
-    )
+    """Return the passage between two points of the outline, given by their indices. Points are rounded to 1 mm."""
+    assert field.outline is not None
+    (ax, ay), (bx, by) = field.outline.data[list(pair)].tolist()
+    one, other = (field.names[owner] for owner in field.owners[list(pair)])
+    return Passage(goal, ((round(ax, 3), round(ay, 3)), (round(bx, 3), round(by, 3))), (one, other))
 
 
 def _candidate_pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int, int]]:
@@ -141,16 +139,3 @@ def _narrowest_pair(one: int, other: int, field: ClearanceField) -> tuple[int, i
 def _subsample(indices: npt.NDArray[np.int64], required: int) -> npt.NDArray[np.int64]:
     """Return about MAX_POINTS_PER_SIDE of the indices, evenly spaced, and the index `required`."""
     return np.append(indices[:: 1 + len(indices) // MAX_POINTS_PER_SIDE], required)
-
-
-def _name_of_solid(index: int, field: ClearanceField) -> str:
-    """Return the name of the solid at a point of the outline; "" without names."""
-    owner = int(field.owners[index])
-    return field.names[owner] if owner < len(field.names) else ""
-
-
-def _outline_point(index: int, field: ClearanceField) -> Point:
-    """Return a point of the outline, rounded to 1 mm."""
-    assert field.outline is not None
-    x, y = field.outline.data[index].tolist()
-    return round(x, 3), round(y, 3)

@@ -22,7 +22,7 @@ from simscen.worlds.routes.clearance import (
     clearance_field,
     search_grid,
 )
-from simscen.worlds.routes.narrow_gaps import narrowest_gap_in
+from simscen.worlds.routes.narrow_gaps import narrowest_gap
 from simscen.worlds.routes.passages import find_passages, passage_between
 
 Z_RANGE_M = (0.03, 0.4)
@@ -87,19 +87,16 @@ class ShortestPaths:
     def leg(self, start: Pose2, goal: Pose2, name: str) -> Leg:
         """Return the shortest path to the goal `name`, with its passages.
 
-        If there is no path, the length is inf, and the only passage is the gap that is too narrow, if one was found.
+        If there is no path, the length is inf, and the only passage is the gap that is too narrow. There is none if
+        the start or the goal is blocked, or if no such gap was found.
         """
         path = self.path(start, goal)
         if path is not None:
             return Leg(polyline_length(path), find_passages(path, name, self._field))
-        return Leg(math.inf, self._too_narrow_gap(start, goal, name))
-
-    def _too_narrow_gap(self, start: Pose2, goal: Pose2, name: str) -> tuple[Passage, ...]:
-        """Return the gap that is too narrow, as one passage; () if start or goal is blocked, or without a gap."""
         if not self._field.has_clearance(np.array([start[:2], goal[:2]]), self._min_clearance).all():
-            return ()
-        gap = narrowest_gap_in(self._field, (start, goal), self._radius)
-        return (passage_between(gap.sides, name, self._field),) if len(gap.sides) == 2 else ()
+            return Leg(math.inf)
+        gap = narrowest_gap(self._field, (start, goal), self._radius)
+        return Leg(math.inf, (passage_between(gap.sides, name, self._field),) if gap.sides else ())
 
     def path(self, start: Pose2, goal: Pose2) -> Array | None:
         """Return the points (n, 2) of the shortest path, with arcs as short chords; None if there is no path."""
@@ -108,9 +105,9 @@ class ShortestPaths:
             return None
         if is_line_clear(ends[0], ends[1], self._field, self._min_clearance):
             return ends
-        optimistic = self._search(self._optimistic_graph, ends)
-        if optimistic is None or self._is_clear(optimistic):
-            return optimistic
+        path = self._search(self._optimistic_graph, ends)
+        if path is None or all(is_line_clear(a, b, self._field, self._min_clearance) for a, b in pairwise(path)):
+            return path
         return self._search(self._strict_graph, ends)
 
     def may_reach(self, start: Pose2, goal: Pose2) -> bool:
@@ -153,9 +150,6 @@ class ShortestPaths:
         inner = self._field.grid.center_of(cells)
         return tighten_path(np.concatenate((ends[:1], inner, ends[1:])), self._field, self._radius)
 
-    def _is_clear(self, path: Array) -> bool:
-        return all(is_line_clear(a, b, self._field, self._min_clearance) for a, b in pairwise(path))
-
     def _free_cell(self, graph: GridGraph, point: Array) -> tuple[int, int] | None:
         """Return the free cell (row, column) nearest to a point (2,); None if none within two cells is free."""
         grid = self._field.grid
@@ -184,14 +178,15 @@ def legs_between(
     built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float, z_range: tuple[float, float] = Z_RANGE_M
 ) -> list[Leg]:
     """Return the shortest path of a disc for each pair (start, goal) of `ends`."""
-    stops = [pose for start, goal in ends for pose in (start, goal.pose)]
-    paths = shortest_paths_in(built, stops, radius, z_range) if stops else None
+    if not ends:
+        return []
+    paths = shortest_paths_in(built, [pose for start, goal in ends for pose in (start, goal.pose)], radius, z_range)
     found: dict[tuple[Pose2, Pose2], Leg] = {}
     legs = []
     for start, goal in ends:
-        assert paths is not None
-        leg = found.get((start, goal.pose))
-        found[start, goal.pose] = leg = leg or paths.leg(start, goal.pose, goal.name)
+        if (start, goal.pose) not in found:
+            found[start, goal.pose] = paths.leg(start, goal.pose, goal.name)
+        leg = found[start, goal.pose]
         legs.append(replace(leg, passages=tuple(replace(each, goal=goal.name) for each in leg.passages)))
     return legs
 
@@ -199,13 +194,9 @@ def legs_between(
 def _bounds_containing(built: BuiltWorld, stops: Sequence[Pose2]) -> Bounds:
     """Return the bounds of the world, or of its map if the world has none, extended to contain the stops."""
     x0, y0, x1, y1 = built.world.bounds
-    corners = [(x0, y0), (x1, y1)]
-    if not any(built.world.bounds):
-        height, width = (cells * built.map.resolution for cells in built.map.shape)
-        corners = built.map.origin.apply(np.array([[0, 0], [width, 0], [0, height], [width, height]])).tolist()
-    points = np.array([*corners, *(stop[:2] for stop in stops)])
-    (left, low), (right, high) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-    return left, low, right, high
+    corners = [(x0, y0), (x1, y1)] if any(built.world.bounds) else built.map.corners
+    xs, ys = zip(*corners, *(stop[:2] for stop in stops), strict=True)
+    return min(xs), min(ys), max(xs), max(ys)
 
 
 def tighten_path(path: Array, field: ClearanceField, radius: float) -> Array:

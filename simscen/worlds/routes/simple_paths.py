@@ -48,19 +48,15 @@ class SimplePaths:
 
     def length(self, start: Point, goal: Point) -> float:
         """Return the length in m of a path, not necessarily the shortest one, to the goal; inf if none was found."""
-        if (start, goal) not in self._lengths:
-            self._lengths[start, goal] = self._find_length(start, goal)
-        return self._lengths[start, goal]
-
-    def _find_length(self, start: Point, goal: Point) -> float:
-        if self._is_clear(start, goal):
-            return math.dist(start, goal)
 
         def last_leg(here: Point) -> float:
             near = math.dist(here, goal) < 2 * STEP_M and self._is_clear(here, goal)
             return math.dist(here, goal) if near else math.inf
 
-        return self._search(start, goal, last_leg)
+        if (start, goal) not in self._lengths:
+            is_direct = self._is_clear(start, goal)
+            self._lengths[start, goal] = math.dist(start, goal) if is_direct else self._search(start, goal, last_leg)
+        return self._lengths[start, goal]
 
     def can_enter(self, start: Point, towards: Point, is_inside: Callable[[Point], bool]) -> bool:
         """Return whether a path was found from `start` to any point for which `is_inside` is true.

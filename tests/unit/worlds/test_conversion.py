@@ -17,7 +17,8 @@ from simscen.core.geometry.shapes import Body, Box, Capsule, Cone, Cylinder, Ext
 from simscen.model.world import WorldSpec
 from simscen.spec.moving_objects import path_through_waypoints
 from simscen.worlds.conversion import convert_world
-from simscen.worlds.geometry.cross_section import rings_from_segments, section_segments
+from simscen.worlds.geometry.cross_section import cross_section
+from simscen.worlds.geometry.section_polygons import rings_from_segments
 from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 from simscen.worlds.world_file import world_from_spec
 
@@ -41,7 +42,7 @@ def section_of(solids, height):
     rings = [
         Polygon(ring)
         for solid in solids
-        for ring in rings_from_segments(section_segments(merge_solids([solid]), height))
+        for ring in rings_from_segments(cross_section(merge_solids([solid]), height).segments)
     ]
     return union_all(rings)
 

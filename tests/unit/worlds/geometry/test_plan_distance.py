@@ -6,7 +6,7 @@ import shapely
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Cone, Extrusion, Solid, Sphere
-from simscen.worlds.geometry.cross_section import horizontal_distance
+from simscen.worlds.geometry.mesh_overlaps import horizontal_distance
 from simscen.worlds.geometry.triangulation import merge_solids
 
 BODY = (0.05, 0.4)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Cone, Cylinder, Extrusion, Solid, Sphere
-from simscen.worlds.geometry.cross_section import horizontal_distance
+from simscen.worlds.geometry.mesh_overlaps import horizontal_distance
 from simscen.worlds.geometry.prisms import bounding_rectangle, mesh_rectangle, upright_prism
 from simscen.worlds.geometry.triangulation import merge_solids
 

@@ -4,9 +4,10 @@ import shapely
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Solid, Sphere
+from simscen.worlds.geometry.cross_section import MAX_SECTIONS, sections_between
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.occupancy_map import empty_grid
-from simscen.worlds.routes.clearance import MAX_SECTIONS, clearance_field, sections_between
+from simscen.worlds.routes.clearance import clearance_field
 
 BOUNDS, BODY = (-3.0, -3.0, 3.0, 3.0), (0.03, 0.4)
 

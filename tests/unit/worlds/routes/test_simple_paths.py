@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import Box, Solid
+from simscen.worlds.geometry.mesh_overlaps import footprint_overlaps_solid
 from simscen.worlds.geometry.overlaps import first_solid_in_footprint, place_polygon
 from simscen.worlds.geometry.triangulation import merge_solids
-from simscen.worlds.routes.clearance import footprint_overlaps_solid
+from simscen.worlds.routes.clearance import clearance_field, search_grid
 from simscen.worlds.routes.narrow_gaps import narrowest_gap
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 from simscen.worlds.routes.simple_paths import simple_paths_between
@@ -59,14 +60,14 @@ def test_sealed_room_is_unreachable_and_its_narrowest_gap_is_in_the_wall() -> No
     exact = ShortestPaths(merge_solids(solids), BOUNDS, 0.2, Z)
     assert not exact.may_reach(START, GOAL)
     assert not exact.may_enter([START], lambda pose: pose.distance(GOAL) - 0.5)
-    gap = narrowest_gap(merge_solids(solids), BOUNDS, (START, GOAL), 0.2, Z)
+    gap = narrowest_gap(clearance_field(merge_solids(solids), search_grid(BOUNDS, 0.2), Z), (START, GOAL), 0.2)
     assert (gap.width, round(gap.x, 1)) == (0.0, 2.5)
 
 
 def test_width_of_a_gap_is_measured_between_its_walls() -> None:
     for width in (0.2, 0.31, 0.38):
         solids = [*ROOM, wall(2.0, 0.0, 3.0, "low"), wall(2.0, 3.0 + width, 4.0, "high")]
-        gap = narrowest_gap(merge_solids(solids), BOUNDS, (START, GOAL), 0.2, Z)
+        gap = narrowest_gap(clearance_field(merge_solids(solids), search_grid(BOUNDS, 0.2), Z), (START, GOAL), 0.2)
         assert abs(gap.width - width) < 0.021
         assert math.dist((gap.x, gap.y), (2.0, 3.0 + width / 2)) < 0.1
         assert not ShortestPaths(merge_solids(solids), BOUNDS, 0.25, Z).may_reach(START, GOAL)
