@@ -12,7 +12,15 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry.shapes import Mesh
-from simscen.loading.loaded import CriterionMask, LoadedMap, LoadedRobot, LoadedScenario, LoadedWorld
+from simscen.loading.loaded import (
+    KEEPOUT_MASK_KEYS,
+    SPEED_MASK_KEYS,
+    CriterionMask,
+    LoadedMap,
+    LoadedRobot,
+    LoadedScenario,
+    LoadedWorld,
+)
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.yaml.textfile import with_source_line
 from simscen.loading.yaml.tree import Keys, MappingNode, key_position, value_position
@@ -125,10 +133,6 @@ def _unknown_argument_problem(robot: LoadedRobot, argument: str, declared: Seque
     return Problem(*key_position(robot.tree, ("arguments", argument)), "SC403", message, hint)
 
 
-KEEPOUT_MASK_KEYS: Keys = ("stack", "keepout_mask")
-"""Keys that lead to the keepout mask of the stack in a scenario."""
-SPEED_MASK_KEYS: Keys = ("stack", "speed_mask", "file")
-"""Keys that lead to the speed mask of the stack in a scenario."""
 MAX_RECTANGLES = 100_000
 """Largest number of rectangles of equal cells in the mask of a criterion. Every log contains all these rectangles."""
 

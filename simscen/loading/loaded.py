@@ -16,6 +16,11 @@ from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.world import RosMapSpec, WorldSpec
 
+KEEPOUT_MASK_KEYS: Keys = ("stack", "keepout_mask")
+"""Keys that lead to the keepout mask of the stack in a scenario."""
+SPEED_MASK_KEYS: Keys = ("stack", "speed_mask", "file")
+"""Keys that lead to the speed mask of the stack in a scenario."""
+
 
 @dataclass(frozen=True)
 class LoadedMap:
@@ -60,8 +65,6 @@ class LoadedRobot:
     """Specification; None for a URDF alone."""
     urdf: Path | None = None
     """URDF or xacro file: the one that the `*.robot.yaml` names, or `path` itself; None without one."""
-    is_shipped: bool = False
-    """Whether the robot ships with simscen."""
     tree: MappingNode | None = field(repr=False, default=None)
     """YAML tree of `spec`."""
     packages: Mapping[str, Path] = field(default_factory=dict)
@@ -190,11 +193,7 @@ class LoadedScenario:
 
     def problem(self, keys: Keys, code: str, message: str, hint: str = "") -> Problem:
         """Return an error at the position of the value at `keys`, with the text of its line."""
-        return self.problem_at(self.position_of(*keys), code, message, hint)
-
-    def problem_at(self, position: Position, code: str, message: str, hint: str = "") -> Problem:
-        """Return an error at a position in any file of the scenario, with the text of its line."""
-        return self.with_source_line(Problem(*position, code=code, message=message, hint=hint))
+        return self.with_source_line(Problem(*self.position_of(*keys), code, message, hint))
 
     def with_source_line(self, problem: Problem) -> Problem:
         """Return a copy of a problem with the text of its line in any file of the scenario."""

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.loading import multirobot
@@ -11,10 +10,10 @@ from simscen.loading.checks.runner import check_robot_names, check_scenario
 from simscen.loading.codes import UNSUPPORTED_BY_STACK
 from simscen.loading.files.assets import Assets, find_criterion_masks
 from simscen.loading.files.paths import PathSandbox
-from simscen.loading.loaded import LoadedMap, LoadedScenario
+from simscen.loading.loaded import KEEPOUT_MASK_KEYS, SPEED_MASK_KEYS, LoadedMap, LoadedScenario
 from simscen.loading.named_places import places_of, resolve_places, unknown_places
 from simscen.loading.schema.messages import quoted, suggestion
-from simscen.loading.schema.validate import check
+from simscen.loading.schema.validate import check, not_a_mapping
 from simscen.loading.stacks.choice import StackChoice, not_a_scenario, recognize_stack_file
 from simscen.loading.stacks.nav2_expansion import with_nav2_parameters
 from simscen.loading.variations.expand import VARIATIONS, Variation, VariationSpace, expand_variations, variation_space
@@ -22,7 +21,7 @@ from simscen.loading.variations.naming import number_of
 from simscen.loading.variations.options import Change
 from simscen.loading.variations.variation_problems import VariationProblems, merge_problems
 from simscen.loading.yaml.library import Library
-from simscen.loading.yaml.tree import Keys, MappingNode, Node, ScalarNode, child, node_at, value_position
+from simscen.loading.yaml.tree import Keys, MappingNode, ScalarNode, child, node_at, value_position
 from simscen.model.scenario import ScenarioSpec
 
 SUFFIXES = (".scenario.yaml", ".scenario.yml", ".yaml", ".yml")
@@ -165,11 +164,10 @@ def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Pat
         return [not_a_scenario(kind, display_name)]
     if choice is not None:
         library.add(choice.texts, choice.files)
+    if not problems and tree is not None and not isinstance(tree, MappingNode):
+        problems = [not_a_mapping(tree)]
     if problems or not isinstance(tree, MappingNode):
-        wrong = (
-            check(ScenarioSpec, tree, multirobot.scenario_robot_problems) if tree is not None and not problems else []
-        )
-        return library.with_source(sorted([*problems, *(wrong if isinstance(wrong, list) else ())]))
+        return library.with_source(sorted(problems))
     return file, tree
 
 
@@ -186,7 +184,10 @@ def _load_variation(
     tree = expanded_tree.tree
     spec = check(ScenarioSpec, tree, multirobot.scenario_robot_problems)
     if isinstance(spec, list):
-        return library.with_source(sorted([*spec, *_problems_of_world(tree, library)]))
+        assets, world = Assets(library), child(tree, "world")
+        if isinstance(world, ScalarNode) and isinstance(world.value, str):
+            assets.world(world)  # reports also the problems of the world file
+        return library.with_source(sorted([*spec, *assets.problems]))
     if problems := check_robot_names(spec, tree):
         return library.with_source(problems)
     loaded = (
@@ -208,14 +209,6 @@ def _ineffective_variation_problems(variation: Variation, tree: MappingNode, cho
             message = f"{quoted(change.target.path)} changes nothing with --stack {choice.written}"
             hint = "select variations that do not set it with -k or --variation, or choose another stack"
             yield Problem(*change.target.position, UNSUPPORTED_BY_STACK, message, hint)
-
-
-def _problems_of_world(tree: Node, library: Library) -> list[Problem]:
-    """Return the problems of the world file of an invalid scenario."""
-    assets, node = Assets(library), child(tree, "world")
-    if isinstance(node, ScalarNode) and isinstance(node.value, str):
-        assets.world(node)
-    return assets.problems
 
 
 def _load_multi_robot(
@@ -255,16 +248,16 @@ def _load_single_robot(
     """
     assets = Assets(library)
     world = assets.world_of(spec.world, tree, file)
-    robot_map = _robot_map(spec, tree, assets)
-    keepout_mask = _mask(spec.stack.keepout_mask, tree, ("stack", "keepout_mask"), assets)
-    limits = spec.stack.speed_mask
-    speed_mask = _mask(limits.file if limits else None, tree, ("stack", "speed_mask", "file"), assets)
+    robot_map = None if spec.map == "none" else _map_at(("map",), tree, assets)
+    keepout_mask = _map_at(KEEPOUT_MASK_KEYS, tree, assets)
+    speed_mask = _map_at(SPEED_MASK_KEYS, tree, assets)
     criterion_masks = find_criterion_masks(spec, tree, assets)
     robot = assets.robot(spec.only_robot.model, value_position(tree, ("robot", "model")))
     if world is None or robot is None or assets.problems:
         return library.with_source(sorted(assets.problems))
     sandbox, display_name, places = library.sandbox, library.sandbox.display_name(file), places_of(world)
     unknown = library.with_source(list(unknown_places(spec, tree, places)))
+    maps = (world.map, robot_map, keepout_mask, speed_mask, *(mask.map for mask in criterion_masks.values()))
     loaded = LoadedScenario(
         id=scenario_id(file, sandbox.root),
         path=display_name,
@@ -274,18 +267,12 @@ def _load_single_robot(
         text=library.texts[display_name],
         spec=resolve_places(spec, places),
         world=world,
-        map=robot_map,
+        map="none" if spec.map == "none" else robot_map,
         robot=robot,
         tree=tree,
         sources=dict(library.texts),
         files=dict(library.files),
-        notes=_map_notes(
-            world.map,
-            robot_map if robot_map != "none" else None,
-            keepout_mask,
-            speed_mask,
-            *(mask.map for mask in criterion_masks.values()),
-        ),
+        notes=tuple(dict.fromkeys(note for ros_map in maps if ros_map is not None for note in ros_map.notes)),
         keepout_mask=keepout_mask,
         speed_mask=speed_mask,
         criterion_masks=criterion_masks,
@@ -298,23 +285,10 @@ def _load_single_robot(
     return replace(loaded, notes=(*loaded.notes, *problems))
 
 
-def _robot_map(spec: ScenarioSpec, tree: MappingNode, assets: Assets) -> LoadedMap | Literal["none"] | None:
-    """Load the ROS map of the robot; "none" for no map, None for the map of the world."""
-    node = node_at(tree, ("map",))
-    if spec.map is None or spec.map == "none" or not isinstance(node, ScalarNode):
-        return "none" if spec.map == "none" else None
-    return assets.map(node)
-
-
-def _mask(mask_path: str | None, tree: MappingNode, keys: Keys, assets: Assets) -> LoadedMap | None:
-    """Load the filter mask of the stack at `keys`; None if `mask_path` is None."""
+def _map_at(keys: Keys, tree: MappingNode, assets: Assets) -> LoadedMap | None:
+    """Load the ROS map whose path is at `keys` of a valid scenario; None if there is no path."""
     node = node_at(tree, keys)
-    return assets.map(node) if mask_path is not None and isinstance(node, ScalarNode) else None
-
-
-def _map_notes(*maps: LoadedMap | None) -> tuple[Problem, ...]:
-    """Return the warnings about the maps, without duplicates."""
-    return tuple(dict.fromkeys(note for used in maps if used for note in used.notes))
+    return assets.map(node) if isinstance(node, ScalarNode) else None
 
 
 def is_unusable_name(name: str) -> bool:

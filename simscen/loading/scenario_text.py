@@ -12,8 +12,8 @@ from simscen.loading.plugins import missing_plugins
 from simscen.loading.schema.validate import Model, check
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.parser import parse_yaml
-from simscen.loading.yaml.scalars import to_yaml
 from simscen.loading.yaml.tree import MappingNode, Node
+from simscen.loading.yaml.writing import to_yaml
 from simscen.model.scenario import CriteriaSpec, ScenarioSpec
 
 JUDGING_PLUGINS = frozenset({"criterion", "metric"})

@@ -8,12 +8,11 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simscen.loading.files.single_files import world_text
 from simscen.loading.scenario import load_scenario
 from simscen.loading.scenario_text import resolved_text
 from simscen.loading.yaml.parser import parse_yaml
-from simscen.loading.yaml.scalars import to_yaml
 from simscen.loading.yaml.textfile import read_text
+from simscen.loading.yaml.writing import to_yaml, world_text
 from simscen.model.world import WorldSpec
 from tests.scenario_files import spec_of_text
 

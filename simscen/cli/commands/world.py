@@ -18,8 +18,9 @@ from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.builders import world_from_file
 from simscen.loading.checks.scene_runner import world_reader_notes
 from simscen.loading.files.discovery import default_root
-from simscen.loading.files.single_files import load_world_file, world_text
+from simscen.loading.files.single_files import load_world_file
 from simscen.loading.loaded import LoadedWorld
+from simscen.loading.yaml.writing import world_text
 from simscen.model.world import WorldSpec
 from simscen.report.display_text import number_with_noun
 from simscen.run.sessions.output_folder import write_atomically

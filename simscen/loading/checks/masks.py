@@ -11,7 +11,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.polygons import depth_inside_polygon, separation_from_boxes
 from simscen.criteria.keepout import Keepout
 from simscen.criteria.speed import Speed
-from simscen.loading.builders import KEEPOUT_MASK_KEYS, SPEED_MASK_KEYS, load_criterion_masks, load_masks
+from simscen.loading.builders import load_criterion_masks, load_masks
 from simscen.loading.checks.registry import CheckProblem
 from simscen.loading.checks.scene import (
     WORLD,
@@ -20,6 +20,7 @@ from simscen.loading.checks.scene import (
     required_failure_hint,
 )
 from simscen.loading.goals import expects_start_failure
+from simscen.loading.loaded import KEEPOUT_MASK_KEYS, SPEED_MASK_KEYS
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.tree import Keys
 

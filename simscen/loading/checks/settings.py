@@ -93,9 +93,8 @@ def degrees_as_radians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     files: list[tuple[BaseModel | None, MappingNode | None]] = [
         (loaded.spec, loaded.tree),
         (loaded.world.spec, loaded.world.tree),
+        (loaded.robot.spec, loaded.robot.tree),
     ]
-    if not loaded.robot.is_shipped:
-        files.append((loaded.robot.spec, loaded.robot.tree))
     for spec, tree in files:
         for keys, value in angles_of(spec) if spec is not None and tree is not None else ():
             node = node_at(tree or loaded.tree, keys)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -55,7 +54,7 @@ class Assets:
 
     def world(self, node: ScalarNode) -> LoadedWorld | None:
         """Load the world in the file whose path is the value of `node`."""
-        path = self._find_file(str(node.value), node.position)
+        path = self._find(str(node.value), node.position)
         return None if path is None else self._load_cached(self.world_file, path)
 
     def world_file(self, path: Path) -> LoadedWorld | None:
@@ -84,10 +83,10 @@ class Assets:
         loaded_map = sdf = None
         if spec.map is not None:
             position = value_position(tree, ("map",))
-            found = self._find_file(spec.map, position)
+            found = self._find(spec.map, position)
             loaded_map = self.map_file(found) if found else None
         if spec.sdf is not None:
-            sdf = self._find_file(spec.sdf, value_position(tree, ("sdf",)))
+            sdf = self._find(spec.sdf, value_position(tree, ("sdf",)))
         self.problems += unknown_places(spec, tree, spec.places)
         spec = resolve_places(spec, spec.places)
         name = spec.name or path.name.split(".")[0]
@@ -96,7 +95,7 @@ class Assets:
 
     def map(self, node: ScalarNode) -> LoadedMap | None:
         """Load the ROS map in the YAML file whose path is the value of `node`."""
-        path = self._find_file(str(node.value), node.position)
+        path = self._find(str(node.value), node.position)
         return None if path is None else self._load_cached(self.map_file, path)
 
     def map_file(self, path: Path) -> LoadedMap | None:
@@ -106,20 +105,17 @@ class Assets:
     def robot(self, written: str, position: Position) -> LoadedRobot | None:
         """Load the robot in the file with the path `written`, or the shipped robot with this name."""
         if "/" in written or written.endswith((*URDF_SUFFIXES, ".yaml", ".yml")):
-            path = self._find_file(written, position)
+            path = self._find(written, position)
             return None if path is None else self._load_cached(self.robot_file, path)
         shipped_files = shipped_robots()
         if written in shipped_files:
-            return self._load_cached(partial(self.robot_file, is_shipped=True), shipped_files[written])
+            return self._load_cached(self.robot_file, shipped_files[written])
         hint = f"{suggestion(written, shipped_files)} (or the path of a *.robot.yaml or .urdf file)"
         self._add_problem(position, "SC023", f"no robot called {quoted(written)} ships with simscen", hint)
         return None
 
-    def robot_file(self, path: Path, is_shipped: bool = False) -> LoadedRobot | None:
-        """Load the robot in a `*.robot.yaml`, or in a `.urdf` or `.xacro` file, which is parsed later.
-
-        `is_shipped` is True for a robot that ships with simscen.
-        """
+    def robot_file(self, path: Path) -> LoadedRobot | None:
+        """Load the robot in a `*.robot.yaml`, or in a `.urdf` or `.xacro` file, which is parsed later."""
         name = path.name.split(".")[0]
         if path.suffix in URDF_SUFFIXES:
             text = read_text(path, self.library.sandbox.display_name(path))
@@ -131,20 +127,20 @@ class Assets:
         spec = self._validated(RobotSpec, tree)
         if spec is None or tree is None:
             return None
-        urdf = self._find_file(spec.urdf, value_position(tree, ("urdf",))) if spec.urdf else None
-        positions = {package: value_position(tree, ("packages", package)) for package in spec.packages}
-        packages = {
-            package: self._find_folder(spec.packages[package], position) for package, position in positions.items()
-        }
-        if (spec.urdf and urdf is None) or None in packages.values():
+        urdf = self._find(spec.urdf, value_position(tree, ("urdf",))) if spec.urdf else None
+        packages = {}
+        for package, written in spec.packages.items():
+            folder = self._find(written, value_position(tree, ("packages", package)), "folder")
+            if folder is not None:
+                packages[package] = folder
+        if (spec.urdf and urdf is None) or len(packages) < len(spec.packages):
             return None
         mapping = tree if isinstance(tree, MappingNode) else None
-        found = {package: folder for package, folder in packages.items() if folder is not None}
-        return LoadedRobot(name, path, spec, urdf, is_shipped, mapping, found)
+        return LoadedRobot(name, path, spec, urdf, mapping, packages)
 
     def _load_cached(self, load: Callable[[Path], Loaded | None], path: Path) -> Loaded | None:
         """Return `load(path)`; from the cache if the file has been loaded without problems before."""
-        key = getattr(load, "func", load).__name__, path
+        key = load.__name__, path
         if key in self.library.loaded:
             known: Loaded = self.library.loaded[key]
             return known
@@ -159,7 +155,7 @@ class Assets:
         spec = self._validated(RosMapSpec, tree)
         if spec is None or tree is None:
             return None
-        image = self._find_file(spec.image, value_position(tree, ("image",)))
+        image = self._find(spec.image, value_position(tree, ("image",)))
         notes = tuple(self.library.with_source(_ignored_key_warnings(tree)))
         return LoadedMap(path, spec, image, notes) if image else None
 
@@ -179,27 +175,14 @@ class Assets:
             return None
         return spec
 
-    def _find_file(self, written: str, position: Position) -> Path | None:
-        """Return the existing regular file with the path `written`."""
-        found = self._find_path(written, position)
-        if found is not None and not found.is_file():
-            self._add_problem(position, "SC001", f"not a regular file: {quoted(written)}")
-            return None
-        return found
-
-    def _find_folder(self, written: str, position: Position) -> Path | None:
-        """Return the existing folder with the path `written`."""
-        found = self._find_path(written, position)
-        if found is not None and not found.is_dir():
-            self._add_problem(position, "SC001", f"not a folder: {quoted(written)}")
-            return None
-        return found
-
-    def _find_path(self, written: str, position: Position) -> Path | None:
-        """Return the existing file or folder with the path `written`."""
+    def _find(self, written: str, position: Position, kind: str = "regular file") -> Path | None:
+        """Return the existing file or folder with the path `written`. `kind` is "regular file" or "folder"."""
         found = self.library.sandbox.find(written, self.library.folder_of(position))
         if isinstance(found, PathProblem):
             self._add_problem(position, found.code, found.message, found.hint)
+            return None
+        if not (found.is_dir() if kind == "folder" else found.is_file()):
+            self._add_problem(position, "SC001", f"not a {kind}: {quoted(written)}")
             return None
         return found
 
@@ -214,20 +197,14 @@ def is_ros_map(tree: Node | None) -> bool:
 
 def _ignored_key_warnings(tree: Node) -> list[Problem]:
     """Return warnings about keys of a ROS map that map_server ignores."""
-    entries = tree.entries if isinstance(tree, MappingNode) else {}
-    messages = {
-        key: f"{quoted(key)} has no meaning in a ROS map" for key in entries if key not in RosMapSpec.model_fields
-    }
-    return [
-        Problem(*entries[key].key, "SC311", message, _ignored_key_hint(key), "warning")
-        for key, message in messages.items()
-    ]
-
-
-def _ignored_key_hint(key: str) -> str:
-    """Return the hint for a key: "did you mean …?" if it is similar to a key of ROS maps; else that it is ignored."""
-    near = suggestion(key, RosMapSpec.model_fields)
-    return near if near.startswith("did you mean") else "it is ignored, as by map_server"
+    warnings = []
+    for key, entry in tree.entries.items() if isinstance(tree, MappingNode) else ():
+        if key not in RosMapSpec.model_fields:
+            near = suggestion(key, RosMapSpec.model_fields)
+            hint = near if near.startswith("did you mean") else "it is ignored, as by map_server"
+            message = f"{quoted(key)} has no meaning in a ROS map"
+            warnings.append(Problem(*entry.key, "SC311", message, hint, "warning"))
+    return warnings
 
 
 def shipped_robots() -> dict[str, Path]:

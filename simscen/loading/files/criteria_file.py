@@ -68,12 +68,11 @@ def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> Lo
     if isinstance(file, Problem):
         raise InvalidInput([file])
     tree, problems = library.read(file, defaults=True)
+    if not problems and tree is not None:
+        spec = check(CriteriaSpec, tree, multirobot.criteria_robot_problems)
+        problems = spec if isinstance(spec, list) else []
     if problems or not isinstance(tree, MappingNode):
-        spec = [] if problems or tree is None else check(CriteriaSpec, tree, multirobot.criteria_robot_problems)
-        raise InvalidInput(library.with_source([*problems, *(spec if isinstance(spec, list) else ())]))
-    spec = check(CriteriaSpec, tree, multirobot.criteria_robot_problems)
-    if isinstance(spec, list):
-        raise InvalidInput(library.with_source(spec))
+        raise InvalidInput(library.with_source(problems))
     return _load_tree(file, tree, library)
 
 
@@ -89,7 +88,7 @@ def _load_tree(file: Path, tree: MappingNode, library: Library) -> LoadedCriteri
         assets.problems += unknown_places(spec, tree, known, NO_WORLD_HINT)
         spec = resolve_places(spec, known)
     if assets.problems:
-        raise InvalidInput(library.with_source(sorted(assets.problems)))
+        raise InvalidInput(library.with_source(assets.problems))
     display_name = library.sandbox.display_name(file)
     positions = [value_position(tree, ("pass", index)) for index in range(len(spec.pass_))]
     lines = tuple(position.line if position.path == display_name else 0 for position in positions)

@@ -44,14 +44,17 @@ class PathSandbox:
             missing = PathProblem("SC023", message, "" if self.world_path else "allow its folder with --world-path")
             return self._in_world_path(written.removeprefix(MODEL_SCHEME)) or missing
         path = _resolved(folder / written)
-        if self.contains(path):
-            try:
-                path.stat()
-            except OSError as error:
-                problem = _stat_problem(error, written, path)
-            else:
-                return path
-        return self._in_world_path(written) or problem or _outside_problem(written)
+        if not self.contains(path):
+            hint = "choose the root with --root, or allow a folder with --world-path"
+            outside = PathProblem("SC020", f"{quoted(written)} is outside the scenario root", hint)
+            return self._in_world_path(written) or outside
+        try:
+            path.stat()
+        except OSError as error:
+            code = "SC022" if error.errno == errno.ELOOP else "SC023"
+            missing = PathProblem(code, f"{os_error_reason(error)}: {quoted(written)}", _similar_name_hint(path))
+            return self._in_world_path(written) or missing
+        return path
 
     def resolve_argument(self, path: Path) -> Path | Problem:
         """Return the absolute path of a file on the command line, which need not exist.
@@ -129,18 +132,6 @@ def _name_problem(path: Path, name: str) -> Problem | None:
 def _resolved(path: Path) -> Path:
     """Return the absolute path with symbolic links resolved. A loop of links is no error, unlike in Path.resolve."""
     return Path(os.path.realpath(path))
-
-
-def _outside_problem(written: str) -> PathProblem:
-    """Return the problem that a path in a YAML file leads out of the sandbox."""
-    hint = "choose the root with --root, or allow a folder with --world-path"
-    return PathProblem("SC020", f"{quoted(written)} is outside the scenario root", hint)
-
-
-def _stat_problem(error: OSError, written: str, path: Path) -> PathProblem:
-    """Return the problem for an error of `path.stat()`. `written` is the path in the YAML file."""
-    code = "SC022" if error.errno == errno.ELOOP else "SC023"
-    return PathProblem(code, f"{os_error_reason(error)}: {quoted(written)}", _similar_name_hint(path))
 
 
 def _similar_name_hint(missing: Path) -> str:

@@ -28,14 +28,18 @@ def hint_for_wrong_type(error_type: str, model: type[BaseModel], loc: Sequence[K
     `model` is the model of the whole file. `error_type` is pydantic's type of the error, such as "list_type".
     """
     models = models_at(model, loc)
-    in_list = isinstance(next((part for part in reversed(loc) if not _is_tag(part)), ""), int)
+    keys = [part for part in loc if isinstance(part, int) or " " not in part]  # tags of unions contain a space
+    in_list = bool(keys) and isinstance(keys[-1], int)
     if error_type == "list_type":
         return _list_hint(node, in_list)
     if isinstance(node, SequenceNode):
         return _sequence_for_mapping_hint(models, node)
     if isinstance(node, ScalarNode):
         colon_hint = _missing_colon_hint(models, node.value, in_list) if isinstance(node.value, str) else ""
-        return colon_hint or _scalar_for_mapping_hint(models, node) or _explain_hint(model, loc)
+        if hint := colon_hint or _scalar_for_mapping_hint(models, node):
+            return hint
+        if loc and any(issubclass(one, Choice) and loc[-1] in one.choices() for one in models_at(model, loc[:-1])):
+            return f"`simscen explain {loc[-1]}` shows its keys"
     return ""
 
 
@@ -108,12 +112,6 @@ def _is_valid(model: type[BaseModel], value: dict[str, object]) -> bool:
     return True
 
 
-def _explain_hint(model: type[BaseModel], loc: Sequence[Key]) -> str:
-    """Return a hint to use `simscen explain` if the last key of `loc` selects the kind of a Choice; "" otherwise."""
-    chosen = any(issubclass(one, Choice) and loc[-1] in one.choices() for one in models_at(model, loc[:-1]) if loc)
-    return f"`simscen explain {loc[-1]}` shows its keys" if chosen else ""
-
-
 def _missing_colon_hint(models: Iterable[type[BaseModel]], word: str, in_list: bool) -> str:
     """Return a hint on how to write the text `word` as a key of a Choice, with a colon and a value; "" if unknown."""
     for choice in (model for model in models if issubclass(model, Choice)):
@@ -140,8 +138,3 @@ def _find_key_below(models: Iterable[type[BaseModel]], key: str, depth: int = 1)
             if (found := _find_key_below(below, key, depth + 1)) is not None:
                 return [name, *found]
     return None
-
-
-def _is_tag(part: Key) -> bool:
-    """Return whether this part of a `loc` is the tag of a union member. Only tags contain a space."""
-    return isinstance(part, str) and " " in part

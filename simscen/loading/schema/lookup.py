@@ -9,7 +9,6 @@ from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, RootModel, Tag
-from pydantic.fields import FieldInfo
 
 from simscen.loading.yaml.tree import Key
 from simscen.spec.base import LazySpec, annotation_of
@@ -55,16 +54,11 @@ def has_no_required_keys(model: type[BaseModel]) -> bool:
     return not issubclass(model, RootModel | Choice) and not any(f.is_required() for f in model.model_fields.values())
 
 
-def field_type(model: type[BaseModel], key: str) -> Any:
+def _field_type(model: type[BaseModel], key: str) -> Any:
     """Return the type of the field with this key in YAML; None if it is unknown or cannot be imported."""
-    for name, field in model.model_fields.items():
-        if key in (field.alias, name):
-            return _type_of(field)
-    return None
-
-
-def _type_of(field: FieldInfo) -> Any:
-    """Return the type of a field; None if it cannot be imported from its package."""
+    field = next((field for name, field in model.model_fields.items() if key in (field.alias, name)), None)
+    if field is None:
+        return None
     if mark := next((mark for mark in field.metadata if isinstance(mark, ExtensibleUnion)), None):
         return Annotated[field.annotation, mark]
     try:
@@ -75,7 +69,7 @@ def _type_of(field: FieldInfo) -> Any:
 
 def _union_members(kind: Any) -> list[Any]:
     """Return the members of a union; for any other type, the type itself."""
-    if mark := _extensible_union(kind):
+    if mark := next((mark for mark in _metadata(kind) if isinstance(mark, ExtensibleUnion)), None):
         return [
             *_union_members(mark.built_in_union),
             *(Annotated[model, Tag(name)] for name, model in installed_specs(mark.group).items()),
@@ -94,7 +88,7 @@ def _types_below(kind: Any, part: Key) -> list[Any]:
     """Return the possible types of the value at the key or index `part` of a value of type `kind`."""
     unwrapped = _unwrapped(kind)
     if _is_model(unwrapped) and isinstance(part, str):
-        matches = field_type(unwrapped, part)
+        matches = _field_type(unwrapped, part)
         return [] if matches is None else [matches]
     if get_origin(unwrapped) is list and isinstance(part, int):
         return [get_args(unwrapped)[0]]
@@ -121,11 +115,6 @@ def _type_values(model: type[BaseModel]) -> tuple[Any, ...]:
 def _metadata(kind: Any) -> tuple[Any, ...]:
     """Return the metadata of an `Annotated` type; () for other types."""
     return tuple(get_args(kind)[1:]) if get_origin(kind) is Annotated else ()
-
-
-def _extensible_union(kind: Any) -> ExtensibleUnion | None:
-    """Return the ExtensibleUnion annotation of a type; None if it has none."""
-    return next((mark for mark in _metadata(kind) if isinstance(mark, ExtensibleUnion)), None)
 
 
 def _unwrapped(kind: Any) -> Any:

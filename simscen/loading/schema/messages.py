@@ -80,13 +80,9 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     matches = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
     if matches:
         return f"did you mean `{lowered[matches[0]]}`?"
-    return f"expected one of: {_listed(choices)}" if choices else ""
-
-
-def _listed(choices: list[str]) -> str:
-    """Return the choices separated by commas: at most MAX_LISTED_CHOICES, then the number of further choices."""
     more = len(choices) - MAX_LISTED_CHOICES
-    return f"{', '.join(choices[:MAX_LISTED_CHOICES])}, and {more} more" if more > 1 else ", ".join(choices)
+    listed = f"{', '.join(choices[:MAX_LISTED_CHOICES])}, and {more} more" if more > 1 else ", ".join(choices)
+    return f"expected one of: {listed}" if choices else ""
 
 
 def translate_error(error_type: str, context: Mapping[str, Any], node: Node, text: str) -> Message:
@@ -99,17 +95,16 @@ def translate_error(error_type: str, context: Mapping[str, Any], node: Node, tex
         return Message("SC011", text, _type_hint(error_type, node))
     if error_type in _BOUNDS:
         words, key = _BOUNDS[error_type]
-        return Message("SC013", f"must be {words} {_number(context[key])}, got {short_value(node)}")
+        bound = f"{context[key]:g}" if isinstance(context[key], float) else str(context[key])
+        return Message("SC013", f"must be {words} {bound}, got {short_value(node)}")
     if error_type in _TEMPLATES:
         code, template = _TEMPLATES[error_type]
         return Message(code, template.format_map(context))
     if error_type == "literal_error":
         word = str(node.value) if isinstance(node, ScalarNode) else ""
-        return Message(
-            "SC014",
-            f"{short_value(node)} is not one of the choices",
-            suggestion(word, _choices(str(context["expected"]))),
-        )
+        choices = str(context["expected"]).replace(" or ", ", ").split(",")  # pydantic writes "'a', 'b' or 'c'"
+        hint = suggestion(word, [choice.strip().strip("'") for choice in choices])
+        return Message("SC014", f"{short_value(node)} is not one of the choices", hint)
     if error_type == "value_error":
         reason = str(context["error"])
         is_empty_choice = reason.startswith("expected one of")
@@ -156,15 +151,6 @@ def short_value(node: Node) -> str:
     if isinstance(node, ScalarNode) and node.value is not None:
         return quoted(str(node.value).lower() if isinstance(node.value, bool) else str(node.value))
     return describe_node(node)
-
-
-def _number(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _choices(expected: str) -> list[str]:
-    """Return the choices that pydantic lists as "'a', 'b' or 'c'"."""
-    return [part.strip().strip("'") for part in expected.replace(" or ", ", ").split(",")]
 
 
 def _invalid_name(node: Node, pattern: str) -> Message:

@@ -1,7 +1,7 @@
 """Validation of a YAML tree against a pydantic model. Errors become problems with positions and hints."""
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from itertools import islice
 from typing import Any, TypeVar
 
@@ -57,8 +57,11 @@ def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
 
 def _supported_mapping(tree: Node) -> MappingNode | Problem:
     """Return the tree; or a problem if it is not a mapping, or is written for another version of the language."""
-    if isinstance(tree, MappingNode):
-        return _version_problem(tree) or tree
+    return _version_problem(tree) or tree if isinstance(tree, MappingNode) else not_a_mapping(tree)
+
+
+def not_a_mapping(tree: Node) -> Problem:
+    """Return the problem that the tree of a file is not a mapping."""
     return Problem(*tree.position, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")
 
 
@@ -75,7 +78,11 @@ def _problems(
     model: type[BaseModel], tree: MappingNode, errors: list[dict[str, Any]], missing: Sequence[Problem] = ()
 ) -> list[Problem]:
     """Return the problems of empty values, the problems `missing`, and the problems for pydantic's `errors`."""
-    empty = [_empty_value_problem(model, tree, keys) for keys in _empty_values(tree)]
+    empty = [
+        _empty_value_problem(model, tree, keys)
+        for keys, node in nodes_with_keys(tree)
+        if isinstance(node, ScalarNode) and node.value is None
+    ]
     return _without_duplicates([*empty, *missing, *(_problem_for_error(model, tree, error) for error in errors)])
 
 
@@ -88,11 +95,9 @@ def _is_missing_key(error: dict[str, Any]) -> bool:
 def _version_problem(tree: MappingNode) -> Problem | None:
     """Return a problem if the file is written for another version of the language; None if not, or if unknown."""
     version = child(tree, "simscen")
-    if not isinstance(version, ScalarNode) or version.value == LANGUAGE_VERSION or isinstance(version.value, bool):
+    if version is None or type(version.plain) is not int or version.plain == LANGUAGE_VERSION:
         return None
-    if not isinstance(version.value, int):
-        return None
-    message = f"needs schema {version.value}; this version of simscen supports {LANGUAGE_VERSION}"
+    message = f"needs schema {version.plain}; this version of simscen supports {LANGUAGE_VERSION}"
     return Problem(*version.position, "SC009", message)
 
 
@@ -169,13 +174,8 @@ def _type_key_problem(model: type[BaseModel], tree: Node, loc: Keys, error: dict
     return Problem(*value_position(tree, (*loc, "type")), "SC014", message, messages.suggestion(written, types))
 
 
-def _empty_values(tree: Node) -> Iterator[Keys]:
-    """Yield the keys of all values that are empty, such as `off:` instead of `off: {}`."""
-    return (keys for keys, node in nodes_with_keys(tree) if isinstance(node, ScalarNode) and node.value is None)
-
-
 def _empty_value_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
-    """Return the problem of the empty value at `loc`."""
+    """Return the problem of the empty value at `loc`, such as `off:` instead of `off: {}`."""
     *holder, key = loc
     if isinstance(key, int):
         return Problem(
@@ -205,14 +205,11 @@ def _without_duplicates(problems: list[Problem]) -> list[Problem]:
     for problem in problems:
         missing_key = problem.message if problem.code == "SC010" else ""
         first_at.setdefault((problem.path, problem.line, problem.col, missing_key), problem)
-    misspelled = {problem.hint for problem in problems if problem.code == "SC012"}
+    spelling_hints = {problem.hint for problem in problems if problem.code == "SC012"}
     return [
         problem
         for problem in first_at.values()
-        if not (problem.code == "SC010" and problem.hint == "" and _spelling_hint(problem) in misspelled)
+        if problem.code != "SC010"
+        or problem.hint
+        or f"did you mean {problem.message.split()[2]}?" not in spelling_hints  # the third word is the missing key
     ]
-
-
-def _spelling_hint(missing: Problem) -> str:
-    """Return the hint for a misspelling of this missing key."""
-    return f"did you mean {missing.message.split()[2]}?"

@@ -15,7 +15,7 @@ from simscen.loading.schema.validate import check
 from simscen.loading.stacks.choice import EXTERNAL
 from simscen.loading.stacks.external_commands import parse_command
 from simscen.loading.yaml.library import Library
-from simscen.loading.yaml.tree import MappingNode, value_position
+from simscen.loading.yaml.tree import Node, value_position
 from simscen.model.stack_files import ExternalStackSpec, UserConfigSpec
 
 
@@ -25,7 +25,7 @@ class UserConfig:
 
     file: Path
     spec: UserConfigSpec
-    tree: MappingNode | None = field(repr=False, default=None)
+    tree: Node | None = field(repr=False, default=None)
     library: Library | None = field(repr=False, default=None)
 
     def command(self, name: str, environment: Mapping[str, str], folder: Path) -> ExternalCommand | None:
@@ -64,7 +64,7 @@ def load_config(file: Path) -> UserConfig:
     library = Library(PathSandbox.around(Path(os.devnull), [file.parent]))
     tree, problems = library.read(file)
     spec = check(UserConfigSpec, tree) if tree is not None else []
-    if problems or isinstance(spec, list) or not isinstance(tree, MappingNode):
+    if problems or isinstance(spec, list):
         raise InvalidInput(library.with_source([*problems, *(spec if isinstance(spec, list) else [])]))
     return UserConfig(file, spec, tree, library)
 

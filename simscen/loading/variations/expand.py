@@ -184,7 +184,8 @@ def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -
     position = tree.entries[VARIATIONS].value.position
     try:
         if numbers is not None:
-            return [one for number in numbers if (one := _variation_or_none(space, number)) is not None]
+            known = [number for number in numbers if space.is_random or 0 < number <= space.count]
+            return [one for number in known if (one := space.variation(number)) is not None]
         if problem := _too_many_problem(space, position):
             return [problem]
         found = space.named_variations()
@@ -220,14 +221,6 @@ def variation_space(tree: MappingNode) -> VariationSpace | list[Problem] | None:
         hint = "vary with `sampled` and `method: random` alone, or remove `acceptance`"
         builder.add_problem(tree.entries[ACCEPTANCE].key, "SC016", message, hint)
     return builder.problems or VariationSpace(own, found, builder.targets, is_random)
-
-
-def _variation_or_none(space: VariationSpace, number: int) -> Variation | None:
-    """Return the variation with this number; None if it is unknown or does not meet the conditions."""
-    try:
-        return space.variation(number)
-    except IndexError:
-        return None
 
 
 def _too_many_problem(space: VariationSpace, position: Position) -> Problem | None:

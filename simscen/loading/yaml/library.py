@@ -55,7 +55,8 @@ class Library:
         defaults_file = path.parent / DEFAULTS_FILE
         # A defaults.yaml that cannot be read is a problem; ignoring it would change the scenario silently.
         if isinstance(tree, MappingNode) and os.path.lexists(defaults_file) and path.name != DEFAULTS_FILE:
-            base, more = self._read_defaults(defaults_file)
+            file = self.sandbox.resolve_argument(defaults_file)
+            base, more = (None, [file]) if isinstance(file, Problem) else self._read_with_base(file, ())
             problems = [*problems, *more]
             if isinstance(base, MappingNode):
                 tree = extend_mapping(tree, base)
@@ -85,20 +86,14 @@ class Library:
         tree, problems = self._read_file(path)
         if not isinstance(tree, MappingNode) or EXTENDS not in tree.entries:
             return tree, problems
-        entry = tree.entries[EXTENDS]
-        own = tree.without_keys(EXTENDS)
-        base = self._base_file(entry, path, (*chain, path))
+        own, chain = tree.without_keys(EXTENDS), (*chain, path)
+        base = self._base_file(tree.entries[EXTENDS].value, chain)
         if isinstance(base, Problem):
             return own, [*problems, base]
-        base_tree, more = self._read_with_base(base, (*chain, path))
+        base_tree, more = self._read_with_base(base, chain)
         if isinstance(base_tree, MappingNode):
             return extend_mapping(own, base_tree), problems + more
         return own, problems + more
-
-    def _read_defaults(self, defaults_file: Path) -> tuple[Node | None, list[Problem]]:
-        """Return the tree of a `defaults.yaml`, merged with the files that it extends, and all problems."""
-        path = self.sandbox.resolve_argument(defaults_file)
-        return (None, [path]) if isinstance(path, Problem) else self._read_with_base(path, ())
 
     def _read_file(self, path: Path) -> tuple[Node | None, list[Problem]]:
         """Return the tree of a file alone, and all problems. Keep its text and path."""
@@ -110,12 +105,12 @@ class Library:
         self.texts[name] = text
         return parse_yaml(text, name)
 
-    def _base_file(self, entry: Entry, path: Path, chain: tuple[Path, ...]) -> Path | Problem:
-        """Return the file that the file `path` extends; or a problem. `entry` is the entry of its key `extends`."""
-        position = entry.value.position
-        if not isinstance(entry.value, ScalarNode) or not isinstance(entry.value.value, str):
+    def _base_file(self, extends: Node, chain: tuple[Path, ...]) -> Path | Problem:
+        """Return the file that the last file of `chain` extends; or a problem. `extends` is the value of its key."""
+        position = extends.position
+        if not isinstance(extends, ScalarNode) or not isinstance(extends.value, str):
             return Problem(*position, "SC011", f"`{EXTENDS}` must be the path of one file")
-        base = self.sandbox.find(entry.value.value, path.parent)
+        base = self.sandbox.find(extends.value, chain[-1].parent)
         if isinstance(base, PathProblem):
             return Problem(*position, base.code, base.message, base.hint)
         if base in chain:

@@ -1,13 +1,14 @@
 """Rewriting of a YAML text with new content. Unchanged parts keep their lines and comments."""
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import yaml
 
 from simscen.loading.yaml.parser import parse_yaml
-from simscen.loading.yaml.scalars import Dumper, to_yaml
 from simscen.loading.yaml.tree import MappingNode, SequenceNode
+from simscen.loading.yaml.writing import Dumper, to_yaml
 
 LINE_WIDTH_CHARS = 100
 """Length of a line above which new lists and mappings continue in the next line."""
@@ -32,7 +33,7 @@ def changed_text(text: str, path: str, content: Mapping[str, Any], comment: str 
         elif isinstance(original, MappingNode) and key in segments and isinstance(value, list):
             parts.append(_list_text(key, value, original, lines, segments[key]))
         else:
-            parts.append(_dumped({key: value}))
+            parts.append(_entry(key, value))
     whole = "".join(parts)
     written, problems = parse_yaml(whole, path)
     if problems or written is None or written.plain != content:
@@ -65,11 +66,11 @@ def _list_text(key: str, value: list[Any], original: MappingNode, lines: Sequenc
     node = original.entries[key].value
     start = original.entries[key].key.line - 1
     if not isinstance(node, SequenceNode) or not value or not node.items:
-        return _dumped({key: value})
+        return _entry(key, value)
     first_lines = [item.position.line - 1 for item in node.items]
     begin_lines = all(lines[line].lstrip().startswith("- ") for line in first_lines)
     if not begin_lines or len(set(first_lines)) < len(first_lines) or first_lines[0] == start:
-        return _dumped({key: value})
+        return _entry(key, value)
     starts = [_with_comments(line, lines) for line in first_lines]
     end = _with_comments(start, lines) + len(segment)
     ends = [*starts[1:], end]
@@ -80,7 +81,7 @@ def _list_text(key: str, value: list[Any], original: MappingNode, lines: Sequenc
     for item in value:
         same = next((index for index, (plain, _) in enumerate(rest) if plain == item), None)
         if same is None:
-            parts.append(_indented(_dumped([item]), indent))
+            parts.append(textwrap.indent(_dump_innermost_flow([item]), " " * indent))
         else:
             parts.append(rest[same][1])
             rest = rest[same + 1 :]
@@ -95,19 +96,8 @@ def _joined_lines(lines: Sequence[str]) -> str:
     return "".join(f"{line}\n" for line in trimmed)
 
 
-def _indented(text: str, columns: int) -> str:
-    return "".join(f"{' ' * columns}{line}\n" for line in text.splitlines())
-
-
-def _dumped(data: Any) -> str:
-    """Return the YAML text of a list, or of a top-level mapping, which is never in braces."""
-    if isinstance(data, dict):
-        return "".join(_entry(key, value) for key, value in data.items())
-    return _dump_innermost_flow(data)
-
-
 def _entry(key: str, value: Any) -> str:
-    """Return the YAML text of a top-level key and its value."""
+    """Return the YAML text of a top-level key and its value, without braces around them."""
     text = _dump_innermost_flow({key: value})
     is_braced = text.startswith("{")
     return f"{text.strip()[1:-1]}\n" if is_braced else text

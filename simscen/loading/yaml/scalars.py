@@ -1,4 +1,4 @@
-"""Reading and writing of scalars by the core schema of YAML 1.2 (YAML 1.2.2, section 10.3.2).
+"""Values of scalars by the core schema of YAML 1.2 (YAML 1.2.2, section 10.3.2).
 
 PyYAML implements YAML 1.1. Numbers with a leading zero are text here, because YAML 1.1 reads them as octal, but YAML
 1.2 as decimal.
@@ -6,9 +6,6 @@ PyYAML implements YAML 1.1. Numbers with a leading zero are text here, because Y
 
 import math
 import re
-from typing import Any
-
-import yaml
 
 from simscen.loading.yaml.tree import Scalar
 
@@ -45,39 +42,3 @@ def parse_scalar(text: str) -> Scalar:
     if base is not None:
         return int(text, 0 if base != 10 else 10)
     return float(text) if _FLOAT_PATTERN.fullmatch(text) else text
-
-
-_TAGS = {str: "str", bool: "bool", int: "int", float: "float", type(None): "null"}
-"""Names of YAML types, by Python type."""
-# Characters that `read_text` rejects, and line breaks of YAML 1.1; strings with one of them are written with escapes.
-_NEEDS_ESCAPES = re.compile("[\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]")
-
-
-class Dumper(yaml.SafeDumper):
-    """PyYAML dumper for YAML 1.2. It quotes text such as `1e3` (a number in YAML 1.2), but not `on` or `1:30`."""
-
-    def resolve(self, kind: type[yaml.Node], value: Any, implicit: Any) -> Any:
-        """Return the tag of a node. For a scalar without quotes, `parse_scalar` determines the tag."""
-        if kind is yaml.ScalarNode and implicit[0]:
-            return f"tag:yaml.org,2002:{_plain_type(value)}"
-        return super().resolve(kind, value, implicit)  # type: ignore[no-untyped-call]
-
-    def ignore_aliases(self, data: Any) -> bool:
-        """Return True, so that no aliases are written."""
-        return True
-
-
-def to_yaml(data: Any, dumper: type[Dumper] = Dumper) -> str:
-    """Return data as YAML text, which `parse_yaml` reads back unchanged. Keys must be text, and keep their order."""
-    text: str = yaml.dump(data, Dumper=dumper, sort_keys=False, allow_unicode=True, width=1000)
-    if _NEEDS_ESCAPES.search(text):
-        text = yaml.dump(data, Dumper=dumper, sort_keys=False, allow_unicode=False, width=1000)
-    return text
-
-
-def _plain_type(text: str) -> str:
-    """Return the name of the YAML type of a scalar without quotes, such as "int"."""
-    try:
-        return _TAGS[type(parse_scalar(text))]
-    except ValueError:  # an integer that parse_scalar rejects
-        return "int"

@@ -13,8 +13,8 @@ import numpy as np
 from simscen.core.errors import SimscenError
 from simscen.core.geometry import Array
 from simscen.loading.files.discovery import default_root
-from simscen.loading.files.single_files import CompactDumper, load_robot_file
-from simscen.loading.yaml.scalars import to_yaml
+from simscen.loading.files.single_files import load_robot_file
+from simscen.loading.yaml.writing import CompactDumper, to_yaml
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, Scans, TimedValues, usual_period
 
 

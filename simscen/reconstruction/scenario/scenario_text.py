@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from simscen.core.geometry import Pose2
-from simscen.loading.files.single_files import CompactDumper
-from simscen.loading.yaml.scalars import to_yaml
+from simscen.loading.yaml.writing import CompactDumper, to_yaml
 from simscen.reconstruction.objects.found_object import FittedPedestrian, FoundObject
 from simscen.reconstruction.objects.pedestrians import is_person
 from simscen.reconstruction.reasons import FoundFault, Reason

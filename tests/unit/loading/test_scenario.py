@@ -88,7 +88,6 @@ def test_gazebo_worlds_and_urdfs_are_known_by_their_suffix(write: Write, scenari
 
 def test_a_shipped_robot_is_known_by_its_name(write: Write, scenario: str, tmp_path: Path) -> None:
     loaded = _loaded(write("a.scenario.yaml", scenario.replace("cube.robot.yaml", "turtlebot")), tmp_path)
-    assert loaded.robot.is_shipped
     assert loaded.robot.spec is not None
 
 

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import InvalidInput
-from simscen.loading.files.single_files import load_world_file, world_text
+from simscen.loading.files.single_files import load_world_file
+from simscen.loading.yaml.writing import world_text
 
 WORLDS = sorted((Path(__file__).parents[4] / "worlds").glob("*.world.yaml"))
 
