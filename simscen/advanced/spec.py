@@ -43,7 +43,7 @@ class ScanMatchingAmcl(AmclParameters):
     narrow cluster. The pose is then probably right, and the surroundings have changed."""
     map_trust_full: Probability = 0.8
     """A scan has its full weight if at least this share of its beams on the mapped area fits, and 80 % of its beams end
-    there. 0 = full weight of all scans, as in Nav2."""
+    there. 0 = full weight of all scans, as in Nav2; `sure_update_interval` then has no effect."""
     settling_distance: NonNegativeLength = 4.0
     """The weight of scans after a given initial pose starts at a fifth, and grows by 1 / `settling_distance` per meter
     up to its full value. Over this distance, the pose is also searched near the initial one. Early scans count less

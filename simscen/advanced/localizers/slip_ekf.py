@@ -47,9 +47,8 @@ class ScanMatchingCorrection:
         """Return the translation (x, y) in m, in the map frame, that corrects dead reckoning since the last scan.
 
         The result is 0 if scan matching fails or differs too much from dead reckoning (see `MatchedMotion.agrees`).
+        At least one pose must have been added.
         """
-        if not self._dead_reckoning:
-            return 0.0, 0.0
         current = self._dead_reckoning.latest_until(scan.tick)
         sensor, previous = self._previous or (scan.sensor, current)
         if scan.sensor != sensor:

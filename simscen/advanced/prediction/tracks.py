@@ -173,8 +173,8 @@ class TrackLifecycle:
             return
         elif track.has_moved and speed > track.speed_std and track.last_update_tick == tick:
             track.is_moving = not track.updates[-1].was_occupied  # it may return over positions that it has just left
-        else:
-            track.is_moving = track.has_moved = self._is_moving(track, tick, speed, tracks) and has_left(track)
+        elif self._is_moving(track, tick, speed, tracks) and has_left(track):
+            track.is_moving = track.has_moved = True
 
     def has_ended(self, track: Track, tick: int, tracks: list[Track], sees_past: Callable[[Track], bool]) -> bool:
         """Return whether a track has ended. `sees_past(track)` returns whether the track's position is visible."""

@@ -33,3 +33,12 @@ def test_track_next_to_a_moving_obstacle_continues() -> None:
     neighbor = track(*[True] * (MAX_UPDATES_OUTSIDE_FREE_SPACE + 1))
     neighbor.is_moving = True
     assert ended(track(True, *[False] * MAX_UPDATES_OUTSIDE_FREE_SPACE), neighbor) == [False, False]
+
+
+def test_track_that_has_moved_is_remembered_while_it_stands() -> None:
+    """A scan in which the obstacle is not seen is no proof that it never moved."""
+    one = track(*[True] * 4)
+    one.has_moved = True
+    tick = one.last_update_tick + TICK_RATE_HZ // 10
+    TrackLifecycle(Prediction(), TICK_RATE_HZ).update_motion(one, tick, [one], lambda _: True)
+    assert (one.is_moving, one.has_moved) == (False, True)
