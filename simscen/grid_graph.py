@@ -1,12 +1,10 @@
-"""Shortest paths over the free cells of a grid (Dijkstra's algorithm), and resampling of polylines."""
+"""Shortest paths over the free cells of a grid (Dijkstra's algorithm)."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-
-from simscen.core.geometry import Array
 
 CellMask = npt.NDArray[np.bool_]
 CellIndices = npt.NDArray[np.int64]
@@ -100,15 +98,3 @@ def _crossed_cells(move: tuple[int, int]) -> list[tuple[int, int]]:
     if abs(b) == 2:
         return [(0, b // 2), (a, b // 2)]
     return [(a, 0), (0, b)] if a and b else []
-
-
-def resample_polyline(points: Array, spacing: float, min_segments: int = 1) -> Array:
-    """Return the polyline (n, 2) resampled to at least `min_segments` equal segments of at most `spacing` m."""
-    distances = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-    samples = np.linspace(0.0, distances[-1], max(min_segments, math.ceil(distances[-1] / spacing)) + 1)
-    return np.column_stack((np.interp(samples, distances, points[:, 0]), np.interp(samples, distances, points[:, 1])))
-
-
-def polyline_length(points: Array) -> float:
-    """Return the length in m of a polyline (n, 2)."""
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import model_validator
 
-from simscen.core.geometry.polygons import POINT, polygon_defect, separation, separation_from_boxes
+from simscen.core.geometry.polygon_separation import POINT, separation, separation_from_boxes
+from simscen.core.geometry.polygons import polygon_defect
 from simscen.core.records.events import EventKind
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion

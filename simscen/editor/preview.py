@@ -9,9 +9,9 @@ import numpy as np
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry.polylines import polyline_length
 from simscen.core.geometry.shapes import Solid
 from simscen.editor.checking import TextChecks
-from simscen.grid_graph import polyline_length
 from simscen.loading.checks.scene import Scene
 from simscen.loading.goals import scenario_goals
 from simscen.loading.loaded import LoadedScenario

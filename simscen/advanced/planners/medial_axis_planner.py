@@ -15,8 +15,8 @@ from simscen.advanced.planners.bit_star_searches import Leg, searches
 from simscen.advanced.planners.informed_set import InformedSet
 from simscen.advanced.spec import MedialAxisPlanner as PlannerSpec
 from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry.polylines import resample_polyline
 from simscen.core.messages.navigation import ErrorCode, Path
-from simscen.grid_graph import resample_polyline
 from simscen.stack.planners.endpoints import Endpoints, find_endpoints
 from simscen.stack.planners.ompl_planner import (
     FINE_SPACING_CELLS,

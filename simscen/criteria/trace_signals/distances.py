@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.core.geometry.polygons import POINT, separation
+from simscen.core.geometry.polygon_separation import POINT, separation
 from simscen.core.records.events import EventKind
 from simscen.criteria.trace_signals.ground_truth import check_samples
 from simscen.criteria.trace_signals.readers import goal_distance, true_poses

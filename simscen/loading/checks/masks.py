@@ -8,7 +8,8 @@ from simscen.core.environment.costmap_filters import FilterMasks, MaskBlocks, in
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.core.environment.world_model import Polygon
 from simscen.core.geometry import Pose2
-from simscen.core.geometry.polygons import depth_inside_polygon, separation_from_boxes
+from simscen.core.geometry.polygon_separation import separation_from_boxes
+from simscen.core.geometry.polygons import depth_inside_polygon
 from simscen.criteria.keepout import Keepout
 from simscen.criteria.speed import Speed
 from simscen.loading.builders import load_criterion_masks, load_masks

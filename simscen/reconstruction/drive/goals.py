@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.geometry.polygons import path_corners
+from simscen.core.geometry.polylines import path_corners
 from simscen.core.records.events import Event, EventKind
 from simscen.reconstruction.drive.log_messages import LogMessages
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal, TimedValues

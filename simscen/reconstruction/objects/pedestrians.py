@@ -10,7 +10,7 @@ import numpy as np
 
 from simscen.core.environment.world_model import Behavior, Ignorable, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2
-from simscen.core.geometry.polygons import path_corners
+from simscen.core.geometry.polylines import path_corners
 from simscen.pedestrians.forces import RELAXATION_TIME_S
 from simscen.reconstruction.objects.found_object import FittedPedestrian, FoundObject
 from simscen.reconstruction.objects.pedestrian_trial import PedestrianTrial

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
+from simscen.core.geometry.polylines import polyline_length, resample_polyline
 from simscen.core.records.case import Passage, Point
-from simscen.grid_graph import polyline_length, resample_polyline
 from simscen.worlds.routes.clearance import ClearanceField
 
 MAX_WIDTH_M = 4.0

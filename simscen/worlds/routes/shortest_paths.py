@@ -10,10 +10,11 @@ import numpy as np
 
 from simscen.core.environment.world_model import BuiltWorld
 from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry.polylines import polyline_length, resample_polyline
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.messages.goals import Goal
 from simscen.core.records.case import Passage
-from simscen.grid_graph import CellIndices, GridGraph, polyline_length, resample_polyline
+from simscen.grid_graph import CellIndices, GridGraph
 from simscen.worlds.maps.map_size import Bounds
 from simscen.worlds.routes.clearance import (
     HALF_DIAGONAL_CELLS,

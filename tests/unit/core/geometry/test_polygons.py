@@ -6,7 +6,9 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simscen.core.geometry.polygons import convex_pieces, path_corners, polygon_defect
+from simscen.core.geometry.polygon_separation import convex_pieces
+from simscen.core.geometry.polygons import polygon_defect
+from simscen.core.geometry.polylines import path_corners
 
 L = ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))
 

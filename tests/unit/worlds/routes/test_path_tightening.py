@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose3
+from simscen.core.geometry.polylines import polyline_length, resample_polyline
 from simscen.core.geometry.shapes import Cylinder, Solid
-from simscen.grid_graph import polyline_length, resample_polyline
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.occupancy_map import empty_grid
 from simscen.worlds.routes.clearance import clearance_field
