@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from simscen.actions.base import WorldAction
-from simscen.core.environment.world_model import Behavior, Ignorable, Polygon, WalkingPedestrian
-from simscen.core.geometry import Pose2
+from simscen.core.environment.world_model import Behavior, Ignorable, WalkingPedestrian
+from simscen.core.geometry import Polygon, Pose2
 from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec

@@ -3,7 +3,8 @@
 import math
 from dataclasses import dataclass, replace
 
-from simscen.core.environment.world_model import Polygon, World
+from simscen.core.environment.world_model import World
+from simscen.core.geometry import Polygon
 from simscen.core.geometry.polygons import distance_to_segment
 from simscen.core.geometry.shapes import Solid
 from simscen.loading.builders import load_robot

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simscen.core.environment.world_model import Polygon
-from simscen.core.geometry import Array, Pose2, wrap_array
+from simscen.core.geometry import Array, Polygon, Pose2, wrap_array
 
 
 class Frames(NamedTuple):

@@ -18,8 +18,7 @@ import numpy.typing as npt
 from simscen.core.decorators import fast_dataclass
 from simscen.core.environment.costmap_filters import FilterMasks, Zones
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.environment.world_model import Polygon
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Polygon, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import Belief, ErrorCode, Estimate, Path

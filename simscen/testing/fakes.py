@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from simscen.core.clock import Clock
 from simscen.core.environment.costmap_filters import ZoneSwitch
-from simscen.core.environment.world_model import Patch, Polygon, WalkingPedestrian
-from simscen.core.geometry import Array, Pose2, Pose3
+from simscen.core.environment.world_model import Patch, WalkingPedestrian
+from simscen.core.geometry import Array, Polygon, Pose2, Pose3
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.geometry.ray_fans import RayCaster
 from simscen.core.geometry.shapes import Body, MotionPath

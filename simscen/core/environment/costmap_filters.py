@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Polygon, Pose2
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-
-    from simscen.core.environment.world_model import Polygon
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,18 +6,12 @@ import base64
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from simscen.core.environment.costmap_filters import Filter, MaskBlocks
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.geometry import Pose2
-
-if TYPE_CHECKING:
-    from simscen.core.environment.world_model import Polygon
-else:
-    Polygon = tuple[tuple[float, float], ...]
+from simscen.core.geometry import Polygon, Pose2
 
 
 @dataclass(frozen=True)

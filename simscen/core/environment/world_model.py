@@ -8,11 +8,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Polygon, Pose2
 from simscen.core.geometry.shapes import Body, Solid, TriangleMesh
-
-Polygon = tuple[tuple[float, float], ...]
-"""Corners (x, y) in m, in order; the last one is connected to the first one."""
 
 GRAVITY_M_S2 = 9.81
 """Gravitational acceleration, positive downwards."""

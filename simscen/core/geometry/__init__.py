@@ -5,6 +5,7 @@ Lengths are in meters and angles in radians. Frames follow ROS REP 103.
 
 from simscen.core.geometry.poses import (
     Array,
+    Polygon,
     Pose2,
     Pose3,
     Vector,
@@ -14,4 +15,4 @@ from simscen.core.geometry.poses import (
     wrap_array,
 )
 
-__all__ = ["Array", "Pose2", "Pose3", "Vector", "forward_and_left", "rotated", "wrap", "wrap_array"]
+__all__ = ["Array", "Polygon", "Pose2", "Pose3", "Vector", "forward_and_left", "rotated", "wrap", "wrap_array"]

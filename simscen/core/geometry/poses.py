@@ -34,6 +34,8 @@ def wrap_array(angles: Array) -> Array:
 
 Vector = tuple[float, float, float]
 """(x, y, z)."""
+Polygon = tuple[tuple[float, float], ...]
+"""Corners (x, y) in m, in order; the last one is connected to the first one."""
 
 
 def rotated(quaternion: tuple[float, float, float, float], vector: Vector) -> Vector:

@@ -151,7 +151,6 @@ class RayCaster(Protocol):
 
         The distance is inf if nothing is hit within `reach` m.
         """
-        ...
 
     def sweep(self, fan: RayFan, pose: Pose3, reach: float) -> Array | Float32Array:
         """Return the distances (n,) in m for the rays of a fan at `pose`. Larger values than `reach` mean no hit."""

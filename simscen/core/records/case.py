@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.environment.costmap_filters import MaskBlocks
-from simscen.core.environment.world_model import Polygon
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Polygon, Pose2
 from simscen.core.messages.goals import Goal
 from simscen.core.records.disturbances import Disturbance
 from simscen.core.records.run_result import Outcome, RunResult

@@ -46,7 +46,6 @@ class DeferredTruth(Protocol):
 
     def truth(self) -> Truth:
         """Return the ground truth."""
-        ...
 
 
 class LogLine(NamedTuple):

@@ -6,8 +6,7 @@ import numpy as np
 
 from simscen.core.environment.costmap_filters import FilterMasks, MaskBlocks, in_keepout_mask
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
-from simscen.core.environment.world_model import Polygon
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Polygon, Pose2
 from simscen.core.geometry.polygon_separation import separation_from_boxes
 from simscen.core.geometry.polygons import depth_inside_polygon
 from simscen.criteria.keepout import Keepout

@@ -8,9 +8,8 @@ from simscen.actions.doors import CloseDoor, OpenDoor, panel_path
 from simscen.actions.objects import Move, Spawn, Teleport
 from simscen.actions.pedestrian import Pedestrian
 from simscen.actions.robot import Kidnap
-from simscen.core.environment.world_model import Polygon
 from simscen.core.errors import Problem
-from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry import Polygon, Pose2, Pose3
 from simscen.core.geometry.motion_paths import MAX_STEP_M, largest_step, too_fast_message
 from simscen.core.geometry.shapes import MotionPath, Solid
 from simscen.core.messages.goals import Goal

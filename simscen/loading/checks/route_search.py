@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
-from simscen.core.environment.world_model import Polygon
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Polygon, Pose2
 from simscen.core.geometry.polygons import distance_to_polygon
 from simscen.core.geometry.shapes import Solid
 from simscen.loading.checks.scene import Scene

@@ -7,8 +7,7 @@ import numpy as np
 from PIL import Image
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
-from simscen.core.environment.world_model import Polygon
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Polygon, Pose2
 from simscen.report.picture import map_layer, palette
 from simscen.report.picture.canvas import Canvas, TextItem, printable
 from simscen.report.picture.palette import AMBER, FAINT_INK, GREEN, INK, PAGE, ROBOT, RULE

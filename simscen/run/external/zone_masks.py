@@ -19,7 +19,7 @@ from simscen.run.external.protocol import KEEPOUT_ZONES, SPEED_ZONES
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from simscen.core.environment.world_model import Polygon
+    from simscen.core.geometry import Polygon
     from simscen.record.topics import Topic
     from simscen.run.preparation import PreparedScenario
     from simscen.stack.protocols import Surroundings

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from simscen.core.environment.costmap_filters import Filter, FilterMasks, Zones, ZoneSwitch
-from simscen.core.environment.world_model import Polygon
+from simscen.core.geometry import Polygon
 from simscen.model.stack_base import StackBase
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from simscen.core.clock import Clock
 from simscen.core.environment.costmap_filters import ZoneSwitch
-from simscen.core.environment.world_model import Patch, Polygon, WalkingPedestrian, World
-from simscen.core.geometry import Pose2
+from simscen.core.environment.world_model import Patch, WalkingPedestrian, World
+from simscen.core.geometry import Polygon, Pose2
 from simscen.core.geometry.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, MotionPath, Shape, Sphere
 from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import Belief, Path

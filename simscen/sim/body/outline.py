@@ -7,8 +7,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from simscen.core.decorators import cached_on_instance
-from simscen.core.environment.world_model import Polygon
-from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry import Array, Polygon, Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 
 MIN_POINTS_TO_FILTER = 200

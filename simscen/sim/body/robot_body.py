@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simscen.core.environment.world_model import GRAVITY_M_S2, Polygon
+from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.errors import InvalidInput, Problem
-from simscen.core.geometry import Pose3, Vector
+from simscen.core.geometry import Polygon, Pose3, Vector
 from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import Solid, Sphere
 from simscen.model.robot import Drive, Limits, Omnidirectional, RobotSpec

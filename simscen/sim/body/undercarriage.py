@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from simscen.core.environment.world_model import GRAVITY_M_S2, Polygon
-from simscen.core.geometry import Pose3
+from simscen.core.environment.world_model import GRAVITY_M_S2
+from simscen.core.geometry import Polygon, Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Solid, Sphere
 from simscen.model.robot import Ackermann, Differential, Drive, Mecanum, Omnidirectional, SkidSteer
 from simscen.sim.body.inertia import MassProperties, inertia_of_shape

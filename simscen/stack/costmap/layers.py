@@ -13,8 +13,7 @@ import numpy.typing as npt
 from simscen.core.decorators import cached_on_instance
 from simscen.core.environment.costmap_filters import Zones, in_keepout_mask
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
-from simscen.core.environment.world_model import Polygon
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Polygon, Pose2
 from simscen.core.geometry.polygons import distance_to_polygon, points_in_polygon
 from simscen.stack.costmap.distance_transform import (
     MAX_REACH_CELLS,

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.environment.world_model import Polygon
-from simscen.core.geometry import Array
+from simscen.core.geometry import Array, Polygon
 from simscen.core.geometry.polygons import points_in_polygon
 from simscen.core.geometry.shapes import Solid, TriangleMesh
 from simscen.worlds.geometry.cross_section import cross_section, sections_between, winds_around

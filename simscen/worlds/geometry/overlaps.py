@@ -8,8 +8,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from simscen.core.environment.world_model import Polygon
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Polygon, Pose2
 from simscen.core.geometry.polygons import polygon_contains, segments_cross
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 from simscen.worlds.geometry.prisms import upright_prism

@@ -9,8 +9,7 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from simscen.core.environment.world_model import Polygon
-from simscen.core.geometry import Pose3
+from simscen.core.geometry import Polygon, Pose3
 from simscen.core.geometry.meshes import FLOOR_HEIGHT_M
 from simscen.core.geometry.polygons import distance_to_segment
 from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Solid, facet_count

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.environment.occupancy_grid import FREE, OccupancyGrid
-from simscen.core.environment.world_model import BuiltWorld, Polygon
-from simscen.core.geometry import Array
+from simscen.core.environment.world_model import BuiltWorld
+from simscen.core.geometry import Array, Polygon
 from simscen.core.geometry.shapes import Body
 from simscen.worlds.geometry.cross_section import cross_section
 from simscen.worlds.geometry.triangulation import merge_solids
