@@ -15,7 +15,6 @@ MAX_DRAWS = 20_000_000
 """Number of drawn values above which a bootstrap uses fewer resamples, but at least a tenth of RESAMPLES."""
 CONFIDENCE = 0.95
 """Confidence level of the bootstrap interval."""
-_LN_2 = math.log(2.0)
 _DRAWS_PER_BATCH = 1 << 20
 """Number of values that a bootstrap draws at once."""
 
@@ -49,7 +48,9 @@ def sign_test(more: int, less: int) -> float:
     `more` is the number of pairs with an increase, and `less` the number of pairs with a decrease.
     """
     pairs, fewer = more + less, min(more, less)
-    term = math.exp(math.lgamma(pairs + 1) - math.lgamma(fewer + 1) - math.lgamma(pairs - fewer + 1) - pairs * _LN_2)
+    term = math.exp(
+        math.lgamma(pairs + 1) - math.lgamma(fewer + 1) - math.lgamma(pairs - fewer + 1) - pairs * math.log(2.0)
+    )
     tail = term
     for k in range(fewer, 0, -1):
         term *= k / (pairs - k + 1)  # from the binomial coefficient of k to that of k - 1
@@ -73,17 +74,16 @@ Z_95 = 1.959963984540054
 """Two-sided 95 % quantile of the normal distribution."""
 
 
-def wilson_interval(successes: float, runs: int, z: float = Z_95) -> tuple[float, float]:
-    """Return the lower and upper limit of the Wilson score interval of a success rate (Wilson 1927, JASA 22(158)).
+def wilson_interval(successes: float, runs: int) -> tuple[float, float]:
+    """Return the limits of the 95 % Wilson score interval of a success rate (Wilson 1927, JASA 22(158)).
 
-    `successes` may be fractional. `z` is the two-sided normal quantile of the confidence level. Raises ValueError
-    unless 0 <= successes <= runs and runs >= 1.
+    `successes` may be fractional. Raises ValueError unless 0 <= successes <= runs and runs >= 1.
     """
     if runs < 1 or not 0 <= successes <= runs:
         raise ValueError(f"{successes} successes of {runs} runs")
-    rate, square = successes / runs, z * z
+    rate, square = successes / runs, Z_95 * Z_95
     middle = (rate + square / (2 * runs)) / (1 + square / runs)
-    half = z / (1 + square / runs) * math.sqrt(rate * (1 - rate) / runs + square / (4 * runs * runs))
+    half = Z_95 / (1 + square / runs) * math.sqrt(rate * (1 - rate) / runs + square / (4 * runs * runs))
     return max(0.0, middle - half), min(1.0, middle + half)
 
 

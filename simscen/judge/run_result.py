@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 from simscen.core.records.case import Case
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
@@ -41,7 +42,7 @@ def judge_run(
     metrics:   additional metrics of plugins
     expected:  expected failure of the run; None to expect success
     """
-    coverage = coverage.with_gaps(time_gaps(trace))
+    coverage = replace(coverage, partial={**time_gaps(trace), **coverage.partial})
     verdicts = explain_failures(judge(criteria, trace, case, coverage), trace, case)
     disturbances = disturbance_outcomes(trace, case)
     missing = missing_disturbances(trace, disturbances, verdicts)

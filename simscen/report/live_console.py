@@ -20,7 +20,7 @@ from simscen.core.records.session_events import (
     SessionFinished,
     SessionStarted,
 )
-from simscen.report.display_text import StyledLine, TerminalStyle, escape_ci_commands, one_line, plain_text
+from simscen.report.display_text import StyledLine, TerminalStyle, escape_ci_commands, plain_text
 from simscen.report.text_reporters import PlainReporter, SessionFormatter
 
 MIN_FINISHED_RUNS = 2
@@ -113,7 +113,7 @@ class LiveReporter:
         self._live = Live(console=self._console, refresh_per_second=8, transient=True)
         self._formatter = SessionFormatter(slow, lambda: style.columns)
         self._estimate = ProgressEstimate(clock)
-        self._running: dict[RunKey, tuple[RunStarted, float, str]] = {}
+        self._running: dict[RunKey, tuple[RunStarted, float]] = {}
 
     def __enter__(self) -> "LiveReporter":
         self._live.start()
@@ -129,9 +129,9 @@ class LiveReporter:
         self._estimate(event)
         match event:
             case RunStarted():
-                self._running[event.key] = (event, 0.0, "")
+                self._running[event.key] = (event, 0.0)
             case RunProgress() if event.key in self._running:
-                self._running[event.key] = (self._running[event.key][0], event.simulated, event.note)
+                self._running[event.key] = (self._running[event.key][0], event.simulated)
             case RunFinished():
                 self._running.pop(event.key, None)
             case _:
@@ -148,11 +148,11 @@ class LiveReporter:
         progress = self._estimate.text
         return Group(*rows, *([Text(f"  {progress}", style="dim")] if progress and rows else []))
 
-    def _row(self, started: RunStarted, simulated: float, note: str) -> Text:
-        """Return the line of a current run with its simulated time in s and the note of its latest progress event."""
+    def _row(self, started: RunStarted, simulated: float) -> Text:
+        """Return the line of a current run with its simulated time in s."""
         name = self._formatter.naming.name(started.key)
         limit = f" of at most {started.time_limit:.0f} s" if started.time_limit else ""
-        row = [("  … ", "cyan"), (f"{name} ", ""), (f"{simulated:6.1f} s{limit}  {one_line(note)}", "dim")]
+        row = [("  … ", "cyan"), (f"{name} ", ""), (f"{simulated:6.1f} s{limit}", "dim")]
         return Text.assemble(*row, no_wrap=True, overflow="ellipsis")
 
 

@@ -121,10 +121,10 @@ def face_normals(mesh: TriangleMesh) -> Array:
     return unit
 
 
-def upward_faces(mesh: TriangleMesh, max_slope: float = MAX_SLOPE_RAD) -> Mask:
-    """Return a mask of the faces above the floor that point upwards and are at most `max_slope` rad steep."""
+def upward_faces(mesh: TriangleMesh) -> Mask:
+    """Return a mask of the faces above the floor that point upwards and are at most MAX_SLOPE_RAD steep."""
     top = mesh.vertices[mesh.faces, 2].max(axis=1, initial=-math.inf)
-    found: Mask = (face_normals(mesh)[:, 2] >= math.cos(max_slope)) & (top > FLOOR_HEIGHT_M)
+    found: Mask = (face_normals(mesh)[:, 2] >= math.cos(MAX_SLOPE_RAD)) & (top > FLOOR_HEIGHT_M)
     return found
 
 

@@ -3,11 +3,11 @@
 Segment k of a path leads from pose k to pose k + 1.
 """
 
-import itertools
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
 from typing import NamedTuple
+
+import numpy as np
 
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.geometry.shapes import MotionPath
@@ -122,24 +122,19 @@ def largest_step(path: MotionPath, seconds: float, reach: float = 0.0) -> float:
     The point is within `reach` m of the origin of the body. Jumps do not count: segments without duration, and the
     return to the first pose in a loop.
     """
-    durations = [end - begin for begin, end in itertools.pairwise(path.times)]
-    lengths = [_speed(path, k, reach) * duration if duration > 0 else 0.0 for k, duration in enumerate(durations)]
+    durations = np.diff(path.times)
+    lengths = np.array(
+        [_speed(path, k, reach) * duration if duration > 0 else 0.0 for k, duration in enumerate(durations.tolist())]
+    )
     if path.mode == "back_and_forth":
-        lengths, durations = lengths + lengths[::-1], durations + durations[::-1]
-    if path.mode != "once" and (lap := sum(durations)) > 0:  # repeated, so that steps across the end count too
+        lengths, durations = np.append(lengths, lengths[::-1]), np.append(durations, durations[::-1])
+    if path.mode != "once" and (lap := durations.sum()) > 0:  # repeated, so that steps across the end count too
         laps = 2 + int(seconds / lap)
-        lengths, durations = lengths * laps, durations * laps
-    times = list(itertools.accumulate(durations, initial=0.0))
-    distances = list(itertools.accumulate(lengths, initial=0.0))
-    after = (
-        _interpolate(time + seconds, times, distances) - distance
-        for time, distance in zip(times, distances, strict=True)
-    )
-    before = (
-        distance - _interpolate(time - seconds, times, distances)
-        for time, distance in zip(times, distances, strict=True)
-    )
-    return max(*after, *before)
+        lengths, durations = np.tile(lengths, laps), np.tile(durations, laps)
+    times, distances = np.append(0.0, np.cumsum(durations)), np.append(0.0, np.cumsum(lengths))
+    after = np.interp(times + seconds, times, distances) - distances
+    before = distances - np.interp(times - seconds, times, distances)
+    return float(max(after.max(), before.max()))
 
 
 def too_fast_message(name: str, step: float) -> str:
@@ -148,15 +143,6 @@ def too_fast_message(name: str, step: float) -> str:
         f"`{name}` moves up to {step:.2g} m in one physics tick; contact with the robot can be missed if it moves more "
         f"than {MAX_STEP_M:g} m"
     )
-
-
-def _interpolate(time: float, times: Sequence[float], values: Sequence[float]) -> float:
-    """Return the value at `time` by linear interpolation; the first or last value outside of `times`."""
-    if time <= times[0] or time >= times[-1]:
-        return values[0] if time <= times[0] else values[-1]
-    k = bisect_right(times, time)
-    part = (time - times[k - 1]) / (times[k] - times[k - 1])
-    return values[k - 1] + part * (values[k] - values[k - 1])
 
 
 class SweptSegment(NamedTuple):

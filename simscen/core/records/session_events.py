@@ -66,11 +66,10 @@ class RunStarted:
 
 @dataclass(frozen=True)
 class RunProgress:
-    """Progress of a run: the `simulated` time in s, and the current activity as a `note`, e.g. "goal shelf"."""
+    """Progress of a run: the `simulated` time in s."""
 
     key: RunKey
     simulated: float
-    note: str = ""
 
 
 @dataclass(frozen=True)

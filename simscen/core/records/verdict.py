@@ -1,7 +1,7 @@
 """Verdicts of criteria, declarations of expected failures, and the evidence that criteria need from a log."""
 
 from collections.abc import Mapping, Set
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 
 
@@ -125,10 +125,6 @@ class LogCoverage:
     def lacking(self, required: Set[Evidence]) -> list[Evidence]:
         """Return the required evidence that is missing."""
         return [evidence for evidence in Evidence if evidence in self.missing and evidence in required]
-
-    def with_gaps(self, gaps: Mapping[Evidence, str]) -> "LogCoverage":
-        """Return a copy with additional `partial` evidence. `gaps` contains the reasons."""
-        return replace(self, partial={**gaps, **self.partial})
 
 
 COMPLETE_COVERAGE = LogCoverage()
