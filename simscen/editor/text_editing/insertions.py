@@ -20,22 +20,29 @@ def insert_entry(text: str, mapping: SourceNode, key: str, value: Any, order: Se
     """Return the splice that adds a key with a value to a mapping.
 
     `order` is the preferred order of keys. The key is inserted after its last predecessor in `order` that the mapping
-    has, otherwise at the end.
+    has; without a predecessor, before its first successor; without both, at the end.
     """
     if not mapping.entries:
         return Splice(mapping.start, mapping.end, flow_text({key: value}))
-    entries = list(mapping.entries.items())
-    before = [entry for name, entry in entries if name in order[: order.index(key)]] if key in order else []
-    after = max(before, key=lambda entry: entry.start) if before else entries[-1][1]
-    end = max(after.value.end, after.end)
-    if mapping.is_flow and text[mapping.start] != "{":  # one pair in brackets: [key: value]
-        pair = f"{text[mapping.start : end]}, {string_text(key)}: {flow_text(value)}"
-        return Splice(mapping.start, end, f"{{{pair}}}")
+    order = order if key in order else ()
+    position = order.index(key) if order else 0
+    entries = mapping.entries
+    predecessors = [entries[name] for name in order[:position] if name in entries]
+    successors = [entries[name] for name in order[position + 1 :] if name in entries]
+    pair = f"{string_text(key)}: {flow_text(value)}"
+    indent = column(text, next(iter(entries.values())).start)
+    is_pair_in_brackets = mapping.is_flow and text[mapping.start] != "{"  # [key: value]
+    if successors and not predecessors and not is_pair_in_brackets:
+        start = min(entry.start for entry in successors)
+        new = f"{pair}, " if mapping.is_flow else f"{_block_entry(key, value, indent)}\n{' ' * indent}"
+        return Splice(start, start, new)
+    end = max(max(entry.end, entry.value.end) for entry in predecessors or entries.values())
+    if is_pair_in_brackets:
+        return Splice(mapping.start, end, f"{{{text[mapping.start : end]}, {pair}}}")
     if mapping.is_flow:
-        return Splice(end, end, f", {string_text(key)}: {flow_text(value)}")
-    place = line_end(text, end)
-    indent = column(text, entries[0][1].start)
-    return Splice(place, place, "\n" + " " * indent + _block_entry(key, value, indent))
+        return Splice(end, end, f", {pair}")
+    end = line_end(text, end)
+    return Splice(end, end, f"\n{' ' * indent}{_block_entry(key, value, indent)}")
 
 
 def insert_item(text: str, sequence: SourceNode, value: Any, index: int | None = None) -> Splice:

@@ -99,6 +99,22 @@ def test_new_keys_take_the_indentation_and_the_order_of_the_language() -> None:
 @pytest.mark.parametrize(
     ("before", "after"),
     [
+        ("robot: amr\npass: []\n", "name: a\nrobot: amr\npass: []\n"),
+        ("# aisle\n\nother: 1\nrobot: amr\n", "# aisle\n\nother: 1\nname: a\nrobot: amr\n"),
+        ("- robot: amr\n  pass: []\n", "- name: a\n  robot: amr\n  pass: []\n"),
+        ("{robot: amr, pass: []}", "{name: a, robot: amr, pass: []}"),
+        ("[robot: amr]", "[{robot: amr, name: a}]"),
+        ("other: 1\n", "other: 1\nname: a\n"),
+    ],
+)
+def test_a_key_that_the_language_puts_first_goes_before_its_successors(before: str, after: str) -> None:
+    keys = ("name",) if isinstance(plain(before), dict) else (0, "name")
+    assert edited(before, SetValue(keys, "a", ("simscen", "name", "robot", "pass"))) == after
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
         ("g: [1, 2]\n", "g: [1, 2, 3]\n"),
         ("g: []\n", "g: [3]\n"),
         ("g:\n- 1\n- 2 # two\nh: 1\n", "g:\n- 1\n- 2 # two\n- 3\nh: 1\n"),
