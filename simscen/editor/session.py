@@ -211,7 +211,7 @@ class EditorSession:
 
     def _edited_text(self, text: str, edits: Any) -> str:
         try:
-            return apply_edits(text, read_edits(edits, text, self.file.kind)).text
+            return apply_edits(text, read_edits(edits, text, self.file.kind))
         except EditRefused as error:
             raise RequestRefused(str(error), 422) from error
 

@@ -3,10 +3,9 @@
 The new text is parsed to verify the edit. If a value outside of the edit has changed, the edit is refused.
 """
 
-import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from simscen.editor.text_editing.insertions import insert_entry, insert_item, remove_part
 from simscen.editor.text_editing.splices import EditRefused, Splice, apply_splices, path_text
@@ -51,50 +50,28 @@ class RemovePart:
 Edit = SetValue | AddItem | RemovePart
 
 
-class EditedText(NamedTuple):
-    """The text after edits, and the splices in the order in which they were applied."""
-
-    text: str
-    splices: tuple[Splice, ...]
-
-
-def apply_edits(text: str, edits: Sequence[Edit]) -> EditedText:
+def apply_edits(text: str, edits: Sequence[Edit]) -> str:
     """Apply edits one after the other, and return the new text. Raises EditRefused if an edit is impossible."""
-    done: list[Splice] = []
     remaining = list(edits)
     while remaining:
-        source = _parse(text)
-        splices = _independent_splices(text, source, remaining)
-        taken = len(splices)
-        if not splices:
-            splices, taken = [_splice(text, source, remaining[0])], 1
-        splices = [splice for splice in splices if text[splice.start : splice.end] != splice.text]
+        source = parse_source(text)
+        if source is None:
+            raise EditRefused("the text is not valid YAML; correct it first")
+        splices = _independent_splices(text, source, remaining) or [_splice(text, source, remaining[0])]
         new = apply_splices(text, splices)
-        _require_content(text, new, remaining[:taken])
-        done += splices
-        text, remaining = new, remaining[taken:]
-    return EditedText(text, tuple(done))
-
-
-def _parse(text: str) -> SourceNode:
-    """Return the syntax tree of a text. Raises EditRefused if it is not valid."""
-    source = parse_source(text)
-    if source is None:
-        raise EditRefused("the text is not valid YAML; correct it first")
-    return source
+        _require_content(text, new, remaining[: len(splices)])
+        text, remaining = new, remaining[len(splices) :]
+    return text
 
 
 def _independent_splices(text: str, source: SourceNode, edits: Sequence[Edit]) -> list[Splice]:
     """Return the splices of the first edits that replace different scalars, so that one syntax tree suffices."""
     found: list[Splice] = []
     for edit in edits:
-        node = source_at(source, edit.keys) if isinstance(edit, SetValue) else None
-        if (
-            node is None
-            or node.kind != "scalar"
-            or not isinstance(edit, SetValue)
-            or isinstance(edit.value, dict | list)
-        ):
+        if not isinstance(edit, SetValue) or isinstance(edit.value, dict | list):
+            break
+        node = source_at(source, edit.keys)
+        if node is None or node.kind != "scalar":
             break
         splice = _replacement(text, node, edit.value)
         if any(other.start < splice.end and splice.start < other.end for other in found):
@@ -167,8 +144,7 @@ def _require_content(old: str, new: str, edits: Sequence[Edit]) -> None:
 
 
 def _edited_data(plain: Any, edit: Edit) -> Any:
-    """Return a copy of the parsed content `plain` after an edit."""
-    plain = copy.deepcopy(plain)
+    """Return the parsed content after an edit. `plain` is changed, unless the edit replaces it completely."""
     holder = {"": plain}
     node: Any = holder
     path: list[Key] = ["", *edit.keys]

@@ -19,6 +19,8 @@ NUMBER_TOLERANCE = 2e-6
 """Difference up to which two numbers count as equal, in the unit of their text."""
 
 _PLAIN_NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.([0-9]*))?|\.([0-9]+))")
+_INFINITE_NUMBERS = {"nan": ".nan", "inf": ".inf", "-inf": "-.inf"}
+"""Numbers that are not finite as YAML, by their text in Python."""
 _UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ufffe\uffff]")
 
 
@@ -37,9 +39,9 @@ def scalar_text(value: Any) -> str:
         return "null"
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, int | float):
-        return number_text(float(value)) if isinstance(value, float) else str(value)
-    return string_text(str(value))
+    if isinstance(value, float):
+        return number_text(value)
+    return str(value) if isinstance(value, int) else string_text(str(value))
 
 
 def replacement_text(value: Any, old: str, style: str) -> str:
@@ -50,35 +52,32 @@ def replacement_text(value: Any, old: str, style: str) -> str:
     if isinstance(value, int | float) and not isinstance(value, bool):
         quote = style if style in ("'", '"') else ""
         inner = old[1:-1] if quote else old
-        text = quantity_text(float(value), inner)
-        return f"{quote}{text}{quote}" if _unit(inner) else text
+        text = _quantity_text(float(value), inner)
+        return f"{quote}{text}{quote}" if _scale(inner) else text
     if isinstance(value, str) and style in (">", "|"):
         lines = [line for line in old.split("\n")[1:] if line.strip()]
         indent = len(lines[0]) - len(lines[0].lstrip()) if lines else 0
-        return (block_scalar_text(value, old, indent) if indent else None) or scalar_text(value)
+        return (_block_scalar_text(value, old, indent) if indent else None) or scalar_text(value)
     if isinstance(value, str) and style == "'" and not _UNPRINTABLE.search(value):
         return "'" + value.replace("'", "''") + "'"
     if isinstance(value, str) and style == '"':
-        return quoted_text(value)
+        return _quoted_text(value)
     return scalar_text(value)
 
 
-def quantity_text(value: float, old: str) -> str:
+def _quantity_text(value: float, old: str) -> str:
     """Return a number in SI units as text with the unit and the decimal places of the text `old`, e.g. "1.50 m"."""
-    match = NUMBER_AND_UNIT_PATTERN.fullmatch(old)
-    scale = _scale(_unit(old))
-    if match is None or not scale:
-        plain = _PLAIN_NUMBER.fullmatch(old.strip())
-        return number_text(value, len(plain[1] or plain[2] or "") if plain else 0)
-    decimals = _PLAIN_NUMBER.fullmatch(match[1])
-    number = number_text(value / scale, len(decimals[1] or decimals[2] or "") if decimals else 0)
-    return number + old[match.end(1) :].rstrip()
+    scale = _scale(old)
+    match = NUMBER_AND_UNIT_PATTERN.fullmatch(old) if scale else None
+    number, unit = (match[1], old[match.end(1) :].rstrip()) if match else (old.strip(), "")
+    plain = _PLAIN_NUMBER.fullmatch(number)
+    return number_text(value / (scale or 1.0), len(plain[1] or plain[2] or "") if plain else 0) + unit
 
 
 def number_text(value: float, decimals: int = 0) -> str:
     """Return a number as text with at least min(`decimals`, MAX_PADDED_DECIMALS) decimal places."""
     if not math.isfinite(value) or abs(value) >= 1e9 or 0 < abs(value) < 10.0 ** (1 - MAX_DECIMALS):
-        return _special_number_text(value)
+        return repr(value) if math.isfinite(value) else _INFINITE_NUMBERS[str(value)]
     number, _, places = f"{value:.{MAX_DECIMALS}f}".partition(".")
     places = places.rstrip("0").ljust(min(decimals, MAX_PADDED_DECIMALS), "0")
     text = f"{number}.{places}" if places else number
@@ -98,11 +97,11 @@ def is_same_value(found: Any, wanted: Any) -> bool:
     numbers = si_number(found), si_number(wanted)
     if not all(isinstance(number, int | float) for number in numbers):
         return False
-    scale = max(_scale_of_value(found), _scale_of_value(wanted))
+    scale = max(_scale(found) or 1.0, _scale(wanted) or 1.0)
     return math.isclose(*numbers, rel_tol=1e-9, abs_tol=NUMBER_TOLERANCE * scale)
 
 
-def quoted_text(text: str) -> str:
+def _quoted_text(text: str) -> str:
     """Return a text in double quotes."""
     return _UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", json.dumps(text, ensure_ascii=False))
 
@@ -110,40 +109,20 @@ def quoted_text(text: str) -> str:
 def string_text(text: str) -> str:
     """Return a string as YAML, without quotes if that is valid in block and flow style."""
     if "\n" in text or _UNPRINTABLE.search(text) or text != text.strip():
-        return quoted_text(text)
+        return _quoted_text(text)
     tree, problems = parse_yaml(f"[{{k: {text}}}, {{{text}: 1}}]", "")
     if problems or tree is None or tree.plain != [{"k": text}, {text: 1}]:
-        return quoted_text(text)
+        return _quoted_text(text)
     return text
 
 
-def _unit(text: str) -> str:
-    """Return the unit of a text such as "2.5 m"; "" without a known unit."""
-    match = NUMBER_AND_UNIT_PATTERN.fullmatch(text)
-    return match[2] if match and _scale(match[2]) else ""
+def _scale(value: Any) -> float:
+    """Return the factor from the unit of a value such as "2.5 cm" to the SI unit; 0 without a known unit."""
+    match = NUMBER_AND_UNIT_PATTERN.fullmatch(value) if isinstance(value, str) else None
+    return next((units[match[2]] for units in UNITS.values() if match and match[2] in units), 0.0)
 
 
-def _scale(unit: str) -> float:
-    """Return the factor from a unit to the SI unit; 0 for an unknown unit."""
-    return next((units[unit] for units in UNITS.values() if unit in units), 0.0)
-
-
-def _scale_of_value(value: Any) -> float:
-    """Return the factor from the unit of a quantity to the SI unit; 1 for a value without a unit."""
-    unit = _unit(value) if isinstance(value, str) else ""
-    return _scale(unit) if unit else 1.0
-
-
-def _special_number_text(value: float) -> str:
-    """Return a number that is not finite, very large, or very small as YAML."""
-    if math.isnan(value):
-        return ".nan"
-    if math.isinf(value):
-        return ".inf" if value > 0 else "-.inf"
-    return repr(value)
-
-
-def block_scalar_text(value: str, old: str, indent: int) -> str | None:
+def _block_scalar_text(value: str, old: str, indent: int) -> str | None:
     """Return a string in the style of the block scalar `old` (`>` or `|`); None if the style cannot represent it.
 
     `indent` is the number of spaces before each line.

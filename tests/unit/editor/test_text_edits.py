@@ -21,7 +21,7 @@ SHIPPED = sorted([*ROOT.glob("scenarios/**/*.yaml"), *ROOT.glob("worlds/*.world.
 
 
 def edited(text: str, *edits: Edit) -> str:
-    return apply_edits(text, edits).text
+    return apply_edits(text, edits)
 
 
 def plain(text: str) -> Any:
