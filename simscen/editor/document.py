@@ -91,8 +91,8 @@ class Document:
         `version` is the version that was edited. Raises ChangedMeanwhile if the file now has another version and
         `overwrite` is False. Raises UsageError if the file cannot be written.
         """
-        if not overwrite and (now := self._current_version()) != version:
-            raise ChangedMeanwhile(self._change_message(version, now), self._content_of_version(now))
+        if not overwrite:
+            self._require_version(version)
         data = self._mark + text.replace("\n", self._line_break).encode()
         try:
             mode = stat.S_IMODE(self.path.stat().st_mode) if self.path.exists() else None
@@ -103,23 +103,20 @@ class Document:
             raise UsageError(f"{self.display_name}: cannot be written: {error.strerror or error}") from error
         return _version(data)
 
-    def _current_version(self) -> str:
+    def _require_version(self, version: str) -> None:
+        """Raise ChangedMeanwhile if the file has another version."""
         try:
-            return _version(self.path.read_bytes())
+            now = _version(self.path.read_bytes())
         except OSError:
-            return NEW
-
-    def _content_of_version(self, version: str) -> Content:
-        """Return the current content of the file, given its version. The text is "" if it cannot be read."""
-        text = read_text(self.path, self.display_name) if version != NEW else ""
-        return Content(text if isinstance(text, str) else "", version)
-
-    def _change_message(self, version: str, now: str) -> str:
-        """Return the message of ChangedMeanwhile for a change from `version` to the version `now`."""
+            now = NEW
+        if now == version:
+            return
+        text = read_text(self.path, self.display_name) if now != NEW else ""
         what = "was created" if version == NEW else "was deleted" if now == NEW else "was changed by another program"
-        return f"{self.display_name} {what} since it was opened here; reload it, or overwrite it with your text"
+        hint = "reload it, or overwrite it with your text"
+        message = f"{self.display_name} {what} since it was opened here; {hint}"
+        raise ChangedMeanwhile(message, Content(text if isinstance(text, str) else "", now))
 
 
 def _version(raw: bytes) -> str:
-    """Return the version of a file with this content."""
     return hashlib.sha256(raw).hexdigest()

@@ -6,7 +6,6 @@ import secrets
 import sys
 import threading
 import traceback
-from dataclasses import replace
 from html import unescape
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -18,64 +17,9 @@ from simscen.core.version import PACKAGE
 from simscen.editor.session import EditorSession, RequestRefused
 from simscen.report.picture.palette import css_variables
 
-_WORLD_PAGE = re.compile(r"world-([0-9]{1,4})")
-"""First part of the path of the page of a world file."""
-
-
-class OpenFiles:
-    """Editor sessions of the main file, and of all world files to which it has referred.
-
-    The page of world file number n has the path `world-n/`. The number of a world file never changes. The session of a
-    world file starts when its page is first requested.
-    """
-
-    def __init__(self, main: EditorSession) -> None:
-        self.main = main
-        self._worlds: dict[Path, int] = {}
-        self._sessions: dict[int, EditorSession] = {}
-        self._lock = threading.Lock()
-        main.world_page_address = self._page_address
-
-    def resolve(self, name: str) -> tuple[EditorSession, str] | None:
-        """Return the session of a requested path, and the rest of the path; None for an unknown world file."""
-        first, slash, rest = name.partition("/")
-        match = _WORLD_PAGE.fullmatch(first) if slash else None
-        if match is None:
-            return self.main, name
-        session = self._session(int(match[1]))
-        return None if session is None else (session, rest)
-
-    def stop_runs(self) -> None:
-        """Stop the runs of all sessions."""
-        for session in (self.main, *self._sessions.values()):
-            session.runs.close()
-
-    def _page_address(self, world: Path) -> str:
-        """Return the path of the page of a world file. A new file gets the next number."""
-        with self._lock:
-            return f"world-{self._worlds.setdefault(world, len(self._worlds) + 1)}/"
-
-    def _session(self, number: int) -> EditorSession | None:
-        """Return the session of world file `number`, and start it if necessary.
-
-        Return None for an unknown number, or if the file cannot be read.
-        """
-        with self._lock:
-            if number not in self._sessions:
-                path = next((path for path, known in self._worlds.items() if known == number), None)
-                if path is None:
-                    return None
-                try:
-                    self._sessions[number] = self.main.open_world(replace(self.main.file, path=path, kind="world"))
-                except InvalidInput:
-                    return None
-            return self._sessions[number]
-
-
 ADDRESS = "127.0.0.1"
 """Address of this machine, which other machines cannot reach."""
-PAGE_FOLDER = PACKAGE / "data" / "editor"
-REPLAY_FOLDER = PACKAGE / "data" / "replay"
+PAGE_FOLDER, REPLAY_FOLDER = PACKAGE / "data" / "editor", PACKAGE / "data" / "replay"
 SHARED_MODULES = ("camera.js", "dom.js")
 """JavaScript modules in REPLAY_FOLDER that the editor page uses as well."""
 MAX_REQUEST_BYTES = 4 << 20
@@ -85,6 +29,8 @@ CONTENT_SECURITY_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:; frame-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'"
 )
+_WORLD_PATH = re.compile(r"world-([0-9]{1,4})/(.*)", re.DOTALL)
+"""Path of the page of a world file, and the rest of the path."""
 _REPLAY_PATH = re.compile(r"runs/([0-9]{1,6})/replay\.html")
 """Path of the replay page of a trial run."""
 _POLICY_OF_PAGE = re.compile(r'http-equiv="Content-Security-Policy" content="([^"]*)"')
@@ -100,14 +46,22 @@ class Response(NamedTuple):
 
 
 class EditorServer(ThreadingHTTPServer):
-    """HTTP server of an editor session, only for programs on this machine."""
+    """HTTP server of the editor, only for programs on this machine.
+
+    It serves the session of the main file, and sessions of all world files to which the main file has referred. The
+    page of world file number n has the path `world-n/`; its session starts when the page is first requested.
+    """
 
     daemon_threads = True
 
     def __init__(self, session: EditorSession, port: int = 0) -> None:
         """Listen on the port; 0 selects a free one. Raises OSError if the port is in use."""
         super().__init__((ADDRESS, port), _Handler)
-        self.open_files, self.token = OpenFiles(session), secrets.token_urlsafe(24)
+        self.session, self.token = session, secrets.token_urlsafe(24)
+        self._worlds: list[Path] = []
+        self._world_sessions: dict[int, EditorSession] = {}
+        self._lock = threading.Lock()
+        session.world_page_address = self._world_page_address
         self.hosts = {f"{name}:{self.server_port}" for name in (ADDRESS, "localhost")}
         self.files = {file.name: file for file in PAGE_FOLDER.iterdir() if file.suffix in CONTENT_TYPES}
         self.files |= {name: REPLAY_FOLDER / name for name in SHARED_MODULES}
@@ -117,19 +71,40 @@ class EditorServer(ThreadingHTTPServer):
         """URL of the page, with the token."""
         return f"http://{ADDRESS}:{self.server_port}/{self.token}/"
 
-    @property
-    def session(self) -> EditorSession:
-        """Session of the main file."""
-        return self.open_files.main
+    def resolve(self, name: str) -> tuple[EditorSession, str] | None:
+        """Return the session of a requested path, and the rest of the path; None for an unknown world file."""
+        match = _WORLD_PATH.fullmatch(name)
+        if match is None:
+            return self.session, name
+        session = self._world_session(int(match[1]))
+        return None if session is None else (session, match[2])
 
     def stop_runs(self) -> None:
         """Stop the runs of all sessions."""
-        self.open_files.stop_runs()
+        for session in (self.session, *self._world_sessions.values()):
+            session.runs.close()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Ignore a connection that the browser closed; print other errors."""
         if not isinstance(sys.exc_info()[1], ConnectionError | TimeoutError):
             super().handle_error(request, client_address)
+
+    def _world_page_address(self, world: Path) -> str:
+        """Return the path of the page of a world file. A new file gets the next number."""
+        with self._lock:
+            if world not in self._worlds:
+                self._worlds.append(world)
+            return f"world-{self._worlds.index(world) + 1}/"
+
+    def _world_session(self, number: int) -> EditorSession | None:
+        """Return the session of world file `number`; None for an unknown number, or if the file cannot be read."""
+        with self._lock:
+            if number not in self._world_sessions and 0 < number <= len(self._worlds):
+                try:
+                    self._world_sessions[number] = self.session.open_world(self._worlds[number - 1])
+                except InvalidInput:
+                    return None
+            return self._world_sessions.get(number)
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -174,11 +149,10 @@ class _Handler(BaseHTTPRequestHandler):
             return None
         token, _, name = self.path.partition("?")[0].removeprefix("/").partition("/")
         if not secrets.compare_digest(token.encode(errors="replace"), self.server.token.encode()):
-            self._send(
-                _error("wrong or missing token; use the address that simscen edit printed", HTTPStatus.FORBIDDEN)
-            )
+            message = "wrong or missing token; use the address that simscen edit printed"
+            self._send(_error(message, HTTPStatus.FORBIDDEN))
             return None
-        requested = self.server.open_files.resolve(name)
+        requested = self.server.resolve(name)
         if requested is None:
             self._send(_error("there is no such file to edit", HTTPStatus.NOT_FOUND))
         return requested
@@ -242,30 +216,20 @@ def _response(session: EditorSession, name: str, body: bytes) -> Response:
         if not isinstance(data, dict):
             return _error("a request must be a JSON object", HTTPStatus.BAD_REQUEST)
         return _json(handler(data))
-    except (ValueError, RecursionError) as error:
-        if not isinstance(error, json.JSONDecodeError | UnicodeDecodeError | RecursionError):
-            return _internal_error()
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError):
         return _error("the request is not JSON", HTTPStatus.BAD_REQUEST)
     except RequestRefused as refused:
         return _json({**refused.data, "error": str(refused)}, refused.status)
     except Exception:
-        return _internal_error()
+        traceback.print_exc()
+        message = "internal error: this is a bug in simscen; the terminal shows details"
+        return _error(message, HTTPStatus.INTERNAL_SERVER_ERROR)
 
 
 def _json(data: Any, status: int = 200) -> Response:
-    return Response(
-        json.dumps(data, ensure_ascii=False, allow_nan=False).encode(errors="replace"), "application/json", status
-    )
+    body = json.dumps(data, ensure_ascii=False, allow_nan=False).encode(errors="replace")
+    return Response(body, "application/json", status)
 
 
 def _error(message: str, status: HTTPStatus) -> Response:
-    """Return a JSON answer with an error message."""
     return _json({"error": message}, status)
-
-
-def _internal_error() -> Response:
-    """Print the traceback in the terminal, and return an error for the page."""
-    traceback.print_exc()
-    return _error(
-        "internal error: this is a bug in simscen; the terminal shows details", HTTPStatus.INTERNAL_SERVER_ERROR
-    )

@@ -7,6 +7,7 @@ world.
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,12 @@ from simscen.editor.document import NEW, ChangedMeanwhile, Content, Document, Ed
 from simscen.editor.forms import form_data
 from simscen.editor.map_view.background import Backgrounds
 from simscen.editor.map_view.map_edits import read_edits
-from simscen.editor.map_view.map_objects import MapObject, object_at_problem
-from simscen.editor.map_view.scene import map_objects, scene_data, scene_parts
+from simscen.editor.map_view.map_objects import MapObject
+from simscen.editor.map_view.scene import map_objects, object_at_problem, scene_data, scene_parts
 from simscen.editor.preview import preview_data
 from simscen.editor.text_editing.splices import EditRefused
 from simscen.editor.text_editing.text_edits import apply_edits
-from simscen.editor.trial_run import TrialRuns
+from simscen.editor.trial_run import TrialRun, TrialRuns
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.yaml.source_nodes import SourceNode, parse_source
@@ -32,11 +33,6 @@ Data = dict[str, Any]
 """JSON object."""
 CommandResolver = Callable[[LoadedScenario], tuple[LoadedScenario, list[Problem]]]
 """Function that adds the commands of external stacks to a scenario. It returns the scenario and the problems found."""
-
-
-def _without_commands(loaded: LoadedScenario) -> tuple[LoadedScenario, list[Problem]]:
-    """Return the scenario unchanged. This is the CommandResolver if no commands are configured."""
-    return loaded, []
 
 
 class RequestRefused(Exception):
@@ -61,7 +57,7 @@ class EditorSession:
         new_text: str = "",
         lenient: bool = False,
         stack: StackChoice | None = None,
-        resolve_commands: CommandResolver = _without_commands,
+        resolve_commands: CommandResolver = lambda loaded: (loaded, []),
     ) -> None:
         """Open a file. Raises InvalidInput if the file cannot be read.
 
@@ -96,9 +92,9 @@ class EditorSession:
             "run-stop": self.run_stop,
         }
 
-    def open_world(self, file: EditedFile) -> "EditorSession":
+    def open_world(self, path: Path) -> "EditorSession":
         """Return a session for a world file of this scenario. Raises InvalidInput if the file cannot be read."""
-        return EditorSession(file, self._backend_factory, lenient=self._lenient)
+        return EditorSession(replace(self.file, path=path, kind="world"), self._backend_factory, lenient=self._lenient)
 
     def open(self, _: Data) -> Data:
         """Return the text of the file, or the last text if the file can no longer be read."""
@@ -143,8 +139,7 @@ class EditorSession:
 
     def edit(self, request: Data) -> Data:
         """Return the text after `edits` on the map or in a form."""
-        text = _text(request)
-        return {"text": self._edited_text(text, request.get("edits"))}
+        return {"text": self._edited_text(request, request.get("edits"))}
 
     def form(self, request: Data) -> Data:
         """Return the form of the value at `keys`."""
@@ -160,7 +155,7 @@ class EditorSession:
         """Return the shortest paths and the clearances of the robots after `edits`."""
         if self.file.kind != "scenario":
             return {"reason": "", "robots": {}}
-        text = self._edited_text(_text(request), request.get("edits", []))
+        text = self._edited_text(request, request.get("edits", []))
         with self._preview_lock:
             return preview_data(self._preview_checks, text)
 
@@ -182,14 +177,13 @@ class EditorSession:
         """Start a run of the scenario or its first variation. The request is refused if the text has errors."""
         if self.file.kind != "scenario":
             raise RequestRefused("only a scenario can run")
+        text = _text(request)
         with self._check_lock:
-            loaded = self._checks.load(_text(request))
-            if isinstance(loaded, list):
-                raise RequestRefused(f"the scenario has problems: {_first_message(loaded)}", 422)
-            problems = self._checks.problems(_text(request))
+            loaded = self._checks.load(text)
+            problems = loaded if isinstance(loaded, list) else self._checks.problems(text)
         errors = [problem for problem in problems if problem.severity == "error"]
-        if errors:
-            raise RequestRefused(f"the scenario has problems: {_first_message(errors)}", 422)
+        if isinstance(loaded, list) or errors:
+            raise RequestRefused(f"the scenario has problems: {_first_message(errors or problems)}", 422)
         scenario, undefined = self._resolve_commands(loaded[0])
         if undefined:
             raise RequestRefused(f"{_first_message(undefined)}; {undefined[0].hint}", 422)
@@ -197,19 +191,24 @@ class EditorSession:
 
     def run_status(self, request: Data) -> Data:
         """Return the state of the run with the number `run`."""
-        trial = self.runs.trial(_run_number(request))
+        trial = self._trial(request)
         if trial is None:
             raise RequestRefused("there is no such run", 404)
         return trial.data()
 
     def run_stop(self, request: Data) -> Data:
         """Stop the run with the number `run`."""
-        trial = self.runs.trial(_run_number(request))
+        trial = self._trial(request)
         if trial is not None:
             trial.is_canceled = True
         return {}
 
-    def _edited_text(self, text: str, edits: Any) -> str:
+    def _trial(self, request: Data) -> TrialRun | None:
+        number = request.get("run")
+        return self.runs.trial(number) if isinstance(number, int) else None
+
+    def _edited_text(self, request: Data, edits: Any) -> str:
+        text = _text(request)
         try:
             return apply_edits(text, read_edits(edits, text, self.file.kind))
         except EditRefused as error:
@@ -256,9 +255,3 @@ def _first_message(problems: list[Problem]) -> str:
     """Return the message of the first problem, with its line and column."""
     first = min(problems)
     return f"{first.line}:{first.col}: {first.message}" if first.line else first.message
-
-
-def _run_number(request: Data) -> int:
-    """Return the number of the run in a request; 0 if it is missing."""
-    number = request.get("run")
-    return number if isinstance(number, int) else 0

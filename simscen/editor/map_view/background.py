@@ -39,20 +39,12 @@ class Backgrounds:
         image:     image of the map
         segments:  lines (x, y, x, y) in m of the SDF world
         """
-        files = (
-            ()
-            if source is None
-            else tuple(
-                (str(file), file.stat().st_mtime_ns)
-                for file in (
-                    source.sdf,
-                    source.map.path if source.map else None,
-                    source.map.image if source.map else None,
-                )
-                if file is not None and file.exists()
-            )
-        )
-        if not files or source is None:
+        if source is None:
+            return {"id": "", "bounds": None}
+        map_files = (source.map.path, source.map.image) if source.map else ()
+        existing = [file for file in (source.sdf, *map_files) if file is not None and file.exists()]
+        files = tuple((str(file), file.stat().st_mtime_ns) for file in existing)
+        if not files:
             return {"id": "", "bounds": None}
         if self._cached_files != files:
             self._cached = {"id": str(hash(files)), "bounds": None, **self._image_or_segments(source)}

@@ -4,10 +4,10 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from simscen.editor.forms import schema_of_kind
 from simscen.editor.map_view.map_objects import Keys
 from simscen.editor.text_editing.splices import EditRefused
 from simscen.editor.text_editing.text_edits import AddItem, Edit, RemovePart, SetValue
+from simscen.editor.value_schemas import schema_of_kind
 from simscen.loading.yaml.source_nodes import SourceNode, parse_source, source_at
 
 

@@ -1,16 +1,14 @@
-"""Objects on the map of the editor, and functions that read them from the data of a world.
+"""Objects on the map of the editor, and functions that read positions, outlines, and paths from the data of a file.
 
 The data are dicts, lists, and scalars. They need not be valid; values that cannot be read are ignored. `keys` are the
 path to a value in the file.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from simscen.core.errors import Problem
-from simscen.loading.yaml.source_nodes import SourceNode, source_at
 from simscen.loading.yaml.tree import Key
 from simscen.spec.quantities import si_number
 
@@ -21,10 +19,6 @@ Notation = Literal["pose", "point", "keyframe"]
 Corners = list[tuple[float, float]]
 """Corners (x, y) of a polygon in m."""
 CIRCLE_CORNERS = 24
-PERSON_RADIUS_M = 0.25
-"""Radius of a pedestrian without the key `radius`."""
-MAX_OBJECTS = 3000
-"""Maximum number of objects on a map."""
 
 
 @dataclass(frozen=True)
@@ -177,83 +171,3 @@ def motion_path(
     elif keyframes := keyframe_handles(motion.get("keyframes"), (*keys, "keyframes")):
         begins_there = number(items(items(motion.get("keyframes"))[0])[0]) == 0
         yield MapObject(keys, "path", label, keyframes, line="open", origin=None if begins_there else start)
-
-
-def object_at_problem(problem: Problem, objects: Sequence[MapObject], source: SourceNode | None, text: str) -> str:
-    """Return the ID of the object to which a problem in the text belongs; "" if there is none.
-
-    If several objects contain the problem, the one with the shortest YAML is chosen. A problem at a key belongs to the
-    value in the same line. `source` is the syntax tree of `text`.
-    """
-    if not problem.line or source is None:
-        return ""
-    lines = text.split("\n")
-    line_start = sum(len(line) + 1 for line in lines[: problem.line - 1])
-    index, line_end = line_start + max(problem.col - 1, 0), line_start + len(lines[problem.line - 1])
-    nodes = [(node, one) for one in objects if one.keys and (node := source_at(source, one.keys)) is not None]
-    around = [(node.end - node.start, one) for node, one in nodes if node.start <= index <= node.end]
-    behind = [(node.end - node.start, one) for node, one in nodes if index < node.start <= line_end]
-    found = around or behind
-    return "/".join(map(str, min(found, key=lambda each: each[0])[1].keys)) if found else ""
-
-
-def world_places(world: Any) -> dict[str, tuple[float, float, float]]:
-    """Return the places in the data of a world, by name."""
-    found = {}
-    for name, pose in mapping(mapping(world).get("places")).items():
-        for handle in pose_handle(pose, (), {}):
-            found[name] = (handle.x, handle.y, handle.yaw or 0.0)
-    return found
-
-
-def world_objects(world: Any, keys: Keys, places: Places) -> Iterator[MapObject]:
-    """Yield the objects of a world. `world` is its data, at `keys` of the file."""
-    data = mapping(world)
-    yield from _regions(data, keys)
-    yield from _walls_ramps_doors(data, keys, places)
-    for key, kind in (("obstacles", "obstacle"), ("objects", "object")):
-        for index, thing in enumerate(items(data.get(key))):
-            yield from _object(mapping(thing), (*keys, key, index), kind, places)
-    for name, pose in mapping(data.get("places")).items():
-        own = (*keys, "places", name)
-        yield MapObject(own, "place", name, pose_handle(pose, own, {}))
-
-
-def _regions(data: dict[str, Any], keys: Keys) -> Iterator[MapObject]:
-    """Yield the regions, as closed lines."""
-    for name, ring in mapping(data.get("regions")).items():
-        own = (*keys, "regions", name)
-        corners = point_handles(ring, own, {})
-        yield MapObject(own, "region", name, corners, line="closed", moves_as_one=True, points_keys=own)
-
-
-def _walls_ramps_doors(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObject]:
-    """Yield the walls, ramps, and doors, which are lines with a width."""
-    for index, wall in enumerate(map(mapping, items(data.get("walls")))):
-        own = (*keys, "walls", index)
-        corners = point_handles(wall.get("points"), (*own, "points"), places)
-        label, width = str(wall.get("name", f"wall_{index + 1}")), number(wall.get("thickness", 0.1)) or 0.1
-        points = (*own, "points")
-        yield MapObject(own, "wall", label, corners, line="open", moves_as_one=True, points_keys=points, width=width)
-    for index, ramp in enumerate(map(mapping, items(data.get("ramps")))):
-        own = (*keys, "ramps", index)
-        ends = tuple(handle for end in ("start", "end") for handle in point_handle(ramp.get(end), (*own, end), places))
-        width = number(ramp.get("width")) or 0.5
-        yield MapObject(own, "ramp", str(ramp.get("name", "ramp")), ends, line="open", moves_as_one=True, width=width)
-    for index, door in enumerate(map(mapping, items(data.get("doors")))):
-        own = (*keys, "doors", index)
-        posts, width = (
-            point_handles(door.get("points"), (*own, "points"), places),
-            number(door.get("thickness")) or 0.05,
-        )
-        yield MapObject(own, "door", str(door.get("name", "door")), posts, line="open", moves_as_one=True, width=width)
-
-
-def _object(thing: dict[str, Any], keys: Keys, kind: str, places: Places) -> Iterator[MapObject]:
-    """Yield an obstacle or movable object, and its path if it moves."""
-    handle = pose_handle(thing.get("pose"), (*keys, "pose"), places)
-    label = str(thing.get("name", kind))
-    yield MapObject(keys, kind, label, handle, outline(thing))
-    yield from motion_path(
-        thing.get("move"), (*keys, "move"), f"path of {label}", places, handle[0] if handle else None
-    )

@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 from simscen.editor.map_view.map_objects import (
-    PERSON_RADIUS_M,
     Keys,
     MapObject,
     Places,
@@ -23,8 +22,8 @@ from simscen.editor.map_view.map_objects import (
     pose_handle,
 )
 
-SETTINGS = "settings"
-"""Kind of the object for the top-level keys of the scenario."""
+PERSON_RADIUS_M = 0.25
+"""Radius of a pedestrian without the key `radius`."""
 KIND_OF_POSE_ACTION = {"teleport": "teleport", "kidnap": "kidnap", "new_goal": "goal"}
 """Kind of the object on the map for each action with a pose."""
 COMBINED_TRIGGERS = {"all", "any"}
@@ -33,7 +32,7 @@ COMBINED_TRIGGERS = {"all", "any"}
 
 def scenario_objects(data: dict[str, Any], places: Places) -> Iterator[MapObject]:
     """Yield the objects of a scenario, except the objects of its world."""
-    yield MapObject((), SETTINGS, str(data.get("name", "scenario")))
+    yield MapObject((), "settings", str(data.get("name", "scenario")))
     robots = mapping(data.get("robots"))
     if not robots:
         yield from _robot(mapping(data.get("robot")), ("robot",), "robot", places)
@@ -49,15 +48,16 @@ def scenario_objects(data: dict[str, Any], places: Places) -> Iterator[MapObject
         label = str(event.get("name", f"event-{index + 1}"))
         yield MapObject(own, "event", label)
         yield from _event(event, own, label, places)
-        for number_, step in enumerate(map(mapping, items(event.get("then")))):
-            yield from _event(
-                step, (*own, "then", number_), str(step.get("name", f"{label} then {number_ + 1}")), places
-            )
+        for step_index, step in enumerate(map(mapping, items(event.get("then")))):
+            step_label = str(step.get("name", f"{label} then {step_index + 1}"))
+            yield from _event(step, (*own, "then", step_index), step_label, places)
     yield from _zones(data, (), "")
     yield from _faults(data, (), places)
     for index, criterion in enumerate(map(mapping, items(data.get("pass")))):
-        region = _region_of(criterion)
-        yield MapObject(("pass", index), "criterion", _first_key(criterion), region=region)
+        kind = _first_key(criterion)
+        condition = mapping(criterion.get(kind))
+        region = condition.get("region", condition.get("in"))
+        yield MapObject(("pass", index), "criterion", kind, region=region if isinstance(region, str) else "")
 
 
 def _robot(robot: dict[str, Any], keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
@@ -85,13 +85,11 @@ def _goals(value: Any, keys: Keys, prefix: str, places: Places) -> Iterator[MapO
 def _event(event: dict[str, Any], keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
     """Yield the objects for the triggers and actions of an event."""
     yield from _triggers(event.get("when"), (*keys, "when"), f"trigger of {label}", places)
-    actions = event.get("do")
-    written: list[tuple[Keys, Any]] = [(("do", index), action) for index, action in enumerate(items(actions))]
-    if isinstance(actions, dict):
-        written = [(("do",), actions)]
-    for own, action in written:
+    actions, own = event.get("do"), (*keys, "do")
+    written = [((*own, index), action) for index, action in enumerate(items(actions))]
+    for action_keys, action in [(own, actions)] if isinstance(actions, dict) else written:
         for kind, value in mapping(action).items():
-            yield from _action(kind, mapping(value), (*keys, *own, kind), label, places)
+            yield from _action(kind, mapping(value), (*action_keys, kind), label, places)
 
 
 def _action(kind: str, action: dict[str, Any], keys: Keys, event: str, places: Places) -> Iterator[MapObject]:
@@ -101,9 +99,9 @@ def _action(kind: str, action: dict[str, Any], keys: Keys, event: str, places: P
     if kind == "spawn":
         yield MapObject(keys, "spawn", name or kind, handle, outline(action))
     elif kind == "pedestrian":
-        goals = point_handles(action.get("goals"), (*keys, "goals"), places)
-        body = [circle(number(action.get("radius")) or PERSON_RADIUS_M)]
         points = (*keys, "goals")
+        goals = point_handles(action.get("goals"), points, places)
+        body = [circle(number(action.get("radius")) or PERSON_RADIUS_M)]
         yield MapObject(keys, "person", name or kind, (*handle, *goals), body, "open", points_keys=points)
     elif kind in KIND_OF_POSE_ACTION:
         label = f"goal {name}" if kind == "new_goal" else f"{kind} {name}".strip()
@@ -173,10 +171,3 @@ def _faults(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObj
 def _first_key(entry: dict[str, Any], without: tuple[str, ...] = ("id", "severity", "robot")) -> str:
     """Return the kind of a criterion or fault: its first key that is not in `without`."""
     return next((key for key in entry if key not in without), "entry")
-
-
-def _region_of(criterion: dict[str, Any]) -> str:
-    """Return the name of the region of a criterion; "" for none."""
-    chosen = mapping(criterion.get(_first_key(criterion)))
-    region = chosen.get("region", chosen.get("in"))
-    return region if isinstance(region, str) else ""

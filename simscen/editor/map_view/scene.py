@@ -1,27 +1,24 @@
 """Scene that the editor page shows for a text: objects of the scenario and of its world, and the background."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from simscen.core.errors import InvalidInput
+from simscen.core.errors import InvalidInput, Problem
 from simscen.editor.document import EditedFile
 from simscen.editor.map_view.background import Backgrounds
-from simscen.editor.map_view.map_objects import (
-    MAX_OBJECTS,
-    Handle,
-    Keys,
-    MapObject,
-    mapping,
-    world_objects,
-    world_places,
-)
+from simscen.editor.map_view.map_objects import Handle, Keys, MapObject, mapping
 from simscen.editor.map_view.scenario_objects import scenario_objects
+from simscen.editor.map_view.world_objects import world_objects, world_places
 from simscen.loading.files.assets import Assets
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.schema.validate import check
 from simscen.loading.yaml.source_nodes import SourceNode, parse_source, source_at
-from simscen.loading.yaml.tree import MappingNode, Position, ScalarNode, child, key_position, value_position
+from simscen.loading.yaml.tree import MappingNode, ScalarNode, child, key_position, value_position
 from simscen.model.world import WorldSpec
+
+MAX_OBJECTS = 3000
+"""Maximum number of objects on a map."""
 
 
 @dataclass(frozen=True)
@@ -67,58 +64,47 @@ def scene_parts(file: EditedFile, text: str) -> SceneParts | None:
         elif isinstance(node, ScalarNode) and isinstance(node.value, str):
             world = assets.world(node)
         elif isinstance(node, MappingNode):
-            world = _inline_world(assets, node, file)
+            spec = check(WorldSpec, node)
+            world = None if isinstance(spec, list) else assets.complete_world(spec, node, file.path)
     except (InvalidInput, OSError):
         pass  # `validate` reports it
     return SceneParts(file, text, tree, assets, world, is_inline)
 
 
-def _inline_world(assets: Assets, node: MappingNode, file: EditedFile) -> LoadedWorld | None:
-    """Return the world in a scenario file; None if it is invalid."""
-    spec = check(WorldSpec, node)
-    return None if isinstance(spec, list) else assets.complete_world(spec, node, file.path)
-
-
 def map_objects(parts: SceneParts) -> list[MapObject]:
     """Return at most MAX_OBJECTS objects, for the map and the list of objects."""
-    data, places = parts.tree.plain, world_places(parts.world_data)
-    found: list[MapObject] = []
-    if parts.file.kind == "scenario":
-        found += scenario_objects(data, places)
-    found += world_objects(parts.world_data, _world_keys(parts), places)
+    places = world_places(parts.world_data)
+    if parts.file.kind == "world":
+        found = list(world_objects(parts.world_data, (), places))
+    else:
+        found = [*scenario_objects(parts.tree.plain, places), *world_objects(parts.world_data, ("world",), places)]
     return found[:MAX_OBJECTS]
 
 
 def scene_data(parts: SceneParts, backgrounds: Backgrounds) -> dict[str, Any]:
     """Return the objects, regions, places, background, and name of the world file as JSON data."""
     source = parse_source(parts.text)
-    display_name = parts.file.display_name
     return {
         "kind": parts.file.kind,
         "objects": [_object_data(map_object, parts, source) for map_object in map_objects(parts)],
         "regions": {
-            name: [[handle.x, handle.y] for handle in world_object.handles]
-            for world_object in world_objects(parts.world_data, (), {})
-            if world_object.kind == "region" and (name := world_object.label)
+            one.label: [[handle.x, handle.y] for handle in one.handles]
+            for one in world_objects(parts.world_data, (), {})
+            if one.kind == "region" and one.label
         },
         "places": sorted(world_places(parts.world_data)),
         "inline": parts.is_inline,
-        "world_file": _world_file(parts, display_name),
+        "world_file": _world_file(parts),
         "background": backgrounds.background(parts.world),
     }
 
 
-def _world_keys(parts: SceneParts) -> Keys:
-    """Return the path to the world in the edited file."""
-    return () if parts.file.kind == "world" else ("world",)
-
-
-def _world_file(parts: SceneParts, edited_name: str) -> str:
+def _world_file(parts: SceneParts) -> str:
     """Return the name of the world file; "" if it is the edited file, a map, or an SDF file."""
     if parts.is_inline or parts.world is None:
         return ""
     name = parts.assets.library.sandbox.display_name(parts.world.path)
-    return "" if name == edited_name or parts.world.spec is None else name
+    return "" if name == parts.file.display_name or parts.world.spec is None else name
 
 
 def _object_data(one: MapObject, parts: SceneParts, source: SourceNode | None) -> dict[str, Any]:
@@ -162,7 +148,8 @@ def _own_line(keys: Keys, parts: SceneParts, source: SourceNode | None) -> tuple
     """
     if source is None or (not parts.is_inline and parts.file.kind == "scenario" and keys[:1] == ("world",)):
         return False, 0
-    position = _position(parts.tree, keys)
+    find_position = key_position if keys and isinstance(keys[-1], str) else value_position
+    position = find_position(parts.tree, keys)
     is_here = position.path == parts.file.display_name and source_at(source, keys) is not None
     line = position.line if is_here and keys else 0
     if any(isinstance(key, int) for key in keys):  # an item of an inherited list cannot be changed here
@@ -170,6 +157,19 @@ def _own_line(keys: Keys, parts: SceneParts, source: SourceNode | None) -> tuple
     return True, line
 
 
-def _position(tree: MappingNode, keys: Keys) -> Position:
-    """Return the file position of the key or list item at `keys`."""
-    return key_position(tree, keys) if keys and isinstance(keys[-1], str) else value_position(tree, keys)
+def object_at_problem(problem: Problem, objects: Sequence[MapObject], source: SourceNode | None, text: str) -> str:
+    """Return the ID of the object to which a problem in the text belongs; "" if there is none.
+
+    If several objects contain the problem, the one with the shortest YAML is chosen. A problem at a key belongs to the
+    value in the same line. `source` is the syntax tree of `text`.
+    """
+    if not problem.line or source is None:
+        return ""
+    lines = text.split("\n")
+    line_start = sum(len(line) + 1 for line in lines[: problem.line - 1])
+    index, line_end = line_start + max(problem.col - 1, 0), line_start + len(lines[problem.line - 1])
+    nodes = [(node, one) for one in objects if one.keys and (node := source_at(source, one.keys)) is not None]
+    around = [(node.end - node.start, one) for node, one in nodes if node.start <= index <= node.end]
+    behind = [(node.end - node.start, one) for node, one in nodes if index < node.start <= line_end]
+    found = around or behind
+    return "/".join(map(str, min(found, key=lambda each: each[0])[1].keys)) if found else ""

@@ -56,7 +56,7 @@ def insert_item(text: str, sequence: SourceNode, value: Any, index: int | None =
         if at_end:
             return Splice(like.end, like.end, _separator(text, items) + flow_text(value))
         return Splice(like.start, like.start, f"{flow_text(value)}, ")
-    dash = dash_before(text, like.start)
+    dash = _dash_before(text, like.start)
     indent = column(text, dash)
     item = f"- {_block_value(text, value, like, indent + INDENT)}"
     if at_end:
@@ -67,7 +67,7 @@ def insert_item(text: str, sequence: SourceNode, value: Any, index: int | None =
     return Splice(place, place, " " * indent + item + "\n")
 
 
-def dash_before(text: str, start: int) -> int:
+def _dash_before(text: str, start: int) -> int:
     """Return the position of the dash before the list item that starts at `start`."""
     return text.rfind("-", 0, start)
 
@@ -118,7 +118,8 @@ def remove_part(text: str, source: SourceNode, keys: tuple[Key, ...]) -> Splice:
         assert isinstance(keys[-1], int)
         parts = [(item.start, item.end) for item in parent.items]
         if not parent.is_flow:
-            parts = [(dash_before(text, start), max(end, dash_before(text, start) + 1)) for start, end in parts]
+            dashes = [_dash_before(text, start) for start, _ in parts]
+            parts = [(dash, max(end, dash + 1)) for dash, (_, end) in zip(dashes, parts, strict=True)]
         number = keys[-1]
     else:
         parts = [(entry.start, max(entry.end, entry.value.end)) for entry in parent.entries.values()]
