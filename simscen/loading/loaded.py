@@ -153,6 +153,13 @@ class LoadedScenario:
         """Return whether a part of the scenario that names `robot` applies to this view; True if it names no robot."""
         return robot is None or not self.robot_name or robot == self.robot_name
 
+    def may_do(self, *kinds: str) -> bool:
+        """Return whether an action of an event can have the effect of an action of one of these kinds.
+
+        Actions of installed packages can have any effect. Without kinds, return whether there is such an action.
+        """
+        return any(action.may_do(*kinds) for step in self.spec.steps for action in step.actions)
+
     @property
     def title(self) -> str:
         """The id with the name of the variation, e.g. `aisle[speed=0.5]`."""

@@ -3,7 +3,7 @@
 from simscen.core.errors import Problem
 from simscen.loading.stacks.choice import EXTERNAL, StackChoice, replace_stack
 from simscen.loading.yaml.library import merge_mappings
-from simscen.loading.yaml.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child
+from simscen.loading.yaml.tree import Entry, MappingNode, ScalarNode, SequenceNode, child, entries_of, items_of
 from simscen.model.scenario import RobotEntry
 
 ROBOT, ROBOTS, PASS, EXPECTED, STACK = "robot", "robots", "pass", "expected", "stack"
@@ -17,9 +17,8 @@ def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
 
     Nodes keep their positions in the file. The key `expected`, which applies to all robots together, is left out.
     """
-    robots = child(tree, ROBOTS)
-    entries = robots.entries if isinstance(robots, MappingNode) else {}
-    return {name: _single_robot_tree(tree, entries[name]) for name in sorted(entries)}
+    robots = entries_of(child(tree, ROBOTS))
+    return {name: _single_robot_tree(tree, robots[name]) for name in sorted(robots)}
 
 
 def has_multiple_robots(tree: MappingNode) -> bool:
@@ -40,7 +39,7 @@ def _single_robot_tree(tree: MappingNode, entry: Entry) -> MappingNode:
     robot = {key: value for key, value in own_tree.entries.items() if key in RobotEntry.model_fields}
     own = {key: value for key, value in own_tree.entries.items() if key not in robot and key != PASS}
     merged = merge_mappings(MappingNode(tree.position, own), tree.without_keys(ROBOTS, EXPECTED))
-    criteria = SequenceNode(tree.position, (*_items(child(tree, PASS)), *_items(child(own_tree, PASS))))
+    criteria = SequenceNode(tree.position, (*items_of(child(tree, PASS)), *items_of(child(own_tree, PASS))))
     return MappingNode(
         tree.position,
         {**merged.entries, ROBOT: Entry(entry.key, MappingNode(position, robot)), PASS: Entry(entry.key, criteria)},
@@ -76,11 +75,6 @@ def external_stack_name(tree: MappingNode) -> str | None:
     return str(name.value) if isinstance(name, ScalarNode) else None
 
 
-def _items(node: Node | None) -> tuple[Node, ...]:
-    """Return the items of a list; () for anything else."""
-    return node.items if isinstance(node, SequenceNode) else ()
-
-
 def scenario_robot_problems(tree: MappingNode) -> list[Problem]:
     """Return problems of a scenario: missing `robot` or criteria, and keys that exclude `robots`."""
     problems = criteria_robot_problems(tree)
@@ -108,8 +102,9 @@ def criteria_robot_problems(tree: MappingNode) -> list[Problem]:
             message = f"`{key}` belong to one robot, but the scenario has several"
             hint = f"move them to each robot in `{ROBOTS}`"
             problems.append(Problem(*tree.entries[key].key, "SC016", message, hint))
-    for name, entry in robots.entries.items() if isinstance(robots, MappingNode) else ():
-        if isinstance(entry.value, MappingNode) and not _items(criteria) and not _items(child(entry.value, PASS)):
+    for name, entry in entries_of(robots).items():
+        own_criteria = child(entry.value, PASS)
+        if isinstance(entry.value, MappingNode) and not items_of(criteria) and not items_of(own_criteria):
             message = f"missing key `{PASS}` in `{ROBOTS}.{name}`"
             hint = "add criteria for this robot, or for all robots at top level"
             problems.append(Problem(*entry.key, "SC010", message, hint))

@@ -153,9 +153,10 @@ def _empty_instance(original_class: type[Choice]) -> Choice:
 
 def _address(field: FieldInfo) -> str:
     """Return the address "module:Class" of the specification of a field; "" for a list or another Choice."""
-    lazy = next((item for item in field.metadata if isinstance(item, LazySpec)), None)
-    if lazy is not None:
-        return f"{lazy.module}:{lazy.name}"
-    kinds = [kind for kind in get_args(field.annotation) if isinstance(kind, type) and issubclass(kind, Spec)]
-    kinds = [kind for kind in kinds if not issubclass(kind, Choice)]
-    return f"{kinds[0].__module__}:{kinds[0].__name__}" if kinds else ""
+    for item in field.metadata:
+        if isinstance(item, LazySpec):
+            return f"{item.module}:{item.name}"
+    for kind in get_args(field.annotation):
+        if isinstance(kind, type) and issubclass(kind, Spec) and not issubclass(kind, Choice):
+            return f"{kind.__module__}:{kind.__name__}"
+    return ""

@@ -91,27 +91,16 @@ class Motion(Spec):
 
     def path(self, current: Pose2, start: float = 0.0) -> MotionPath:
         """Return the path of an object from the pose `current`. The object starts to move in `start` seconds."""
-        if self.keyframes is not None:
-            return _path_through_keyframes(current, self.keyframes, self.repeat, start, self.ease, self.phase)
-        assert self.through is not None and self.speed is not None
-        return path_through_waypoints(current, self.through, self.speed, self.repeat, self.ease, start)
-
-
-def _path_through_keyframes(
-    current: Pose2,
-    keyframes: list[tuple[float, float, float, float]],
-    repeat: str,
-    start: float,
-    ease: str,
-    phase: float,
-) -> MotionPath:
-    """Return the path through keyframes. The parameters are the fields of Motion and the arguments of `Motion.path`."""
-    times, poses = [t for t, *_ in keyframes], [Pose2(x, y, yaw) for _, x, y, yaw in keyframes]
-    if times[0] > 0:
-        times, poses = [0.0, *times], [current, *poses]
-    if repeat == "loop":
-        poses[-1] = poses[0]
-    return MotionPath(tuple(times), tuple(poses), repeat, start, ease, phase)
+        if self.keyframes is None:
+            assert self.through is not None and self.speed is not None
+            return path_through_waypoints(current, self.through, self.speed, self.repeat, self.ease, start)
+        times = [time for time, *_ in self.keyframes]
+        poses = [Pose2(x, y, yaw) for _, x, y, yaw in self.keyframes]
+        if times[0] > 0:
+            times, poses = [0.0, *times], [current, *poses]
+        if self.repeat == "loop":
+            poses[-1] = poses[0]
+        return MotionPath(tuple(times), tuple(poses), self.repeat, start, self.ease, self.phase)
 
 
 def path_through_waypoints(

@@ -160,12 +160,9 @@ class PlaceShorthand:
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         name = handler.generate_schema(Annotated[PlaceName, Field(description=PLACE_NAME_DESCRIPTION)])
         mapping = handler(source)
-        convert = core_schema.no_info_plain_validator_function(self._as_mapping)
+        convert = core_schema.no_info_plain_validator_function(lambda place: {self.key: place})
         shorthand = core_schema.chain_schema([name, convert, mapping])
         return core_schema.tagged_union_schema({"text": shorthand, "written out": mapping}, _union_tag)
-
-    def _as_mapping(self, place: str) -> dict[str, str]:
-        return {self.key: place}
 
 
 PlaceOrPose = Annotated[PoseSpec, PlaceAllowed()]

@@ -2,10 +2,11 @@
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, PlainValidator, WithJsonSchema
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 _METERS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
@@ -50,12 +51,16 @@ class Quantity:
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         number = dict(handler(schema))
-        units = "|".join(unit.replace("^", r"\^") for unit in UNITS[self.dimension])  # must also be valid in JavaScript
-        pattern = rf"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({units})\s*$"
         # Bounds apply only to numbers and the pattern only to text, so both fit into one schema.
-        message = f"expected {self._with_article}, e.g. {self.example}; units: {', '.join(UNITS[self.dimension])}"
-        schema = {**number, "type": [number["type"], "string"], "pattern": pattern, "description": self.description}
-        return {**schema, "patternErrorMessage": message}
+        return {
+            **number,
+            "type": [number["type"], "string"],
+            "pattern": _json_schema_pattern(UNITS[self.dimension]),
+            "description": self.description,
+            "patternErrorMessage": (
+                f"expected {self._with_article}, e.g. {self.example}; units: {', '.join(UNITS[self.dimension])}"
+            ),
+        }
 
     @property
     def example(self) -> str:
@@ -94,6 +99,12 @@ class Quantity:
         )
 
 
+def _json_schema_pattern(units: Iterable[str]) -> str:
+    """Return the pattern of a number with one of these units, which is also valid in JavaScript."""
+    choices = "|".join(unit.replace("^", r"\^") for unit in dict.fromkeys(units))
+    return rf"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({choices})\s*$"
+
+
 @dataclass(frozen=True)
 class AnyQuantity:
     """Annotation of a float with a dimension that depends on another field. The JSON schema allows all units.
@@ -102,12 +113,12 @@ class AnyQuantity:
     """
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        units = "|".join(re.escape(unit) for unit in dict.fromkeys(unit for units in UNITS.values() for unit in units))
-        units = units.replace("\\ ", " ").replace("\\%", "%")  # JavaScript rejects unnecessary escapes
-        message = "expected a number with a unit, such as 1.5 m, or a bare number in SI units"
-        pattern = rf"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*({units})\s*$"
-        text = {"pattern": pattern, "patternErrorMessage": message}
-        return {**handler(schema), "type": ["number", "string"], **text}
+        return {
+            **handler(schema),
+            "type": ["number", "string"],
+            "pattern": _json_schema_pattern(unit for units in UNITS.values() for unit in units),
+            "patternErrorMessage": "expected a number with a unit, such as 1.5 m, or a bare number in SI units",
+        }
 
 
 class WholeQuantity(Quantity):
@@ -157,21 +168,6 @@ class Amount(NamedTuple):
     unit: str = ""
 
 
-@dataclass(frozen=True)
-class _ParsedAmount:
-    """Annotation of an Amount that is given as a number or as text."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(_parse_amount)
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"type": ["number", "string"], "description": "a number, with its unit if it has one"}
-
-
-AnyAmount = Annotated[Amount, _ParsedAmount()]
-"""Amount of any dimension."""
-
-
 def to_common_unit(amounts: tuple[Amount, ...]) -> tuple[tuple[float, ...], str]:
     """Return the amounts as numbers in one unit, and this unit.
 
@@ -209,3 +205,8 @@ def _parse_amount(value: Any) -> Amount:
     found = f"the text `{value}`" if isinstance(value, str) else "something else"
     problem = f"expected a number with or without a unit, got {found}"
     raise PydanticCustomError("amount", "{problem}", {"problem": problem})
+
+
+_AMOUNT_SCHEMA = {"type": ["number", "string"], "description": "a number, with its unit if it has one"}
+AnyAmount = Annotated[Amount, PlainValidator(_parse_amount), WithJsonSchema(_AMOUNT_SCHEMA)]
+"""Amount of any dimension, which is given as a number or as text."""

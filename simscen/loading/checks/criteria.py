@@ -68,8 +68,7 @@ def _why_impossible(loaded: LoadedScenario, kind: str, criterion: Any) -> str | 
         return why_no_recovery(loaded, criterion.name)
     if kind != "result":
         return None
-    cancels = any(action.may_do("cancel_goal") for step in loaded.spec.steps for action in step.actions)
-    if criterion.status == "CANCELED" and not cancels:
+    if criterion.status == "CANCELED" and not loaded.may_do("cancel_goal"):
         return "no event cancels a goal"
     if criterion.status == "SUCCEEDED" and criterion.error_code not in (None, NO_ERROR):
         return f"a result that SUCCEEDED has no error code such as {criterion.error_code.name}"
@@ -103,8 +102,7 @@ def contradicting_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find goals that are never sent, because the run stops at the expected failure of the goal before."""
     spec = loaded.spec
-    new_goals = any(action.may_do("new_goal") for step in spec.steps for action in step.actions)
-    if spec.on_goal_failure == "continue" or new_goals:
+    if spec.on_goal_failure == "continue" or loaded.may_do("new_goal"):
         return
     for index, goal in enumerate(spec.goals):
         if expected_failure_name(goal.expect) and (spec.navigation.loops > 1 or index + 1 < len(spec.goals)):

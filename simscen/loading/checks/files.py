@@ -20,7 +20,7 @@ from simscen.loading.schema.validate import check_partial
 from simscen.loading.stacks.choice import NAV2_FILE_KIND, STACK_FILE_KIND, read_stack_file, recognize_stack_file
 from simscen.loading.variations.variation_problems import VariationProblems, merge_problems
 from simscen.loading.yaml.library import APPEND_SUFFIX, DEFAULTS_FILE, Library
-from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, child, node_at, value_position
+from simscen.loading.yaml.tree import MappingNode, ScalarNode, child, entries_of, node_at
 from simscen.model.scenario import ScenarioSpec
 
 CHECKED_DRAWS = range(1, 21)
@@ -93,7 +93,7 @@ def file_kind(file: Path, root: Path) -> str:
         tree, "".join(library.texts.values()), library.sandbox.display_name(file.absolute())
     ):
         return "stack" if kind == STACK_FILE_KIND else kind
-    keys = set(tree.entries) if isinstance(tree, MappingNode) else set()
+    keys = entries_of(tree).keys()
     if keys & _SCENARIO_KEYS:
         return "scenario"
     return "robot" if keys & _ROBOT_KEYS else "world" if keys & _WORLD_KEYS else "scenario"
@@ -104,30 +104,14 @@ def _base_file_problems(file: Path, library: Library) -> list[Problem]:
     tree, problems = library.read(file)
     if problems or tree is None:
         return library.with_source(problems)
-    problems = check_partial(ScenarioSpec, _with_plain_keys(tree))
-    return library.with_source(
-        sorted([*problems, *(_named_file_problems(tree, library) if isinstance(tree, MappingNode) else [])])
-    )
-
-
-def _with_plain_keys(tree: Node) -> Node:
-    """Return the YAML tree with keys such as `pass+` renamed to `pass`."""
-    if not isinstance(tree, MappingNode):
-        return tree
-    entries = {
-        key.removesuffix(APPEND_SUFFIX): entry for key, entry in tree.entries.items() if key.endswith(APPEND_SUFFIX)
-    }
-    return MappingNode(
-        tree.position, {**entries, **{key: entry for key, entry in tree.entries.items() if key[-1:] != APPEND_SUFFIX}}
-    )
-
-
-def _named_file_problems(tree: MappingNode, library: Library) -> list[Problem]:
-    """Return the problems of the world and the robot that a base file names."""
-    assets = Assets(library)
-    world, model = child(tree, "world"), node_at(tree, ("robot", "model"))
-    if isinstance(world, ScalarNode) and isinstance(world.value, str):
-        assets.world(world)
-    if isinstance(model, ScalarNode) and isinstance(model.value, str):
-        assets.robot(model.value, value_position(tree, ("robot", "model")))
-    return assets.problems
+    assets, renamed = Assets(library), tree
+    if isinstance(tree, MappingNode):
+        appended = {key.removesuffix(APPEND_SUFFIX): entry for key, entry in tree.entries.items()}
+        unchanged = {key: entry for key, entry in tree.entries.items() if not key.endswith(APPEND_SUFFIX)}
+        renamed = MappingNode(tree.position, {**appended, **unchanged})  # with `pass` for `pass+`
+        world, model = child(tree, "world"), node_at(tree, ("robot", "model"))
+        if isinstance(world, ScalarNode) and isinstance(world.value, str):
+            assets.world(world)
+        if isinstance(model, ScalarNode) and isinstance(model.value, str):
+            assets.robot(model.value, model.position)
+    return library.with_source(sorted([*check_partial(ScenarioSpec, renamed), *assets.problems]))

@@ -24,7 +24,7 @@ def _start_is_blocked(scene: Scene) -> bool:
 @WORLD.check("SC050")
 def unreachable_triggers(scene: Scene) -> Iterator[CheckProblem]:
     """Find events and faults that wait for the robot in an area that it cannot reach within the time limit."""
-    if _start_is_blocked(scene) or scene.may_do():  # an action of an installed package may take the robot anywhere
+    if _start_is_blocked(scene) or scene.loaded.may_do():  # actions of installed packages may take the robot anywhere
         return
     starts, robot, limit = scene.start_poses, scene.loaded.robot.spec, scene.loaded.spec.time_limit
     for keys, name, what, corners, distance in scene.cached(trigger_areas):

@@ -48,7 +48,7 @@ def unreachable_goals(scene: Scene) -> list[tuple[CheckProblem, Gap]]:
         message = f"goal `{goal.name}` cannot be reached from the start: {gap.description}"
         if solids is not world and routes.is_reachable(starts, goal.pose, world):
             problem = CheckProblem(keys, message, "no event opens, moves or removes it", warning=True)
-        elif scene.may_do():
+        elif scene.loaded.may_do():
             problem = CheckProblem(
                 keys, message, "unless an action of an installed package opens a route", warning=True
             )
@@ -144,7 +144,7 @@ def impossible_time_bounds(scene: Scene) -> Iterator[CheckProblem]:
     """Find timeouts, time limits, and bounds of criteria that no drive can meet."""
     goals, robot = scenario_goals(scene.loaded.spec), scene.loaded.robot.spec
     failing = any(expects_failure(scene.loaded.spec, goal.name) for goal in goals)
-    if not goals or robot is None or failing or scene.may_do(*SHORTCUT_ACTIONS):
+    if not goals or robot is None or failing or scene.loaded.may_do(*SHORTCUT_ACTIONS):
         return
     routes, stops = scene.cached(robot_routes), (scene.start, *(goal.pose for goal in goals))
     # Upper bounds on the lengths are cheap. If a drive of these lengths meets all bounds, so does the shortest drive.

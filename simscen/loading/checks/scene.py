@@ -129,7 +129,7 @@ class Scene:
 
     @cached_property
     def _unmoved(self) -> list[Body]:
-        if self.may_do():
+        if self.loaded.may_do():
             return []
         moved = {getattr(action, "name", "") for _, kind, action in self.actions if kind in MOVING_ACTIONS}
         return [body for body in self.world.bodies if body.path is None and body.name not in moved]
@@ -158,13 +158,6 @@ class Scene:
         located = [found for step in self.loaded.spec.steps for found in step.located_actions()]
         relevant = [(keys, action) for keys, action in located if self.loaded.includes_robot(action.robot)]
         return [((*keys, action.kind), action.kind, action.chosen) for keys, action in relevant]
-
-    def may_do(self, *kinds: str) -> bool:
-        """Return whether an action of an event can have the effect of an action of one of these kinds.
-
-        Actions of installed packages can have any effect. Without kinds, return whether there is such an action.
-        """
-        return any(action.may_do(*kinds) for step in self.loaded.spec.steps for action in step.actions)
 
     def footprint_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
         """Return text such as "inside obstacle …" if the robot at a pose overlaps a solid; else None."""

@@ -17,7 +17,7 @@ from simscen.loading.schema.validate import check
 from simscen.loading.spec_walk import references
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.textfile import read_text
-from simscen.loading.yaml.tree import MappingNode, Node, Position, ScalarNode, node_at, value_position
+from simscen.loading.yaml.tree import MappingNode, Node, Position, ScalarNode, entries_of, node_at, value_position
 from simscen.model.robot import RobotSpec
 from simscen.model.world import RosMapSpec, WorldSpec
 
@@ -192,13 +192,13 @@ class Assets:
 
 def is_ros_map(tree: Node | None) -> bool:
     """Return whether a YAML tree is the content of a ROS map file, as map_server reads it."""
-    return isinstance(tree, MappingNode) and "image" in tree.entries and "resolution" in tree.entries
+    return {"image", "resolution"} <= entries_of(tree).keys()
 
 
 def _ignored_key_warnings(tree: Node) -> list[Problem]:
     """Return warnings about keys of a ROS map that map_server ignores."""
     warnings = []
-    for key, entry in tree.entries.items() if isinstance(tree, MappingNode) else ():
+    for key, entry in entries_of(tree).items():
         if key not in RosMapSpec.model_fields:
             near = suggestion(key, RosMapSpec.model_fields)
             hint = near if near.startswith("did you mean") else "it is ignored, as by map_server"

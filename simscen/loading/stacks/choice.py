@@ -12,7 +12,7 @@ from simscen.loading.stacks.nav2_expansion import NAV2_PARAMS, with_nav2_paramet
 from simscen.loading.stacks.nav2_parameters import is_nav2_parameter_file
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.textfile import read_text
-from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, child, key_position
+from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, child, entries_of
 from simscen.model.stack_files import StackFileSpec
 
 SCENARIO_KEYS = ("keepout", "keepout_mask", "speed_zones", "speed_mask")
@@ -149,9 +149,14 @@ def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Pro
         tree = expanded.tree
     spec = check(StackFileSpec, tree)
     section = child(tree, "stack")
-    misplaced = _misplaced_key_problems(section) if isinstance(section, MappingNode) else []
-    if isinstance(spec, list) or misplaced or not isinstance(section, MappingNode):
-        return library.with_source(sorted([*misplaced, *(spec if isinstance(spec, list) else [])]))
+    problems = spec if isinstance(spec, list) else []
+    for name in SCENARIO_KEYS:
+        if (entry := entries_of(section).get(name)) is not None:
+            message = f"`{name}` belongs to a scenario, not to a stack file"
+            hint = "write it under `stack:` of the scenario, where it applies to every stack"
+            problems.append(Problem(*entry.key, "SC016", message, hint))
+    if problems or not isinstance(section, MappingNode):
+        return library.with_source(sorted(problems))
     return section.without_keys(NAV2_PARAMS), notes
 
 
@@ -168,16 +173,6 @@ def _read_tree(file: Path, library: Library) -> tuple[Node | None, list[Problem]
     return MappingNode(start, entries), []
 
 
-def _misplaced_key_problems(section: MappingNode) -> list[Problem]:
-    """Return a problem for each zone or mask in a stack file, because they belong to a scenario."""
-    hint = "write it under `stack:` of the scenario, where it applies to every stack"
-    return [
-        Problem(*key_position(section, (name,)), "SC016", f"`{name}` belongs to a scenario, not to a stack file", hint)
-        for name in SCENARIO_KEYS
-        if name in section.entries
-    ]
-
-
 STACK_FILE_KIND, NAV2_FILE_KIND = "stack file", "parameter file of Nav2"
 """Kinds of files with the parameters of a stack, as in messages."""
 _STACK_FILE_KEYS = frozenset({"simscen", "name", "description", "stack"})
@@ -191,8 +186,8 @@ def recognize_stack_file(tree: Node | None, text: str, display_name: str) -> str
     """
     if is_nav2_parameter_file(text, display_name):
         return NAV2_FILE_KIND
-    keys = set(tree.entries) if isinstance(tree, MappingNode) else set()
-    return STACK_FILE_KIND if "stack" in keys <= _STACK_FILE_KEYS else ""
+    keys = entries_of(tree).keys()
+    return STACK_FILE_KIND if "stack" in keys and keys <= _STACK_FILE_KEYS else ""
 
 
 def not_a_scenario(kind: str, display_name: str) -> Problem:

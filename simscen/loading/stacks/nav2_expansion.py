@@ -21,6 +21,7 @@ from simscen.loading.yaml.tree import (
     ScalarNode,
     SequenceNode,
     child,
+    entries_of,
     existing_keys,
     node_at,
     value_position,
@@ -48,9 +49,7 @@ def with_nav2_parameters(tree: MappingNode, library: Library) -> ExpandedTree:
     The texts of the Nav2 files are added to `library`.
     """
     result = ExpandedTree(tree)
-    robots = child(tree, ROBOTS)
-    names = robots.entries if isinstance(robots, MappingNode) else ()
-    for keys in (*((ROBOTS, name, STACK) for name in names), (STACK,)):
+    for keys in (*((ROBOTS, name, STACK) for name in entries_of(child(tree, ROBOTS))), (STACK,)):
         stack = node_at(tree, keys)
         if existing_keys(tree, keys) == keys and isinstance(stack, MappingNode) and NAV2_PARAMS in stack.entries:
             result.tree = result.tree.with_value(keys, _merge_parameters(stack, library, result), stack.position)

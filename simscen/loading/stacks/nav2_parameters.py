@@ -8,7 +8,7 @@ from typing import Any
 from simscen.core.errors import Problem
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.textfile import read_text, with_source_line
-from simscen.loading.yaml.tree import MappingNode, Node, Position
+from simscen.loading.yaml.tree import MappingNode, Node, Position, entries_of
 from simscen.ros2.nav2.parameter_rules import PublishedNames, check
 
 PARAMETERS_KEY = "ros__parameters"
@@ -90,7 +90,7 @@ def _ros_nodes(tree: Node, name: str) -> Iterator[tuple[str, MappingNode]]:
 
     `name` is the last part of the key of the tree; "" for the tree of a file.
     """
-    for key, entry in tree.entries.items() if isinstance(tree, MappingNode) else ():
+    for key, entry in entries_of(tree).items():
         if key == PARAMETERS_KEY and isinstance(entry.value, MappingNode):
             yield name, entry.value
         else:

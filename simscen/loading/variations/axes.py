@@ -23,7 +23,7 @@ from simscen.loading.variations.conditions import (
 from simscen.loading.variations.naming import NAME_HINT, name_error
 from simscen.loading.variations.options import Change, Option, RandomOptions, typical_options, value_node
 from simscen.loading.variations.paths import PathError, Target, resolve_path
-from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode, child, node_at
+from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, child, entries_of, items_of, node_at
 
 if TYPE_CHECKING:  # most scenarios have no variations
     from simscen.model.variations import Sampled, VariationBlock
@@ -68,15 +68,14 @@ class AxisBuilder:
 
         With `distinct`, equal values of a path are reported as problems.
         """
-        if not isinstance(node, MappingNode):
-            return []
         found = []
-        for path, entry in node.entries.items():
-            assert isinstance(entry.value, SequenceNode)
-            if distinct:
-                self._report_duplicates(entry.value)
+        for path, entry in entries_of(node).items():
+            values = items_of(entry.value)
+            for number, value in enumerate(values):
+                if distinct and any(value.plain == other.plain for other in values[:number]):
+                    self.add_problem(value.position, "SC054", "this value is listed twice", "remove one of them")
             if (target := self._resolve_target(path, entry)) is not None:
-                found.append([Change(target, value, n) for n, value in enumerate(entry.value.items, start=1)])
+                found.append([Change(target, value, number) for number, value in enumerate(values, start=1)])
         return found
 
     def _pairwise_options(self, node: Node | None, conditions: Sequence[Condition]) -> list[Option]:
@@ -100,43 +99,38 @@ class AxisBuilder:
 
     def _pairs_options(self, node: Node | None) -> list[Option]:
         """Return one option with the first values of all paths, one with the second values, and so on."""
-        assert isinstance(node, MappingNode)
-        lengths = {
-            path: len(entry.value.items)
-            for path, entry in node.entries.items()
-            if isinstance(entry.value, SequenceNode)
-        }
-        first, *others = lengths
-        for path in others:
-            if lengths[path] != lengths[first]:
-                message = f"{quoted(path)} has {lengths[path]} values, {quoted(first)} has {lengths[first]}"
+        (first, first_entry), *others = entries_of(node).items()
+        length = len(items_of(first_entry.value))
+        for path, entry in others:
+            own_length = len(items_of(entry.value))
+            if own_length != length:
+                message = f"{quoted(path)} has {own_length} values, {quoted(first)} has {length}"
                 hint = "the lists of `pairs` must have the same length"
-                self.add_problem(node.entries[path].value.position, "SC016", message, hint)
+                self.add_problem(entry.value.position, "SC016", message, hint)
                 return []
         return [Option(changes) for changes in zip(*self._changes_by_path(node, False), strict=True)]
 
     def _list_options(self, node: Node | None) -> list[Option]:
         """Return an option for each item of `list`."""
-        assert isinstance(node, SequenceNode)
         found = []
-        for number, item in enumerate(node.items, start=1):
-            assert isinstance(item, MappingNode)
-            name = self._item_name(item)
-            entries = [(path, entry) for path, entry in item.entries.items() if path != "name"]
+        for number, item in enumerate(items_of(node), start=1):
+            name, changes = self._item_name(item), []
+            entries = {path: entry for path, entry in entries_of(item).items() if path != "name"}
             if not entries:
                 self.add_problem(item.position, "SC010", "this variation changes nothing", "add a path and its value")
-            targets = [(self._resolve_target(path, entry), entry) for path, entry in entries]
-            changes = [Change(target, entry.value, number) for target, entry in targets if target is not None]
+            for path, entry in entries.items():
+                if (target := self._resolve_target(path, entry)) is not None:
+                    changes.append(Change(target, entry.value, number))
             self._report_overlaps([[Option((change,))] for change in changes])
             found.append(Option(tuple(changes), name))
         return found
 
-    def _item_name(self, item: MappingNode) -> str:
+    def _item_name(self, item: Node) -> str:
         """Return the `name` of an item of `list`; "" for none. Report invalid and repeated names."""
-        entry = item.entries.get("name")
-        if entry is None:
+        node = child(item, "name")
+        if node is None:
             return ""
-        position, value = entry.value.position, entry.value.plain
+        position, value = node.position, node.plain
         name = value if isinstance(value, str) else str(value) if isinstance(value, int | float) else ""
         if (error := name_error(name)) is not None:
             self.add_problem(position, "SC017", error, NAME_HINT)
@@ -181,14 +175,6 @@ class AxisBuilder:
         self.targets.setdefault(path, target)
         return target
 
-    def _report_duplicates(self, items: SequenceNode) -> None:
-        """Report values that occur more than once in a list."""
-        seen: list[object] = []
-        for item in items.items:
-            if item.plain in seen:
-                self.add_problem(item.position, "SC054", "this value is listed twice", "remove one of them")
-            seen.append(item.plain)
-
     def _report_overlaps(self, axes: Sequence[Sequence[Option]]) -> None:
         """Report paths of different axes that lead to the same value, or to a value and to a part of it."""
         targets = [
@@ -206,10 +192,9 @@ class AxisBuilder:
     def read_conditions(self, block: Node) -> list[Condition]:
         """Return the conditions under the key `require` of a block. Report invalid conditions."""
         node, found = child(block, "require"), list[Condition]()
-        for item in node.items if isinstance(node, SequenceNode) else ():
-            assert isinstance(item, ScalarNode)
+        for item in items_of(node):
             try:
-                found.append(parse_condition(str(item.value)))
+                found.append(parse_condition(str(item.plain)))
             except ConditionError as error:
                 self.add_problem(item.position, "SC017", str(error), GRAMMAR)
         return found
@@ -220,10 +205,10 @@ class AxisBuilder:
         Call this after `build_axes`. `conditions` is the result of `read_conditions`. Nothing is reported for a block
         with an invalid condition.
         """
-        node = child(block, "require")
-        if not isinstance(node, SequenceNode) or len(conditions) < len(node.items):
+        items = items_of(child(block, "require"))
+        if len(conditions) < len(items):
             return
-        for condition, item in zip(conditions, node.items, strict=True):
+        for condition, item in zip(conditions, items, strict=True):
             for path in condition.paths:
                 if path not in self.targets and written_value(self.tree, path) is None:
                     message = f"`{path}` is neither varied nor written in the scenario"

@@ -16,7 +16,7 @@ from simscen.loading.variations.conditions import Condition, ConditionError, all
 from simscen.loading.variations.naming import derive_name, make_unique, name_error, numbered_name, short_names
 from simscen.loading.variations.options import Change, Option, typical_options
 from simscen.loading.variations.paths import Target
-from simscen.loading.yaml.tree import MappingNode, Node, Position, SequenceNode
+from simscen.loading.yaml.tree import MappingNode, Node, Position, SequenceNode, child, entries_of, items_of
 
 VARIATIONS, ACCEPTANCE = "variations", "acceptance"
 """Top-level keys of a scenario."""
@@ -245,9 +245,9 @@ def _too_many_problem(space: VariationSpace, position: Position) -> Problem | No
 def _position_of_require(tree: MappingNode) -> Position:
     """Return the position of the first `require` in `variations`; of `variations` if there is none."""
     value = tree.entries[VARIATIONS].value
-    for block in value.items if isinstance(value, SequenceNode) else [value]:
-        if isinstance(block, MappingNode) and "require" in block.entries:
-            return block.entries["require"].value.position
+    for block in items_of(value) or [value]:
+        if (require := child(block, "require")) is not None:
+            return require.position
     return value.position
 
 
@@ -276,10 +276,8 @@ def _node_size(node: Node) -> int:
 def _positions(node: Node) -> Iterator[Position]:
     """Yield the positions of a node and of all keys and values below it."""
     yield node.position
-    if isinstance(node, MappingNode):
-        for entry in node.entries.values():
-            yield entry.key
-            yield from _positions(entry.value)
-    elif isinstance(node, SequenceNode):
-        for item in node.items:
-            yield from _positions(item)
+    for entry in entries_of(node).values():
+        yield entry.key
+        yield from _positions(entry.value)
+    for item in items_of(node):
+        yield from _positions(item)

@@ -18,6 +18,7 @@ from simscen.loading.yaml.tree import (
     SequenceNode,
     child,
     dotted_path,
+    entries_of,
 )
 
 LIST_KEYS = frozenset({"goals", "events", "faults", "pass", "metrics", "tags"})
@@ -95,11 +96,10 @@ def _resolve_keys(path: str, parts: list[str], tree: MappingNode) -> Keys:
                 keys += found
                 for key in found:
                     node = child(node, key)
-            case ScalarNode():
-                raise PathError(
-                    f"{quoted(path)} leads to nothing: `{dotted_path(keys)}` is {_describe(node)}, without a `{part}`",
-                    _scalar_hint(keys),
-                )
+            case ScalarNode(value=value):
+                what = "empty" if value is None else short_value(node)
+                message = f"{quoted(path)} leads to nothing: `{dotted_path(keys)}` is {what}, without a `{part}`"
+                raise PathError(message, _scalar_hint(keys))
             case None:
                 if keys[-1] in LIST_KEYS and len(keys) == 1:
                     raise PathError(f"{quoted(path)} leads to nothing: the scenario has no `{keys[-1]}`")
@@ -136,9 +136,7 @@ def _item_keys(path: str, keys: list[Key], items: SequenceNode, part: str, rest:
     if not found:
         known = [name for item in items.items for name in _item_names(item)]
         if keys[0] in KEYS_BY_KIND:
-            known += [
-                key for item in items.items if isinstance(item, MappingNode) for key in item.entries if key != "id"
-            ]
+            known += [key for item in items.items for key in entries_of(item) if key != "id"]
         hint = suggestion(part, known) if known else "use the index; the first item is [0]"
         raise PathError(f"{quoted(path)} leads to nothing: no item of `{holder}` is called {quoted(part)}", hint)
     if kinds and not (rest and rest[0] in ("id", "severity", "then", part)):
@@ -150,15 +148,8 @@ def _item_names(item: Node) -> list[str]:
     """Return the names of an item of a list. A text is its own name."""
     if isinstance(item, ScalarNode):
         return [item.value] if isinstance(item.value, str) else []
-    if not isinstance(item, MappingNode):
-        return []
-    values = [item.entries[key].value for key in _NAME_KEYS if key in item.entries]
+    values = [child(item, key) for key in _NAME_KEYS]
     return [value.value for value in values if isinstance(value, ScalarNode) and isinstance(value.value, str)]
-
-
-def _describe(scalar: ScalarNode) -> str:
-    """Return the value for messages; "empty" for no value."""
-    return short_value(scalar) if scalar.value is not None else "empty"
 
 
 def _scalar_hint(keys: list[Key]) -> str:

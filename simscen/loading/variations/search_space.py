@@ -11,7 +11,7 @@ from simscen.loading.variations.expand import VARIATIONS, Variation
 from simscen.loading.variations.options import Change, value_node
 from simscen.loading.variations.paths import Target
 from simscen.loading.variations.sampling import quantile
-from simscen.loading.yaml.tree import MappingNode, SequenceNode, node_at
+from simscen.loading.yaml.tree import MappingNode, items_of, node_at
 from simscen.model.variations import OneOf, Sampled, VariationsSection
 
 
@@ -61,7 +61,7 @@ def search_space(tree: MappingNode) -> SearchSpace | list[Problem]:
     if isinstance(section, list):
         return section
     blocks = section.variations.blocks
-    node = entry.value.items[0] if isinstance(entry.value, SequenceNode) and entry.value.items else entry.value
+    node = next(iter(items_of(entry.value)), entry.value)
     if len(blocks) != 1 or not blocks[0].is_sampled_alone:
         message, hint = "only the ranges of `sampled` can be searched", "write one block with `sampled` alone"
         return [Problem(*entry.value.position, "SC016", message, hint)]

@@ -96,15 +96,23 @@ def child(node: Node | None, key: Key) -> Node | None:
     return None
 
 
+def entries_of(node: Node | None) -> dict[str, Entry]:
+    """Return the entries of a mapping; {} for other nodes."""
+    return node.entries if isinstance(node, MappingNode) else {}
+
+
+def items_of(node: Node | None) -> tuple[Node, ...]:
+    """Return the items of a sequence; () for other nodes."""
+    return node.items if isinstance(node, SequenceNode) else ()
+
+
 def nodes_with_keys(node: Node, keys: Keys = ()) -> Iterator[tuple[Keys, Node]]:
     """Yield a node and all nodes below it with their keys, in the order of the file. `keys` are the keys of `node`."""
     yield keys, node
-    if isinstance(node, MappingNode):
-        for key, entry in node.entries.items():
-            yield from nodes_with_keys(entry.value, (*keys, key))
-    elif isinstance(node, SequenceNode):
-        for index, item in enumerate(node.items):
-            yield from nodes_with_keys(item, (*keys, index))
+    for key, entry in entries_of(node).items():
+        yield from nodes_with_keys(entry.value, (*keys, key))
+    for index, item in enumerate(items_of(node)):
+        yield from nodes_with_keys(item, (*keys, index))
 
 
 def _with_value(node: Node | None, keys: Keys, value: Node, position: Position) -> Node:
