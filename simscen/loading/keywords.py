@@ -56,7 +56,6 @@ class _Parser:
         return lambda text: any(option(text) for option in options)
 
     def _parse_and(self, depth: int) -> Matcher:
-        """Parse parts joined by `and`."""
         parts = [self._parse_term(depth)]
         while self._take("and"):
             parts.append(self._parse_term(depth))

@@ -34,13 +34,14 @@ def known_names(loaded: LoadedScenario, world: World | None = None) -> Names:
     """Return all names to which a scenario can refer. `world` is its built world; None if it is not built yet."""
     world_names = _names_in_files(loaded) if world is None else _names_in_built_world(loaded, world)
     movable = world_names["movable"]
+    marks = _names_in_actions(loaded, "mark")
     disturbances = _distinct(event_names(loaded), [fault.label for fault in loaded.spec.faults])
     return {
         **world_names,
         "mover": None if movable is None else [*movable, *loaded.other_robots],
         "goal": goal_names(loaded),
-        "event": _distinct(event_names(loaded), mark_names(loaded)),
-        "disturbance": _distinct(disturbances, mark_names(loaded)),
+        "event": _distinct(event_names(loaded), marks),
+        "disturbance": _distinct(disturbances, marks),
         "verdict": None if loaded.other_robots else _distinct(verdict_names(loaded.spec.pass_), disturbances),
     }
 
@@ -61,29 +62,25 @@ def event_names(loaded: LoadedScenario) -> list[str]:
     return [step.name for step in loaded.spec.steps]
 
 
-def mark_names(loaded: LoadedScenario) -> list[str]:
-    """Return the names of the marks (named times of the run) that events set by the action `mark`."""
-    return _distinct(_names_in_actions(loaded, "mark"))
-
-
 def _names_in_files(loaded: LoadedScenario) -> Names:
     """Return the names of places, regions, doors, and objects, as far as they are known without a built world."""
     world = loaded.world.spec
-    imported = world is None or loaded.world.map is not None or loaded.world.sdf is not None
+    imported = loaded.world.map is not None or loaded.world.sdf is not None
     spawned = spawned_names(loaded)
-    return {
+    names: dict[str, list[str] | None] = {
         "place": list(world.places) if world else [],
         "region": list(world.regions) if world else [],
         "door": [door.name for door in world.doors] if world else [],
-        "object": None
-        if imported or world is None
-        else _distinct(_object_names(world), spawned, list(loaded.other_robots)),
-        "movable": None if imported or world is None else _distinct(_movable_names(world), spawned),
+        "object": None,
+        "movable": None,
     }
+    if world is not None and not imported:
+        names["object"] = _distinct(_object_names(world), spawned, list(loaded.other_robots))
+        names["movable"] = _distinct(_movable_names(world), spawned)
+    return names
 
 
 def _names_in_built_world(loaded: LoadedScenario, world: World) -> Names:
-    """Return the names of places, regions, doors, and objects in a built world."""
     moving, spawned = [body.name for body in world.bodies], spawned_names(loaded)
     return {
         "place": list(world.places),
@@ -125,7 +122,6 @@ def _names_in_actions(loaded: LoadedScenario, kind: str) -> list[str]:
 
 
 def _movable_names(world: WorldSpec) -> list[str]:
-    """Return the names of the objects and doors of a world file."""
     return [*(thing.name for thing in world.objects), *(door.name for door in world.doors)]
 
 
@@ -140,5 +136,4 @@ def _object_names(world: WorldSpec) -> list[str]:
 
 
 def _distinct(*names: list[str]) -> list[str]:
-    """Return the names of all lists, each once."""
     return list(dict.fromkeys(name for part in names for name in part))

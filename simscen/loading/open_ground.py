@@ -26,7 +26,6 @@ def with_stops_in_bounds(world: World, loaded: LoadedScenario) -> World:
 
 
 def _stops(loaded: LoadedScenario) -> Iterator[Pose2]:
-    """Yield the stops of a scenario of one robot."""
     spec = loaded.spec
     yield spec.only_robot.pose.pose
     for goal in (*scenario_goals(spec), *event_goals(spec, loaded.includes_robot).values()):

@@ -73,7 +73,6 @@ def robot_size(loaded: LoadedScenario) -> RobotSize:
 
 
 def _circle(radius: float) -> Polygon:
-    """Return a polygon that approximates a circle around the origin."""
     angles = [2 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS)]
     return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
 

@@ -73,7 +73,6 @@ def criteria_of_text(text: str, name: str, facts: Mapping[str, str], robot: str 
 
 
 def _read(text: str, name: str) -> Node:
-    """Return the YAML tree of a text. Raises InvalidInput."""
     tree, problems = parse_yaml(text, name)
     if tree is None or problems:
         raise InvalidInput(problems)
@@ -81,7 +80,6 @@ def _read(text: str, name: str) -> Node:
 
 
 def _validated(model: type[Model], tree: Node) -> Model:
-    """Return the specification in a tree. Raises InvalidInput."""
     spec = check(model, tree)
     if isinstance(spec, list):
         raise InvalidInput(spec)

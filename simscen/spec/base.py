@@ -53,7 +53,6 @@ class Spec(BaseModel):
 
 
 def _reject_boolean(value: Any) -> Any:
-    """Return the value. Raises PydanticCustomError for true and false."""
     if isinstance(value, bool):  # `True == 1`, so a Literal accepts it
         raise PydanticCustomError("literal_error", "expected 1", {"expected": "1"})
     return value
@@ -79,7 +78,6 @@ class Ranged(Spec):
 
     @model_validator(mode="after")
     def _check_order(self) -> "Ranged":
-        """Raise ValueError if a minimum is greater than its maximum."""
         for low in type(self).model_fields:
             high = low.replace("min", "max")
             if high == low or high not in type(self).model_fields:
@@ -130,7 +128,6 @@ def _docs_of_module(module: str) -> dict[str, dict[str, str]]:
 
 
 def _docs_of_class(node: ast.ClassDef) -> dict[str, str]:
-    """Return the docstrings of the fields of a class by field name."""
     docs = {}
     for statement, following in zip(node.body, node.body[1:], strict=False):
         if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
@@ -200,7 +197,6 @@ class LazySpec:
         return generated if schema["type"] == "nullable" else generated["anyOf"][0]
 
     def _validate(self, value: Any) -> BaseModel:
-        """Return the specification of a value. Raises pydantic.ValidationError."""
         return self.load().model_validate(value, by_alias=True, by_name=False)
 
 

@@ -74,7 +74,6 @@ class Choice(Spec):
 
     @model_validator(mode="after")
     def _check_one_choice(self) -> "Choice":
-        """Raise ValueError unless the mapping has exactly one choice."""
         given = self._given_keys()
         if not given:
             raise ValueError(f"expected one of: {', '.join(self.choices())}")
@@ -83,7 +82,6 @@ class Choice(Spec):
         return self
 
     def _given_keys(self) -> list[str]:
-        """Return the keys in YAML of the choices in the mapping."""
         return [key for key, name in self.choices().items() if getattr(self, name) is not None]
 
     @property

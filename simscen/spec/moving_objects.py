@@ -27,7 +27,6 @@ Keyframe = Annotated[tuple[Duration, Length, Length, Angle], Field(strict=False)
 
 
 def _check_times(keyframes: list[tuple[float, float, float, float]]) -> list[tuple[float, float, float, float]]:
-    """Return the keyframes. Raises ValueError unless their times increase."""
     for before, after in itertools.pairwise(keyframes):
         if after[0] <= before[0]:
             raise ValueError(f"the times of keyframes must rise, but {after[0]:g} s comes after {before[0]:g} s")
@@ -62,7 +61,6 @@ class Motion(Spec):
 
     @model_validator(mode="after")
     def _check_kind(self) -> Motion:
-        """Raise ValueError unless the keys describe either waypoints or keyframes."""
         if (self.through is None) == (self.keyframes is None):
             raise ValueError("expected through and speed, or keyframes")
         if (self.through is None) != (self.speed is None):
@@ -190,7 +188,6 @@ class ShapedObject(Spec):
 
     @model_validator(mode="after")
     def _check_shape(self) -> ShapedObject:
-        """Raise ValueError unless there is exactly one shape."""
         if sum(shape is not None for shape in (self.box, self.cylinder, self.polygon)) != 1:
             raise ValueError("expected exactly one of: box, cylinder, polygon")
         return self

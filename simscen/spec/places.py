@@ -47,7 +47,6 @@ Point = Annotated[list[Length], Field(min_length=2, max_length=2)]
 
 
 def _check_polygon(ring: list[Point]) -> list[Point]:
-    """Return the corners of a polygon. Raises ValueError for an invalid polygon."""
     defect = polygon_defect([(x, y) for x, y in ring])
     if defect:
         raise ValueError(f"the polygon {defect}")

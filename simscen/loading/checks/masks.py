@@ -69,7 +69,6 @@ def forbidden_goals_and_starts(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _region_test(corners: Polygon) -> ZoneTest:
-    """Return the test for a zone with these corners."""
     return lambda pose, within: depth_inside_polygon(pose, corners) > within
 
 

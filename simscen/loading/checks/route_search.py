@@ -86,7 +86,6 @@ class RobotRoutes:
         return self.scene.cache.simple_paths(solids, self.scene.size.inscribed, self.z_range)
 
     def _exact_paths(self, solids: tuple[Solid, ...]) -> "ShortestPaths":
-        """Return the exact path search between `solids`."""
         return self.scene.cache.shortest_paths(solids, self.bounds, self.scene.size.inscribed, self.z_range)
 
 

@@ -157,7 +157,6 @@ def impossible_time_bounds(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _violated_bounds(scene: Scene, drive: Drive) -> Iterator[CheckProblem]:
-    """Yield a problem for each bound of the scenario that the drive violates."""
     spec = scene.loaded.spec
     for index, goal in enumerate(drive.goals[: len(spec.goals)]):
         is_sent = index == 0 or spec.on_goal_failure == "stop"

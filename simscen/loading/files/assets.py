@@ -151,7 +151,6 @@ class Assets:
         return found
 
     def _ros_map(self, tree: Node | None, path: Path) -> LoadedMap | None:
-        """Return the ROS map with the YAML tree `tree` in the file `path`."""
         spec = self._validated(RosMapSpec, tree)
         if spec is None or tree is None:
             return None
@@ -160,13 +159,11 @@ class Assets:
         return LoadedMap(path, spec, image, notes) if image else None
 
     def _read_tree(self, path: Path) -> Node | None:
-        """Return the YAML tree of a file; None if it cannot be parsed."""
         tree, problems = self.library.read(path)
         self.problems += problems
         return tree
 
     def _validated(self, model: type[Model], tree: Node | None) -> Model | None:
-        """Return the specification in a YAML tree; None if the tree is None or invalid."""
         if tree is None:
             return None
         spec = check(model, tree)

@@ -75,7 +75,6 @@ def default_root(paths: Iterable[Path]) -> Path:
 
 
 def _contains_any(folder: Path, names: tuple[str, ...]) -> bool:
-    """Return whether a folder contains a file or folder with one of these names."""
     return any(exists(folder / name) for name in names)
 
 
@@ -85,7 +84,6 @@ def _is_too_wide(folder: Path) -> bool:
 
 
 def _missing_path_problem(path: Path) -> Problem | None:
-    """Return a problem if a path does not exist or cannot be accessed; else None."""
     try:
         path.lstat()
     except (OSError, ValueError) as error:

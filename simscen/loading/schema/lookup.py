@@ -113,7 +113,6 @@ def _type_values(model: type[BaseModel]) -> tuple[Any, ...]:
 
 
 def _metadata(kind: Any) -> tuple[Any, ...]:
-    """Return the metadata of an `Annotated` type; () for other types."""
     return tuple(get_args(kind)[1:]) if get_origin(kind) is Annotated else ()
 
 

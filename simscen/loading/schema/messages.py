@@ -154,7 +154,6 @@ def short_value(node: Node) -> str:
 
 
 def _invalid_name(node: Node, pattern: str) -> Message:
-    """Return the message for a name that does not match `pattern`."""
     value = node.value if isinstance(node, ScalarNode) and isinstance(node.value, str) else ""
     control = next((c for c in value if not c.isprintable()), None)
     if control is not None:

@@ -102,7 +102,6 @@ def _version_problem(tree: MappingNode) -> Problem | None:
 
 
 def _problem_for_error(model: type[BaseModel], tree: Node, error: dict[str, Any]) -> Problem:
-    """Return the problem for a validation error of pydantic."""
     loc: Keys = error["loc"]
     kind: str = error["type"]
     if kind == "extra_forbidden":
@@ -129,7 +128,6 @@ def _problem_for_error(model: type[BaseModel], tree: Node, error: dict[str, Any]
 
 
 def _unknown_key_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
-    """Return the problem of the unknown key at the end of `loc`."""
     key = str(loc[-1])
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     where = f" in `{holder}`" if holder else ""

@@ -51,7 +51,6 @@ def translate_costmap(parameters: Parameters, section: str) -> Iterator[Translat
 
 
 def _layer_classes(parameters: Parameters) -> Mapping[str, str]:
-    """Return the classes of the layers of a costmap, by name of the layer."""
     if not isinstance(parameters.get("plugins"), list):
         return DEFAULT_LAYERS
     return {layer: class_of(parameters.get(f"{layer}.plugin", "")) for layer in strings(parameters["plugins"])}

@@ -48,7 +48,6 @@ def _translate_controller_server(parameters: Parameters) -> Iterator[Translation
 
 
 def _translate_planner_server(parameters: Parameters) -> Iterator[Translation]:
-    """Translate the parameters of the first planner."""
     planner = _first_plugin(parameters, "planner", "GridBased")
     yield from _note_unused_plugins(parameters, "planner", planner)
     yield from _translate_plugin(parameters, planner, "planner", PLANNERS)
@@ -205,7 +204,6 @@ def _xy_and_rotation(value: Any) -> list[float]:
 
 
 def _translate_amcl(parameters: Parameters) -> Iterator[Translation]:
-    """Translate the parameters of AMCL."""
     for name, value in parameters.items():
         if name == "robot_model_type":
             model = MOTION_MODELS.get(class_of(value))
@@ -216,7 +214,6 @@ def _translate_amcl(parameters: Parameters) -> Iterator[Translation]:
 
 
 def _translate_behavior_server(parameters: Parameters) -> Iterator[Translation]:
-    """Translate the parameters of the recovery behaviors."""
     for name, value in parameters.items():
         # A negative minimum has no effect in Nav2.
         no_minimum = name == "min_rotational_vel" and isinstance(value, float | int) and value < 0

@@ -49,7 +49,6 @@ class UserConfig:
             raise self._invalid((name, "command"), str(error), hint) from error
 
     def _invalid(self, keys: tuple[str, str], message: str, hint: str) -> InvalidInput:
-        """Return the error for the value at `keys` under `stacks`."""
         assert self.tree is not None and self.library is not None, "only stacks from a file can be invalid"
         position = value_position(self.tree, ("stacks", *keys))
         problem = Problem(*position, code="SC061", message=message, hint=hint)

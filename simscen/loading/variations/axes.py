@@ -21,7 +21,7 @@ from simscen.loading.variations.conditions import (
     written_value,
 )
 from simscen.loading.variations.naming import NAME_HINT, name_error
-from simscen.loading.variations.options import Change, Option, RandomOptions, typical_options, value_node
+from simscen.loading.variations.options import Axis, Change, Option, RandomOptions, typical_options, value_node
 from simscen.loading.variations.paths import PathError, Target, resolve_path
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, child, entries_of, items_of, node_at
 
@@ -42,14 +42,33 @@ class AxisBuilder:
     _names: dict[str, Position] = field(default_factory=dict)
     """Positions of the names of variations in the file, by name in lower case."""
 
-    def build_axes(
-        self, block: "VariationBlock", node: Node, conditions: Sequence[Condition]
-    ) -> list[Sequence[Option]]:
-        """Return the axes of a block: one for each path under `grid`, and one for each other kind, such as `pairs`.
+    def build_block(self, block: "VariationBlock", node: Node) -> tuple[list[Axis], list[Condition]]:
+        """Return the axes and the conditions of a block. `node` is its YAML tree."""
+        conditions = self._read_conditions(node)
+        axes = [] if self.problems and block.pairwise else self._build_axes(block, node, conditions)
+        items = items_of(child(node, "require"))
+        if len(conditions) < len(items):  # a condition is invalid
+            return axes, conditions
+        for condition, item in zip(conditions, items, strict=True):
+            for path in condition.paths:
+                if path not in self.targets and written_value(self.tree, path) is None:
+                    message = f"`{path}` is neither varied nor written in the scenario"
+                    self.add_problem(item.position, "SC030", message, "write its value, or vary it")
+        return axes, conditions
 
-        `node` is the YAML tree of the block, `conditions` are its conditions.
-        """
-        found: list[Sequence[Option]] = [
+    def _read_conditions(self, block: Node) -> list[Condition]:
+        """Return the conditions under the key `require` of a block. Report invalid conditions."""
+        found = []
+        for item in items_of(child(block, "require")):
+            try:
+                found.append(parse_condition(str(item.plain)))
+            except ConditionError as error:
+                self.add_problem(item.position, "SC017", str(error), GRAMMAR)
+        return found
+
+    def _build_axes(self, block: "VariationBlock", node: Node, conditions: Sequence[Condition]) -> list[Axis]:
+        """Return the axes of a block: one for each path under `grid`, and one for each other kind, such as `pairs`."""
+        found: list[Axis] = [
             [Option((change,)) for change in changes] for changes in self._changes_by_path(child(node, "grid"), True)
         ]
         if block.pairwise is not None:
@@ -111,7 +130,6 @@ class AxisBuilder:
         return [Option(changes) for changes in zip(*self._changes_by_path(node, False), strict=True)]
 
     def _list_options(self, node: Node | None) -> list[Option]:
-        """Return an option for each item of `list`."""
         found = []
         for number, item in enumerate(items_of(node), start=1):
             name, changes = self._item_name(item), []
@@ -139,7 +157,7 @@ class AxisBuilder:
             self.add_problem(position, "SC033", f"the variation at line {first.line} is also called {quoted(name)}")
         return name
 
-    def _sampled_options(self, sampled: "Sampled", node: Node | None) -> Sequence[Option]:
+    def _sampled_options(self, sampled: "Sampled", node: Node | None) -> Axis:
         """Return options with drawn values. Report invalid distributions. `node` is their YAML tree."""
         from simscen.loading.variations.sampling import draw_value, draw_values
 
@@ -175,7 +193,7 @@ class AxisBuilder:
         self.targets.setdefault(path, target)
         return target
 
-    def _report_overlaps(self, axes: Sequence[Sequence[Option]]) -> None:
+    def _report_overlaps(self, axes: Sequence[Axis]) -> None:
         """Report paths of different axes that lead to the same value, or to a value and to a part of it."""
         targets = [
             {change.target.path: change.target for option in typical_options(axis) for change in option.changes}
@@ -188,31 +206,6 @@ class AxisBuilder:
                     same = len(one.keys) == len(other.keys)
                     what = "change the same value" if same else "overlap: one is part of the other"
                     self.add_problem(other.position, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
-
-    def read_conditions(self, block: Node) -> list[Condition]:
-        """Return the conditions under the key `require` of a block. Report invalid conditions."""
-        node, found = child(block, "require"), list[Condition]()
-        for item in items_of(node):
-            try:
-                found.append(parse_condition(str(item.plain)))
-            except ConditionError as error:
-                self.add_problem(item.position, "SC017", str(error), GRAMMAR)
-        return found
-
-    def check_condition_paths(self, conditions: Sequence[Condition], block: Node) -> None:
-        """Report paths in the conditions of a block that are neither varied nor written in the scenario.
-
-        Call this after `build_axes`. `conditions` is the result of `read_conditions`. Nothing is reported for a block
-        with an invalid condition.
-        """
-        items = items_of(child(block, "require"))
-        if len(conditions) < len(items):
-            return
-        for condition, item in zip(conditions, items, strict=True):
-            for path in condition.paths:
-                if path not in self.targets and written_value(self.tree, path) is None:
-                    message = f"`{path}` is neither varied nor written in the scenario"
-                    self.add_problem(item.position, "SC030", message, "write its value, or vary it")
 
     def add_problem(self, position: Position, code: str, message: str, hint: str = "") -> None:
         """Add a problem to `problems` unless it is there already."""

@@ -14,7 +14,7 @@ from simscen.loading.schema.validate import check
 from simscen.loading.variations.axes import AxisBuilder
 from simscen.loading.variations.conditions import Condition, ConditionError, all_hold, plain_values
 from simscen.loading.variations.naming import derive_name, make_unique, name_error, numbered_name, short_names
-from simscen.loading.variations.options import Change, Option, typical_options
+from simscen.loading.variations.options import Axis, Change, Option, typical_options
 from simscen.loading.variations.paths import Target
 from simscen.loading.yaml.tree import MappingNode, Node, Position, SequenceNode, child, entries_of, items_of
 
@@ -68,7 +68,7 @@ class Block:
     With `is_random`, the block has a single axis with options that are drawn at random.
     """
 
-    axes: Sequence[Sequence[Option]]
+    axes: Sequence[Axis]
     conditions: Sequence[Condition]
     is_random: bool
 
@@ -212,10 +212,7 @@ def variation_space(tree: MappingNode) -> VariationSpace | list[Problem] | None:
     nodes = entry.value.items if isinstance(entry.value, SequenceNode) else [entry.value]
     is_random = len(specs) == 1 and specs[0].is_random
     for block, node in zip(specs, nodes, strict=True):
-        conditions = builder.read_conditions(node)
-        axes = [] if builder.problems and block.pairwise else builder.build_axes(block, node, conditions)
-        builder.check_condition_paths(conditions, node)
-        found.append(Block(axes, conditions, is_random))
+        found.append(Block(*builder.build_block(block, node), is_random))
     if specs and not is_random and ACCEPTANCE in tree.entries:
         message = "these variations are not independent random draws, so no confidence can be stated for a pass rate"
         hint = "vary with `sampled` and `method: random` alone, or remove `acceptance`"
@@ -264,7 +261,6 @@ def _variation_name(options: Sequence[Option], keys: dict[str, str], number: int
 
 
 def _option_size(option: Option) -> int:
-    """Return the number of keys and values in the changes of an option."""
     return sum(_node_size(change.value) for change in option.changes)
 
 

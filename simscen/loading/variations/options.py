@@ -3,9 +3,9 @@
 An option contains new values for one or several paths. The values are listed in a file or drawn at random.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING
 
 from simscen.loading.variations.paths import Target
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, node_at
@@ -31,8 +31,8 @@ class Option:
     name: str = ""
 
 
-class RandomOptions(Sequence[Option]):
-    """Options with random values, drawn on demand. Indices beyond the length are valid as well."""
+class RandomOptions:
+    """Sequence of options with random values, drawn on demand. Indices beyond the length are valid as well."""
 
     def __init__(self, sampled: "Sampled", distributions: MappingNode, targets: Sequence[Target]) -> None:
         """Draw from the distributions in `sampled`. `distributions` is the YAML tree of these distributions by path."""
@@ -41,25 +41,19 @@ class RandomOptions(Sequence[Option]):
     def __len__(self) -> int:
         return self._sampled.count
 
-    @overload
-    def __getitem__(self, index: int) -> Option: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Option]: ...
-    def __getitem__(self, index: int | slice) -> Option | list[Option]:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
+    def __getitem__(self, index: int) -> Option:
         from simscen.loading.variations.sampling import draw_value
 
-        drawn = [(target, draw_value(self._sampled, target.path, index)) for target in self._targets]
-        return Option(
-            tuple(
-                Change(target, value_node(self._distributions.entries[target.path].value, value), index + 1)
-                for target, value in drawn
-            )
-        )
+        changes = []
+        for target in self._targets:
+            value = draw_value(self._sampled, target.path, index)
+            node = value_node(self._distributions.entries[target.path].value, value)
+            changes.append(Change(target, node, index + 1))
+        return Option(tuple(changes))
 
-    def __iter__(self) -> Iterator[Option]:
-        return (self[index] for index in range(len(self)))
+
+Axis = Sequence[Option] | RandomOptions
+"""Options of which each variation uses one."""
 
 
 def value_node(distribution: Node, value: object) -> Node:
@@ -78,6 +72,6 @@ def value_node(distribution: Node, value: object) -> Node:
     return ScalarNode(distribution.position, value)
 
 
-def typical_options(axis: Sequence[Option]) -> Sequence[Option]:
+def typical_options(axis: Axis) -> Sequence[Option]:
     """Return options of an axis that together change all its targets: the first one if they are random, else all."""
-    return axis[:1] if isinstance(axis, RandomOptions) else axis
+    return [axis[0]] if isinstance(axis, RandomOptions) else axis

@@ -66,9 +66,7 @@ def search_space(tree: MappingNode) -> SearchSpace | list[Problem]:
         message, hint = "only the ranges of `sampled` can be searched", "write one block with `sampled` alone"
         return [Problem(*entry.value.position, "SC016", message, hint)]
     builder, block = AxisBuilder(own), blocks[0]
-    conditions = builder.read_conditions(node)
-    builder.build_axes(block, node, conditions)
-    builder.check_condition_paths(conditions, node)
+    _, conditions = builder.build_block(block, node)
     if builder.problems:
         return builder.problems
     distributions = node_at(node, ("sampled", "values"))

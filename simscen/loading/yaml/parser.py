@@ -121,7 +121,6 @@ class _Composer:
         return node, height
 
     def _compose_content(self, event: ev.NodeEvent, depth: int) -> tuple[Node, int]:
-        """Return the scalar, sequence, or mapping that begins with `event`, and its height."""
         if isinstance(event, ev.ScalarEvent):
             return ScalarNode(self._position_of(event), self._scalar_value(event)), 0
         if isinstance(event, ev.SequenceStartEvent):
@@ -139,7 +138,6 @@ class _Composer:
             return 0
 
     def _compose_sequence(self, start: ev.Event, depth: int) -> tuple[Node, int]:
-        """Return the sequence that begins with the event `start`, and its height."""
         items, height = [], 0
         while not isinstance(event := next(self._events), ev.SequenceEndEvent):
             item, below = self._compose_node(event, depth + 1)
@@ -148,7 +146,6 @@ class _Composer:
         return SequenceNode(self._position_of(start), tuple(items)), height + 1
 
     def _compose_mapping(self, start: ev.Event, depth: int) -> tuple[Node, int]:
-        """Return the mapping that begins with the event `start`, and its height."""
         entries: dict[str, Entry] = {}
         merged: list[Node] = []
         height = 0
@@ -235,7 +232,6 @@ class _Composer:
         return Problem(*position, code=code, message=message, hint=hint)
 
     def _syntax_problem(self, error: yaml.MarkedYAMLError) -> Problem:
-        """Return the problem for a syntax error of PyYAML."""
         mark = error.problem_mark or error.context_mark
         if mark is None:
             return self._problem(None, "SC003", error.problem or "cannot be read as YAML")

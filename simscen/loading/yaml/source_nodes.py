@@ -81,7 +81,6 @@ class _Composer:
         return self._compose_mapping(start, is_flow)
 
     def _compose_sequence(self, start: int, is_flow: bool) -> SourceNode:
-        """Return the sequence that begins at the index `start`."""
         items = []
         while not isinstance(event := next(self._events), ev.SequenceEndEvent):
             items.append(self.compose_node(event, is_flow))
@@ -89,7 +88,6 @@ class _Composer:
         return SourceNode("sequence", start, end, is_flow, items=tuple(items))
 
     def _compose_mapping(self, start: int, is_flow: bool) -> SourceNode:
-        """Return the mapping that begins at the index `start`."""
         entries: dict[str, SourceEntry] = {}
         last = start
         while not isinstance(event := next(self._events), ev.MappingEndEvent):
@@ -113,5 +111,4 @@ class _Composer:
 
 
 def _index(mark: Any) -> int:
-    """Return the index in the text of a mark of PyYAML."""
     return int(mark.index)

@@ -37,7 +37,6 @@ def to_yaml(data: Any, dumper: type[Dumper] = Dumper) -> str:
 
 
 def _plain_type(text: str) -> str:
-    """Return the name of the YAML type of a scalar without quotes, such as "int"."""
     try:
         return _TAGS[type(parse_scalar(text))]
     except ValueError:  # an integer that parse_scalar rejects
