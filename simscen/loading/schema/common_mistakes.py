@@ -74,6 +74,9 @@ def _list_hint(node: Node, in_list: bool) -> str:
     if in_list and isinstance(node, ScalarNode) and isinstance(node.value, int | float):
         return "write each point as a list: `[[1, 2], [3, 4]]`"
     if isinstance(node, MappingNode):
+        point = [entry.value.value for entry in node.entries.values() if isinstance(entry.value, ScalarNode)]
+        if list(node.entries) == ["x", "y"] and len(point) == 2:
+            return f"write the point as a list: `[{point[0]}, {point[1]}]`"
         return "start each item of the list with `- `"
     return f"write `[{node.value}]`" if isinstance(node, ScalarNode) and isinstance(node.value, str) else ""
 
