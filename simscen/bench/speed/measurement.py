@@ -20,9 +20,9 @@ class Measurement:
     more_is_better: bool = False
 
     @classmethod
-    def of(cls, rounds: Sequence[float], unit: str, *, more_is_better: bool = False) -> "Measurement":
+    def of(cls, rounds: Sequence[float], unit: str) -> "Measurement":
         """Return the measurement with the median of these rounds as its value."""
-        return cls(statistics.median(rounds), unit, tuple(rounds), more_is_better)
+        return cls(statistics.median(rounds), unit, tuple(rounds))
 
 
 Measurements = dict[str, Measurement]

@@ -94,11 +94,7 @@ class ObstacleFieldTimes:
     baseline_step_us: float
 
 
-def no_progress(_: str) -> None:
-    """Do nothing. This is the ProgressCallback without output."""
-
-
-def measure_patrol(rounds: int, report_progress: ProgressCallback = no_progress) -> PatrolTimes:
+def measure_patrol(rounds: int, report_progress: ProgressCallback = lambda _: None) -> PatrolTimes:
     """Measure `rounds` runs of PATROL and of its baseline, and then the parts of further runs."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
     simulated = time_run(prepared).simulated  # the first run pays for imports and caches

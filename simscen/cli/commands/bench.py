@@ -18,9 +18,10 @@ from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit
 
 if TYPE_CHECKING:
+    from simscen.bench.speed.large_worlds import WorldCost
+    from simscen.bench.speed.run_overhead import ExternalStackCost, Overhead
     from simscen.bench.speed.run_speed import ObstacleFieldTimes, PatrolTimes
-    from simscen.bench.speed.scaling import WorldCost
-    from simscen.bench.speed.session_speed import ExternalStackCost, Overhead, SuiteResult
+    from simscen.bench.speed.session_speed import SuiteResult
 
 
 def growth_command(
@@ -37,7 +38,7 @@ def growth_command(
 
     before = load_baseline(compare)
     with engine_output_on_stderr():
-        from simscen.bench.speed.scaling import measure_growth
+        from simscen.bench.speed.growth import measure_growth
 
         figures = measure_growth(rounds, print_progress)
     print_result(Result.on_this_machine(figures), growth_text(figures), {}, format_, before)
@@ -68,7 +69,7 @@ def worlds_command(
     from simscen.cli.process import engine_output_on_stderr
 
     with engine_output_on_stderr():
-        from simscen.bench.speed.scaling import measure_worlds
+        from simscen.bench.speed.large_worlds import measure_worlds
 
         costs = list(measure_worlds(rounds))
     print_text(json.dumps([asdict(cost) for cost in costs], indent=2) if as_json else worlds_text(costs))
@@ -183,7 +184,7 @@ def command(
     before = load_baseline(compare)
     with engine_output_on_stderr():
         from simscen.bench.speed import run_speed
-        from simscen.bench.speed.session_speed import measure_external, measure_overhead
+        from simscen.bench.speed.run_overhead import measure_external, measure_overhead
 
         patrol = run_speed.measure_patrol(rounds, print_progress)
         overhead = measure_overhead(rounds, FORK_SERVER, print_progress)

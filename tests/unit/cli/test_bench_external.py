@@ -1,4 +1,4 @@
-from simscen.bench.speed.session_speed import ExternalStackCost
+from simscen.bench.speed.run_overhead import ExternalStackCost
 from simscen.cli.commands.bench import _external_lines
 
 

@@ -53,8 +53,8 @@ def test_other_machine_and_version_are_reported() -> None:
 
 def test_judgment_respects_direction_and_needs_two_rounds() -> None:
     few, many = (
-        Measurement.of((10.0, 11.0), "", more_is_better=True),
-        Measurement.of((20.0, 21.0), "", more_is_better=True),
+        Measurement(10.5, "", (10.0, 11.0), more_is_better=True),
+        Measurement(20.5, "", (20.0, 21.0), more_is_better=True),
     )
     assert (judgment(few, many), judgment(many, few)) == ("better", "worse")
     assert judgment(few, Measurement.of((20.0,), "")) == ""

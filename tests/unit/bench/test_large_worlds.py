@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.bench.speed.scaling import (
+from simscen.bench.speed.large_worlds import (
     MOVABLE_COUNT,
     MOVING_COUNT,
     STATIC_COUNT,

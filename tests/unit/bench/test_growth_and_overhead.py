@@ -2,8 +2,9 @@
 
 import pytest
 
-from simscen.bench.speed.scaling import QUANTITIES, write_scaled_patrol
-from simscen.bench.speed.session_speed import SHORT_RUN_S, SuiteResult, evenly_spaced, short_patrol
+from simscen.bench.speed.growth import QUANTITIES, write_scaled_patrol
+from simscen.bench.speed.run_overhead import SHORT_RUN_S, short_patrol
+from simscen.bench.speed.session_speed import SuiteResult, evenly_spaced
 from simscen.loading.builders import load_robot, load_world
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
