@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
@@ -173,7 +173,7 @@ def scan(ranges: Array, tick: int = 0, **changes: object) -> Scan:
 def pose_errors(beliefs: list[Belief], truth: Array) -> Array:
     """Return the errors (k, 3) of beliefs in x and y in m and yaw in rad, in the map frame. Yaw errors are wrapped."""
     error: Array = np.array([belief.pose for belief in beliefs]) - truth
-    error[:, 2] = (error[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    error[:, 2] = wrap_array(error[:, 2])
     return error
 
 

@@ -26,15 +26,12 @@ from simscen.model.robot import SensorSpec
 from simscen.model.stack_base import ControllerSpec, StackBase
 from simscen.spec.registry import GROUPS, BrokenPlugin, RegisteredType, find_type
 from simscen.stack.protocols import RobotModel
+from simscen.testing.contracts.actions_and_triggers import ActionContract, TriggerContract
 from simscen.testing.contracts.base import Contract, Promise
 from simscen.testing.contracts.behavior import BehaviorContract
-from simscen.testing.contracts.controller import ControllerContract, GoalCheckerContract
-from simscen.testing.contracts.criteria_and_metrics import (
-    ActionContract,
-    CriterionContract,
-    MetricContract,
-    TriggerContract,
-)
+from simscen.testing.contracts.controller import ControllerContract
+from simscen.testing.contracts.criteria_and_metrics import CriterionContract, MetricContract
+from simscen.testing.contracts.goal_checker import GoalCheckerContract
 from simscen.testing.contracts.localizer import LocalizerContract
 from simscen.testing.contracts.planner import PlannerContract
 from simscen.testing.contracts.sensors_and_faults import FaultContract, SensorContract

@@ -13,11 +13,10 @@ from simscen.core.records.session_events import RunFinished
 from simscen.core.records.verdict import Status
 from simscen.core.statistics import MIN_PAIRS, bootstrap_mean_interval, wilson_interval
 from simscen.judge.metrics.compute import barn_score
+from simscen.run.lockstep import TIME_LIMIT
 
 Interval = tuple[float, float]
 """Lower and upper limit of a 95 % confidence interval."""
-TIME_LIMIT_REACHED = "time limit"
-"""Value of `RunResult.ended` of a run that reached its time limit."""
 
 
 class TrialOutcome(str, Enum):
@@ -52,7 +51,12 @@ class Trial:
             return TrialOutcome.COLLISION
         if self.run.outcome is Outcome.PASSED:
             return TrialOutcome.SUCCESS
-        return TrialOutcome.TIMEOUT if self.run.result.ended == TIME_LIMIT_REACHED else TrialOutcome.FAILED
+        return TrialOutcome.TIMEOUT if self.run.result.ended == TIME_LIMIT else TrialOutcome.FAILED
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the outcome is SUCCESS."""
+        return self.outcome is TrialOutcome.SUCCESS
 
     @property
     def score(self) -> float | None:
@@ -60,9 +64,7 @@ class Trial:
         if self.reference_length is None:
             return None
         seconds = self.metric("time_to_goal")
-        return barn_score(
-            self.outcome is TrialOutcome.SUCCESS and seconds is not None, seconds or 0.0, self.reference_length
-        )
+        return barn_score(self.succeeded and seconds is not None, seconds or 0.0, self.reference_length)
 
     @property
     def sct(self) -> float | None:
@@ -70,7 +72,7 @@ class Trial:
 
         SCT is the time for the shortest path at top speed divided by the time to the goal; 0 without success.
         """
-        if self.outcome is not TrialOutcome.SUCCESS:
+        if not self.succeeded:
             return 0.0
         seconds, length = self.metric("time_to_goal"), self.metric("shortest_length")
         if seconds is None or length is None or self.top_speed is None:
@@ -114,18 +116,18 @@ class ExperimentSummary:
 def summarize(experiment: str, trials: Sequence[Trial]) -> ExperimentSummary:
     """Return the summary of the trials of an experiment."""
     outcomes = [trial.outcome for trial in trials]
+    rates = {outcome: outcomes.count(outcome) / len(trials) if trials else 0.0 for outcome in TrialOutcome}
     sct_values = [trial.sct for trial in trials]
-    successful = [trial for trial in trials if trial.outcome is TrialOutcome.SUCCESS]
-    arrived = [trial for trial in successful if trial.metric("time_to_goal") is not None]
+    arrived = [trial for trial in trials if trial.succeeded and trial.metric("time_to_goal") is not None]
     return ExperimentSummary(
         case=experiment,
         runs=len(trials),
-        success=_rate(outcomes, TrialOutcome.SUCCESS),
+        success=rates[TrialOutcome.SUCCESS],
         success_interval=success_interval(trials),
-        collisions=_rate(outcomes, TrialOutcome.COLLISION),
-        timeouts=_rate(outcomes, TrialOutcome.TIMEOUT),
-        failed=_rate(outcomes, TrialOutcome.FAILED),
-        errors=_rate(outcomes, TrialOutcome.ERROR),
+        collisions=rates[TrialOutcome.COLLISION],
+        timeouts=rates[TrialOutcome.TIMEOUT],
+        failed=rates[TrialOutcome.FAILED],
+        errors=rates[TrialOutcome.ERROR],
         seconds=mean([trial.metric("time_to_goal") for trial in arrived]),
         score=mean([trial.score for trial in trials]),
         path_ratio=mean([trial.metric("path_length_ratio") for trial in arrived]),
@@ -135,14 +137,7 @@ def summarize(experiment: str, trials: Sequence[Trial]) -> ExperimentSummary:
 
 def success_interval(trials: Sequence[Trial]) -> Interval | None:
     """Return the interval of the success rate; None with fewer than five worlds."""
-    return ClusteredMean.from_pairs(
-        (trial.world, float(trial.outcome is TrialOutcome.SUCCESS)) for trial in trials
-    ).rate_interval()
-
-
-def _rate(outcomes: Sequence[TrialOutcome], outcome: TrialOutcome) -> float:
-    """Return the fraction of `outcomes` that are `outcome`."""
-    return outcomes.count(outcome) / len(outcomes) if outcomes else 0.0
+    return ClusteredMean.from_pairs((trial.world, float(trial.succeeded)) for trial in trials).rate_interval()
 
 
 def mean(values: Sequence[float | None]) -> float | None:
@@ -255,22 +250,18 @@ def compare_experiment(experiment: str, baseline: Sequence[Trial], other: Sequen
     if any(first.world != second.world or first.run.key.seed != second.run.key.seed for first, second in pairs):
         raise ValueError(f"{experiment}: the runs are not of the same drives")
     completed = [pair for pair in pairs if TrialOutcome.ERROR not in (pair[0].outcome, pair[1].outcome)]
-    both_succeeded = [pair for pair in completed if all(map(_has_succeeded, pair))]
-    success = _difference(completed, lambda trial: float(_has_succeeded(trial)), is_rate=True)
+    both_succeeded = [pair for pair in completed if pair[0].succeeded and pair[1].succeeded]
+    success = _difference(completed, lambda trial: float(trial.succeeded), is_rate=True)
     return ExperimentComparison(
         case=experiment,
         pairs=len(completed),
-        better=sum(_has_succeeded(second) > _has_succeeded(first) for first, second in completed),
-        worse=sum(_has_succeeded(second) < _has_succeeded(first) for first, second in completed),
+        better=sum(second.succeeded and not first.succeeded for first, second in completed),
+        worse=sum(first.succeeded and not second.succeeded for first, second in completed),
         success=success or Difference(0.0, None),
         seconds=_difference(both_succeeded, lambda trial: trial.metric("time_to_goal")),
         sct=_difference(completed, lambda trial: trial.sct),
         score=_difference(completed, lambda trial: trial.score),
     )
-
-
-def _has_succeeded(trial: Trial) -> bool:
-    return trial.outcome is TrialOutcome.SUCCESS
 
 
 def _difference(

@@ -26,6 +26,11 @@ SIDE_GOAL = Goal("aside", Pose2(1.5, 3.2, 1.5))
 GOAL_END_KINDS = {EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED}
 
 
+def names_of_kind(drive: Drive, kind: str) -> list[str]:
+    """Return the names of the events of this kind so far."""
+    return [event.name for event in drive.events_of_kind(kind)]
+
+
 class DecisionCheckingStack:
     """Wrapper of a stack that checks each decision: types, finite commands, and events of the current tick."""
 
@@ -57,7 +62,7 @@ class StackContract(Contract):
     role = "stack"
     robot: RobotModel | None = None
 
-    def new_drive(self, *goals: Goal, discs: tuple[tuple[float, float, float], ...] = (), seed: int = 1) -> Drive:
+    def new_drive(self, *goals: Goal, discs: tuple[tuple[float, float, float], ...] = ()) -> Drive:
         """Return a drive to the goals before its first step. `discs` are unmapped round obstacles (x, y, radius)."""
         robot, world = self.robot or round_robot(), Flatland().room(6, 4)
         grid = world.grid((-0.5, -0.5, 6.5, 4.5))
@@ -66,7 +71,7 @@ class StackContract(Contract):
         setting = Setting(
             surroundings,
             "stack",
-            Streams(seed),
+            Streams(1),
             CONTROL_PERIOD_TICKS / TICK_RATE_HZ,
             estimate=Estimate(START_POSE, (0.05, 0.05, 0.02)),
         )
@@ -118,12 +123,8 @@ class StackContract(Contract):
         canceled_at = len(d.commands)
         d.run(0.5, until="")
         require(set(d.commands[canceled_at:]) == {STOP}, "commands a velocity after it was canceled")
-        require(
-            [e.name for e in d.events_of_kind("goal.canceled")] == ["far"], "does not report that its goal is canceled"
-        )
-        require(
-            [e.name for e in d.events_of_kind("navigation.ended")] == ["CANCELED"], "does not end its task as CANCELED"
-        )
+        require(names_of_kind(d, "goal.canceled") == ["far"], "does not report that its goal is canceled")
+        require(names_of_kind(d, "navigation.ended") == ["CANCELED"], "does not end its task as CANCELED")
 
     @promise
     def a_goal_that_preempts_is_driven_to_first(self) -> None:
@@ -133,10 +134,10 @@ class StackContract(Contract):
         d.run(0.5, until="")
         require(d.stack.goal == SIDE_GOAL, f"drives to {d.stack.goal} after it was sent to {SIDE_GOAL}")
         d.run(60)
-        canceled = [e.name for e in d.events_of_kind("goal.canceled")]
+        canceled = names_of_kind(d, "goal.canceled")
         require(canceled == ["far"], f"reports that {canceled or 'nothing'} is canceled, not far")
         require(
-            [e.name for e in d.events_of_kind("goal.reached")] == ["aside"],
+            names_of_kind(d, "goal.reached") == ["aside"],
             "does not reach the goal that it was sent to",
         )
 
@@ -144,13 +145,13 @@ class StackContract(Contract):
     def every_goal_is_accepted_once_and_ends_once(self) -> None:
         """Given a reachable and an unreachable goal then each goal is accepted once and ends once, in this order."""
         d = self.new_drive(NEAR_GOAL, Goal("never", Pose2(40.0, 0.0), timeout=3.0)).run(60)
-        accepted = [e.name for e in d.events_of_kind("goal.accepted")]
+        accepted = names_of_kind(d, "goal.accepted")
         ended = [e.name for e in d.log if e.kind in GOAL_END_KINDS]
         require(accepted == ["near", "never"], f"accepts {accepted}, not near, then never")
         require(ended == ["near", "never"], f"ends {ended}, not near, then never")
-        require([e.name for e in d.events_of_kind("goal.failed")] == ["never"], "does not fail a goal outside the map")
+        require(names_of_kind(d, "goal.failed") == ["never"], "does not fail a goal outside the map")
         require(
-            [e.name for e in d.events_of_kind("navigation.ended")] == ["FAILED"],
+            names_of_kind(d, "navigation.ended") == ["FAILED"],
             "does not end its task once, as FAILED",
         )
 
