@@ -2,8 +2,9 @@
 
 import pytest
 
+from simscen.advanced.spec import Retrace
 from simscen.model.controllers import SimpleGoalChecker
-from simscen.model.recovery import BackUp, ClearCostmap, Retrace, Spin, Wait
+from simscen.model.recovery import BackUp, ClearCostmap, Spin, Wait
 from simscen.testing import Promise, promises_of
 
 SPECS = {
