@@ -69,23 +69,24 @@ class Writer:
 class Reader:
     """Reads a message field by field, in the order of its definition and in either byte order.
 
-    Methods raise ValueError if the data are not CDR or too short.
+    `offset` is the number of bytes that have been read, and `byte_order` is "<" or ">", as in `struct`. Methods raise
+    ValueError if the data are not CDR or too short.
     """
 
     def __init__(self, data: bytes) -> None:
         if len(data) < len(HEADER) or data[:2] not in _BYTE_ORDERS:
             raise ValueError("a message is not plain CDR")
-        self._data, self._byte_order, self._offset = data, _BYTE_ORDERS[data[:2]], len(HEADER)
+        self._data, self.byte_order, self.offset = data, _BYTE_ORDERS[data[:2]], len(HEADER)
 
     def take(self, codes: str) -> tuple[Any, ...]:
         """Return the next numbers, of the same width. `codes` are their format codes of `struct`, e.g. "7d"."""
-        layout = struct.Struct(self._byte_order + codes)
+        layout = struct.Struct(self.byte_order + codes)
         self._align(struct.calcsize("<" + codes[-1]))
         try:
-            values = layout.unpack_from(self._data, self._offset)
+            values = layout.unpack_from(self._data, self.offset)
         except struct.error:
             raise ValueError(_TOO_SHORT) from None
-        self._offset += layout.size
+        self.offset += layout.size
         return values
 
     def count(self) -> int:
@@ -99,7 +100,7 @@ class Reader:
     def blob(self, size: int) -> bytes:
         """Return the next `size` bytes."""
         start = self._skip(size)
-        return self._data[start : self._offset]
+        return self._data[start : self.offset]
 
     def numbers(self, code: str) -> array[Any]:
         """Return the next sequence of numbers. `code` is a type code of `array`, e.g. "f"."""
@@ -107,17 +108,17 @@ class Reader:
         if count := self.count():
             self._align(values.itemsize)
             values.frombytes(self.blob(count * values.itemsize))
-        if (self._byte_order == ">") is not (sys.byteorder == "big"):
+        if (self.byte_order == ">") is not (sys.byteorder == "big"):
             values.byteswap()
         return values
 
     def _align(self, width: int) -> None:
         """Skip padding up to a multiple of `width` bytes."""
-        self._offset += -(self._offset - len(HEADER)) % width
+        self.offset += -(self.offset - len(HEADER)) % width
 
     def _skip(self, size: int) -> int:
         """Skip `size` bytes, and return the offset of the first one."""
-        start, self._offset = self._offset, self._offset + size
-        if self._offset > len(self._data):
+        start, self.offset = self.offset, self.offset + size
+        if self.offset > len(self._data):
             raise ValueError(_TOO_SHORT)
         return start

@@ -10,16 +10,16 @@ import rclpy
 
 from simscen.peer.goals import Goal, Goals
 from simscen.ros2.bring_up import BringUp
-from simscen.ros2.frames import TF_STATIC, FrameNames
 from simscen.ros2.goal_sender import ACTIONS, ActionSender, GoalFailed, GoalSender, GoalSenders, StackState
 from simscen.ros2.graph import CLOCK, LATCHED_TOPICS, Graph, ReceivedMessage, Topic
+from simscen.ros2.graph_names import FrameNames, TopicNames
 from simscen.ros2.launch import LaunchedCommand
-from simscen.ros2.messages import NS_PER_S, find_type, read_twist, write_twist
+from simscen.ros2.messages import NS_PER_S, TF_STATIC, find_type, read_twist, write_twist
 from simscen.ros2.nav2.actions import MotionActions, RecoveryReporter
 from simscen.ros2.nav2.filter_info import FilterInfo
 from simscen.ros2.nav2.report import LogLine, Nav2Report
 from simscen.ros2.node_barrier import NodeBarrier
-from simscen.ros2.options import AdapterError, Options, TopicNames
+from simscen.ros2.options import AdapterError, Options
 from simscen.ros2.pose_estimate import PLAN, PoseEstimate
 from simscen.ros2.readiness import COMMAND, TWIST_STAMPED_TYPE, Readiness
 from simscen.ros2.synchronization import LockstepSynchronization, Message, PacedSynchronization

@@ -12,8 +12,8 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+from simscen.ros2.graph_names import TopicNames
 from simscen.ros2.messages import find_type, shift_stamps, write_clock
-from simscen.ros2.options import TopicNames
 
 NODE_NAME = "simscen"
 """Name of simscen's own node."""

@@ -7,7 +7,8 @@ import signal
 import sys
 import tempfile
 import time
-from typing import Any, Callable, Dict, List, NamedTuple, Sequence, Tuple
+from contextlib import ExitStack
+from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
 
 from simscen.peer import messages, wire
 from simscen.peer.goals import Goal, Goals
@@ -15,7 +16,8 @@ from simscen.peer.wire import Connection, Disconnected
 from simscen.ros2.launch import LaunchedCommand
 from simscen.ros2.nav2.filter_info import MASK_TOPICS, FilterInfo
 from simscen.ros2.nav2.report import ROSOUT
-from simscen.ros2.options import AdapterError, BringUpAborted, Domain, Options, claim_domain, ros_environment
+from simscen.ros2.options import AdapterError, BringUpAborted, Options
+from simscen.ros2.ros_domain import claim_domain, ros_environment
 
 EVENTS = "/simscen/events"
 DEFAULT_MODE = "navigate_to_pose"
@@ -33,8 +35,8 @@ def main(values: Dict[str, Any]) -> int:
     # Exceptions unwind, so that the adapter ends what it started.
     signal.signal(signal.SIGTERM, _terminate)
     try:
-        with AdapterRun(Options(**values)) as run:
-            run.serve(connection)
+        with AdapterRun(Options(**values), connection) as run:
+            run.serve()
     except AdapterError as error:
         print(f"simscen ros2: {error}", file=sys.stderr)
         connection.send_json(wire.ERROR, {"message": str(error)})
@@ -101,9 +103,10 @@ class ReceivedStep(NamedTuple):
 class AdapterRun:
     """One run of the adapter. As a context manager, it ends adapter and launch command, and frees the domain."""
 
-    def __init__(self, options: Options) -> None:
-        self._options = options
-        self._cleanup: List[Callable[[], None]] = []
+    def __init__(self, options: Options, connection: Connection) -> None:
+        self._connection, self._hello = connection, Hello.receive(connection)
+        self._options = _options_for(options, self._hello.mode)
+        self._cleanup = ExitStack()
         self.goals = Goals()
         self._adapter: Any = None
         self._steps_until_ready: List[ReceivedStep] = []
@@ -116,65 +119,65 @@ class AdapterRun:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         if self._adapter is not None:
             self._adapter.end()
-        for function in reversed(self._cleanup):
-            function()
+        self._cleanup.close()
 
-    def serve(self, connection: Connection) -> None:
-        """Answer frames from HELLO to END. Raises AdapterError, and Disconnected if simscen closes the connection."""
-        from simscen.ros2.adapter import Adapter, require_packages
-        from simscen.ros2.graph import Topic
+    def serve(self) -> None:
+        """Answer frames until END. Raises AdapterError, and Disconnected if simscen closes the connection."""
+        from simscen.ros2.adapter import require_packages
 
-        hello = Hello.receive(connection)
-        options = self._options_for(hello.mode)
-        if options.nav2:
-            require_packages(options)
+        if self._options.nav2:
+            require_packages(self._options)
         self._set_environment()
-        topics = [Topic(*topic) for topic in hello.topics.values()]
-
-        def make_adapter(restart_reason: str) -> Adapter:
-            launched = LaunchedCommand(options.launch, os.environ) if options.launch else None
-            limits, filter_info = (hello.period_s, hello.answer_limit_s), FilterInfo(hello.zone_masks)
-            return Adapter(options, topics, self.goals, launched, *limits, filter_info, restart_reason)
-
-        adapter = self._adapter = make_adapter("")
-        adapter.prepare()
-        facts = adapter.run_facts()
+        self._start_adapter("")
+        facts = self._adapter.run_facts()
         welcome = {
             "protocol": wire.PROTOCOL,
             "name": "simscen ros2",
             "version": facts["rclpy"],
             "step": "control",
             "modes": [*MODES],
-            "first_answer_limit": options.ready + READY_MARGIN_S,
-            "first_answer_until": adapter.latest_start_s,
-            "topics": [PROTOCOL_TOPICS.get(t.name, t.name) for t in topics if t.name in adapter.needed_topics],
+            "first_answer_limit": self._options.ready + READY_MARGIN_S,
+            "first_answer_until": self._adapter.latest_start_s,
+            "topics": [
+                PROTOCOL_TOPICS.get(name, name)
+                for name, _ in self._hello.topics.values()
+                if name in self._adapter.needed_topics
+            ],
             "about": facts,
         }
-        connection.send_json(wire.WELCOME, welcome)
-        self._answer_steps(connection, hello, make_adapter)
-
-    def _answer_steps(self, connection: Connection, hello: Hello, make_adapter: Callable[[str], Any]) -> None:
-        """Process all frames after the handshake, until END."""
+        self._connection.send_json(wire.WELCOME, welcome)
         now = 0
         while True:
-            kind, body = connection.receive()
+            kind, body = self._connection.receive()
             if kind == wire.STEP:
                 header, content = wire.from_step(body)
                 now = header.sec * 10**9 + header.nanosec
                 self.goals.now = now * 1e-9
-                published = [(hello.topics[number][0], data) for number, data in content]
+                published = [(self._hello.topics[number][0], data) for number, data in content]
                 due = bool(header.flags & wire.COMMAND_DUE)
-                received = self._step(ReceivedStep(now, published, due, header.deadline * 1e-3), make_adapter)
+                received = self._step(ReceivedStep(now, published, due, header.deadline * 1e-3))
                 stamp = header.sec, header.nanosec
                 received += [(ROSOUT, messages.log(stamp, *line)) for line in self._adapter.take_lines()]
-                connection.send(wire.answer_frame(header.tick, self._number_messages(received, hello.stack_topics)))
+                self._connection.send(wire.answer_frame(header.tick, self._number_messages(received)))
             elif kind == wire.END:
-                connection.send_json(wire.BYE, {"about": self._adapter.run_facts()})
+                self._connection.send_json(wire.BYE, {"about": self._adapter.run_facts()})
                 return
             else:
                 self._process_frame(kind, wire.from_json(body), now)
 
-    def _step(self, step: ReceivedStep, make_adapter: Callable[[str], Any]) -> List[Tuple[str, bytes]]:
+    def _start_adapter(self, restart_reason: str) -> None:
+        """Run the launch command, and create and prepare the adapter. The reason is empty for the first start."""
+        from simscen.ros2.adapter import Adapter
+        from simscen.ros2.graph import Topic
+
+        options, hello = self._options, self._hello
+        launched = LaunchedCommand(options.launch, os.environ) if options.launch else None
+        topics = [Topic(*topic) for topic in hello.topics.values()]
+        limits, filter_info = (hello.period_s, hello.answer_limit_s), FilterInfo(hello.zone_masks)
+        self._adapter = Adapter(options, topics, self.goals, launched, *limits, filter_info, restart_reason)
+        self._adapter.prepare()
+
+    def _step(self, step: ReceivedStep) -> List[Tuple[str, bytes]]:
         """Perform a step, and return the messages of the nodes. If Nav2 aborts its bring-up, restart Nav2 once.
 
         After a restart, all earlier steps are repeated.
@@ -191,23 +194,13 @@ class AdapterRun:
             print(f"simscen ros2: {error}; starting the launched command again", file=sys.stderr)
             earlier, self._adapter = self._adapter, None
             earlier.end()
-            self._adapter = make_adapter(f"{error.manager} had given up the bring-up")
+            self._start_adapter(f"{error.manager} had given up the bring-up")
             self._adapter.mode, self._adapter.continue_after_failure = earlier.mode, earlier.continue_after_failure
-            self._adapter.prepare()
             for repeated in self._steps_until_ready:
                 self._adapter.step(*repeated)
             return list(self._adapter.step(*step._replace(limit_s=end - time.monotonic())))
         finally:
             self._steps_until_ready.append(step)
-
-    def _options_for(self, mode: str) -> Options:
-        """Return the options with `mode` as `goals`. Raises AdapterError if `--goals` contradicts the mode."""
-        requested = self._options.goals
-        if mode in (DEFAULT_MODE, requested):
-            return self._options
-        if requested != "auto":
-            raise AdapterError(f"the scenario sends goals by {mode}, but --goals is {requested}")
-        return self._options._replace(goals=mode)
 
     def _process_frame(self, kind: int, content: Dict[str, Any], now: int) -> None:
         """Update the goals by a GOAL, PREEMPT, or CANCEL frame."""
@@ -220,31 +213,38 @@ class AdapterRun:
         elif kind == wire.CANCEL:
             self._adapter.cancel(now, content["all"])
 
-    def _number_messages(
-        self, received: Sequence[Tuple[str, bytes]], stack_topics: Dict[str, int]
-    ) -> "List[Tuple[int, bytes]]":
+    def _number_messages(self, received: Sequence[Tuple[str, bytes]]) -> List[Tuple[int, bytes]]:
         """Return the `received` messages and the events of the goals, with topic numbers instead of topics."""
+        stack_topics = self._hello.stack_topics
         out = [(stack_topics[topic], data) for topic, data in received if topic in stack_topics]
         events = (json.dumps(event, allow_nan=False) for event in self.goals.take_events())
         return out + [(stack_topics[EVENTS], messages.string(event)) for event in events]
 
     def _set_environment(self) -> None:
-        """Claim a ROS domain, and set the environment variables of this process and its nodes."""
+        """Claim a ROS domain, and set the environment variables of this process and its nodes.
+
+        By default, a launch command gets a free domain, and nodes that the user starts are in the user's domain.
+        """
         options, environment = self._options, dict(os.environ)
-        domain = self._claim_domain(options, environment)
-        self._cleanup.append(domain.release)
+        requested = options.domain
+        if requested is None and not options.launch:
+            requested = int(environment.get("ROS_DOMAIN_ID") or 0)
+        domain = claim_domain(requested, environment)
+        self._cleanup.callback(domain.release)
         logs = tempfile.mkdtemp(prefix="simscen-ros-logs-")
-        self._cleanup.append(lambda: shutil.rmtree(logs, ignore_errors=True))
+        self._cleanup.callback(shutil.rmtree, logs, ignore_errors=True)
         os.environ.clear()
         os.environ.update(ros_environment(domain.number, logs, environment))
         os.environ.pop(wire.SOCKET_FD_VARIABLE, None)  # nodes must not use the socket to simscen
 
-    @staticmethod
-    def _claim_domain(options: Options, environment: Dict[str, str]) -> Domain:
-        """Claim the requested domain. By default, claim a free domain for a launch command, else the user's domain."""
-        if options.domain is not None or options.launch:
-            return claim_domain(options.domain, environment)
-        return claim_domain(int(environment.get("ROS_DOMAIN_ID") or 0), environment)
+
+def _options_for(options: Options, mode: str) -> Options:
+    """Return the options with `mode` as `goals`. Raises AdapterError if `--goals` contradicts the mode."""
+    if mode in (DEFAULT_MODE, options.goals):
+        return options
+    if options.goals != "auto":
+        raise AdapterError(f"the scenario sends goals by {mode}, but --goals is {options.goals}")
+    return options._replace(goals=mode)
 
 
 def _is_robot_topic(topic: Dict[str, Any]) -> bool:

@@ -4,16 +4,15 @@ import functools
 import importlib
 import math
 import struct
-from typing import Any, Optional, Sequence, Tuple
+from typing import Any, Iterable, List, Optional, Sequence, Tuple
 
-LITTLE_ENDIAN = b"\0\1\0\0"
-"""Header of four bytes before a message in little-endian CDR."""
+from simscen.peer.cdr import Reader, Writer
+
 NS_PER_S = 10**9
 """Nanoseconds per second."""
+TF, TF_STATIC = "/tf", "/tf_static"
 TRANSFORMS_TYPE, PATH_TYPE = "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Path"
 SCAN_TYPE, ODOMETRY_TYPE = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry"
-POSE_BYTES = 56
-"""Size of a pose or transform in CDR: seven doubles."""
 
 Pose = Tuple[float, float, float]
 """x and y in meters, yaw in radians."""
@@ -33,49 +32,59 @@ def find_type(name: str) -> Optional[Any]:
 
 def read_header(message: bytes) -> Tuple[int, str]:
     """Return the stamp in ns and the frame of a serialized message that begins with a std_msgs/Header."""
-    order = _byte_order(message)
-    seconds, nanoseconds, size = struct.unpack_from(order + "iII", message, 4)
-    return seconds * NS_PER_S + nanoseconds, message[16 : 16 + size - 1].decode("utf-8", "replace")
+    reader = Reader(message)
+    seconds, nanoseconds = reader.take("iI")
+    return seconds * NS_PER_S + nanoseconds, reader.string()
 
 
 def read_twist(message: bytes, is_stamped: bool) -> Tuple[float, ...]:
     """Return linear x, y, z in m/s and angular x, y, z in rad/s of a serialized Twist (or TwistStamped)."""
-    order, start = _byte_order(message), 4
+    reader = Reader(message)
     if is_stamped:
-        (size,) = struct.unpack_from(order + "I", message, 12)
-        start += -(-(12 + size) // 8) * 8
-    return struct.unpack_from(order + "6d", message, start)
+        reader.take("iI")
+        reader.string()
+    return reader.take("6d")
+
+
+def read_path(message: bytes) -> List[Tuple[float, float]]:
+    """Return the points x, y in m of a serialized nav_msgs/msg/Path."""
+    reader, points = Reader(message), []
+    reader.take("iI")
+    reader.string()
+    for _ in range(reader.count()):
+        reader.take("iI")
+        reader.string()
+        points.append(reader.take("7d")[:2])
+    return points
 
 
 def write_twist(numbers: Sequence[float]) -> bytes:
     """Return a serialized geometry_msgs/msg/Twist of linear x, y, z and angular x, y, z."""
-    return LITTLE_ENDIAN + struct.pack("<6d", *numbers)
+    return Writer().put("6d", *numbers).done()
 
 
 def write_clock(nanoseconds: int) -> bytes:
     """Return a serialized rosgraph_msgs/msg/Clock."""
-    return LITTLE_ENDIAN + struct.pack("<iI", nanoseconds // NS_PER_S, nanoseconds % NS_PER_S)
+    return Writer().put("iI", *divmod(nanoseconds, NS_PER_S)).done()
 
 
 def shift_stamps(type_name: str, message: bytes, offset_ns: int) -> bytes:
     """Return the serialized message with `offset_ns` added to all of its stamps; a negative stamp becomes 0."""
     if not offset_ns:
         return message
-    shifted = bytearray(message)
+    reader, shifted = Reader(message), bytearray(message)
     if type_name == TRANSFORMS_TYPE:
-        (count,) = struct.unpack_from(_byte_order(message) + "I", message, 4)
-        position = 8
-        for _ in range(count):
-            position = _shift_header(shifted, _align(position, 4), offset_ns)
-            position = _align(_skip_string(shifted, position), 8) + POSE_BYTES
+        for _ in range(reader.count()):
+            _shift_header(reader, shifted, offset_ns)
+            reader.string()
+            reader.take("7d")
     elif type_name == PATH_TYPE:
-        position = _align(_shift_header(shifted, 4, offset_ns), 4)
-        (count,) = struct.unpack_from(_byte_order(message) + "I", message, position)
-        position += 4
-        for _ in range(count):
-            position = _align(_shift_header(shifted, _align(position, 4), offset_ns), 8) + POSE_BYTES
+        _shift_header(reader, shifted, offset_ns)
+        for _ in range(reader.count()):
+            _shift_header(reader, shifted, offset_ns)
+            reader.take("7d")
     elif _has_header(type_name):
-        _shift_header(shifted, 4, offset_ns)
+        _shift_header(reader, shifted, offset_ns)
     return bytes(shifted)
 
 
@@ -86,34 +95,19 @@ def _has_header(type_name: str) -> bool:
     return next(iter(fields.values()), "") == "std_msgs/Header"
 
 
-def _shift_header(message: bytearray, position: int, offset_ns: int) -> int:
-    """Add `offset_ns` to the stamp of the header at `position`; return the position after the header."""
-    order = _byte_order(message)
-    seconds, nanoseconds = struct.unpack_from(order + "iI", message, position)
+def _shift_header(reader: Reader, shifted: bytearray, offset_ns: int) -> None:
+    """Read a header, and write its stamp plus `offset_ns` to the same place of `shifted`."""
+    seconds, nanoseconds = reader.take("iI")
     stamp = max(0, seconds * NS_PER_S + nanoseconds + offset_ns)
-    struct.pack_into(order + "iI", message, position, *divmod(stamp, NS_PER_S))
-    return _skip_string(message, position + 8)
+    struct.pack_into(reader.byte_order + "iI", shifted, reader.offset - 8, *divmod(stamp, NS_PER_S))
+    reader.string()
 
 
-def _skip_string(message: bytearray, position: int) -> int:
-    """Return the position after the string at `position`."""
-    position = _align(position, 4)
-    (size,) = struct.unpack_from(_byte_order(message) + "I", message, position)
-    return position + 4 + int(size)
-
-
-def _align(position: int, width: int) -> int:
-    """Return the next position that is aligned to `width` bytes, counted from the end of the CDR header."""
-    return position + -(position - 4) % width
-
-
-def _byte_order(message: Sequence[int]) -> str:
-    return "<" if message[1] & 1 else ">"
-
-
-def quaternion_yaw(x: float, y: float, z: float, w: float) -> float:
-    """Return the yaw angle of a quaternion."""
-    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+def transforms_first(messages: Iterable[Tuple[str, bytes]]) -> List[Tuple[str, bytes]]:
+    """Return the messages (topic, CDR) with transforms first, otherwise in the same order."""
+    # Nav2's collision monitor waits in a callback until it can transform its newest scan. Meanwhile, it does not answer
+    # the node barrier, so that a later transform would never be published.
+    return sorted(messages, key=lambda message: message[0] not in (TF, TF_STATIC))
 
 
 def compose(a: Pose, b: Pose) -> Pose:

@@ -1,7 +1,8 @@
 """Pose estimate and newest plan of the stack, derived from the messages of simscen and of the nodes."""
 
-from typing import Any, List, Optional, Tuple
+from typing import List, Optional, Tuple
 
+from simscen.peer.messages import read
 from simscen.ros2 import messages
 from simscen.ros2.graph import ReceivedMessage
 from simscen.ros2.messages import Pose
@@ -40,9 +41,9 @@ class PoseEstimate:
     def process_published(self, topic: str, data: bytes) -> None:
         """Process a message from simscen."""
         if topic == "/odom":
-            self._odometry = _pose(_read("nav_msgs/msg/Odometry", data).pose.pose)
+            self._odometry = read("nav_msgs/msg/Odometry", data).pose
         elif topic == "/initialpose":
-            self._initial = _pose(_read("geometry_msgs/msg/PoseWithCovarianceStamped", data).pose.pose)
+            self._initial = read("geometry_msgs/msg/PoseWithCovarianceStamped", data).pose
 
     def process_received(self, message: ReceivedMessage) -> bool:
         """Process a message from the nodes. Return False for one that simscen does not need: /tf without map -> odom.
@@ -51,11 +52,10 @@ class PoseEstimate:
         """
         if message.topic == "/amcl_pose":
             _require_map_frame(message)
-            self._amcl_pose = _pose(_read(message.type, message.data).pose.pose)
+            self._amcl_pose = read(message.type, message.data).pose
         elif message.topic == PLAN:
             _require_map_frame(message)
-            poses = _read(message.type, message.data).poses
-            self.plan = [(stamped.pose.position.x, stamped.pose.position.y) for stamped in poses]
+            self.plan = messages.read_path(message.data)
         elif message.topic == "/tf":
             return self._process_transforms(message)
         return True
@@ -63,15 +63,12 @@ class PoseEstimate:
     def _process_transforms(self, message: ReceivedMessage) -> bool:
         """Store map -> odom of a message on /tf. Return whether the message contains it."""
         found = False
-        for link in _read(message.type, message.data).transforms:
-            if link.child_frame_id.lstrip("/") != ODOM_FRAME:
+        for link in read(message.type, message.data):
+            if link.child.lstrip("/") != ODOM_FRAME:
                 continue
-            if link.header.frame_id.lstrip("/") != MAP_FRAME:
-                raise AdapterError(
-                    f"/tf: the stack publishes {ODOM_FRAME!r} in {link.header.frame_id!r}, not in {MAP_FRAME!r}"
-                )
-            origin, q = link.transform.translation, link.transform.rotation
-            self._map_from_odom = (origin.x, origin.y, messages.quaternion_yaw(q.x, q.y, q.z, q.w))
+            if link.frame.lstrip("/") != MAP_FRAME:
+                raise AdapterError(f"/tf: the stack publishes {ODOM_FRAME!r} in {link.frame!r}, not in {MAP_FRAME!r}")
+            self._map_from_odom = link.pose2d
             found = True
         return found
 
@@ -81,14 +78,3 @@ def _require_map_frame(message: ReceivedMessage) -> None:
     frame = messages.read_header(message.data)[1]
     if frame.lstrip("/") != MAP_FRAME:
         raise AdapterError(f"{message.topic} is in the frame {frame!r}; simscen's map frame is {MAP_FRAME!r}")
-
-
-def _read(type_name: str, data: bytes) -> Any:
-    from rclpy.serialization import deserialize_message
-
-    return deserialize_message(data, messages.find_type(type_name))
-
-
-def _pose(pose: Any) -> Pose:
-    q = pose.orientation
-    return pose.position.x, pose.position.y, messages.quaternion_yaw(q.x, q.y, q.z, q.w)

@@ -19,9 +19,8 @@ Without a command, the robot keeps its previous command. ROS time is always a mu
 import time
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
-from simscen.ros2.frames import transforms_first
 from simscen.ros2.graph import Graph, ReceivedMessage
-from simscen.ros2.messages import NS_PER_S, read_header
+from simscen.ros2.messages import NS_PER_S, read_header, transforms_first
 from simscen.ros2.nav2.actions import MotionActions
 from simscen.ros2.node_barrier import NodeBarrier
 from simscen.ros2.options import AdapterError

@@ -5,13 +5,13 @@ from typing import Any, List, Set
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
-from simscen.ros2.frames import SHARED_FRAMES, TF_STATIC, FrameNames
 from simscen.ros2.graph import Graph
-from simscen.ros2.messages import TRANSFORMS_TYPE, find_type
+from simscen.ros2.graph_names import SHARED_FRAMES, FrameNames
+from simscen.ros2.messages import TF, TF_STATIC, TRANSFORMS_TYPE, find_type
 
 PROFILES = {
     TF_STATIC: QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL),
-    "/tf": QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT),
+    TF: QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT),
 }
 """QoS profiles of the subscriptions, by topic."""
 

@@ -16,9 +16,9 @@ import typer
 from simscen.cli.diagnostics import as_text, print_text, relative_to_working_folder
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.loading.stacks.nav2_parameters import Nav2Parameters, read_nav2_parameters
-from simscen.ros2.frames import FrameNames
+from simscen.ros2.graph_names import FrameNames, TopicNames
 from simscen.ros2.nav2.parameter_rules import PublishedNames
-from simscen.ros2.options import AdapterError, TopicNames
+from simscen.ros2.options import AdapterError
 
 SOCKET_VARIABLE = "SIMSCEN_STACK_FD"
 """Environment variable with the file descriptor of the socket to the simulation; set only during a run."""

@@ -38,14 +38,14 @@ class MessageReader(Reader):
     @property
     def remaining(self) -> int:
         """Number of bytes that have not been read."""
-        return len(self._data) - self._offset
+        return len(self._data) - self.offset
 
     def array(self, kind: str, shape: tuple[int, ...]) -> npt.NDArray[np.generic]:
         """Return the next numbers as an array. `kind` is a numpy type without byte order, e.g. "f8".
 
         Raises ValueError if the message is too short.
         """
-        dtype, size = np.dtype(self._byte_order + kind), math.prod(shape)
+        dtype, size = np.dtype(self.byte_order + kind), math.prod(shape)
         if size:  # an empty sequence at the end of a message has no padding
             self._align(dtype.itemsize)
         return np.frombuffer(self._data, dtype, size, self._skip(size * dtype.itemsize)).reshape(shape)

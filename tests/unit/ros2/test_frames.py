@@ -1,6 +1,7 @@
 """Frames in the user's graph: their names, and the order in which transforms are published."""
 
-from simscen.ros2.frames import FrameNames, transforms_first
+from simscen.ros2.graph_names import FrameNames
+from simscen.ros2.messages import transforms_first
 
 
 def test_transforms_are_published_before_the_readings_that_need_them() -> None:

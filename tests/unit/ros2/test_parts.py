@@ -13,9 +13,12 @@ import pytest
 import simscen.ros2
 from simscen.core.geometry.kinematics import Twist
 from simscen.peer import messages as peer_messages
+from simscen.peer.cdr import HEADER
 from simscen.record.messages import encode
 from simscen.ros2 import messages
-from simscen.ros2.options import AdapterError, TopicNames, claim_domain, ros_environment
+from simscen.ros2.graph_names import TopicNames
+from simscen.ros2.options import AdapterError
+from simscen.ros2.ros_domain import claim_domain, ros_environment
 
 FOLDER = Path(simscen.ros2.__file__).parent
 
@@ -75,7 +78,7 @@ def test_a_domain_in_use_cannot_be_claimed_by_number(tmp_path: Path) -> None:
 
 def test_the_lock_of_a_domain_ends_with_its_process(tmp_path: Path) -> None:
     code = (
-        "import os; from simscen.ros2.options import claim_domain; "
+        "import os; from simscen.ros2.ros_domain import claim_domain; "
         "held = claim_domain(7, os.environ); print(flush=True); input()"
     )
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path)}
@@ -104,7 +107,7 @@ def test_a_stamped_twist_is_read_for_any_length_of_its_frame() -> None:
     for frame in ("", "b", "base_link", "base_footprint", "robot_1/base_link"):
         text = frame.encode() + b"\0"
         body = struct.pack("<iII", 12, 500_000_000, len(text)) + text
-        stamped = messages.LITTLE_ENDIAN + body + b"\0" * (-len(body) % 8) + struct.pack("<6d", *numbers)
+        stamped = HEADER + body + b"\0" * (-len(body) % 8) + struct.pack("<6d", *numbers)
         assert messages.read_twist(stamped, is_stamped=True) == numbers
         assert messages.read_header(stamped) == (12_500_000_000, frame)
 

@@ -1,14 +1,37 @@
-"""Frames in simscen's messages: renaming for the user's graph, and publishing of transforms before other messages."""
+"""Names of simscen's topics and frames in the user's graph."""
 
-from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterable, Optional, Sequence
 
-from simscen.ros2.messages import find_type
+from simscen.ros2.messages import TF, TF_STATIC, find_type
 from simscen.ros2.options import AdapterError
 
 BASE_FRAME = "base_link"
-TF, TF_STATIC = "/tf", "/tf_static"
 SHARED_FRAMES = ("map", "odom")
 """Frames that cannot be renamed, because both simscen and the nodes publish transforms of them."""
+
+
+class TopicNames:
+    """Callable that maps topics of the stack protocol to their names in the graph.
+
+    Remappings have the form `/scan:=/front/scan`. A new name without a leading slash is relative to the namespace.
+    Topics without a remapping are moved to the namespace, except /clock. Raises AdapterError for an invalid remapping.
+    """
+
+    def __init__(self, namespace: str, remappings: Iterable[str]) -> None:
+        self.namespace = "/" + namespace.strip("/") if namespace.strip("/") else ""
+        self._targets: Dict[str, str] = {}
+        for text in remappings:
+            source, separator, target = text.partition(":=")
+            if not separator or not source or not target:
+                raise AdapterError(f"--remap {text}: not of the form /from:=/to")
+            self._targets["/" + source.lstrip("/")] = target
+
+    def __call__(self, topic: str) -> str:
+        """Return the name in the graph of `topic`, which begins with a slash."""
+        target = self._targets.get(topic)
+        if target is None:
+            return topic if topic == "/clock" else self.namespace + topic
+        return target if target.startswith("/") else f"{self.namespace}/{target}"
 
 
 class FrameNames:
@@ -63,10 +86,3 @@ class FrameNames:
         transform.header.frame_id, transform.child_frame_id = self.base_frames
         transform.transform.rotation.w = 1.0
         return transform
-
-
-def transforms_first(messages: Iterable[Tuple[str, bytes]]) -> List[Tuple[str, bytes]]:
-    """Return the messages (topic, CDR) with transforms first, otherwise in the same order."""
-    # Nav2's collision monitor waits in a callback until it can transform its newest scan. Meanwhile, it does not answer
-    # the node barrier, so that a later transform would never be published.
-    return sorted(messages, key=lambda message: message[0] not in (TF, TF_STATIC))
