@@ -52,8 +52,7 @@ class ComparedScans:
     @cached_property
     def residuals(self) -> Array:
         """Measured minus expected ranges (n, beams) in m; nan without a measured or an expected range."""
-        with np.errstate(invalid="ignore"):
-            return np.where(self.is_hit & np.isfinite(self.expected), self.scans.ranges - self.expected, np.nan)
+        return _residuals(self.scans, self.expected)
 
     @cached_property
     def is_explained(self) -> Mask:
@@ -112,14 +111,17 @@ def compare_scans(drive: RecordedDrive, scans: Scans, world: StaticWorld) -> Com
     """Compare scans of a drive with the static world, from the poses of the drive at the times of the scans."""
     poses = lidar_poses(drive, scans)
     expected = world.ranges_from(poses, scans.angles, scans.range_max)
-    with np.errstate(invalid="ignore"):
-        residuals = np.where(scans.is_hit() & np.isfinite(expected), scans.ranges - expected, np.nan)
-    noise = range_noise(residuals, expected)
+    noise = range_noise(_residuals(scans, expected), expected)
     fixed = TRUE_POSE_TOLERANCE_M if drive.has_true_poses else BELIEVED_POSE_TOLERANCE_M
     growth = 0.0 if drive.has_true_poses else BELIEVED_POSE_TOLERANCE_PER_M
     reach = np.minimum(expected, scans.range_max)
     tolerance = fixed + NOISE_SIGMAS * np.minimum(noise, 0.3)[:, None] + growth * reach
     return ComparedScans(scans, poses, expected, noise, tolerance)
+
+
+def _residuals(scans: Scans, expected: Array) -> Array:
+    with np.errstate(invalid="ignore"):
+        return np.where(scans.is_hit() & np.isfinite(expected), scans.ranges - expected, np.nan)
 
 
 def range_noise(residuals: Array, expected: Array) -> Array:

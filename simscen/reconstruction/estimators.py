@@ -12,7 +12,12 @@ from simscen.reconstruction.compared_scans import compare_scans
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, motion_steps
 from simscen.reconstruction.faults.commands import command_faults
 from simscen.reconstruction.faults.false_returns import false_return_faults, glass_fault
-from simscen.reconstruction.faults.lidar_calibration import mount_fault, range_error_faults, with_corrected_mount
+from simscen.reconstruction.faults.lidar_calibration import (
+    mount_error,
+    mount_fault,
+    range_error_faults,
+    with_corrected_mount,
+)
 from simscen.reconstruction.faults.lidar_readings import (
     invalid_scan_faults,
     missing_beam_faults,
@@ -112,16 +117,17 @@ def _faults_and_objects_of_scans(
         unknowns.append("objects that are not on the map, and faults of the lidar, because the log has no scans")
         return [], [*other_robots]
     faults = [*stream_faults("lidar", scans.times, scans.arrivals, drive.duration)]
-    faults += stuck_scans("lidar", scans, drive.duration)
+    faults += stuck_scans(scans, drive.duration)
     if len(scans) > MAX_SCANS:
         step = -(-len(scans) // MAX_SCANS)
         scans = scans.subset(slice(None, None, step))
         unknowns.append(f"what only some scans show: of the {step * len(scans)} scans, every {step}th was used")
     compared = compare_scans(drive, scans, world)
-    mount = mount_fault(compared, world) if is_calibrated else None
-    if mount is not None:
-        faults.append(mount)
-        compared = with_corrected_mount(compared, world)
+    if is_calibrated:
+        error = mount_error(compared, world)
+        if (wrong_mount := mount_fault(error)) is not None:
+            faults.append(wrong_mount)
+            compared = with_corrected_mount(compared, world, error)
     faults += invalid_scan_faults(compared, drive.duration)
     faults += missing_beam_faults(compared, drive.duration)
     limits = [*range_faults(compared, drive.duration, robot.lidar_noise)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -11,18 +11,13 @@ from simscen.loading.checks.scene_runner import check_in_world
 from simscen.loading.files.discovery import default_root
 from simscen.loading.scenario import try_variations
 from simscen.loading.world_cache import WorldCache
-from simscen.reconstruction.drive.reader import DriveOptions, read_drive
+from simscen.reconstruction.drive.reader import read_drive
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.drive.run_description import choose_robot, read_description
 from simscen.reconstruction.estimators import run_estimators
 from simscen.reconstruction.objects.find_objects import object_of_robot
 from simscen.reconstruction.scenario.contents import EstimatedParts, GivenParts, scenario_contents
-from simscen.reconstruction.scenario.given_parts import (
-    DEFAULT_LIDAR_HEIGHT_M,
-    GivenFiles,
-    choose_world,
-    prepare_given_parts,
-)
+from simscen.reconstruction.scenario.given_parts import GivenFiles, choose_world, prepare_given_parts, scenario_stem
 from simscen.reconstruction.scenario.robot_file import robot_properties
 from simscen.reconstruction.scenario.scenario_text import ScenarioContents, scenario_text
 from simscen.reconstruction.static_world import StaticWorld
@@ -33,12 +28,14 @@ class ReconstructionOptions:
     """Options of a reconstruction.
 
     Attributes:
-        drive: Options for reading the log.
+        truth: Ground truth in the log, see `read_drive`.
+        topics: Topics by role such as "odom", for roles whose topic is not the default.
         files: World, map, and robot that replace the ones in the log.
         root: Folder of the files that the recorded scenario refers to; None for the working folder.
     """
 
-    drive: DriveOptions = field(default_factory=DriveOptions)
+    truth: str | None = None
+    topics: Mapping[str, str] = field(default_factory=dict)
     files: GivenFiles = field(default_factory=GivenFiles)
     root: Path | None = None
 
@@ -79,7 +76,7 @@ class Reconstruction:
 
 
 def _write_valid(
-    drive: RecordedDrive, given: GivenParts, estimated: EstimatedParts, name: str, log: Path, out: Path
+    drive: RecordedDrive, given: GivenParts, estimated: EstimatedParts, log: Path, out: Path
 ) -> tuple[ScenarioContents, EstimatedParts]:
     """Write the scenario without objects and faults that make it invalid, such as an object inside the robot.
 
@@ -87,6 +84,7 @@ def _write_valid(
     unknowns, which the file lists for the user. Return the written contents and the remaining parts. Raise InvalidInput
     if the scenario cannot be loaded.
     """
+    name = scenario_stem(out).replace("_", " ")
     while True:
         contents = scenario_contents(drive, given, estimated, name, log.name)
         out.write_text(scenario_text(contents), encoding="utf-8")
@@ -136,11 +134,10 @@ def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> R
     """
     robot_of_log = choose_robot(log, options.files.robot)
     files = replace(options.files, robot="") if robot_of_log else options.files
-    drive = read_drive(log, replace(options.drive, robot=robot_of_log))
+    drive = read_drive(log, options.truth, options.topics, robot_of_log)
     described = read_description(log, options.root or Path.cwd(), robot_of_log)
     choice = choose_world(drive, described, files, out)
-    height = DEFAULT_LIDAR_HEIGHT_M if drive.scans is None else drive.scans.height
-    static_world = StaticWorld(choice.world, height)
+    static_world = StaticWorld(choice.world, drive.lidar_height)
     given = prepare_given_parts(drive, described, choice, files, out, static_world)
     is_known = bool(files.robot) or described.robot is not None
     robot = robot_properties(given.robot, out.parent, is_known)
@@ -149,6 +146,5 @@ def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> R
         for name, outline, times, poses in described.other_robots
     ]
     estimated = run_estimators(drive, static_world, robot, others, choice.is_built)
-    name = out.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".scenario").replace("_", " ")
-    contents, estimated = _write_valid(drive, given, estimated, name, log, out)
+    contents, estimated = _write_valid(drive, given, estimated, log, out)
     return Reconstruction(log, (out, *choice.files), drive, estimated, contents, static_world)

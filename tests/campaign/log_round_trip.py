@@ -17,7 +17,6 @@ from simscen.core.errors import SimscenError
 from simscen.core.records.trace import Samples
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.model.scenario import ScenarioSpec
-from simscen.reconstruction.drive.reader import DriveOptions
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.scenario_from_log import Reconstruction, ReconstructionOptions, scenario_from_log
 from simscen.record.log_reader import Log, read_log
@@ -92,7 +91,7 @@ def compare(file: Path, out: Path, truth: str | None = None) -> Row:
     log = read_log(file)
     row = Row(log.header.name.removeprefix("scenarios/"))
     try:
-        made = scenario_from_log(file, out, ReconstructionOptions(DriveOptions(truth), root=ROOT))
+        made = scenario_from_log(file, out, ReconstructionOptions(truth, root=ROOT))
     except SimscenError as error:
         row.problem = str(error).splitlines()[0]
         return row

@@ -65,12 +65,11 @@ def write_scenario_from_log(options: FromLogOptions, verify: bool) -> None:
 
 def _reconstruct(options: FromLogOptions) -> Reconstruction:
     from simscen.reconstruction.drive.log_messages import TOPIC_ROLES
-    from simscen.reconstruction.drive.reader import DriveOptions
     from simscen.reconstruction.scenario.given_parts import GivenFiles
     from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
 
-    drive = DriveOptions(options.truth, parse_topics(options.topics, TOPIC_ROLES))
-    reading_options = ReconstructionOptions(drive, GivenFiles(options.world, options.map, options.robot), options.root)
+    renamed, files = parse_topics(options.topics, TOPIC_ROLES), GivenFiles(options.world, options.map, options.robot)
+    reading_options = ReconstructionOptions(options.truth, renamed, files, options.root)
     with create_file(options.out, str(options.out)):
         try:
             return scenario_from_log(options.log, options.out, reading_options)

@@ -5,19 +5,18 @@ A role is the purpose of a topic, such as `odom` or `goal`. Each role has a defa
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from simscen.record import topics
+from simscen.record.foreign.decoded_messages import DECODERS, Decoders
 from simscen.record.foreign.options import TOPICS
 from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
 from simscen.record.frame_names import RobotFrames
 from simscen.record.messages import decode
-from simscen.record.messages.decode import MessageReader, decode_checked
+from simscen.record.messages.decode import MessageReader
 
 
 class LoggedMessage(NamedTuple):
@@ -66,30 +65,16 @@ def decode_polygon(reader: MessageReader) -> list[tuple[float, float]]:
     return [(x, y) for x, y, _ in corners]
 
 
-Decoders = Mapping[str, Callable[[bytes], Any]]
-"""Functions that decode a serialized message, by ROS message type."""
-_POSES: Decoders = {name: partial(decode_checked, decoder) for name, decoder in decode.POSE_DECODERS.items()}
-_TRANSFORMS: Decoders = {topics.TF.type: partial(decode_checked, decode.transforms)}
-_DECODERS: Mapping[str, Decoders] = {
-    "truth": _POSES,
-    "odom": {topics.ODOMETRY_TYPE: partial(decode_checked, decode.odometry)},
-    "amcl_pose": _POSES,
-    "initial": _POSES,
-    "goal": _POSES,
-    "scan": {topics.SCAN_TYPE: partial(decode_checked, decode.laser_scan)},
-    "cmd_vel": {
-        "geometry_msgs/msg/Twist": partial(decode_checked, decode.twist),
-        "geometry_msgs/msg/TwistStamped": partial(decode_checked, decode.twist_stamped),
-    },
-    "plan": {topics.PLAN.type: partial(decode_checked, decode.path)},
-    "tf": _TRANSFORMS,
-    "tf_static": _TRANSFORMS,
-    "status": {"action_msgs/msg/GoalStatusArray": partial(decode_checked, decode.goal_states)},
-    "imu": {topics.IMU_TYPE: partial(decode_checked, decode_imu)},
-    "bumper": {topics.BUMPER_TYPE: lambda data: bool(MessageReader(data).take("?")[0])},
-    "map": {topics.MAP.type: lambda data: decode.occupancy_grid(MessageReader(data))[1]},
-    "footprint": {"geometry_msgs/msg/PolygonStamped": partial(decode_checked, decode_polygon)},
-    "events": {topics.EVENTS.type: lambda data: MessageReader(data).string()},
+_DECODERS: dict[str, Decoders] = {
+    **DECODERS,
+    "initial": decode.POSE_DECODERS,
+    "goal": decode.POSE_DECODERS,
+    "scan": {topics.SCAN_TYPE: decode.laser_scan},
+    "imu": {topics.IMU_TYPE: decode_imu},
+    "bumper": {topics.BUMPER_TYPE: lambda reader: bool(reader.take("?")[0])},
+    "map": {topics.MAP.type: lambda reader: decode.occupancy_grid(reader)[1]},
+    "footprint": {"geometry_msgs/msg/PolygonStamped": decode_polygon},
+    "events": {topics.EVENTS.type: MessageReader.string},
 }
 
 
@@ -154,10 +139,7 @@ def _decode(raw: RawMessage, role: str) -> LoggedMessage:
     """Decode a message of a topic with a role. Raises UnusableLog if this is impossible."""
     if raw.encoding != "cdr":
         raise UnusableLog(f"{raw.topic} is encoded as {raw.encoding or 'something unknown'}, not as CDR")
-    try:
-        message = _DECODERS[role][raw.type](raw.data)
-    except (struct.error, ValueError, UnicodeDecodeError, OverflowError) as error:
-        raise UnusableLog(f"a message of {raw.topic} cannot be read as {raw.type}: {error}") from error
+    message = raw.decode(_DECODERS[role][raw.type])
     return LoggedMessage(raw.time, _stamp(message), message)
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,14 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.reconstruction.drive.goals import find_goals, trim_to_first_goal
 from simscen.reconstruction.drive.log_messages import LoggedMessage, LogMessages, collect_messages
-from simscen.reconstruction.drive.recorded_drive import Polygon, RecordedDrive, Scans, TimedValues, no_values
+from simscen.reconstruction.drive.recorded_drive import (
+    DEFAULT_LIDAR_HEIGHT_M,
+    Polygon,
+    RecordedDrive,
+    Scans,
+    TimedValues,
+    no_values,
+)
 from simscen.record import topics
 from simscen.record.foreign.raw_messages import UnusableLog, is_simscen_log, unusable_log_as_invalid_input
 from simscen.record.foreign.transforms import TransformTree, lidar_mount
@@ -25,43 +33,33 @@ from simscen.record.messages.decode import ScanMessage, StampedPose
 BASE_FRAMES = ("base_link", "base_footprint")
 """Usual names of the base frame, in the order in which they are tried."""
 NO_TRUTH = "none"
-"""Value of DriveOptions.truth to ignore the ground truth of a log."""
+"""Value of `truth` to ignore the ground truth of a log."""
 MAX_CLOCK_DIFFERENCE_NS = 10 * NS_PER_SECOND
 """Maximum difference between the stamp and the log time of a message if both are from the same clock."""
 MIN_POSES = 2
 """Minimum number of poses of a topic or transform that is used as the source of poses."""
-DEFAULT_LIDAR_HEIGHT_M, MIN_LIDAR_HEIGHT_M = 0.2, 0.05
-"""Assumed height of a lidar with unknown mount, and lower limit of the height of any lidar."""
+MIN_LIDAR_HEIGHT_M = 0.05
+"""Lower limit of the height of any lidar."""
 MAX_FOOTPRINT_M = 5.0
 """Maximum coordinate of a usable footprint, in the frame in which the footprint is published."""
 
 
-@dataclass(frozen=True)
-class DriveOptions:
-    """Options for reading a log.
-
-    Attributes:
-        truth: Topic of the ground truth; "none" to ignore the ground truth; None to use the ground truth of a simscen
-            log, and none in other logs.
-        topics: Topics by role such as "odom", for roles whose topic is not the default.
-        robot: Robot whose messages are read, in a simscen log with several robots.
-    """
-
-    truth: str | None = None
-    topics: Mapping[str, str] = field(default_factory=dict)
-    robot: str = ""
-
-
-def read_drive(path: Path, options: DriveOptions) -> RecordedDrive:
+def read_drive(
+    path: Path, truth: str | None = None, renamed: Mapping[str, str] = MappingProxyType({}), robot: str = ""
+) -> RecordedDrive:
     """Read the drive in an MCAP file or a rosbag2 folder, from the first goal on.
 
     Raises InvalidInput if the log is unusable.
+
+    truth:    topic of the ground truth; "none" to ignore the ground truth; None to use the ground truth of a simscen
+        log, and none in other logs
+    renamed:  topics by role such as "odom", for roles whose topic is not the default
+    robot:    robot whose messages are read, in a simscen log with several robots
     """
     with unusable_log_as_invalid_input(path):
-        truth = options.truth
         if truth is None and not path.is_dir() and is_simscen_log(path):
             truth = topics.TRUTH.name
-        messages = collect_messages(path, options.topics, None if truth == NO_TRUTH else truth, options.robot)
+        messages = collect_messages(path, renamed, None if truth == NO_TRUTH else truth, robot)
         return trim_to_first_goal(_DriveReader(path, messages).drive())
 
 
@@ -101,7 +99,10 @@ class _DriveReader:
             bumper=self._signal("bumper", 1, lambda is_pressed: (float(is_pressed),)),
             scans=self._scans(),
             map=self._map(),
-            goals=tuple(find_goals(self._messages, self._seconds, poses)),
+            goals=tuple(
+                goal if goal.name else replace(goal, name=f"goal-{number}")
+                for number, goal in enumerate(find_goals(self._messages, self._seconds, poses), 1)
+            ),
             footprint=self._footprint(poses),
             notes=tuple(self._notes),
         )

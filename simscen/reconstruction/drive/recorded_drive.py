@@ -13,6 +13,8 @@ from simscen.core.geometry import Array, Pose2, wrap_array
 Polygon = tuple[tuple[float, float], ...]
 Mask = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.int64]
+DEFAULT_LIDAR_HEIGHT_M = 0.2
+"""Assumed height of a lidar with unknown mount."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +31,7 @@ class TimedValues:
     @property
     def period(self) -> float:
         """Median time between two messages in s; nan for fewer than two messages."""
-        return float(np.median(np.diff(self.times))) if len(self) > 1 else float("nan")
+        return _median_period(self.times)
 
     def poses_at(self, times: Array) -> Array:
         """Return the poses x, y, yaw (m, 3) at `times` (m,), by linear interpolation of the first three columns."""
@@ -40,6 +42,10 @@ class TimedValues:
     def values_at(self, times: Array) -> Array:
         """Return the newest values (m, k) at `times` (m,); before the first measurement, the first values."""
         return self.values[np.maximum(np.searchsorted(self.times, times, side="right") - 1, 0)]
+
+
+def _median_period(times: Array) -> float:
+    return float(np.median(np.diff(times))) if len(times) > 1 else float("nan")
 
 
 def usual_period(times: Array) -> float:
@@ -87,7 +93,7 @@ class Scans:
     @property
     def period(self) -> float:
         """Median time between two scans in s; nan for fewer than two scans."""
-        return float(np.median(np.diff(self.times))) if len(self) > 1 else float("nan")
+        return _median_period(self.times)
 
     def is_hit(self) -> Mask:
         """Return a mask (n, beams) of beams with a range within the limits of the lidar."""
@@ -110,7 +116,7 @@ class RecordedGoal:
     """Goal of the drive.
 
     Attributes:
-        name: Name of the goal; "" if unknown.
+        name: Name of the goal; "goal-1", "goal-2", … if the log has no name.
         pose: Pose in the map frame.
         sent: Time in s at which the goal was accepted or, if unknown, sent.
         ended: Time in s of the result; None if the log has no result.
@@ -166,10 +172,14 @@ class RecordedDrive:
     scans: Scans | None = None
     map: OccupancyGrid | None = None
     goals: tuple[RecordedGoal, ...] = ()
-
     footprint: Polygon = ()
     notes: tuple[str, ...] = ()
     begin: float = 0.0
+
+    @property
+    def lidar_height(self) -> float:
+        """Height of the lidar above the base frame in m; DEFAULT_LIDAR_HEIGHT_M without scans."""
+        return DEFAULT_LIDAR_HEIGHT_M if self.scans is None else self.scans.height
 
 
 STEP_S = 0.5

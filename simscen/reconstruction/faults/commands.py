@@ -82,8 +82,7 @@ def _speeds(drive: RecordedDrive) -> tuple[Array, Array, Array]:
     times = np.arange(begin, min(float(commands.times[-1]), float(odometry.times[-1])), SAMPLE_PERIOD_S)
     # Commands have no stamp in many logs, so the time of logging counts for both.
     command = commands.values[np.maximum(np.searchsorted(commands.arrivals, times, side="right") - 1, 0)]
-    moved = odometry.values[np.maximum(np.searchsorted(odometry.times, times, side="right") - 1, 0)]
-    return times, command[:, [0, 2]], moved[:, [3, 5]]
+    return times, command[:, [0, 2]], odometry.values_at(times)[:, [3, 5]]
 
 
 def _moving_average(speeds: Array) -> Array:

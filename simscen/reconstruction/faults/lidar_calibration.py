@@ -38,7 +38,7 @@ MIN_BIAS_M, MIN_SCALE_ERROR, MIN_DRIFT_M_S = 0.03, 0.015, 0.003
 def mount_error(compared: ComparedScans, world: StaticWorld) -> Pose2:
     """Return the true pose of the lidar relative to the nominal mount, by Gauss-Newton steps on the range differences.
 
-    Return the identity if too few beams hit the static world.
+    The poses of the drive must be a ground truth. Return the identity if too few beams hit the static world.
     """
     step = max(1, len(compared.scans) // TARGET_SCANS)
     chosen = np.flatnonzero(~compared.scans.is_malformed)[::step]
@@ -84,12 +84,8 @@ def mount_error(compared: ComparedScans, world: StaticWorld) -> Pose2:
     return error
 
 
-def mount_fault(compared: ComparedScans, world: StaticWorld) -> FoundFault | None:
-    """Return the fault of a wrong mount of the lidar; None if the error of the mount is small.
-
-    The poses of the drive must be a ground truth.
-    """
-    error = mount_error(compared, world)
+def mount_fault(error: Pose2) -> FoundFault | None:
+    """Return the fault of a wrong mount of the lidar from its `mount_error`; None if the error is small."""
     shift = math.hypot(error.x, error.y)
     if shift < MIN_OFFSET_M and abs(error.yaw) < MIN_OFFSET_RAD:
         return None
@@ -103,9 +99,8 @@ def mount_fault(compared: ComparedScans, world: StaticWorld) -> FoundFault | Non
     return FoundFault("lidar", "extrinsic", values, reason=Reason(text, None, None, "medium"))
 
 
-def with_corrected_mount(compared: ComparedScans, world: StaticWorld) -> ComparedScans:
-    """Compare the scans again with the lidar at the estimated true pose on the robot."""
-    error = mount_error(compared, world)
+def with_corrected_mount(compared: ComparedScans, world: StaticWorld, error: Pose2) -> ComparedScans:
+    """Compare the scans again with the lidar at its true pose on the robot, from its `mount_error`."""
     poses = offset_poses(compared.poses, error)
     expected = world.ranges_from(poses, compared.scans.angles, compared.scans.range_max)
     return replace(compared, poses=poses, expected=expected)

@@ -34,16 +34,11 @@ MIN_EQUAL_BEAMS = 20
 """Minimum number of beams with a return in both of two equal scans."""
 
 
-def stream_faults(
-    target: str, times: Array, arrivals: Array, end: float, nominal_period: float | None = None
-) -> Iterator[FoundFault]:
-    """Yield the faults of a sensor whose messages were measured at `times` (n,) and logged at `arrivals` (n,), in s.
-
-    `nominal_period` is the period of the sensor in s; None to estimate the period from the times.
-    """
+def stream_faults(target: str, times: Array, arrivals: Array, end: float) -> Iterator[FoundFault]:
+    """Yield the faults of a sensor whose messages were measured at `times` (n,) and logged at `arrivals` (n,), in s."""
     if len(times) < 3:
         return
-    period = nominal_period or usual_period(times)
+    period = usual_period(times)
     if period <= 0.0:
         return
     yield from _delay_faults(target, times, arrivals, period, end)
@@ -151,7 +146,7 @@ def repeated_scans(scans: Scans) -> Mask:
     return same
 
 
-def stuck_scans(target: str, scans: Scans, end: float) -> Iterator[FoundFault]:
+def stuck_scans(scans: Scans, end: float) -> Iterator[FoundFault]:
     """Yield a fault for each time window in which a lidar repeated its last scan."""
     for window in windows(repeated_scans(scans), scans.times, max_gap=0.5 * scans.period):
         if window.last - window.first + 1 < MIN_REPEATED_SCANS:
@@ -160,4 +155,4 @@ def stuck_scans(target: str, scans: Scans, end: float) -> Iterator[FoundFault]:
         until_end = window.end >= end - 1.5 * scans.period
         length = window.end - begin + 0.5 * scans.period
         reason = Reason("the same scan is repeated", window.begin, window.end)
-        yield FoundFault(target, "stuck", {}, begin, None if until_end else length, reason)
+        yield FoundFault("lidar", "stuck", {}, begin, None if until_end else length, reason)

@@ -157,7 +157,7 @@ def _goals(drive: RecordedDrive) -> Iterator[ScenarioGoal]:
     """Yield the goals of the scenario with unique names."""
     taken: set[str] = set()
     for number, goal in enumerate(drive.goals):
-        name = goal.name.replace("#", " loop ") or f"goal-{number + 1}"
+        name = goal.name.replace("#", " loop ")
         if name in taken:
             name = f"{name}-{number + 1}"
         taken.add(name)

@@ -28,8 +28,6 @@ from simscen.reconstruction.static_world import StaticWorld, map_from_scans, wor
 from simscen.worlds.maps.ros_map import save_map
 from simscen.worlds.world_file import world_from_spec
 
-DEFAULT_LIDAR_HEIGHT_M = 0.2
-"""Assumed height of the lidar for a log without scans."""
 WALL_MARGIN_M = 0.05
 """Maximum distance between a wall and the center of its map cell."""
 NOISE_SCANS = 100
@@ -84,13 +82,12 @@ def choose_world(drive: RecordedDrive, described: RunDescription, files: GivenFi
         choice = WorldChoice(described.world, world, Reason("walls and obstacles in the header of the log"))
     else:
         return _world_of_map(drive, files, out)
-    height = DEFAULT_LIDAR_HEIGHT_M if drive.scans is None else drive.scans.height
     if not described.has_map:
         choice.map, choice.map_reason = "none", Reason("the log has no map")
     elif files.map is not None:
         choice.map, choice.map_reason = relative_path(files.map, out), Reason("given with --map")
-    elif drive.map is not None and _differs(drive.map, StaticWorld(choice.world, height).grid):
-        file = out.with_name(f"{_stem(out)}_map.yaml")
+    elif drive.map is not None and _differs(drive.map, StaticWorld(choice.world, drive.lidar_height).grid):
+        file = out.with_name(f"{scenario_stem(out)}_map.yaml")
         save_map(drive.map, file)
         choice.files += [file, file.with_suffix(".pgm")]
         choice.map, choice.map_reason = file.name, Reason("the map on /map differs from the world", 0.0)
@@ -106,8 +103,8 @@ def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path) -> WorldCh
                 [Problem(str(files.map), 0, 0, "SC320", "not a ROS map", "use --world for other worlds")]
             )
         grid, written = load_map(loaded.map), relative_path(files.map, out)
-        return WorldChoice(written, world_from_map(grid, _stem(out)), Reason("given with --map"))
-    file = out.with_name(f"{_stem(out)}_map.yaml")
+        return WorldChoice(written, world_from_map(grid, scenario_stem(out)), Reason("given with --map"))
+    file = out.with_name(f"{scenario_stem(out)}_map.yaml")
     unknowns = ["walls and objects that no scan shows"]
     if drive.map is not None:
         grid, reason = drive.map, Reason("the walls are the occupied cells of /map", 0.0)
@@ -119,7 +116,7 @@ def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path) -> WorldCh
     written_files = [file, file.with_suffix(".pgm")]
     return WorldChoice(
         file.name,
-        world_from_map(grid, _stem(out)),
+        world_from_map(grid, scenario_stem(out)),
         reason,
         is_built=drive.map is None,
         unknowns=unknowns,
@@ -134,7 +131,7 @@ def _world_of_file(file: Path, out: Path, reason: Reason) -> WorldChoice:
     out_root = default_root([out])
     written, copies = relative_path(file, out), list[Path]()
     if not file.resolve().is_relative_to(out_root.resolve()):
-        copy = out.with_name(f"{_stem(out)}{''.join(file.suffixes[-2:])}")
+        copy = out.with_name(f"{scenario_stem(out)}{''.join(file.suffixes[-2:])}")
         if loaded.map is not None:
             save_map(load_map(loaded.map), copy)
         else:
@@ -172,7 +169,7 @@ def prepare_given_parts(
         reasons["robot"] = Reason("robot in the header of the log")
     else:
         clearance = float(static_world.distance_to_walls(drive.poses.values[:, :2]).min()) - WALL_MARGIN_M
-        file = out.with_name(f"{_stem(out)}.robot.yaml")
+        file = out.with_name(f"{scenario_stem(out)}.robot.yaml")
         written = write_robot_file(drive, file, _lidar_noise(drive, static_world), clearance)
         choice.files.append(written.file)
         robot, unknowns = written.file.name, [*unknowns, *written.unknowns]
@@ -199,6 +196,6 @@ def relative_path(file: Path, out: Path) -> str:
     return os.path.relpath(file.resolve(), out.parent.resolve())
 
 
-def _stem(out: Path) -> str:
-    """Return the file name without the extension `.scenario.yaml`."""
+def scenario_stem(out: Path) -> str:
+    """Return the name of the scenario file `out` without the extension `.scenario.yaml`."""
     return out.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".scenario")

@@ -123,12 +123,11 @@ def _lost(drive: RecordedDrive) -> Iterator[Incident]:
 def _goals(drive: RecordedDrive) -> Iterator[Incident]:
     """Yield an incident for each failed goal, and for the last goal if it has no result."""
     for number, goal in enumerate(drive.goals):
-        name = goal.name or f"goal-{number + 1}"
         if goal.status == "failed" and goal.ended is not None:
             code = f" with {goal.error}" if goal.error else ""
             yield Incident(
-                "failed goal", goal.ended, _position(drive, goal.ended), f"`{name}` failed{code}", "goals_reached"
+                "failed goal", goal.ended, _position(drive, goal.ended), f"`{goal.name}` failed{code}", "goals_reached"
             )
         elif goal.ended is None and number == len(drive.goals) - 1:
-            detail = f"`{name}` has no result when the log ends"
+            detail = f"`{goal.name}` has no result when the log ends"
             yield Incident("unfinished goal", drive.duration, _position(drive, drive.duration), detail, "goals_reached")

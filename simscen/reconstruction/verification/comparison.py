@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.reconstruction.drive.reader import DriveOptions, read_drive
+from simscen.reconstruction.drive.reader import read_drive
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal, Scans
 from simscen.reconstruction.scenario.criteria import path_length
 from simscen.reconstruction.scenario.incidents import Incident, find_incidents
@@ -104,7 +105,7 @@ class Verification:
 
 def compare_with_run(reconstruction: Reconstruction, log: Path) -> Verification:
     """Compare the recorded drive with the log of a run of the scenario. Raises InvalidInput for an unusable log."""
-    repeated = read_drive(log, DriveOptions())
+    repeated = read_drive(log)
     incidents, others = compare_incidents(find_incidents(reconstruction.drive), find_incidents(repeated))
     verdicts = (attached_result(log) or {}).get("verdicts", [])
     failed = [verdict["id"] for verdict in verdicts if verdict["status"] != "pass"]
@@ -139,15 +140,15 @@ def compare_drives(recorded: RecordedDrive, repeated: RecordedDrive) -> Iterator
     lengths = [path_length(drive.poses.values[:, :2]) for drive in (recorded, repeated)]
     yield _numbers("path length", lengths[0], lengths[1], "m")
     yield _numbers("duration", recorded.duration, repeated.duration, "s")
-    for number, goal in enumerate(recorded.goals):
-        if number < len(repeated.goals):
-            yield _goal(number, recorded, repeated)
+    for goal, again in zip_longest(recorded.goals, repeated.goals[: len(recorded.goals)]):
+        if again is None:
+            yield ComparedQuantity(f"goal {goal.name}", goal.status, "not sent", "")
         else:
-            name = goal.name or f"goal-{number + 1}"
-            yield ComparedQuantity(f"goal {name}", goal.status, "not sent", "")
-    clearances = nearest_return(recorded), nearest_return(repeated)
-    if None not in clearances:
-        yield _numbers("nearest return of the lidar", float(clearances[0] or 0), float(clearances[1] or 0), "m")
+            difference = "" if goal.ended is None or again.ended is None else f"{again.ended - goal.ended:+.2f} s"
+            yield ComparedQuantity(f"goal {goal.name}", _outcome(goal), _outcome(again), difference)
+    nearest, nearest_again = nearest_return(recorded), nearest_return(repeated)
+    if nearest is not None and nearest_again is not None:
+        yield _numbers("nearest return of the lidar", nearest, nearest_again, "m")
     seen = fraction_seen_alike(recorded, repeated, times)
     if seen is not None:
         text = f"{100 * seen:.0f} % within {SAME_RANGE_M:g} m"
@@ -158,14 +159,6 @@ def _numbers(name: str, log: float, run: float, unit: str) -> ComparedQuantity:
     """Return the row of a quantity with one number for the log and one for the run."""
     difference = round(run - log, 2) + 0.0  # no minus sign before a zero
     return ComparedQuantity(name, f"{log:.2f} {unit}", f"{run:.2f} {unit}", f"{difference:+.2f} {unit}")
-
-
-def _goal(number: int, recorded: RecordedDrive, repeated: RecordedDrive) -> ComparedQuantity:
-    """Return the row of the goal with this index."""
-    first, second = recorded.goals[number], repeated.goals[number]
-    name = f"goal {first.name or f'goal-{number + 1}'}"
-    difference = "" if first.ended is None or second.ended is None else f"{second.ended - first.ended:+.2f} s"
-    return ComparedQuantity(name, _outcome(first), _outcome(second), difference)
 
 
 def _outcome(goal: RecordedGoal) -> str:

@@ -89,10 +89,9 @@ def drive_map(
     shapes += [part for thing in objects for part in _object(thing, box)]
     shapes.append(f'<polyline class="path {name}" points="{_points(drive.poses.values)}"/>')
     shapes += _time_marks(drive, name, box)
-    for number, goal in enumerate(drive.goals, 1):
-        label = goal.name or f"goal-{number}"
+    for goal in drive.goals:
         shapes.append(f'<circle class="goal" cx="{goal.pose.x:.3f}" cy="{-goal.pose.y:.3f}" r="{0.6 * box.font:.3f}"/>')
-        shapes.append(_label(goal.pose.x, goal.pose.y - 1.7 * box.font, label, box, "goalname"))
+        shapes.append(_label(goal.pose.x, goal.pose.y - 1.7 * box.font, goal.name, box, "goalname"))
     for number, incident in enumerate(incidents):
         at_x, at_y = incident.position
         tip = f"<title>{escape(f'{incident.kind} at {incident.time:.2f} s')}</title>"

@@ -5,29 +5,38 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
+from simscen.record import topics
 from simscen.record.foreign.options import TOPICS, ForeignLogOptions
 from simscen.record.foreign.raw_messages import RawMessage, UnusableLog
 from simscen.record.messages import decode
-from simscen.record.messages.decode import CheckedReader, decode_checked
+from simscen.record.messages.decode import MessageReader, decode_checked
 
-_POSE_DECODERS = {name: partial(decode_checked, decoder) for name, decoder in decode.POSE_DECODERS.items()}
-_TRANSFORM_DECODERS = {"tf2_msgs/msg/TFMessage": partial(decode_checked, decode.transforms)}
-_DECODERS: Mapping[str, Mapping[str, Callable[[bytes], Any]]] = {
-    "truth": _POSE_DECODERS,
-    "odom": {"nav_msgs/msg/Odometry": partial(decode_checked, decode.odometry)},
-    "amcl_pose": _POSE_DECODERS,
-    "scan": {"sensor_msgs/msg/LaserScan": lambda data: CheckedReader(data).header()[0]},
+Decoders = Mapping[str, Callable[[MessageReader], Any]]
+"""Functions that decode a message, by ROS message type."""
+
+
+def _stamp(reader: MessageReader) -> int:
+    """Decode only the stamp of a message with a header, and skip the rest of the message."""
+    stamp, _ = reader.header()
+    reader.blob(reader.remaining)
+    return stamp
+
+
+DECODERS: dict[str, Decoders] = {
+    "truth": decode.POSE_DECODERS,
+    "odom": {topics.ODOMETRY_TYPE: decode.odometry},
+    "amcl_pose": decode.POSE_DECODERS,
+    "scan": {topics.SCAN_TYPE: _stamp},
     "cmd_vel": {
-        "geometry_msgs/msg/Twist": partial(decode_checked, decode.twist),
-        "geometry_msgs/msg/TwistStamped": partial(decode_checked, decode.twist_stamped),
+        "geometry_msgs/msg/Twist": decode.twist,
+        "geometry_msgs/msg/TwistStamped": decode.twist_stamped,
     },
-    "plan": {"nav_msgs/msg/Path": partial(decode_checked, decode.path)},
-    "tf": _TRANSFORM_DECODERS,
-    "tf_static": _TRANSFORM_DECODERS,
-    "status": {"action_msgs/msg/GoalStatusArray": partial(decode_checked, decode.goal_states)},
+    "plan": {topics.PLAN.type: decode.path},
+    "tf": {topics.TF.type: decode.transforms},
+    "tf_static": {topics.TF.type: decode.transforms},
+    "status": {"action_msgs/msg/GoalStatusArray": decode.goal_states},
 }
 """Decoders by role and message type. The decoder of scans returns only the stamp."""
 
@@ -68,7 +77,7 @@ def decode_messages(raw: Iterable[RawMessage], roles: Mapping[str, Sequence[str]
 
 def _decode(decoded: DecodedMessages, role: str, message: RawMessage) -> None:
     """Add a message to `decoded`, or the reason why it is unsuitable for the role."""
-    decoders, messages = _DECODERS[role], decoded.by_role[role]
+    decoders, messages = DECODERS[role], decoded.by_role[role]
     if message.encoding != "cdr":
         encoding = message.encoding or "something unknown"
         decoded.problems[role] = f"{message.topic} is encoded as {encoding}, not as CDR"
@@ -78,7 +87,7 @@ def _decode(decoded: DecodedMessages, role: str, message: RawMessage) -> None:
         decoded.problems[role] = f"{message.topic} is a {message.type or 'type without a name'}, expected {expected}"
         return
     try:
-        messages.append((message.time, decoders[message.type](message.data)))
+        messages.append((message.time, decode_checked(decoders[message.type], message.data)))
     except (ValueError, OverflowError) as error:
         where = f"message {len(messages) + 1} of {message.topic}"
         raise UnusableLog(f"{where} cannot be read as {message.type}: {error}") from error

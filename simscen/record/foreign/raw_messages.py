@@ -2,10 +2,10 @@
 
 import json
 import re
-from collections.abc import Container, Iterator
+from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from mcap import records
 
@@ -13,6 +13,9 @@ from simscen.record.log_header import ROBOTS_KEY
 from simscen.record.log_reader import invalid_log, unreadable_log_as_invalid_input
 from simscen.record.mcap_reader import RecordReader, open_log
 from simscen.record.mcap_writer import MAGIC
+from simscen.record.messages.decode import MessageReader, decode_checked
+
+T = TypeVar("T")
 
 
 class UnusableLog(ValueError):
@@ -41,6 +44,13 @@ class RawMessage(NamedTuple):
     encoding: str
     time: int
     data: bytes
+
+    def decode(self, decoder: Callable[[MessageReader], T]) -> T:
+        """Return the message, decoded by a function of `messages.decode`. Raises UnusableLog if it is invalid."""
+        try:
+            return decode_checked(decoder, self.data)
+        except (ValueError, OverflowError) as error:
+            raise UnusableLog(f"a message of {self.topic} cannot be read as {self.type}: {error}") from error
 
 
 class McapMessages:

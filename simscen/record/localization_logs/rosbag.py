@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 from simscen.core.clock import NS_PER_SECOND
 from simscen.core.geometry import Pose2, Pose3
 from simscen.record import topics
+from simscen.record.foreign.decoded_messages import Decoders
 from simscen.record.foreign.options import parse_frame_pair
 from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
 from simscen.record.foreign.transforms import LidarMount, TransformTree, lidar_mount
@@ -21,14 +22,7 @@ from simscen.record.localization_logs.rows import (
     ScanRow,
     all_within,
 )
-from simscen.record.messages.decode import (
-    POSE_DECODERS,
-    MessageReader,
-    StampedPose,
-    decode_checked,
-    laser_scan,
-    transforms,
-)
+from simscen.record.messages.decode import POSE_DECODERS, StampedPose, laser_scan, transforms
 
 INITIAL_POSE_TOPIC = "/initialpose"
 """Topic of the initial pose for AMCL."""
@@ -132,13 +126,10 @@ def _collect_messages(path: Path, odometry: str, scan: str, truth: str) -> _Mess
     return messages
 
 
-def _decode(raw: RawMessage, decoders: Mapping[str, Callable[[MessageReader], Any]]) -> Any:
+def _decode(raw: RawMessage, decoders: Decoders) -> Any:
     if raw.encoding != "cdr" or raw.type not in decoders:
         raise UnusableLog(f"{raw.topic} is a {raw.type or 'type without a name'}, expected {' or '.join(decoders)}")
-    try:
-        return decode_checked(decoders[raw.type], raw.data)
-    except (ValueError, OverflowError) as error:
-        raise UnusableLog(f"a message of {raw.topic} cannot be read as {raw.type}: {error}") from error
+    return raw.decode(decoders[raw.type])
 
 
 def _time(logged: int, message: Any, use_log_time: bool) -> float:

@@ -71,7 +71,7 @@ def test_repeated_scans_are_a_stuck_lidar():
     measured = drives.scans()
     ranges = measured.ranges.copy()
     ranges[50:70] = ranges[49]
-    (fault,) = stuck_scans("lidar", drives.with_ranges(measured, ranges), drives.DURATION_S)
+    (fault,) = stuck_scans(drives.with_ranges(measured, ranges), drives.DURATION_S)
     assert (fault.kind, fault.begin, fault.duration) == (
         "stuck",
         pytest.approx(4.9, abs=0.1),
@@ -80,4 +80,4 @@ def test_repeated_scans_are_a_stuck_lidar():
 
 
 def test_scans_with_noise_are_never_stuck():
-    assert list(stuck_scans("lidar", drives.scans(), drives.DURATION_S)) == []
+    assert list(stuck_scans(drives.scans(), drives.DURATION_S)) == []

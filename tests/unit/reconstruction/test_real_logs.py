@@ -20,7 +20,7 @@ from simscen.core.errors import InvalidInput
 from simscen.loading.scenario import load_scenario
 from simscen.reconstruction import scenario_from_log as scenario_module
 from simscen.reconstruction.drive.goals import BEND_SOURCE, STOP_SOURCE, goals_from_motion
-from simscen.reconstruction.drive.reader import DriveOptions, read_drive
+from simscen.reconstruction.drive.reader import read_drive
 from simscen.reconstruction.drive.recorded_drive import no_values
 from simscen.reconstruction.reasons import FoundFault, Reason
 from simscen.reconstruction.scenario.robot_file import observed_limits, write_robot_file
@@ -141,7 +141,7 @@ def test_the_user_can_give_the_map(tmp_path):
 
 def test_without_goals_the_end_of_the_motion_is_the_goal(tmp_path):
     bag = logs.write_bag(tmp_path / "bag", messages(with_goal=False))
-    drive = read_drive(bag, DriveOptions())
+    drive = read_drive(bag)
     (only,) = drive.goals
     assert only.pose.distance(drives.Pose2(*drives.poses(np.array([drives.DURATION_S - 0.05]))[0].tolist())) < 0.1
 
@@ -158,7 +158,7 @@ def test_a_drive_without_stops_has_goals_where_its_path_bends():
 
 def test_the_mount_of_the_lidar_can_be_on_tf(tmp_path):
     moved = [replace(said, topic="/tf") if said.topic == "/tf_static" else said for said in messages()]
-    drive = read_drive(logs.write_bag(tmp_path / "bag", moved), DriveOptions())
+    drive = read_drive(logs.write_bag(tmp_path / "bag", moved))
     assert not any("mount" in note for note in drive.notes)
 
 
@@ -206,14 +206,14 @@ def test_goals_come_from_the_ends_of_plans_and_the_status_of_the_action(tmp_path
     for time, status in ((0.1, 2), (11.0, 4)):
         at = logs.BEGIN + round(time * logs.SECOND)
         said.append(logs.Message("/navigate_to_pose/_action/status", at, logs.statuses((1, logs.BEGIN, status))))
-    drive = read_drive(logs.write_bag(tmp_path / "bag", sorted(said, key=lambda one: one.time)), DriveOptions())
+    drive = read_drive(logs.write_bag(tmp_path / "bag", sorted(said, key=lambda one: one.time)))
     (only,) = drive.goals
     assert math.dist(only.pose[:2], GOAL) < 0.01
     assert (only.status, only.ended) == ("reached", pytest.approx(11.0, abs=0.2))
 
 
 def test_log_before_the_first_goal_is_ignored(tmp_path):
-    drive = read_drive(logs.write_bag(tmp_path / "bag", messages(idle=5.0)), DriveOptions())
+    drive = read_drive(logs.write_bag(tmp_path / "bag", messages(idle=5.0)))
     assert drive.goals[0].sent == 0.0
     assert drive.duration == pytest.approx(drives.DURATION_S, abs=0.2)
     assert any("before the first goal" in note for note in drive.notes)
@@ -222,7 +222,7 @@ def test_log_before_the_first_goal_is_ignored(tmp_path):
 def test_a_log_without_poses_is_refused_with_a_hint(tmp_path):
     only_scans = [said for said in messages() if said.topic == "/scan"]
     with pytest.raises(InvalidInput, match="no poses of the robot") as error:
-        read_drive(logs.write_bag(tmp_path / "bag", only_scans), DriveOptions())
+        read_drive(logs.write_bag(tmp_path / "bag", only_scans))
     assert "--topic" in error.value.problems[0].hint
 
 
