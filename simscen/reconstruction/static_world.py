@@ -130,8 +130,7 @@ def _driven_cells(shape: tuple[int, ...], path: Array) -> Mask:
     """Return a mask (rows, columns) of cells within BODY_RADIUS_M of a `path` (n, 2) relative to the map's corner."""
     is_path = np.zeros(shape, dtype=bool)
     is_path.reshape(-1)[_index(path, shape)] = True
-    driven: Mask = distance_transform_edt(~is_path) * RESOLUTION_M <= BODY_RADIUS_M
-    return driven
+    return distance_transform_edt(~is_path) * RESOLUTION_M <= BODY_RADIUS_M
 
 
 def _shape(low: Array, high: Array) -> tuple[int, int]:
@@ -160,5 +159,4 @@ def _add_scan(odds: Array, origin: Array, ends: Array) -> None:
 def _index(points: Array, shape: tuple[int, ...]) -> Indices:
     """Return the indices (n,) of the cells of points (n, 2) in the flattened map."""
     cells = np.clip((points / RESOLUTION_M).astype(np.int64), 0, [shape[1] - 1, shape[0] - 1])
-    result: Indices = cells[:, 1] * shape[1] + cells[:, 0]
-    return result
+    return cells[:, 1] * shape[1] + cells[:, 0]

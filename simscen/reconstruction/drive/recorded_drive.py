@@ -98,8 +98,7 @@ class Scans:
     def is_hit(self) -> Mask:
         """Return a mask (n, beams) of beams with a range within the limits of the lidar."""
         with np.errstate(invalid="ignore"):
-            hit: Mask = np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
-            return hit
+            return np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
 
     def subset(self, which: slice) -> Scans:
         """Return the scans of a slice of indices."""

@@ -87,8 +87,7 @@ def _speeds(drive: RecordedDrive) -> tuple[Array, Array, Array]:
 
 def _moving_average(speeds: Array) -> Array:
     """Return the moving average of speeds (n,) over SMOOTHING_S."""
-    result: Array = uniform_filter1d(speeds, round(SMOOTHING_S / SAMPLE_PERIOD_S), mode="nearest")
-    return result
+    return uniform_filter1d(speeds, round(SMOOTHING_S / SAMPLE_PERIOD_S), mode="nearest")
 
 
 def _lag(commanded: Array, driven: Array) -> float:

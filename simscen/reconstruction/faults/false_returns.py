@@ -80,8 +80,7 @@ def isolated_returns(compared: ComparedScans) -> Mask:
         steps = np.abs(np.diff(ranges, axis=1))
     apart = np.ones((len(ranges), ranges.shape[1] + 1), dtype=bool)
     apart[:, 1:-1] = ~(steps < JUMP_M)
-    result: Mask = compared.is_short & apart[:, 1:] & apart[:, :-1]
-    return result
+    return compared.is_short & apart[:, 1:] & apart[:, :-1]
 
 
 def ghost_beams(compared: ComparedScans) -> list[tuple[int, int, float]]:

@@ -54,8 +54,7 @@ class ScanCluster:
 
 def usable_scans(compared: ComparedScans) -> Mask:
     """Return a mask (n,) of scans that are neither invalid nor a repetition of the previous scan."""
-    result: Mask = ~invalid_scans(compared) & ~repeated_scans(compared.scans)
-    return result
+    return ~invalid_scans(compared) & ~repeated_scans(compared.scans)
 
 
 def scan_clusters(compared: ComparedScans, world: StaticWorld, has_true_poses: bool) -> list[list[ScanCluster]]:

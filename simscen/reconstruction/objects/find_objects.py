@@ -108,8 +108,7 @@ def median_of_three(values: Array) -> Array:
     if len(values) < 3:
         return values
     padded = np.concatenate((values[:1], values, values[-1:]))
-    result: Array = np.median(np.lib.stride_tricks.sliding_window_view(padded, 3), axis=1)
-    return result
+    return np.median(np.lib.stride_tricks.sliding_window_view(padded, 3), axis=1)
 
 
 def _median_fraction(fractions: Array) -> float:

@@ -169,8 +169,7 @@ def _outcome(goal: RecordedGoal) -> str:
 
 def common_times(recorded: RecordedDrive, repeated: RecordedDrive) -> Array:
     """Return times (n,) in s, every STEP_S, until the shorter of both drives ends."""
-    times: Array = np.arange(0.0, min(recorded.duration, repeated.duration), STEP_S)
-    return times
+    return np.arange(0.0, min(recorded.duration, repeated.duration), STEP_S)
 
 
 def distances_between(recorded: RecordedDrive, repeated: RecordedDrive, times: Array) -> Array:

@@ -157,8 +157,7 @@ class Timebase:
     def _ticks(self, times: Ticks) -> Ticks:
         """Return the ticks nearest to times in ns, limited to the first and the last tick."""
         since: Ticks = np.clip(times, self.start, self.stop) - self.start
-        ticks: Ticks = (since * self.rate + NS_PER_SECOND // 2) // NS_PER_SECOND
-        return ticks
+        return (since * self.rate + NS_PER_SECOND // 2) // NS_PER_SECOND
 
 
 def _header_times(logged: Ticks, anchor: StampedMessages | None) -> Ticks:
