@@ -130,7 +130,10 @@ class Peer:
         self._connection = connection or Connection.inherited()
         self._canceled = False
         self._bye_content: dict[str, Any] = {}
-        self.hello = self._expect(wire.HELLO)
+        kind, body = self._connection.receive()
+        if kind != wire.HELLO:
+            raise wire.Malformed(f"a frame of kind {kind} instead of HELLO")
+        self.hello = wire.from_json(body)
         if wire.PROTOCOL not in self.hello["protocols"]:
             self.give_up(f"{name} requires version {wire.PROTOCOL} of the stack protocol")
         self._topics: dict[int, tuple[str, str]] = {t["number"]: (t["topic"], t["type"]) for t in self.hello["says"]}
@@ -167,7 +170,8 @@ class Peer:
             if kind == wire.STEP:
                 header, received = wire.from_step(body)
                 self.goals.now = header.sec + header.nanosec * 1e-9
-                step = Step(self, header, [self._message(*each) for each in received], self._canceled)
+                named = [Message(*self._topics[number], data) for number, data in received]
+                step = Step(self, header, named, self._canceled)
                 self._canceled = False
                 yield step
                 self._connection.send(step._answer())
@@ -200,14 +204,3 @@ class Peer:
             self.goals.cancel(content["all"])
         else:
             raise wire.Malformed(f"a stack cannot receive a frame of kind {kind}")
-
-    def _message(self, number: int, data: bytes) -> Message:
-        """Return the message on the topic with this number."""
-        return Message(*self._topics[number], data)
-
-    def _expect(self, kind: int) -> dict[str, Any]:
-        """Receive a frame of this kind, and return its JSON object."""
-        received_kind, body = self._connection.receive()
-        if received_kind != kind:
-            raise wire.Malformed(f"a frame of kind {received_kind} instead of {wire.KIND_NAMES[kind]}")
-        return wire.from_json(body)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -60,13 +61,12 @@ def find_objects(
             found.append(_object_of_track(compared, track, usable, is_moving=False))
     found = [thing for thing in found[len(robots) :] if max(thing.size) >= MIN_SIZE_M]
     found.sort(key=lambda thing: (thing.keyframes[0][0], *thing.keyframes[0][1:3]))
-    kinds = {True: "moving object", False: "object"}
-    counts = {True: 0, False: 0}
-    named = []
-    for thing in found:
-        counts[thing.is_moving] += 1
-        named.append(replace(thing, name=f"{kinds[thing.is_moving]} {counts[thing.is_moving]}"))
-    return [*robots, *named]
+    counts: Counter[str] = Counter()
+    for index, thing in enumerate(found):
+        kind = "moving object" if thing.is_moving else "object"
+        counts[kind] += 1
+        found[index] = replace(thing, name=f"{kind} {counts[kind]}")
+    return [*robots, *found]
 
 
 def object_of_robot(name: str, outline: Polygon, times: Array, poses: Array) -> FoundObject:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simscen.core.geometry import Pose2
+from simscen.core.geometry import Array, Pose2
 from simscen.record.foreign.raw_messages import UnusableLog
 from simscen.record.localization_logs.rows import (
     MAX_COORDINATE_M,
@@ -142,7 +142,7 @@ def _parse_robotlaser(rows: LocalizationRows, order: int, words: list[str]) -> N
     rows.scans.append(ScanRow(time, order, ranges, (first, step, 0.0, range_max), _relative_pose(robot, laser)))
 
 
-def _ranges(words: list[str], count: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def _ranges(words: list[str], count: int) -> Array:
     if len(words) != count or count < 1:
         raise ValueError(f"expected {count} ranges, got {len(words)}")
     return np.array([float(word) for word in words])

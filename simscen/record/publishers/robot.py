@@ -1,6 +1,5 @@
 """Publishers of the moments (records of single ticks) of a robot: ground truth, decisions of the stack, and events."""
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 from simscen.core.clock import Clock
@@ -148,10 +147,6 @@ class StackPublisher:
             self._out.publish(topics.PARTICLE_POSES, now, encode_arrays.pose_array(frame_names.MAP, stamp, subset))
 
 
-MAX_CACHED_WRITERS = 16
-"""Maximum number of cached writers, one for each set of moving objects."""
-
-
 class TruthPublisher:
     """Publishes the ground truth: pose, velocity, and clearance of the robot, and poses of moving objects.
 
@@ -164,8 +159,9 @@ class TruthPublisher:
         self._out, self._time, self._thinning, self._frame = out, time, thinning, frames.truth
         truth = (topics.TRUTH, encode.odometry(frame_names.MAP, frames.truth)), (topics.CLEARANCE, encode.float64())
         self._common_layouts = ((topics.CLOCK, encode.clock()), *truth) if publishes_clock else truth
+        robot = topics.TF, encode.transforms([(frame_names.MAP, self._frame, "pose")])
         self._without_tf = out.batch_writer(self._common_layouts)
-        self._writers: dict[tuple[str, ...], BatchWriter] = {}
+        self._without_objects = out.batch_writer((*self._common_layouts, robot))
         self._precomputed: _PrecomputedBatch | None = None
 
     def write(self, now: int, tick: int, truth: Truth) -> None:
@@ -178,12 +174,8 @@ class TruthPublisher:
                 batch = self._precomputed = self._precompute(poses.predicted)
             batch.writer.write(now, stamp, *fields, batch.serialized[poses.row].tobytes())
             return
-        names = tuple(poses)
-        writer = self._writers.get(names)
-        if writer is None and len(self._writers) < MAX_CACHED_WRITERS:
-            writer = self._writers[names] = self._new_writer(names)
-        if writer is not None:
-            writer.write(now, stamp, *fields, *poses.values())
+        if not poses:
+            self._without_objects.write(now, stamp, *fields)
             return
         self._without_tf.write(now, stamp, *fields)
         links = [(frame_names.MAP, frame_names.object_frame(name), stamp, pose) for name, pose in poses.items()]
@@ -201,12 +193,6 @@ class TruthPublisher:
             writer = self._out.batch_writer((*self._common_layouts, (topics.TF, tf)))
         stamps = [self._time.stamp(tick) for tick in predicted.ticks]
         return _PrecomputedBatch(predicted, packer, writer, packer(stamps, predicted.table))
-
-    def _new_writer(self, names: Iterable[str]) -> BatchWriter:
-        """Return a writer for the ground truth and the poses of the robot and the named objects on /tf."""
-        links = [(frame_names.MAP, frame_names.object_frame(name), f"object{k}") for k, name in enumerate(names)]
-        tf = encode.transforms([(frame_names.MAP, self._frame, "pose"), *links])
-        return self._out.batch_writer((*self._common_layouts, (topics.TF, tf)))
 
 
 class _PrecomputedBatch(NamedTuple):
