@@ -27,7 +27,7 @@ from simscen.reconstruction.drive.recorded_drive import (
 )
 from simscen.record import topics
 from simscen.record.foreign.raw_messages import UnusableLog, is_simscen_log, unusable_log_as_invalid_input
-from simscen.record.foreign.transforms import TransformTree, lidar_mount
+from simscen.record.foreign.transforms import TransformTree, is_upside_down, lidar_mount
 from simscen.record.messages.decode import ScanMessage, StampedPose
 
 BASE_FRAMES = ("base_link", "base_footprint")
@@ -212,13 +212,19 @@ class _DriveReader:
             is_malformed[row] = len(values) != beams
             if not is_malformed[row]:
                 ranges[row] = values
-        mount, height = self._mount(frame)
+        mount, height, is_flipped = self._mount(frame)
         angles = first.angle_min + first.angle_increment * np.arange(beams, dtype=np.float64)
+        angles = -angles if is_flipped else angles
+        if beams > 1 and angles[1] < angles[0]:  # the estimators expect ascending angles
+            angles, ranges = angles[::-1], ranges[:, ::-1]
         limits = first.range_min, first.range_max
         return Scans(times[order], arrivals[order], ranges, angles, *limits, mount, height, is_malformed)
 
-    def _mount(self, frame: str) -> tuple[Pose2, float]:
-        """Return the pose of the lidar on the base and its height in m, from the first transform of each frame."""
+    def _mount(self, frame: str) -> tuple[Pose2, float, bool]:
+        """Return the pose of the lidar on the base, its height in m, and whether it is upside down.
+
+        The first transform of each frame counts.
+        """
         links: dict[str, StampedPose] = {}
         for message in (*self._messages.of("tf_static"), *self._messages.of("tf")):
             for link in message.content:
@@ -229,13 +235,10 @@ class _DriveReader:
         mount = lidar_mount(frame, base, links)
         if mount is None:
             self._notes.append(f"the mount of the lidar `{frame}` is unknown; it is assumed at the base")
-            return Pose2(0.0, 0.0, 0.0), DEFAULT_LIDAR_HEIGHT_M
-        height, at = 0.0, frame
-        while at in links and at != base:
-            height, at = height + Pose3(*links[at].pose).z, links[at].frame
-        if mount.is_upside_down:
+            return Pose2(0.0, 0.0, 0.0), DEFAULT_LIDAR_HEIGHT_M, False
+        if is_upside_down(mount):
             self._notes.append(f"the lidar `{frame}` is mounted upside down")
-        return Pose2(*mount.pose), max(height, MIN_LIDAR_HEIGHT_M)
+        return mount.plane, max(mount.z, MIN_LIDAR_HEIGHT_M), is_upside_down(mount)
 
     def _map(self) -> OccupancyGrid | None:
         """Return the last map; None without a map."""

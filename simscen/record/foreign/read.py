@@ -19,7 +19,7 @@ from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.raw_messages import RawMessage, open_messages, unusable_log_as_invalid_input
 from simscen.record.foreign.timebase import Timebase
 from simscen.record.foreign.trace_reader import ForeignTraceReader
-from simscen.record.foreign.transforms import lidar_mount
+from simscen.record.foreign.transforms import is_upside_down, lidar_mount
 from simscen.record.sensor_messages import SensorMessages
 
 
@@ -74,6 +74,8 @@ SENSOR_TOPICS = (
 """Topics for replays. In MCAP files, scans on other topics are read as well."""
 BASE_FRAME = "base_link"
 """Frame in which replays need the poses of lidars."""
+_UPSIDE_DOWN = Pose3(qx=1.0, qw=0.0)
+"""Rotation by 180° about the x axis."""
 
 
 class SensorMessageCollector:
@@ -104,7 +106,8 @@ class SensorMessageCollector:
         links = {pose.child: pose for _, poses in decoded.by_role["tf_static"] for pose in poses}
         for frame in links:
             if (mount := lidar_mount(frame, BASE_FRAME, links)) is not None:
-                self._sensors.mounts[frame] = Pose3.planar(mount.pose)
+                level = Pose3.planar(mount.plane)
+                self._sensors.mounts[frame] = level.compose(_UPSIDE_DOWN) if is_upside_down(mount) else level
         return self._sensors
 
     def _add(self, message: RawMessage) -> None:

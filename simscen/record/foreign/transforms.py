@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2, Pose3
+from simscen.core.geometry import Array, Pose3
 from simscen.core.records.trace import Ticks
 from simscen.record.foreign.timebase import StampedMessages
 from simscen.record.messages.decode import StampedPose
@@ -111,24 +110,17 @@ def _compose(outer: Array, inner: Array) -> Array:
 _BASE_FRAMES = ("base_link", "base_footprint")
 
 
-class LidarMount(NamedTuple):
-    """Planar pose of a lidar on the base, and whether the lidar is mounted upside down."""
-
-    pose: Pose2
-    is_upside_down: bool
-
-
-def lidar_mount(frame: str, base: str, links: Mapping[str, StampedPose]) -> LidarMount | None:
-    """Return the mount of a lidar with the frame `frame` on the frame `base`, or else on base_link or base_footprint.
+def lidar_mount(frame: str, base: str, links: Mapping[str, StampedPose]) -> Pose3 | None:
+    """Return the pose of a lidar with the frame `frame` on the frame `base`, or else on base_link or base_footprint.
 
     `links` are the static transforms by child frame. Returns None if they do not connect the frames.
     """
-    pose, visited, nearest = Pose3(0, 0, 0, 0, 0, 0, 1), set(), None
+    pose, visited, nearest = Pose3(), set(), None
     while True:
         if frame == base:
-            return _planar_mount(pose)
+            return pose
         if nearest is None and frame.rpartition("/")[2] in _BASE_FRAMES:
-            nearest = _planar_mount(pose)
+            nearest = pose
         if frame not in links or frame in visited:
             return nearest
         visited.add(frame)
@@ -136,6 +128,6 @@ def lidar_mount(frame: str, base: str, links: Mapping[str, StampedPose]) -> Lida
         pose, frame = Pose3(*link.pose).compose(pose), link.frame
 
 
-def _planar_mount(pose: Pose3) -> LidarMount:
-    points_down = 1 - 2 * (pose.qx * pose.qx + pose.qy * pose.qy) < 0  # the z axis
-    return LidarMount(pose.plane, points_down)
+def is_upside_down(mount: Pose3) -> bool:
+    """Return whether the z axis of a lidar points down, so that its beams turn clockwise as seen from above."""
+    return 1 - 2 * (mount.qx * mount.qx + mount.qy * mount.qy) < 0

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.clock import NS_PER_SECOND
-from simscen.core.geometry import Pose2, Pose3
+from simscen.core.geometry import Pose3
 from simscen.record import topics
 from simscen.record.foreign.decoded_messages import Decoders
 from simscen.record.foreign.options import parse_frame_pair
 from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
-from simscen.record.foreign.transforms import LidarMount, TransformTree, lidar_mount
+from simscen.record.foreign.transforms import TransformTree, is_upside_down, lidar_mount
 from simscen.record.localization_logs.rows import (
     MAX_COORDINATE_M,
     LocalizationRows,
@@ -151,7 +151,7 @@ def _poses(topic: str, messages: Iterable[LoggedMessage], use_log_time: bool, no
 def _scans(topic: str, messages: _Messages, use_log_time: bool, notes: list[str]) -> Iterator[ScanRow]:
     """Yield the scans. Scans of a lidar that is mounted upside down are mirrored."""
     base = next((pose.child for *_, pose in messages.odometry if pose.child), "")
-    mounts: dict[str, LidarMount | None] = {}
+    mounts: dict[str, Pose3 | None] = {}
     for logged, index, scan in messages.scans:
         layout = (scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max)
         if any(math.isnan(value) for value in layout) or not all_within(layout[:2], MAX_COORDINATE_M):
@@ -161,9 +161,8 @@ def _scans(topic: str, messages: _Messages, use_log_time: bool, notes: list[str]
             if mounts[scan.frame] is None:
                 frames = f"{scan.frame!r} and {base or 'base_link'!r}"
                 notes.append(f"/tf_static does not connect {frames}; the lidar is assumed to be at the base")
-        pose, is_upside_down = mounts[scan.frame] or LidarMount(Pose2(0.0, 0.0), False)
-        ranges = scan.ranges
-        if is_upside_down:
+        mount, ranges = mounts[scan.frame] or Pose3(), scan.ranges
+        if is_upside_down(mount):
             ranges = ranges[::-1]
             layout = (-(scan.angle_min + (len(ranges) - 1) * scan.angle_increment), *layout[1:])
-        yield ScanRow(_time(logged, scan, use_log_time), index, ranges, layout, pose)
+        yield ScanRow(_time(logged, scan, use_log_time), index, ranges, layout, mount.plane)

@@ -25,7 +25,13 @@ from simscen.reconstruction.drive.recorded_drive import no_values
 from simscen.reconstruction.reasons import FoundFault, Reason
 from simscen.reconstruction.scenario.robot_file import observed_limits, write_robot_file
 from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
-from simscen.reconstruction.static_world import StaticWorld, map_from_scans, world_from_map
+from simscen.reconstruction.static_world import (
+    StaticWorld,
+    beam_ends,
+    lidar_poses,
+    map_from_scans,
+    world_from_map,
+)
 from simscen.worlds.maps.ros_map import save_map
 
 LIDAR_SILENT = (8.0, 9.5)
@@ -160,6 +166,34 @@ def test_the_mount_of_the_lidar_can_be_on_tf(tmp_path):
     moved = [replace(said, topic="/tf") if said.topic == "/tf_static" else said for said in messages()]
     drive = read_drive(logs.write_bag(tmp_path / "bag", moved))
     assert not any("mount" in note for note in drive.notes)
+
+
+def upside_down(said):
+    if said.topic == "/tf_static":
+        said.message.transforms[0].transform.rotation = logs.T["geometry_msgs/msg/Quaternion"](
+            x=1.0, y=0.0, z=0.0, w=0.0
+        )
+    if said.topic == "/scan":
+        said.message.ranges = np.roll(
+            said.message.ranges[::-1], 1
+        )  # the first beam points backward and has no mirror image
+
+
+def clockwise(said):
+    if said.topic == "/scan":
+        said.message.angle_min, said.message.angle_increment = math.pi, -said.message.angle_increment
+        said.message.ranges = np.roll(said.message.ranges[::-1], 1)
+
+
+@pytest.mark.parametrize("change", [upside_down, clockwise])
+def test_scans_of_a_lidar_that_turns_clockwise_hit_the_walls(change, tmp_path):
+    changed = messages()
+    for said in changed:
+        change(said)
+    drive = read_drive(logs.write_bag(tmp_path / "bag", changed))
+    ends = beam_ends(lidar_poses(drive, drive.scans), drive.scans.angles, drive.scans.ranges)[drive.scans.is_hit()]
+    assert np.median(drives.room().distance_to_walls(ends)) < 0.1
+    assert np.all(np.diff(drive.scans.angles) > 0)
 
 
 def test_a_fault_that_does_not_fit_the_sensor_is_only_mentioned(tmp_path, monkeypatch):

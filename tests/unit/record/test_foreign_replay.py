@@ -65,6 +65,21 @@ def test_scans_map_and_lidar_mounts_are_read(tmp_path: Path, write: Callable[...
     assert read.sensors.mounts["laser"].x == pytest.approx(0.2)
 
 
+def test_scan_of_a_lidar_that_is_upside_down_is_mirrored(tmp_path: Path) -> None:
+    turned = link(BEGIN, "base_link", "lidar", 0.2)
+    turned.transforms[0].transform.rotation = T["geometry_msgs/msg/Quaternion"](x=1.0, y=0.0, z=0.0, w=0.0)
+    log = [Message("/tf_static", BEGIN, turned), *drive(2.0)]
+    for message in log:
+        if message.topic == "/scan":
+            message.message.ranges = np.where(np.arange(8) == 0, 1.0, np.inf).astype(np.float32)
+    write_mcap(tmp_path / "log.mcap", log)
+    read = read_foreign_log(tmp_path / "log.mcap", ForeignLogOptions("/mocap"), with_sensors=True)
+    ((_, data), *_) = read.sensors.scans["/scan"]
+    (hit,) = read.sensors.decode_scan(data).points()
+    # The only beam with a hit points at -1 rad in the frame of the lidar, which is on the left of the robot.
+    assert hit == pytest.approx([0.2 + np.cos(1.0), np.sin(1.0)], abs=1e-6)
+
+
 def test_replay_page_is_written_with_and_without_criteria(simscen, tmp_path: Path) -> None:
     log = tmp_path / "monday.mcap"
     write_mcap(log, [a_map(), mounted(), *drive(2.0)])
