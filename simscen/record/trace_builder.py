@@ -18,7 +18,7 @@ from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.records.events import Event
 from simscen.core.records.trace import Moment, Samples, Ticks, Trace
 from simscen.record.messages import event_text
-from simscen.record.messages.encode_arrays import planar_poses
+from simscen.record.messages.encode import planar_poses
 from simscen.record.trace_thinning import Thinning
 
 _pack_tick = struct.Struct("d").pack

@@ -17,7 +17,7 @@ from simscen.core.records.events import Event, EventKind
 from simscen.reconstruction.drive.log_messages import LogMessages
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal, TimedValues
 from simscen.reconstruction.reasons import windows
-from simscen.record.foreign.trace_reader import goal_events
+from simscen.record.foreign.goal_events import goal_events
 from simscen.record.messages import event_text
 
 SAME_GOAL_M = 0.05

@@ -1,124 +1,111 @@
-"""Encoders of ROS 2 messages of fixed size, and of images. Encoders of other messages are in encode_arrays.py.
+"""Encoders that return the bytes of ROS 2 messages: scans, images, paths, particles, transforms, grids, and others.
 
-The encoders return a Template, except `boolean` and `image`, which return the bytes of the message. `Template.packer()`
-returns a function that takes the values of the fields of the template, in the order of the docstring, and returns the
-bytes of the message.
-
-The field `stamp` is seconds and nanoseconds, `pose` is x, y, z and a quaternion x, y, z, w, and `twist` is vx, vy, wz.
-Unknown covariances are zeros.
+numpy serializes the arrays without slow Python loops.
 """
 
-from collections.abc import Sequence
+import struct
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from simscen.core.clock import Stamp
-from simscen.peer.cdr import Writer
+from simscen.core.environment.occupancy_grid import OccupancyGrid
+from simscen.core.geometry import Array, Pose3
+from simscen.core.messages.sensor_data import Scan
+from simscen.peer.cdr import HEADER, Writer
 from simscen.record.messages.template import Template
 
-_NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
-_TWIST = "2d24xd"
-"""Format of six numbers, as in `struct`: vx, vy, wz, and zeros for the other three."""
-_COVARIANCE = "2d24x3d24xd144x2d24xd"
-"""Format of a 6 x 6 covariance: the nine numbers for x, y, yaw, and zeros for the others."""
-_TWIST_VARIANCES = "d48xd216xd"
-"""Format of a 6 x 6 covariance: the variances of vx, vy, wz on the diagonal, and zeros for the others."""
+Link = tuple[str, str, Stamp, Pose3]
+"""Frame, child frame, stamp, and pose of the child in the frame."""
 
 
-def clock() -> Template:
-    """Return the template of rosgraph_msgs/msg/Clock, with the field stamp."""
-    return Template().slot("iI", "*stamp")
+def planar_poses(points: Array) -> Array:
+    """Return poses (n, 7) of points (n, 3 or more) x, y, yaw. A pose is x, y, z and a quaternion x, y, z, w."""
+    poses, halves = np.zeros((len(points), 7)), points[:, 2] / 2
+    poses[:, :2] = points[:, :2]
+    poses[:, 5], poses[:, 6] = np.sin(halves), np.cos(halves)
+    return poses
 
 
-def float64() -> Template:
-    """Return the template of std_msgs/msg/Float64, with the field value."""
-    return Template().slot("d", "value")
+def laser_scan(frame: str, stamp: Stamp, scan: Scan) -> bytes:
+    """Return the bytes of a sensor_msgs/msg/LaserScan without intensities, which was measured at `stamp`."""
+    n = len(scan.ranges)
+    last = scan.angle_min + scan.angle_increment * (n - 1)
+    angles = scan.angle_min, last, scan.angle_increment
+    head = _header_packer(frame, "7fI")(stamp, (*angles, 0.0, 0.0, scan.range_min, scan.range_max, n))
+    return head + scan.ranges.astype("<f4").tobytes() + b"\0\0\0\0"
 
 
-def twist() -> Template:
-    """Return the template of geometry_msgs/msg/Twist, with the field twist."""
-    return Template().slot(_TWIST, "*twist")
+def path(frame: str, stamp: Stamp, points: Array) -> bytes:
+    """Return the bytes of a nav_msgs/msg/Path of `points` (n, 3) x, y, yaw. Every pose has the header of the path."""
+    head = _header_packer(frame, "I")(stamp, (len(points),))
+    if not len(points):
+        return head
+    poses = planar_poses(points).astype("<f8")
+    first = Template(prefix=b"", start=len(head) - len(HEADER)).put("iI", *stamp).string(frame).align(8).buffer
+    following = Template(prefix=b"").put("iI", *stamp).string(frame).align(8).buffer
+    rest = np.empty((len(points) - 1, len(following) + 56), dtype=np.uint8)
+    rest[:, : len(following)] = np.frombuffer(following, dtype=np.uint8)
+    rest[:, len(following) :] = poses[1:].view(np.uint8).reshape(-1, 56)
+    return b"".join((head, first, poses[0].tobytes(), rest.tobytes()))
 
 
-def odometry(frame: str, child: str) -> Template:
-    """Return the template of nav_msgs/msg/Odometry without covariances, with the fields stamp, pose, twist.
+def particle_cloud(frame: str, stamp: Stamp, particles: Array) -> bytes:
+    """Return the bytes of a nav2_msgs/msg/ParticleCloud of `particles` (n, 4) x, y, yaw, weight; n > 0."""
+    cloud = np.empty((len(particles), 8), dtype="<f8")
+    cloud[:, :7] = planar_poses(particles)
+    cloud[:, 7] = particles[:, 3]
+    head = Writer().put("iI", *stamp).string(frame).put("I", len(particles)).align(8)
+    return head.done() + cloud.tobytes()
 
-    `pose` is the pose of the frame `child` in `frame`. `twist` is in the frame `child`.
-    """
-    return (
-        _stamped(frame)
-        .string(child)
-        .slot("7d", "*pose")
-        .put("36d", *[0.0] * 36)
-        .slot(_TWIST, "*twist")
-        .put("36d", *[0.0] * 36)
+
+@lru_cache(maxsize=256)
+def _header_packer(frame: str, codes: str) -> Callable[..., bytes]:
+    """Return a function (stamp, numbers) that packs a std_msgs/msg/Header and numbers with the given `struct` codes."""
+    return Template().slot("iI", "*stamp").string(frame).slot(codes, "*numbers").packer()
+
+
+def tf_message(links: Sequence[Link]) -> bytes:
+    """Return the bytes of a tf2_msgs/msg/TFMessage with a transform for each link."""
+    parts, start = [HEADER, struct.pack("<I", len(links))], 4
+    for frame, child, stamp, pose in links:
+        parts.append(_transform_packer(frame, child, start)(stamp, pose))
+        start = 0
+    return b"".join(parts)
+
+
+@lru_cache(maxsize=1024)
+def _transform_packer(frame: str, child: str, start: int) -> Callable[[Stamp, Pose3], bytes]:
+    """Return a function (stamp, pose) that packs a transform, which starts `start` bytes after a multiple of eight."""
+    transform = Template(prefix=b"", start=start).slot("iI", "*stamp").string(frame).string(child)
+    return transform.slot("7d", "*pose").packer()
+
+
+def occupancy_grid(frame: str, stamp: Stamp, grid: OccupancyGrid) -> bytes:
+    """Return the bytes of a nav_msgs/msg/OccupancyGrid."""
+    height, width = grid.shape
+    head = (
+        Writer()
+        .put("iI", *stamp)
+        .string(frame)
+        .put("iI", *stamp)
+        .put("f", grid.resolution)
+        .put("2I", width, height)
+        .put("7d", *Pose3.planar(grid.origin))
+        .put("I", grid.cells.size)
     )
+    return head.done() + grid.cells.astype(np.int8).tobytes()
 
 
-def odometry_with_covariance(frame: str, child: str) -> Template:
-    """Return the template of nav_msgs/msg/Odometry, with the fields stamp, pose, covariance, twist, variances.
+def pose_array(frame: str, stamp: Stamp, points: Array) -> bytes:
+    """Return the bytes of a geometry_msgs/msg/PoseArray of points (n, 3 or more) x, y, yaw; n > 0.
 
-    `covariance` is 3 x 3 for x, y, yaw, row by row. `variances` are the variances of vx, vy, wz.
+    The numbers are rounded to 32-bit precision.
     """
-    return (
-        _stamped(frame)
-        .string(child)
-        .slot("7d", "*pose")
-        .slot(_COVARIANCE, "*covariance")
-        .slot(_TWIST, "*twist")
-        .slot(_TWIST_VARIANCES, "*variances")
-    )
-
-
-def imu(frame: str) -> Template:
-    """Return the template of sensor_msgs/msg/Imu.
-
-    Its fields are stamp, angular_velocity (x, y, z), angular_velocity_variance, linear_acceleration (x, y, z), and
-    linear_acceleration_variance. The variance is the same for all axes. The message has no orientation.
-    """
-    message = _stamped(frame).put("4d", *_NO_ROTATION).put("9d", -1.0, *[0.0] * 8)
-    for vector in ("angular_velocity", "linear_acceleration"):
-        message.slot("3d", f"*{vector}")
-        for _ in range(2):
-            message.slot("d24x", f"{vector}_variance")
-        message.slot("d", f"{vector}_variance")
-    return message
-
-
-def pose_with_covariance(frame: str) -> Template:
-    """Return the template of geometry_msgs/msg/PoseWithCovarianceStamped, with the fields stamp, pose, covariance.
-
-    `covariance` is 3 x 3 for x, y, yaw, row by row.
-    """
-    return _stamped(frame).slot("7d", "*pose").slot(_COVARIANCE, "*covariance")
-
-
-def pose_stamped(frame: str) -> Template:
-    """Return the template of geometry_msgs/msg/PoseStamped, with the fields stamp, pose."""
-    return _stamped(frame).slot("7d", "*pose")
-
-
-def transforms(links: Sequence[tuple[str, str, str]], serialized_count: int = 0, serialized_bytes: int = 0) -> Template:
-    """Return the template of tf2_msgs/msg/TFMessage, with the fields stamp, one pose for each link, and `serialized`.
-
-    A link is (frame, child frame, name of the field for the pose). All transforms have the same stamp. `serialized` are
-    the bytes of `serialized_count` further transforms from a TransformBatchPacker, `serialized_bytes` in total. Without
-    further transforms, the field does not exist.
-    """
-    message = Template().put("I", len(links) + serialized_count)
-    for frame, child, pose in links:
-        message.slot("iI", "*stamp")
-        message.string(frame)
-        message.string(child)
-        message.slot("7d", f"*{pose}")
-    if serialized_count:
-        message.slot(f"{serialized_bytes}s", "serialized")
-    return message
-
-
-def _stamped(frame: str) -> Template:
-    return Template().slot("iI", "*stamp").string(frame)
+    head = Writer().put("iI", *stamp).string(frame).put("I", len(points)).align(8)
+    return head.done() + planar_poses(points).astype("<f4").astype("<f8").tobytes()
 
 
 def boolean(value: bool) -> bytes:
@@ -144,3 +131,42 @@ def image(frame: str, stamp: Stamp, pixels: "npt.NDArray[np.uint8] | npt.NDArray
         .put("2I", len(content) // height if height else 0, len(content))
     )
     return head.done() + content
+
+
+Bytes = npt.NDArray[np.uint8]
+"""Bytes of one message (n,) or of several messages in rows (k, n)."""
+
+
+class TransformBatchPacker:
+    """Callable encoder of the transforms of the same links at many times.
+
+    The bytes for each time are the end of a tf2_msgs/msg/TFMessage. The caller must put another transform before them.
+    """
+
+    def __init__(self, links: Sequence[tuple[str, str]]) -> None:
+        """Prepare the layout of the transforms. Each link is (frame, child frame)."""
+        message = Template(prefix=b"")
+        self._slices = list[tuple[slice, slice]]()
+        for frame, child in links:
+            stamp = _reserve(message, "iI")
+            message.string(frame)
+            message.string(child)
+            self._slices.append((stamp, _reserve(message, "7d")))
+        self._empty = np.frombuffer(message.buffer, np.uint8)
+        self.size = len(self._empty)
+        """Size in bytes of these transforms in one message."""
+
+    def __call__(self, stamps: Sequence[Stamp], poses: Array) -> Bytes:
+        """Return the bytes (n, size) of the transforms at n `stamps`. `poses` (n, links, 7) are of the child frames."""
+        packed = np.tile(self._empty, (len(poses), 1))
+        times, numbers = np.array(stamps, "<u4").view(np.uint8), np.ascontiguousarray(poses, "<f8").view(np.uint8)
+        for column, (stamp, pose) in enumerate(self._slices):
+            packed[:, stamp], packed[:, pose] = times, numbers[:, column]
+        return packed
+
+
+def _reserve(message: Template, codes: str) -> slice:
+    """Append a slot, and return the slice of its bytes in the message."""
+    message.slot(codes, "*numbers")
+    end = len(message.buffer)
+    return slice(end - struct.calcsize(f"<{codes}"), end)

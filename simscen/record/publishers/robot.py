@@ -14,8 +14,8 @@ from simscen.peer import messages
 from simscen.record import frame_names, topics
 from simscen.record.frame_names import RobotFrames
 from simscen.record.log_header import LogHeader
-from simscen.record.messages import encode, encode_arrays, event_text
-from simscen.record.messages.encode_arrays import Bytes, TransformBatchPacker
+from simscen.record.messages import encode, event_text, message_templates
+from simscen.record.messages.encode import Bytes, TransformBatchPacker
 from simscen.record.publishers.message_sinks import BatchWriter, LogPublisher, MessageSink
 from simscen.record.publishers.scene import ScenePublisher
 from simscen.record.publishers.sensors import SensorPublisher
@@ -28,7 +28,7 @@ class EventPublisher:
     def __init__(self, out: MessageSink, time: Clock, case: Case) -> None:
         self._out, self._time = out, time
         self._goals = {goal.name: goal.pose for goal in case.every_goal}
-        self._goal = encode.pose_stamped(frame_names.MAP).packer()
+        self._goal = message_templates.pose_stamped(frame_names.MAP).packer()
 
     def write(self, now: int, event: Event) -> None:
         """Publish an event. `now` is simulated time in ns."""
@@ -69,7 +69,7 @@ class RobotPublisher:
         """Selects the samples to publish. A TraceBuilder of the same robot can use it as well."""
         self.flush_if_due = out.flush_if_due
         if header.map is not None:
-            out.publish(topics.MAP, 0, encode_arrays.occupancy_grid(frame_names.MAP, (0, 0), header.map))
+            out.publish(topics.MAP, 0, encode.occupancy_grid(frame_names.MAP, (0, 0), header.map))
         if header.robot_description:
             out.publish(topics.ROBOT_DESCRIPTION, 0, messages.string(header.robot_description))
         self._truth = TruthPublisher(out, time, thinning, frames, publishes_clock)
@@ -110,8 +110,8 @@ class StackPublisher:
 
     def __init__(self, out: MessageSink, time: Clock, thinning: Thinning, frames: RobotFrames) -> None:
         self._out, self._time, self._thinning, self._frames = out, time, thinning, frames
-        self._command = out.batch_writer([(topics.COMMAND, encode.twist())])
-        self._belief = out.batch_writer([(topics.BELIEF, encode.pose_with_covariance(frame_names.MAP))])
+        self._command = out.batch_writer([(topics.COMMAND, message_templates.twist())])
+        self._belief = out.batch_writer([(topics.BELIEF, message_templates.pose_with_covariance(frame_names.MAP))])
         self._particle_times = Throttle(time.rate, PARTICLE_RATE_HZ)
         self._pose_array_times = Throttle(time.rate, POSE_ARRAY_RATE_HZ)
         self._local_plan_times = Throttle(time.rate, LOCAL_PLAN_RATE_HZ)
@@ -122,14 +122,14 @@ class StackPublisher:
             self._write_belief(now, tick, decision.belief)
         if decision.plan is not None:
             stamp = self._time.stamp(decision.plan.tick)
-            self._out.publish(topics.PLAN, now, encode_arrays.path(frame_names.MAP, stamp, decision.plan.points))
+            self._out.publish(topics.PLAN, now, encode.path(frame_names.MAP, stamp, decision.plan.points))
         if decision.local_plan is not None and self._local_plan_times.passes(tick):
-            path = encode_arrays.path(frame_names.MAP, self._time.stamp(tick), decision.local_plan.points)
+            path = encode.path(frame_names.MAP, self._time.stamp(tick), decision.local_plan.points)
             self._out.publish(topics.LOCAL_PLAN, now, path)
         for costmap in decision.costmaps:
             topic = topics.GLOBAL_COSTMAP if costmap.name == "global" else topics.LOCAL_COSTMAP
             stamp, frame = self._time.stamp(tick), self._frames.log_frame(costmap.frame)
-            self._out.publish(topic, now, encode_arrays.occupancy_grid(frame, stamp, costmap.grid))
+            self._out.publish(topic, now, encode.occupancy_grid(frame, stamp, costmap.grid))
         if self._thinning.keeps_command(tick, decision.command):
             self._command.write(now, decision.command)
         for line in decision.lines:
@@ -140,11 +140,11 @@ class StackPublisher:
         pose = Pose3.planar(belief.pose)
         self._belief.write(now, stamp, pose, belief.covariance.ravel().tolist())
         if len(belief.particles) and self._particle_times.passes(tick):
-            cloud = encode_arrays.particle_cloud(frame_names.MAP, stamp, belief.particles)
+            cloud = encode.particle_cloud(frame_names.MAP, stamp, belief.particles)
             self._out.publish(topics.PARTICLES, now, cloud)
         if len(belief.particles) and self._pose_array_times.passes(tick):
             subset = belief.particles[:: -(-len(belief.particles) // MAX_ARRAY_POSES)]
-            self._out.publish(topics.PARTICLE_POSES, now, encode_arrays.pose_array(frame_names.MAP, stamp, subset))
+            self._out.publish(topics.PARTICLE_POSES, now, encode.pose_array(frame_names.MAP, stamp, subset))
 
 
 class TruthPublisher:
@@ -157,9 +157,12 @@ class TruthPublisher:
         self, out: MessageSink, time: Clock, thinning: Thinning, frames: RobotFrames, publishes_clock: bool
     ) -> None:
         self._out, self._time, self._thinning, self._frame = out, time, thinning, frames.truth
-        truth = (topics.TRUTH, encode.odometry(frame_names.MAP, frames.truth)), (topics.CLEARANCE, encode.float64())
-        self._common_layouts = ((topics.CLOCK, encode.clock()), *truth) if publishes_clock else truth
-        robot = topics.TF, encode.transforms([(frame_names.MAP, self._frame, "pose")])
+        truth = (
+            (topics.TRUTH, message_templates.odometry(frame_names.MAP, frames.truth)),
+            (topics.CLEARANCE, message_templates.float64()),
+        )
+        self._common_layouts = ((topics.CLOCK, message_templates.clock()), *truth) if publishes_clock else truth
+        robot = topics.TF, message_templates.transforms([(frame_names.MAP, self._frame, "pose")])
         self._without_tf = out.batch_writer(self._common_layouts)
         self._without_objects = out.batch_writer((*self._common_layouts, robot))
         self._precomputed: _PrecomputedBatch | None = None
@@ -180,7 +183,7 @@ class TruthPublisher:
         self._without_tf.write(now, stamp, *fields)
         links = [(frame_names.MAP, frame_names.object_frame(name), stamp, pose) for name, pose in poses.items()]
         robot = frame_names.MAP, self._frame, stamp, truth.pose
-        self._out.publish(topics.TF, now, encode_arrays.tf_message([robot, *links]))
+        self._out.publish(topics.TF, now, encode.tf_message([robot, *links]))
 
     def _precompute(self, predicted: PredictedPoses) -> "_PrecomputedBatch":
         """Serialize the transforms of all objects for all ticks with predicted poses."""
@@ -189,7 +192,7 @@ class TruthPublisher:
             packer, writer = previous.packer, previous.writer
         else:
             packer = TransformBatchPacker([(frame_names.MAP, frame_names.object_frame(name)) for name in names])
-            tf = encode.transforms([(frame_names.MAP, self._frame, "pose")], len(names), packer.size)
+            tf = message_templates.transforms([(frame_names.MAP, self._frame, "pose")], len(names), packer.size)
             writer = self._out.batch_writer((*self._common_layouts, (topics.TF, tf)))
         stamps = [self._time.stamp(tick) for tick in predicted.ticks]
         return _PrecomputedBatch(predicted, packer, writer, packer(stamps, predicted.table))

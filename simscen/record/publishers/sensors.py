@@ -8,7 +8,7 @@ from simscen.core.clock import Clock, Stamp
 from simscen.core.geometry import Pose3
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Readings, Scan
 from simscen.record import frame_names, topics
-from simscen.record.messages import encode, encode_arrays
+from simscen.record.messages import encode, message_templates
 from simscen.record.publishers.message_sinks import BatchWriter, MessageSink
 from simscen.record.topics import Topic
 from simscen.record.trace_thinning import Thinning
@@ -63,7 +63,7 @@ class SensorPublisher:
         }
         self._used_defaults: set[str] = set()
         self._frames = frames
-        self._pack_odometry = encode.odometry_with_covariance(self._frames.odom, self._frames.base).packer()
+        self._pack_odometry = message_templates.odometry_with_covariance(self._frames.odom, self._frames.base).packer()
         self._mounts = dict(mounts)
         self.map_from_odom: Pose3 | None = None
         self.sensor_topics = [(name, topic) for name, kind in sensors.items() for topic in self._topics_of(name, kind)]
@@ -113,18 +113,18 @@ class SensorPublisher:
 
     def _odometry_writers(self, topic: Topic) -> "_OdometryWriters":
         odom, base = self._frames.odom, self._frames.base
-        odometry = topic, encode.odometry_with_covariance(odom, base)
+        odometry = topic, message_templates.odometry_with_covariance(odom, base)
         links = (odom, base, "pose"), (frame_names.MAP, odom, "map_from_odom")
         return _OdometryWriters(
-            self._out.batch_writer((odometry, (topics.TF, encode.transforms(links[:1])))),
-            self._out.batch_writer((odometry, (topics.TF, encode.transforms(links)))),
+            self._out.batch_writer((odometry, (topics.TF, message_templates.transforms(links[:1])))),
+            self._out.batch_writer((odometry, (topics.TF, message_templates.transforms(links)))),
         )
 
     def _write_scan(self, now: int, scan: Scan) -> None:
         if scan.sensor not in self._mounts:
             self._mounts[scan.sensor] = scan.tilted_mount or Pose3.planar(scan.mount)
             self._publish_mounts(now)
-        data = encode_arrays.laser_scan(self._frames.sensor_frame(scan.sensor), self._time.stamp(scan.tick), scan)
+        data = encode.laser_scan(self._frames.sensor_frame(scan.sensor), self._time.stamp(scan.tick), scan)
         self._out.publish(self.topic_of(scan), now, data)
 
     def _write_imu(self, now: int, imu: Imu) -> None:
@@ -132,7 +132,7 @@ class SensorPublisher:
         if writer is None:
             topic = self._topic(imu.sensor, "Imu")
             frame = self._frames.sensor_frame(imu.sensor) if imu.sensor in self._mounts else self._frames.base
-            writer = self._imu_writers[imu.sensor] = self._out.batch_writer([(topic, encode.imu(frame))])
+            writer = self._imu_writers[imu.sensor] = self._out.batch_writer([(topic, message_templates.imu(frame))])
         writer.write(
             now, self._time.stamp(imu.tick),
             imu.angular_velocity, imu.angular_velocity_variance,
@@ -154,7 +154,7 @@ class SensorPublisher:
         base = self._frames.base
         links = [(base, self._frames.sensor_frame(name), _START, pose) for name, pose in self._mounts.items()]
         if links:
-            self._out.publish(topics.TF_STATIC, now, encode_arrays.tf_message(links))
+            self._out.publish(topics.TF_STATIC, now, encode.tf_message(links))
 
     def _topic(self, sensor: str, kind: str) -> Topic:
         """Return the topic of a sensor: `/default` for the first sensor of a kind, `/NAME/default` for the others."""

@@ -16,7 +16,7 @@ from simscen.core.messages.sensor_data import Odometry, Reading, Readings, Scan
 from simscen.peer import messages
 from simscen.record import frame_names, topics
 from simscen.record.frame_names import RobotFrames
-from simscen.record.messages import encode, encode_arrays
+from simscen.record.messages import encode, message_templates
 from simscen.record.publishers.message_sinks import BatchWriter, Layouts
 from simscen.record.publishers.sensors import SensorPublisher
 from simscen.record.topics import Topic
@@ -48,18 +48,18 @@ class StepPublisher:
     def latch(self, grid: OccupancyGrid | None, topic: Topic) -> None:
         """Publish a map or mask once, with the first step. Does nothing for None."""
         if grid is not None:
-            self._latched.append((topic, encode_arrays.occupancy_grid(frame_names.MAP, _FIRST_STAMP, grid)))
+            self._latched.append((topic, encode.occupancy_grid(frame_names.MAP, _FIRST_STAMP, grid)))
 
     def publish_grid(self, tick: int, grid: OccupancyGrid, topic: Topic) -> None:
         """Publish a map or mask with the next step."""
-        data = encode_arrays.occupancy_grid(frame_names.MAP, self._time.stamp(tick), grid)
+        data = encode.occupancy_grid(frame_names.MAP, self._time.stamp(tick), grid)
         self.publish(topic, self._time.nanoseconds(tick), data)
 
     def latch_robot(self, description: str, estimate: Estimate) -> None:
         """Publish the robot description and the initial pose once, with the first step."""
         self._latched.append((topics.ROBOT_DESCRIPTION, messages.string(description)))
         if estimate.pose is not None:
-            pack_pose = encode.pose_with_covariance(frame_names.MAP).packer()
+            pack_pose = message_templates.pose_with_covariance(frame_names.MAP).packer()
             covariance = np.diag(np.square(estimate.std)).ravel().tolist()
             self._latched.append((INITIAL_POSE, pack_pose(_FIRST_STAMP, Pose3.planar(estimate.pose), covariance)))
 

@@ -30,7 +30,7 @@ from simscen.model.stack import StackSpec
 from simscen.peer import Goal, Peer, Step, messages, wire
 from simscen.peer.client import EVENTS, Message
 from simscen.record import topics
-from simscen.record.messages import encode_arrays
+from simscen.record.messages import encode
 from simscen.run.external.protocol import EXACT_SUFFIX, KEEPOUT_MASK, SPEED_MASK
 from simscen.stack.build import build_stack
 from simscen.stack.protocols import RobotModel, Stack, Surroundings
@@ -165,7 +165,7 @@ class ReferenceStackPeer(Peer):
             step.publish(topics.LOCAL_PLAN.name + EXACT_SUFFIX, _encode_table(decision.local_plan.points))
         for costmap in decision.costmaps:
             topic = topics.GLOBAL_COSTMAP if costmap.name == "global" else topics.LOCAL_COSTMAP
-            step.publish(topic.name, encode_arrays.occupancy_grid(costmap.frame, step.stamp, costmap.grid))
+            step.publish(topic.name, encode.occupancy_grid(costmap.frame, step.stamp, costmap.grid))
         if decision.odometry:
             rows = [
                 (odom.tick, *odom.pose, *odom.twist, *odom.twist_variance, *odom.pose_covariance)

@@ -14,7 +14,7 @@ from simscen.core.geometry import Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.record import topics
 from simscen.record.mcap_writer import McapWriter
-from simscen.record.messages import encode
+from simscen.record.messages import message_templates
 from simscen.record.publishers.message_sinks import BatchWriter, LogPublisher
 from simscen.record.topics import load_message_types
 
@@ -127,7 +127,7 @@ def test_the_same_calls_give_the_same_bytes() -> None:
 
 def test_batched_messages_have_the_same_bytes_as_single_ones() -> None:
     """This holds also if a chunk ends, or another message is written, between them."""
-    layouts = (topics.TRUTH, encode.odometry("map", "base")), (topics.CLEARANCE, encode.float64())
+    layouts = (topics.TRUTH, message_templates.odometry("map", "base")), (topics.CLEARANCE, message_templates.float64())
     pose, twist = Pose3(1.0, 2.0), Twist(0.5)
 
     def written(together: bool) -> bytes:

@@ -22,7 +22,7 @@ from simscen.core.records.run_result import Outcome, RunKey, RunResult
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.record.log_header import LogHeader
 from simscen.record.log_reader import Log
-from simscen.record.messages.encode_arrays import occupancy_grid
+from simscen.record.messages.encode import occupancy_grid
 from simscen.record.sensor_messages import SensorMessages
 from simscen.record.topics import GLOBAL_COSTMAP
 from simscen.report.replay import replay_page

@@ -14,7 +14,7 @@ import simscen.ros2
 from simscen.core.geometry.kinematics import Twist
 from simscen.peer import messages as peer_messages
 from simscen.peer.cdr import HEADER
-from simscen.record.messages import encode
+from simscen.record.messages import message_templates
 from simscen.ros2 import messages
 from simscen.ros2.graph_names import TopicNames
 from simscen.ros2.options import AdapterError
@@ -118,7 +118,7 @@ def test_a_big_endian_twist_is_read() -> None:
 
 
 def test_a_twist_has_the_same_bytes_as_in_the_log() -> None:
-    assert messages.write_twist((0.3, 0.1, 0, 0, 0, -0.7)) == encode.twist().packer()(Twist(0.3, 0.1, -0.7))
+    assert messages.write_twist((0.3, 0.1, 0, 0, 0, -0.7)) == message_templates.twist().packer()(Twist(0.3, 0.1, -0.7))
 
 
 def _alive(pid: int) -> bool:
