@@ -68,40 +68,23 @@ class TimeToGoal(Spec, Criterion):
         """Return the finding for the time from the tick `start` until the goal was reached."""
         if outcome.failure:
             return undecided(what, "the robot is expected to fail at this goal")
+        expected = f"to be there within {self.max:.2f} s"
+        detail = [f"goal {outcome.goal.name}: {outcome.summary}"]
         if start is None:
-            return self._judge_without_start(trace, what, outcome)
+            if outcome.end is None and has_ended(trace):
+                return missed(what, "never reached", expected, (trace, trace.end), detail)
+            return undecided(what, "the acceptance of its goal was not recorded", expected)
         if outcome.reached is not None:
             return at_most(what, trace.seconds(outcome.reached - start), self.max, "s", at=(trace, outcome.reached))
         if outcome.was_preempted:
             return undecided(what, outcome.summary)
-        expected = f"to be there within {self.max:.2f} s"
         so_far = trace.seconds(trace.end - start)
         if outcome.end is None and so_far > self.max:
-            return at_most(
-                what,
-                so_far,
-                self.max,
-                "s",
-                at=(trace, trace.end),
-                detail=[f"goal {outcome.goal.name}: {outcome.summary}"],
-            )
+            return at_most(what, so_far, self.max, "s", at=(trace, trace.end), detail=detail)
         if outcome.end is None and not has_ended(trace):
             return undecided(what, f"the log stops {so_far:.2f} s after the start, {outcome.summary}", expected)
         tick = trace.end if outcome.end is None else outcome.end.tick
-        detail = f"goal {outcome.goal.name}: {outcome.summary}"
-        return missed(what, "never reached", expected, (trace, tick), [detail])
-
-    def _judge_without_start(self, trace: Trace, what: str, outcome: GoalOutcome) -> Finding:
-        """Return the finding for a goal without a recorded acceptance.
-
-        It is failed if the log is complete and has no result of the goal, otherwise inconclusive.
-        """
-        expected = f"to be there within {self.max:.2f} s"
-        if outcome.end is None and has_ended(trace):
-            return missed(
-                what, "never reached", expected, (trace, trace.end), [f"goal {outcome.goal.name}: {outcome.summary}"]
-            )
-        return undecided(what, "the acceptance of its goal was not recorded", expected)
+        return missed(what, "never reached", expected, (trace, tick), detail)
 
 
 class PathLength(Spec, Criterion):
@@ -152,9 +135,7 @@ class PathLength(Spec, Criterion):
             return undecided(what, because, f"≤ {self.max_ratio:g}")
         limit = self.max_ratio * shortest
         context = f"({self.max_ratio:g} times the shortest path of {shortest:.2f} m)"
-        unreached = [
-            outcome for outcome in goal_outcomes(trace, case) if outcome.reached is None and not outcome.failure
-        ]
+        unreached = [one for one in goal_outcomes(trace, case) if one.reached is None and not one.failure]
         if unreached and path.length <= limit:
             name = unreached[0].goal.name
             return undecided(what, f"goal {name} was not reached, so the path is incomplete", context)

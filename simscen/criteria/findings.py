@@ -71,23 +71,11 @@ def counted(
 
     A bound of None is not checked. `noun` is the name of one event, e.g. "collision".
     """
-    measured = f"{count} {noun}" if count == 1 else f"{count} {_plural(noun)}"
+    plural = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
+    measured = f"{count} {noun if count == 1 else plural}"
     bounds = [] if low is None else [(count - low, f"≥ {low}")]
     bounds += [] if high is None else [(high - count, f"≤ {high}")]
-    return [
-        Finding(
-            _status(margin),
-            what,
-            measured,
-            limit,
-            float(margin),
-            "",
-            float(count),
-            *_tick_and_place(at),
-            detail=_detail_if_failed(margin, detail),
-        )
-        for margin, limit in bounds
-    ]
+    return [_finding(what, measured, limit, float(margin), "", float(count), at, detail) for margin, limit in bounds]
 
 
 def undecided(what: str, because: str, limit: str = "", detail: Sequence[str] = ()) -> Finding:
@@ -127,25 +115,23 @@ def _bound_finding(
         raise InvalidTrace(f"{what} is not a number")
     digits = decimals(value, limit)
     text = f"{relation} {format_quantity(limit, unit, digits)} {context}".rstrip()
-    return Finding(
-        _status(margin),
-        what,
-        format_quantity(value, unit, digits),
-        text,
-        margin,
-        unit,
-        value,
-        *_tick_and_place(at),
-        detail=_detail_if_failed(margin, detail),
-    )
+    return _finding(what, format_quantity(value, unit, digits), text, margin, unit, value, at, detail)
 
 
-def _status(margin: float) -> Status:
-    return Status.PASS if margin >= 0 else Status.FAIL
-
-
-def _detail_if_failed(margin: float, detail: Sequence[str]) -> tuple[str, ...]:
-    return tuple(detail) if margin < 0 else ()
+def _finding(
+    what: str,
+    measured: str,
+    limit: str,
+    margin: float,
+    unit: str,
+    value: float,
+    at: tuple[Trace, int] | None,
+    detail: Sequence[str],
+) -> Finding:
+    """Return a finding that passes if the margin is not negative. A passed finding has no details."""
+    if margin >= 0:
+        return Finding(Status.PASS, what, measured, limit, margin, unit, value, *_tick_and_place(at))
+    return Finding(Status.FAIL, what, measured, limit, margin, unit, value, *_tick_and_place(at), tuple(detail))
 
 
 def _tick_and_place(at: tuple[Trace, int] | None) -> tuple[int | None, tuple[float, float] | None]:
@@ -160,7 +146,3 @@ def decimals(value: float, limit: float) -> int:
     if value == limit or not math.isfinite(value) or not math.isfinite(limit):
         return 2
     return next((digits for digits in range(2, 9) if f"{value:.{digits}f}" != f"{limit:.{digits}f}"), 9)
-
-
-def _plural(noun: str) -> str:
-    return f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.messages.goals import FAILED, Goal
-from simscen.core.records.events import Event, EventKind
+from simscen.core.records.events import GOAL_END_KINDS, Event, EventKind
 from simscen.criteria.error_codes import error_code_name
 from simscen.criteria.trace_signals.ground_truth import truth
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 
 _ARRIVAL_KINDS = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED)
-_GOAL_END_KINDS = (*_ARRIVAL_KINDS, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
 
 
 @dataclass(frozen=True)
@@ -77,18 +76,18 @@ def goal_outcomes(trace: Trace, case: Case) -> list[GoalOutcome]:
     without reports gets the outcome of the next goal at which the robot stops, as Nav2 reports only whole actions.
     """
     reports = _reports_by_goal(trace)
-    earlier = _earlier_uses([goal.name for goal in case.goals])
+    unused = {name: iter(own) for name, own in reports.items()}
     found = [
-        GoalOutcome(goal, *_nth(reports.get(goal.name, []), earlier[k]), case.expected.get(goal.name, ""))
-        for k, goal in enumerate(case.goals)
+        GoalOutcome(goal, *next(unused.get(goal.name, iter(())), _NO_REPORT), case.expected.get(goal.name, ""))
+        for goal in case.goals
     ]
     found = [_with_outcome_of_next_stop(outcome, found[k + 1 :], reports) for k, outcome in enumerate(found)]
     for goal in case.sent:
         own = reports.get(goal.name, [])
         # A sent goal may preempt several poses of one drive at the same tick.
         preempting = {event.tick for event in trace.events if event.data.get("preempted_by") == goal.name}
-        sent = max(len(own), len(preempting))
-        found += [GoalOutcome(goal, *_nth(own, k)) for k in range(sent)]
+        missing = [_NO_REPORT] * (len(preempting) - len(own))
+        found += [GoalOutcome(goal, *report) for report in (*own, *missing)]
     return sorted(found, key=outcome_start)
 
 
@@ -130,24 +129,15 @@ def _with_outcome_of_next_stop(
     return replace(outcome, accepted=stop.accepted, end=replace(stop.end, kind=kind, name=outcome.goal.name))
 
 
-def _earlier_uses(names: list[str]) -> list[int]:
-    """Return how often each name occurs earlier in the list."""
-    uses: dict[str, int] = {}
-    counts = []
-    for name in names:
-        counts.append(uses.get(name, 0))
-        uses[name] = counts[-1] + 1
-    return counts
-
-
 _Report = tuple[int | None, Event | None]
 """Tick at which a goal was accepted, and the event that ended it; None if not reported."""
+_NO_REPORT: _Report = (None, None)
 
 
 def _reports_by_goal(trace: Trace) -> dict[str, list[_Report]]:
     """Return the reports on goals by name, in order."""
     found: dict[str, list[_Report]] = {}
-    for event in trace.of_kind(EventKind.GOAL_ACCEPTED, *_GOAL_END_KINDS):
+    for event in trace.of_kind(EventKind.GOAL_ACCEPTED, *GOAL_END_KINDS):
         reports = found.setdefault(event.name, [])
         if event.kind == EventKind.GOAL_ACCEPTED:
             reports.append((event.tick, None))
@@ -156,8 +146,3 @@ def _reports_by_goal(trace: Trace) -> dict[str, list[_Report]]:
         else:
             reports.append((None, event))
     return found
-
-
-def _nth(reports: list[_Report], k: int) -> _Report:
-    """Return the report with index k, or (None, None) if there is none."""
-    return reports[k] if k < len(reports) else (None, None)

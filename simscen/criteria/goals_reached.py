@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
@@ -21,6 +22,7 @@ from simscen.spec.places import GoalName
 from simscen.spec.quantities import NonNegativeAngle, NonNegativeLength, PositiveAngle, PositiveDuration, PositiveLength
 
 if TYPE_CHECKING:
+    from simscen.core.messages.goals import Goal
     from simscen.core.records.case import Case
     from simscen.core.records.trace import Trace
 
@@ -68,11 +70,8 @@ class GoalsReached(Spec, Criterion):
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return findings for distance, heading, and time of each reached goal, and one finding for each other goal."""
         outcomes = goal_outcomes(trace, case)
-        chosen = [
-            outcome
-            for outcome in outcomes
-            if any(matches_goal_name(outcome.goal.name, name) for name in self.goals or (None,))
-        ]
+        names: Sequence[str | None] = self.goals or (None,)
+        chosen = [one for one in outcomes if any(matches_goal_name(one.goal.name, name) for name in names)]
         findings = self._judge_unsent(trace, case, {outcome.goal.name for outcome in chosen})
         if not chosen and not findings:
             return [undecided("goals_reached", "the scenario has no goals", "reached")]
@@ -84,6 +83,8 @@ class GoalsReached(Spec, Criterion):
             else:
                 is_via = outcome.goal.via
                 findings += self._judge_via(trace, outcome, outcomes) if is_via else self._judge_reached(trace, outcome)
+                if self.within is not None:
+                    findings.append(_judge_time(trace, outcome, self.within))
                 findings += _judge_wait(trace, case, outcome, outcomes)
         if self.goals is None and all(outcome.was_preempted for outcome in chosen):
             findings.append(undecided("goals_reached", "every goal was preempted", "reached"))
@@ -103,21 +104,32 @@ class GoalsReached(Spec, Criterion):
         return findings
 
     def _judge_unreached(self, trace: Trace, outcome: GoalOutcome) -> Finding:
-        """Return the finding for a goal that the robot did not report as reached; a preempted goal does not fail."""
-        if not outcome.was_preempted:
-            return _unreached_finding(trace, outcome)
-        assert outcome.end is not None
-        if self.goals is None:
-            return held(f"goal {outcome.goal.name}", outcome.summary, "reached", (trace, outcome.end.tick))
-        return undecided(f"goal {outcome.goal.name}", outcome.summary, "reached")
+        """Return the finding for a goal that the robot did not report as reached.
+
+        It fails, unless the goal was preempted, or unless the log is truncated.
+        """
+        what = f"goal {outcome.goal.name}"
+        if outcome.end is None and not has_ended(trace):
+            return _truncated_log_finding(trace, outcome, "reached")
+        tick = trace.end if outcome.end is None else outcome.end.tick
+        if outcome.was_preempted:
+            if self.goals is None:
+                return held(what, outcome.summary, "reached", (trace, tick))
+            return undecided(what, outcome.summary, "reached")
+        details = []
+        if len(trace.truth):
+            details.append(f"{true_pose(trace, tick).distance(outcome.goal.pose):.2f} m from the goal at that time")
+        if outcome.end is None:
+            details.append(f"the run ended at t = {trace.seconds(trace.end):.2f} s: {end_reason(trace)}")
+        return missed(what, outcome.summary, "reached", (trace, tick), details)
 
     def _judge_reached(self, trace: Trace, outcome: GoalOutcome) -> list[Finding]:
-        """Return findings for distance, heading, and time at the report that the goal is reached."""
+        """Return findings for distance and heading at the report that the goal is reached."""
         goal, tick = outcome.goal, outcome.reached
         assert tick is not None
         what, pose = f"goal {goal.name}", true_pose(trace, tick)
-        details = _believed_distance(trace, outcome)
-        findings = [
+        details = _believed_distance(trace, goal, tick)
+        return [
             at_most(
                 what,
                 pose.distance(goal.pose),
@@ -137,44 +149,41 @@ class GoalsReached(Spec, Criterion):
                 detail=details,
             ),
         ]
-        if self.within is not None:
-            findings.append(self._judge_time(trace, outcome, self.within))
-        return findings
 
     def _judge_via(self, trace: Trace, outcome: GoalOutcome, outcomes: list[GoalOutcome]) -> list[Finding]:
-        """Return findings for the smallest distance from a via pose, and for the time of the report."""
+        """Return the finding for the smallest distance from a via pose."""
         tick, distance = closest_approach(trace, outcome, outcomes)
         limit, context = self._limit(outcome), "from the pose at the closest approach"
-        findings = [at_most(f"goal {outcome.goal.name}", distance, limit, "m", at=(trace, tick), context=context)]
-        if self.within is not None:
-            findings.append(self._judge_time(trace, outcome, self.within))
-        return findings
+        return [at_most(f"goal {outcome.goal.name}", distance, limit, "m", at=(trace, tick), context=context)]
 
     def _limit(self, outcome: GoalOutcome) -> float:
         """Return the maximum true distance from a goal in m."""
         return self.tolerance or outcome.goal.xy_tolerance + self.localization_margin
 
-    def _judge_time(self, trace: Trace, outcome: GoalOutcome, within: float) -> Finding:
-        """Return the finding for the time from the acceptance of a goal to the report that it is reached."""
-        what = f"goal {outcome.goal.name} time"
-        if outcome.accepted is None or outcome.reached is None:
-            return undecided(what, "its acceptance was not recorded", f"≤ {within:.2f} s")
-        elapsed = trace.seconds(outcome.reached - outcome.accepted)
-        return at_most(what, elapsed, within, "s", at=(trace, outcome.reached))
+
+def _judge_time(trace: Trace, outcome: GoalOutcome, within: float) -> Finding:
+    """Return the finding for the time from the acceptance of a goal to the report that it is reached."""
+    what = f"goal {outcome.goal.name} time"
+    if outcome.accepted is None or outcome.reached is None:
+        return undecided(what, "its acceptance was not recorded", f"≤ {within:.2f} s")
+    elapsed = trace.seconds(outcome.reached - outcome.accepted)
+    return at_most(what, elapsed, within, "s", at=(trace, outcome.reached))
 
 
 def _judge_expected_failure(trace: Trace, outcome: GoalOutcome) -> Finding:
     """Return the finding for a goal that the scenario expects to fail."""
-    what, expected = f"goal {outcome.goal.name}", _expected_failure_text(outcome)
+    expected = FAILED if outcome.failure == FAILED else f"failed with {outcome.failure}"
     if outcome.end is None and not has_ended(trace):
-        return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {outcome.summary}", expected)
+        return _truncated_log_finding(trace, outcome, expected)
     at = (trace, trace.end if outcome.end is None else outcome.end.tick)
     is_passed_via = outcome.goal.via and outcome.reached is not None  # the drive may fail after passing some poses
-    return (held if outcome.failed_as_expected or is_passed_via else missed)(what, outcome.summary, expected, at)
+    make_finding = held if outcome.failed_as_expected or is_passed_via else missed
+    return make_finding(f"goal {outcome.goal.name}", outcome.summary, expected, at)
 
 
-def _expected_failure_text(outcome: GoalOutcome) -> str:
-    return FAILED if outcome.failure == FAILED else f"failed with {outcome.failure}"
+def _truncated_log_finding(trace: Trace, outcome: GoalOutcome, expected: str) -> Finding:
+    because = f"the log stops at t = {trace.seconds(trace.end):.2f} s, {outcome.summary}"
+    return undecided(f"goal {outcome.goal.name}", because, expected)
 
 
 def _judge_wait(trace: Trace, case: Case, outcome: GoalOutcome, outcomes: list[GoalOutcome]) -> list[Finding]:
@@ -191,24 +200,11 @@ def _judge_wait(trace: Trace, case: Case, outcome: GoalOutcome, outcomes: list[G
     return [at_least(f"goal {outcome.goal.name} wait", waited, outcome.goal.wait, "s", at=(trace, later.accepted))]
 
 
-def _unreached_finding(trace: Trace, outcome: GoalOutcome) -> Finding:
-    """Return a failed finding for a goal that was not reached; an inconclusive one if the log is truncated."""
-    what = f"goal {outcome.goal.name}"
-    if outcome.end is None and not has_ended(trace):
-        return undecided(what, f"the log stops at t = {trace.seconds(trace.end):.2f} s, {outcome.summary}", "reached")
-    tick = trace.end if outcome.end is None else outcome.end.tick
-    reason = f"the run ended at t = {trace.seconds(trace.end):.2f} s: {end_reason(trace)}"
-    details = [reason] if outcome.end is None else []
-    if len(trace.truth):
-        details.insert(0, f"{true_pose(trace, tick).distance(outcome.goal.pose):.2f} m from the goal at that time")
-    return missed(what, outcome.summary, "reached", (trace, tick), details)
-
-
-def _believed_distance(trace: Trace, outcome: GoalOutcome) -> list[str]:
-    """Return a line with the distance of the estimated pose from the goal at the report; empty if it is unknown."""
-    tick, goal = outcome.reached, outcome.goal.pose
-    if tick is None or not len(trace.belief):
+def _believed_distance(trace: Trace, goal: Goal, tick: int) -> list[str]:
+    """Return a line with the distance of the estimated pose from the goal at `tick`; empty if it is unknown."""
+    if not len(trace.belief):
         return []
     x, y, yaw = check_samples(trace.belief, "the belief", trace).at(np.array([tick]))[0, :3].tolist()
-    angle = math.degrees(abs(wrap(yaw - goal.yaw)))
-    return [f"its estimated pose was {math.hypot(x - goal.x, y - goal.y):.2f} m and {angle:.0f}° from the goal"]
+    angle = math.degrees(abs(wrap(yaw - goal.pose.yaw)))
+    distance = math.hypot(x - goal.pose.x, y - goal.pose.y)
+    return [f"its estimated pose was {distance:.2f} m and {angle:.0f}° from the goal"]

@@ -10,12 +10,11 @@ from pydantic import model_validator
 
 from simscen.core.geometry.polygon_separation import POINT, separation, separation_from_boxes
 from simscen.core.geometry.polygons import polygon_defect
-from simscen.core.records.events import EventKind
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import InvalidTrace, at_least, undecided
 from simscen.criteria.timeline import NEVER_ENABLED, clip_samples, enabled_spans
-from simscen.criteria.trace_signals.ground_truth import Flags, truth
+from simscen.criteria.trace_signals.ground_truth import teleport_samples, truth
 from simscen.spec.base import Spec
 from simscen.spec.places import MaskFile, RegionName
 from simscen.spec.quantities import Duration, NonNegativeLength
@@ -128,7 +127,9 @@ def _smallest_distance(trace: Trace, poses: Samples, case: Case, distances: Dist
     yaw = np.unwrap(poses.values[:, 2])
     states = np.column_stack((poses.values[:, :2], yaw, distances(poses.values), poses.ticks))
     best = states[np.argmin(states[:, 3])]
-    driven = ~_is_teleported(trace, poses)
+    teleported = np.zeros(len(poses) + 1, dtype=bool)
+    teleported[teleport_samples(trace, poses.ticks)] = True
+    driven = ~teleported[1:-1]  # the intervals between two samples in which the robot was not teleported
     begin, end = states[:-1][driven], states[1:][driven]
     while len(begin):
         moved = np.hypot(*(end - begin)[:, :2].T) + radius * np.abs(end[:, 2] - begin[:, 2])
@@ -139,11 +140,3 @@ def _smallest_distance(trace: Trace, poses: Samples, case: Case, distances: Dist
         best = min((best, *middle), key=lambda state: float(state[3]))
         begin, end = np.vstack((begin, middle)), np.vstack((middle, end))
     return float(best[3]) - (0.0 if case.footprint else case.inscribed_radius), int(best[4])
-
-
-def _is_teleported(trace: Trace, poses: Samples) -> Flags:
-    """Return a mask (n - 1,) of the intervals between two samples in which the robot was teleported."""
-    placed = [event.tick for event in trace.of_kind(EventKind.ROBOT_PLACED)]
-    teleported = np.zeros(len(poses) + 1, dtype=bool)
-    teleported[np.searchsorted(poses.ticks, placed, side="right")] = True
-    return teleported[1:-1]

@@ -14,7 +14,7 @@ from simscen.core.statistics import chi2_quantile, nees_mean_bounds
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, missed, undecided
 from simscen.criteria.timeline import Span, end_reason, first_sustained, has_ended, never_started, spans
-from simscen.criteria.trace_signals.estimation_errors import DIMENSIONS, nees_samples, pose_error
+from simscen.criteria.trace_signals.estimation_errors import DIMENSIONS, NO_BELIEF, nees_samples, pose_error
 from simscen.spec.base import Spec
 from simscen.spec.places import DisturbanceName
 from simscen.spec.quantities import Duration, PositiveAngle, PositiveDuration, PositiveLength, Quantity
@@ -22,9 +22,6 @@ from simscen.spec.quantities import Duration, PositiveAngle, PositiveDuration, P
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
     from simscen.core.records.trace import Samples, Trace
-
-NO_BELIEF = "the robot never reported an estimated pose"
-"""Reason of inconclusive findings if the trace has no estimated pose."""
 
 
 class LocalizationError(Spec, Criterion):
@@ -74,9 +71,7 @@ class LocalizationError(Spec, Criterion):
             last = trace.seconds(int(error.ticks[-1]))
             because = f"the last belief is from t = {last:.2f} s, but the evaluation begins at {self.after:.2f} s"
             return [undecided("localization_error", because)]
-        return self._judge_bounds(trace, error.select(is_counted))
-
-    def _judge_bounds(self, trace: Trace, error: Samples) -> list[Finding]:
+        error = error.select(is_counted)
         distances, angles = error.values.T
         findings = []
         if self.max is not None:

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from simscen.core.messages.goals import matches_goal_name
-from simscen.core.records.events import Event, EventKind
+from simscen.core.records.events import GOAL_END_KINDS, Event, EventKind
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.error_codes import ErrorCodeValue, error_code_name
@@ -76,11 +76,7 @@ class ErrorCodeIs(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding."""
-        kinds = (
-            [EventKind.NAVIGATION_ENDED]
-            if self.goal is None
-            else [EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED]
-        )
+        kinds = [EventKind.NAVIGATION_ENDED] if self.goal is None else GOAL_END_KINDS
         what = "error code" if self.goal is None else f"error code of goal {self.goal}"
         end = _last(trace, *kinds, name=self.goal)
         if end is None:
@@ -107,9 +103,8 @@ def _missing_result(trace: Trace, what: str, expected: str) -> Finding:
     """Return a failed finding for a result that was never reported; inconclusive if the log is truncated."""
     when = f"t = {trace.seconds(trace.end):.2f} s"
     if has_ended(trace):
-        return missed(
-            what, "no result", expected, (trace, trace.end), [f"the run ended at {when}: {end_reason(trace)}"]
-        )
+        detail = [f"the run ended at {when}: {end_reason(trace)}"]
+        return missed(what, "no result", expected, (trace, trace.end), detail)
     return undecided(what, f"the log stops at {when}, before navigation ended", expected)
 
 
@@ -137,43 +132,29 @@ class NoFalseSuccess(Spec, Criterion):
         """Return findings for all goals that were reported as reached, and for all false reports of SUCCEEDED."""
         outcomes = goal_outcomes(trace, case)
         ended = trace.of_kind(EventKind.NAVIGATION_ENDED)
-        unknown = [
-            event
-            for event in trace.of_kind(EventKind.GOAL_REACHED, EventKind.GOAL_PASSED)
-            if event.name not in _goal_names(case)
-        ]
+        names = {goal.name for goal in case.every_goal}
+        arrivals = trace.of_kind(EventKind.GOAL_REACHED, EventKind.GOAL_PASSED)
+        unknown = [event for event in arrivals if event.name not in names]
         if not ended and not unknown and all(outcome.end is None for outcome in outcomes):
             return [undecided("no_false_success", "the robot reported nothing that could be false")]
         findings = [self._judge_goal(trace, outcome, outcomes) for outcome in outcomes if outcome.reached is not None]
         findings += [
             undecided(f"goal {event.name}", "reported reached, but the scenario has no such goal") for event in unknown
         ]
-        findings += [
-            finding for k in range(len(ended)) if (finding := _judge_success(trace, case, ended, k)) is not None
-        ]
+        findings += [finding for k in range(len(ended)) if (finding := _judge_success(trace, case, ended, k))]
         return findings or [held("no_false_success", "no success was claimed", "no false success")]
 
     def _judge_goal(self, trace: Trace, outcome: GoalOutcome, outcomes: list[GoalOutcome]) -> Finding:
         """Return the finding for the true distance from a goal that the robot reported as reached or passed."""
         assert outcome.reached is not None
-        what, at = f"goal {outcome.goal.name}", (trace, outcome.reached)
         if outcome.goal.via:
             tick, distance = closest_approach(trace, outcome, outcomes)
             context = "from the pose at the closest approach, which the robot reported passed"
-            return at_most(what, distance, self.tolerance, "m", at=(trace, tick), context=context)
-        context = "from the goal when the robot reported it reached"
-        return at_most(
-            what,
-            true_pose(trace, outcome.reached).distance(outcome.goal.pose),
-            self.tolerance,
-            "m",
-            at=at,
-            context=context,
-        )
-
-
-def _goal_names(case: Case) -> set[str]:
-    return {goal.name for goal in case.every_goal}
+        else:
+            tick = outcome.reached
+            distance = true_pose(trace, tick).distance(outcome.goal.pose)
+            context = "from the goal when the robot reported it reached"
+        return at_most(f"goal {outcome.goal.name}", distance, self.tolerance, "m", at=(trace, tick), context=context)
 
 
 def _judge_success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Finding | None:

@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from simscen.core.geometry import Array
 from simscen.core.records.verdict import Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, undecided
 from simscen.criteria.trace_signals.catalog import SignalName, read_signal
 from simscen.criteria.trace_signals.ground_truth import speed
-from simscen.criteria.trace_signals.readers import evenly_sampled_speed
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
-from simscen.criteria.trace_signals.sparc_ldlj import MIN_MOVING_SPEED_M_S, ldlj, sparc
+from simscen.criteria.trace_signals.sparc_ldlj import MIN_MOVING_SPEED_M_S, evenly_sampled_speed, ldlj, sparc
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAcceleration, PositiveJerk
 
@@ -81,26 +79,20 @@ class Smoothness(Spec, Criterion):
 
 def _judge_largest(trace: Trace, case: Case, name: SignalName, limit: float, unit: str) -> Finding:
     """Return the finding for the largest magnitude of a signal."""
-    values = _read_if_available(trace, case, name)
-    if isinstance(values, str):
-        return undecided(name, values, f"≤ {limit:g} {unit}")
+    try:
+        values = read_signal(name, trace, case, {})
+    except SignalUnavailable as reason:
+        return undecided(name, str(reason), f"≤ {limit:g} {unit}")
     k = int(np.argmax(np.abs(values)))
     return at_most(name, float(abs(values[k])), limit, unit, at=(trace, int(trace.truth.ticks[k])))
 
 
 def _judge_mean_jerk(trace: Trace, case: Case, limit: float) -> Finding:
-    values = _read_if_available(trace, case, "jerk")
-    if isinstance(values, str):
-        return undecided("mean jerk", values, f"≤ {limit:g} m/s^3")
-    return at_most("mean jerk", float(values.mean()), limit, "m/s^3")
-
-
-def _read_if_available(trace: Trace, case: Case, name: SignalName) -> Array | str:
-    """Return the values (n,) of a signal, or as text the reason why it is not available."""
     try:
-        return read_signal(name, trace, case, {})
+        values = read_signal("jerk", trace, case, {})
     except SignalUnavailable as reason:
-        return str(reason)
+        return undecided("mean jerk", str(reason), f"≤ {limit:g} m/s^3")
+    return at_most("mean jerk", float(values.mean()), limit, "m/s^3")
 
 
 def _judge_sparc_or_ldlj(trace: Trace, name: Literal["sparc", "ldlj"], limit: float) -> Finding:

@@ -73,10 +73,13 @@ TESTS_OF_MODULE = {
     "criteria/trace_signals/catalog": [
         [f"{_SIGNALS}/test_catalog.py", f"{_STL}/test_condition.py", f"{_STL}/test_criterion.py"]
     ],
-    "criteria/trace_signals/readers": [
-        [f"{_SIGNALS}/test_readers.py", f"{_SIGNALS}/test_motion_signals.py"],
-        TEMPORAL,
-    ],
+    **{
+        f"criteria/trace_signals/{of}": [
+            [f"{_SIGNALS}/test_readers.py", f"{_SIGNALS}/test_motion_signals.py"],
+            TEMPORAL,
+        ]
+        for of in ("event_readers", "readers")
+    },
     **{
         f"criteria/trace_signals/{of}": [[f"{_SIGNALS}/test_ground_truth.py", f"{_SIGNALS}/test_nees.py"], ["golden"]]
         for of in ("ground_truth", "estimation_errors")

@@ -50,6 +50,10 @@ class EventKind(str, Enum):
         return self.value
 
 
+GOAL_END_KINDS = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
+"""Kinds of events that end the drive to a goal."""
+
+
 @dataclass(frozen=True)
 class Event:
     """Recorded event. The meaning of `name` and `data` depends on `kind`."""

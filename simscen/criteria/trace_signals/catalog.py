@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 from simscen.core.geometry import Array
 from simscen.core.records.verdict import Evidence
-from simscen.criteria.trace_signals import distances, readers
+from simscen.criteria.trace_signals import distances, event_readers, readers
 from simscen.criteria.trace_signals.estimation_errors import BELIEF_TIMEOUT_S
 from simscen.criteria.trace_signals.sampling import SignalArguments, SignalQuery
 from simscen.spec.quantities import UNITS
@@ -113,10 +113,8 @@ SIGNALS: dict[SignalName, Signal] = {
         readers.jerk,
         {Evidence.VELOCITY},
     ),
-    "travelled": Signal(
-        "True distance driven so far, in moves of at least 1 cm.", "length", readers.travelled, frozenset()
-    ),
-    "time": Signal("Simulated time since the start.", "duration", readers.time, frozenset()),
+    "travelled": Signal("True distance driven so far, in moves of at least 1 cm.", "length", readers.travelled),
+    "time": Signal("Simulated time since the start.", "duration", readers.time),
     "goal_distance": Signal(
         "True straight-line distance to the goal accepted last, or to the first goal before any goal is accepted.",
         "length",
@@ -198,16 +196,16 @@ SIGNALS: dict[SignalName, Signal] = {
         {Evidence.COMMANDS},
     ),
     "collision_count": Signal(
-        "Number of contacts that have begun so far.", NUMBER, readers.collision_count, {Evidence.CONTACTS}
+        "Number of contacts that have begun so far.", NUMBER, event_readers.collision_count, {Evidence.CONTACTS}
     ),
     "replan_count": Signal(
         "Number of plans made so far for another reason than a new goal.",
         NUMBER,
-        readers.replan_count,
+        event_readers.replan_count,
         {Evidence.PLANNING},
     ),
     "recovery_count": Signal(
-        "Number of recoveries that have started so far.", NUMBER, readers.recovery_count, {Evidence.RECOVERIES}
+        "Number of recoveries that have started so far.", NUMBER, event_readers.recovery_count, {Evidence.RECOVERIES}
     ),
     "localized": Signal(
         f"The newest belief is at most {BELIEF_TIMEOUT_S:g} s old and its position_std at most "
@@ -228,7 +226,7 @@ SIGNALS: dict[SignalName, Signal] = {
     "in_collision": Signal(
         "The robot touches something, or the named object.",
         YES_OR_NO,
-        readers.in_collision,
+        event_readers.in_collision,
         {Evidence.CONTACTS},
         maximum=1.0,
         optional_arguments=("with",),
@@ -236,7 +234,7 @@ SIGNALS: dict[SignalName, Signal] = {
     "goal_active": Signal(
         "The robot drives to a goal, or to the named one.",
         YES_OR_NO,
-        readers.goal_active,
+        event_readers.goal_active,
         {Evidence.NAVIGATION},
         maximum=1.0,
         optional_arguments=("goal",),
@@ -244,7 +242,7 @@ SIGNALS: dict[SignalName, Signal] = {
     "recovery_active": Signal(
         "A recovery is running, or the named one.",
         YES_OR_NO,
-        readers.recovery_active,
+        event_readers.recovery_active,
         {Evidence.RECOVERIES},
         maximum=1.0,
         optional_arguments=("recovery",),
@@ -252,7 +250,7 @@ SIGNALS: dict[SignalName, Signal] = {
     "fault_active": Signal(
         "The fault is active.",
         YES_OR_NO,
-        readers.is_active,
+        event_readers.is_active,
         {Evidence.DISTURBANCES},
         maximum=1.0,
         alternative_arguments=("fault",),
@@ -260,7 +258,7 @@ SIGNALS: dict[SignalName, Signal] = {
     "event_active": Signal(
         "The event has begun and not ended; one without an end lasts to the end of the run.",
         YES_OR_NO,
-        readers.is_active,
+        event_readers.is_active,
         {Evidence.DISTURBANCES},
         maximum=1.0,
         alternative_arguments=("event",),
@@ -268,7 +266,7 @@ SIGNALS: dict[SignalName, Signal] = {
     "started": Signal(
         "The fault or event has just begun: true at the one sample after each start.",
         YES_OR_NO,
-        readers.has_just_started,
+        event_readers.has_just_started,
         {Evidence.DISTURBANCES},
         maximum=1.0,
         alternative_arguments=("fault", "event"),

@@ -27,25 +27,24 @@ _MIN_SQUARED_LENGTH_M2 = sys.float_info.min
 
 
 def distance_to(query: SignalQuery) -> Array:
-    """Return the distance from the robot's center to the point, the goal, or the object in the query."""
+    """Return the distance from the robot's center to the point, the goal, or the origin of the object in the query.
+
+    The distance is inf while the object does not exist.
+    """
     poses, point, goal = true_poses(query.trace), query.arguments.get("point"), query.arguments.get("goal")
     if isinstance(point, Sequence):
         return np.hypot(poses[:, 0] - float(point[0]), poses[:, 1] - float(point[1]))
     if goal is None:
-        return _distance_to_object(query.trace, str(query.arguments["object"]), poses)
+        name = str(query.arguments["object"])
+        positions = object_positions(query.trace, name)
+        distance = np.hypot(poses[:, 0] - positions[:, 0], poses[:, 1] - positions[:, 1])
+        present_distance: Array = np.where(is_present(query.trace, name), distance, np.inf)
+        return present_distance
     goals = {known.name: known.pose for known in query.case.every_goal}
     if goal not in goals:
         raise SignalUnavailable(f"the scenario has no goal `{goal}`")
     pose = goals[str(goal)]
     return np.hypot(poses[:, 0] - pose.x, poses[:, 1] - pose.y)
-
-
-def _distance_to_object(trace: Trace, name: str, poses: Array) -> Array:
-    """Return the distance to the origin of an object; inf while the object does not exist."""
-    positions = object_positions(trace, name)
-    distance = np.hypot(poses[:, 0] - positions[:, 0], poses[:, 1] - positions[:, 1])
-    present_distance: Array = np.where(is_present(trace, name), distance, np.inf)
-    return present_distance
 
 
 def object_positions(trace: Trace, name: str) -> Array:
@@ -55,11 +54,6 @@ def object_positions(trace: Trace, name: str) -> Array:
     """
     if name in trace.objects:
         return check_samples(trace.objects[name], f"the pose of {name}", trace).at(trace.truth.ticks)
-    return _static_position(trace, name)
-
-
-def _static_position(trace: Trace, name: str) -> Array:
-    """Return the position (1, 2) at which an object was spawned. Raises SignalUnavailable if it was never spawned."""
     for event in trace.of_kind(EventKind.OBJECT_SPAWNED):
         x, y = event.data.get("x"), event.data.get("y")
         if event.name == name and isinstance(x, int | float) and isinstance(y, int | float):

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 BELIEF_TIMEOUT_S = 1.0
 """Age up to which a belief is valid, as transform_tolerance of nav2_amcl."""
+NO_BELIEF = "the robot never reported an estimated pose"
+"""Reason of inconclusive findings and undefined metrics if the trace has no belief."""
 
 
 def pose_error(trace: Trace) -> Samples:
@@ -32,15 +34,15 @@ def pose_error(trace: Trace) -> Samples:
         return Samples(np.empty(0, dtype=np.int64), np.empty((0, 2)))
     ticks = np.union1d(belief.ticks, _ticks_with_stale_belief(trace))
     believed = belief.at(ticks)
-    x, y, yaw = _interpolate_poses(poses, ticks)
+    x, y, yaw = interpolate_poses(poses, ticks).T
     distances = np.hypot(believed[:, 0] - x, believed[:, 1] - y)
     return Samples(ticks, np.column_stack((distances, np.abs(wrap_array(believed[:, 2] - yaw)))))
 
 
-def _interpolate_poses(poses: Samples, ticks: Ticks) -> tuple[Array, Array, Array]:
-    """Return x, y, and yaw, each (n,), at the given ticks by linear interpolation; yaw is not wrapped."""
+def interpolate_poses(poses: Samples, ticks: Ticks) -> Array:
+    """Return the poses (n, 3) at the given ticks by linear interpolation; yaw is not wrapped."""
     x, y = (np.interp(ticks, poses.ticks, poses.values[:, axis]) for axis in (0, 1))
-    return x, y, np.interp(ticks, poses.ticks, np.unwrap(poses.values[:, 2]))
+    return np.column_stack((x, y, np.interp(ticks, poses.ticks, np.unwrap(poses.values[:, 2]))))
 
 
 def _ticks_with_stale_belief(trace: Trace) -> Ticks:
@@ -82,6 +84,6 @@ def nees_samples(trace: Trace) -> Samples:
     belief, poses = check_samples(trace.belief, "the belief", trace), truth(trace)
     if not len(belief) or not len(poses) or belief.values.shape[1] < 9:
         return Samples(np.empty(0, dtype=np.int64), np.empty((0, 1)))
-    x, y, yaw = _interpolate_poses(poses, belief.ticks)
-    error = np.column_stack((belief.values[:, 0] - x, belief.values[:, 1] - y, wrap_array(belief.values[:, 2] - yaw)))
+    error = belief.values[:, :3] - interpolate_poses(poses, belief.ticks)
+    error[:, 2] = wrap_array(error[:, 2])
     return Samples(belief.ticks, nees(error, belief.values[:, 3:])[:, np.newaxis])

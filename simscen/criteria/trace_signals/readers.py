@@ -1,4 +1,6 @@
-"""Readers of signals: functions that compute the values (n,) of a signal at the n samples of the truth.
+"""Readers of signals of the motion, the belief, and the goals of the robot.
+
+A reader is a function that computes the values (n,) of a signal at the n samples of the truth.
 
 The value of a yes-or-no signal is 0 or 1. Readers raise SignalUnavailable if the trace lacks the data of the signal,
 and InvalidTrace if the data are not finite. A belief is an estimated pose with its covariance.
@@ -6,30 +8,25 @@ and InvalidTrace if the data are not finite. A belief is an estimated pose with 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.geometry.polygons import points_in_polygon
-from simscen.core.messages.goals import matches_goal_name
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Samples, Ticks
-from simscen.criteria.timeline import spans
 from simscen.criteria.trace_signals.estimation_errors import BELIEF_TIMEOUT_S, nees_samples, pose_error
-from simscen.criteria.trace_signals.ground_truth import Flags, check_samples, drive, speed, teleport_samples, truth
+from simscen.criteria.trace_signals.ground_truth import check_samples, drive, speed, teleport_samples, truth
 from simscen.criteria.trace_signals.ground_truth import clearance as hull_clearance
 from simscen.criteria.trace_signals.ground_truth import turn_rate as unsigned_turn_rate
 from simscen.criteria.trace_signals.sampling import (
-    SignalArguments,
     SignalQuery,
     SignalUnavailable,
     evenly_spaced,
     sample_and_hold,
     sample_ticks,
 )
-from simscen.criteria.trace_signals.sparc_ldlj import CUTOFF_HZ, MIN_RATE_HZ
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
@@ -79,20 +76,6 @@ def jerk(query: SignalQuery) -> Array:
     return np.abs(_finite_difference(query.trace, ground_speed(query), 2))
 
 
-def evenly_sampled_speed(trace: Trace) -> tuple[Array, float]:
-    """Return the true speed over ground (m,) in m/s, sampled at evenly spaced times, and the sample rate in Hz.
-
-    Raises SignalUnavailable if there is no velocity, or if the sample rate is too low for SPARC and LDLJ.
-    """
-    even = evenly_spaced(speed(trace), trace.tick_rate)
-    rate = trace.tick_rate / float(even.ticks[1] - even.ticks[0])
-    if rate < MIN_RATE_HZ:
-        raise SignalUnavailable(
-            f"the truth has {rate:.1f} samples a second, too few for changes up to {CUTOFF_HZ:g} Hz"
-        )
-    return even.values[:, 0], rate
-
-
 def localization_error(query: SignalQuery) -> Array:
     """Return the distance in m between the estimated and the true position."""
     return sample_and_hold(query.trace, pose_error(query.trace), "belief")[:, 0]
@@ -137,7 +120,7 @@ def localized(query: SignalQuery) -> Array:
         return np.zeros(len(sample_ticks(query.trace)))
     has_belief = sample_ticks(query.trace) >= query.trace.belief.ticks[0]
     is_fresh = belief_age(query) <= BELIEF_TIMEOUT_S
-    return _as_numbers(has_belief & is_fresh & (position_std(query) <= LOCALIZED_STD_M))
+    return np.where(has_belief & is_fresh & (position_std(query) <= LOCALIZED_STD_M), 1.0, 0.0)
 
 
 def goal_distance(query: SignalQuery) -> Array:
@@ -178,70 +161,8 @@ def in_region(query: SignalQuery) -> Array:
     name = str(query.arguments["region"])
     if name not in query.case.regions:
         raise SignalUnavailable(f"the world has no region `{name}`")
-    return _as_numbers(points_in_polygon(query.case.regions[name], true_poses(query.trace)[:, :2]))
-
-
-def in_collision(query: SignalQuery) -> Array:
-    """Return whether the robot touches something, or the object of the query."""
-    return _as_numbers(
-        _mask_between_events(
-            query.trace, EventKind.COLLISION_STARTED, (EventKind.COLLISION_ENDED,), query.arguments.get("with")
-        )
-    )
-
-
-def goal_active(query: SignalQuery) -> Array:
-    """Return whether the goal of the query, or any goal, is active: accepted, and not yet ended."""
-    ends = (
-        EventKind.GOAL_REACHED,
-        EventKind.GOAL_PASSED,
-        EventKind.GOAL_FAILED,
-        EventKind.GOAL_CANCELED,
-        EventKind.NAVIGATION_ENDED,
-        EventKind.GOAL_ACCEPTED,
-    )
-    return _as_numbers(_mask_between_events(query.trace, EventKind.GOAL_ACCEPTED, ends, query.arguments.get("goal")))
-
-
-def recovery_active(query: SignalQuery) -> Array:
-    """Return whether the recovery behavior of the query, or any recovery behavior, is active."""
-    return _as_numbers(
-        _mask_between_events(
-            query.trace, EventKind.RECOVERY_STARTED, (EventKind.RECOVERY_ENDED,), query.arguments.get("recovery")
-        )
-    )
-
-
-def is_active(query: SignalQuery) -> Array:
-    """Return whether the fault or event of the query is active."""
-    intervals = [
-        (span.start, span.end + (not span.has_end_event)) for span in spans(query.trace, _label(query.arguments))
-    ]
-    return _as_numbers(_interval_mask(query.trace, intervals))
-
-
-def has_just_started(query: SignalQuery) -> Array:
-    """Return whether the fault or event of the query has started since the previous sample."""
-    starts = [(span.start, span.start) for span in spans(query.trace, _label(query.arguments))]
-    return _as_numbers(_interval_mask(query.trace, starts))
-
-
-def collision_count(query: SignalQuery) -> Array:
-    """Return the number of contacts that have begun so far."""
-    return _count_until_samples(query.trace, [event.tick for event in query.trace.of_kind(EventKind.COLLISION_STARTED)])
-
-
-def replan_count(query: SignalQuery) -> Array:
-    """Return the number of plans that were made so far for another reason than a new goal."""
-    plans = query.trace.of_kind(EventKind.PLAN_MADE)
-    return _count_until_samples(
-        query.trace, [event.tick for event in plans if event.data.get("reason", "goal") != "goal"]
-    )
-
-
-def recovery_count(query: SignalQuery) -> Array:
-    """Return the number of recoveries that have started so far."""
-    return _count_until_samples(query.trace, [event.tick for event in query.trace.of_kind(EventKind.RECOVERY_STARTED)])
+    inside = points_in_polygon(query.case.regions[name], true_poses(query.trace)[:, :2])
+    return np.where(inside, 1.0, 0.0)
 
 
 def true_poses(trace: Trace) -> Array:
@@ -320,55 +241,3 @@ def _current_goals(trace: Trace, case: Case) -> Array:
     if not poses:
         return np.array([case.goals[0].pose], dtype=np.float64)
     return Samples(np.array(ticks, dtype=np.int64), np.array(poses, dtype=np.float64)).at(clock)
-
-
-def _label(arguments: SignalArguments) -> str:
-    """Return the name of the fault or event in the arguments."""
-    return str(arguments.get("fault") or arguments["event"])
-
-
-def _mask_between_events(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: object) -> Flags:
-    """Return a mask (n,) of the samples between each event of the kind `start` and the next event that ends it.
-
-    `ends` are the kinds of events that can end it. `name` is the name of the start events; None for any name.
-    """
-    intervals: list[tuple[int, float]] = []
-    for event in trace.of_kind(start):
-        if name in (None, event.name) or (
-            start is EventKind.GOAL_ACCEPTED and matches_goal_name(event.name, str(name))
-        ):
-            later = (
-                e.tick for e in trace.of_kind(*ends) if _is_end(e.kind, e.name, event.name) and e.tick > event.tick
-            )
-            intervals.append((event.tick, next(later, np.inf)))
-    return _interval_mask(trace, intervals)
-
-
-def _is_end(kind: EventKind, name: str, started: str) -> bool:
-    """Return whether an event of this kind and name ends the goal, contact, or recovery with the name `started`."""
-    return name == started or kind in (EventKind.NAVIGATION_ENDED, EventKind.GOAL_ACCEPTED)
-
-
-def _interval_mask(trace: Trace, intervals: Iterable[tuple[int, float]]) -> Flags:
-    """Return a mask (n,) of the samples in intervals from `start` to before `end`, both in ticks.
-
-    An interval without a sample selects the next sample.
-    """
-    clock = sample_ticks(trace)
-    flags = np.zeros(len(clock), dtype=bool)
-    for start, end in intervals:
-        first, last = np.searchsorted(clock, (start, end), side="left").tolist()
-        flags[first : max(last, first + 1)] = True
-    return flags
-
-
-def _as_numbers(flags: Flags) -> Array:
-    """Convert True to 1 and False to 0."""
-    return flags.astype(np.float64)
-
-
-def _count_until_samples(trace: Trace, ticks: list[int]) -> Array:
-    """Return the number (n,) of `ticks` up to each sample."""
-    return np.searchsorted(np.array(sorted(ticks), dtype=np.int64), sample_ticks(trace), side="right").astype(
-        np.float64
-    )

@@ -66,7 +66,7 @@ def evenly_spaced(samples: Samples, tick_rate: int) -> Samples:
     than MAX_INTERPOLATED_GAP_S.
     """
     if len(samples) < 2:
-        raise SignalUnavailable(f"the run is too short: {_sample_count_text(len(samples))} of the truth")
+        raise SignalUnavailable(f"the run is too short: {len(samples)} sample{'s' * (len(samples) != 1)} of the truth")
     ticks, steps = samples.ticks, np.diff(samples.ticks)
     if (steps <= 0).any():
         raise SignalUnavailable("the samples of the truth are not in chronological order")
@@ -81,8 +81,3 @@ def evenly_spaced(samples: Samples, tick_rate: int) -> Samples:
         )
     grid = np.arange(ticks[0], ticks[-1] + 1, usual_period(ticks))
     return Samples(grid, np.column_stack([np.interp(grid, ticks, column) for column in samples.values.T]))
-
-
-def _sample_count_text(count: int) -> str:
-    """Return "1 sample", "2 samples", and so on."""
-    return "1 sample" if count == 1 else f"{count} samples"

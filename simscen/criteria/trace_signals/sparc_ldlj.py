@@ -7,10 +7,16 @@ authors' own code (siva82kb/SPARC).
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from simscen.core.geometry import Array
+from simscen.criteria.trace_signals.ground_truth import speed
+from simscen.criteria.trace_signals.sampling import SignalUnavailable, evenly_spaced
+
+if TYPE_CHECKING:
+    from simscen.core.records.trace import Trace
 
 MIN_MOVING_SPEED_M_S = 0.01
 """Minimum speed of a moving robot. Lower speeds are noise."""
@@ -23,6 +29,20 @@ MIN_RELATIVE_AMPLITUDE = 0.05
 """Minimum amplitude, relative to the largest one, at both ends of the spectrum that SPARC uses."""
 PADDING_LEVEL = 4
 """Exponent of the factor 2^PADDING_LEVEL by which SPARC lengthens a speed profile with zeros, for a finer spectrum."""
+
+
+def evenly_sampled_speed(trace: Trace) -> tuple[Array, float]:
+    """Return the true speed over ground (m,) in m/s, sampled at evenly spaced times, and the sample rate in Hz.
+
+    Raises SignalUnavailable if there is no velocity, or if the sample rate is too low for SPARC and LDLJ.
+    """
+    even = evenly_spaced(speed(trace), trace.tick_rate)
+    rate = trace.tick_rate / float(even.ticks[1] - even.ticks[0])
+    if rate < MIN_RATE_HZ:
+        raise SignalUnavailable(
+            f"the truth has {rate:.1f} samples a second, too few for changes up to {CUTOFF_HZ:g} Hz"
+        )
+    return even.values[:, 0], rate
 
 
 def sparc(speeds: Array, rate: float) -> float | None:

@@ -21,9 +21,8 @@ from simscen.criteria.goals_reached import GoalsReached
 from simscen.criteria.trace_signals.catalog import read_signal
 from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M, pedestrian_gap
 from simscen.criteria.trace_signals.ground_truth import clearance, drive, speed, truth, turn_rate
-from simscen.criteria.trace_signals.readers import evenly_sampled_speed
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
-from simscen.criteria.trace_signals.sparc_ldlj import MIN_MOVING_SPEED_M_S, ldlj, sparc
+from simscen.criteria.trace_signals.sparc_ldlj import MIN_MOVING_SPEED_M_S, evenly_sampled_speed, ldlj, sparc
 from simscen.judge.evaluation import missing_evidence_reason, partial_evidence_reason
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.trajectory import PATH_METRICS, POSE_METRICS, Values, path_metrics, pose_metrics

@@ -5,7 +5,7 @@ import numpy as np
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Trace
-from simscen.criteria.trace_signals.estimation_errors import nees_samples, pose_error
+from simscen.criteria.trace_signals.estimation_errors import NO_BELIEF, interpolate_poses, nees_samples, pose_error
 from simscen.criteria.trace_signals.ground_truth import DrivenPath, teleport_samples, truth
 
 CURVATURE_SPACING_M = 0.3
@@ -97,7 +97,6 @@ RPE_DELTA_M = 1.0
 """Minimum driven distance between the two poses of a relative pose error (RPE)."""
 
 _STATISTICS = ("rmse", "mean", "median", "max")
-NO_BELIEF = "the robot never reported an estimated pose"
 
 
 def pose_metrics(trace: Trace) -> Values:
@@ -129,7 +128,7 @@ def _relative_errors(trace: Trace) -> Values:
 
     Between the samples i and j, the robot drove at least RPE_DELTA_M.
     """
-    believed, true = trace.belief.values, _truth_at_beliefs(trace)
+    believed, true = trace.belief.values, interpolate_poses(truth(trace), trace.belief.ticks)
     i, j = _pairs(np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1))
     if not len(i):
         return {
@@ -164,13 +163,6 @@ def _between(origin: Array, poses: Array) -> Array:
     c, s = np.cos(origin[:, 2]), np.sin(origin[:, 2])
     dx, dy = (poses - origin)[:, :2].T
     return np.column_stack((c * dx + s * dy, c * dy - s * dx, poses[:, 2] - origin[:, 2]))
-
-
-def _truth_at_beliefs(trace: Trace) -> Array:
-    """Return the true poses (n, 3), interpolated at the ticks of the estimated poses."""
-    poses, ticks = truth(trace), trace.belief.ticks
-    x, y = (np.interp(ticks, poses.ticks, poses.values[:, axis]) for axis in (0, 1))
-    return np.column_stack((x, y, np.interp(ticks, poses.ticks, np.unwrap(poses.values[:, 2]))))
 
 
 def _nees(trace: Trace) -> float | str:

@@ -8,8 +8,8 @@ import pytest
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Samples
 from simscen.criteria.trace_signals.catalog import read_signal
-from simscen.criteria.trace_signals.readers import evenly_sampled_speed
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
+from simscen.criteria.trace_signals.sparc_ldlj import evenly_sampled_speed
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 STEP = 6 / 240

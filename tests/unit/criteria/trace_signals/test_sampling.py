@@ -8,8 +8,8 @@ import pytest
 from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import Evidence
 from simscen.criteria.findings import InvalidTrace
-from simscen.criteria.trace_signals.readers import evenly_sampled_speed
 from simscen.criteria.trace_signals.sampling import SignalUnavailable, evenly_spaced, usual_period
+from simscen.criteria.trace_signals.sparc_ldlj import evenly_sampled_speed
 from simscen.criteria.trace_signals.trace_checks import check_recorded_signals, time_gaps
 from simscen.testing.synthetic_trace import synthetic_trace
 

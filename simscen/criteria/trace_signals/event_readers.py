@@ -1,0 +1,109 @@
+"""Readers of signals about recorded events: goals, collisions, recoveries, replans, faults, and events.
+
+Each function returns the values (n,) of a signal at the n samples of the truth; 0 or 1 for a yes-or-no signal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.core.messages.goals import matches_goal_name
+from simscen.core.records.events import GOAL_END_KINDS, Event, EventKind
+from simscen.criteria.timeline import spans
+from simscen.criteria.trace_signals.sampling import SignalArguments, SignalQuery, sample_ticks
+
+if TYPE_CHECKING:
+    from simscen.core.records.trace import Trace
+
+
+def in_collision(query: SignalQuery) -> Array:
+    """Return whether the robot touches something, or the object of the query."""
+    start, end = EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED
+    return _active_between_events(query.trace, start, (end,), query.arguments.get("with"))
+
+
+def goal_active(query: SignalQuery) -> Array:
+    """Return whether the goal of the query, or any goal, is active: accepted, and not yet ended."""
+    ends = (*GOAL_END_KINDS, EventKind.NAVIGATION_ENDED, EventKind.GOAL_ACCEPTED)
+    return _active_between_events(query.trace, EventKind.GOAL_ACCEPTED, ends, query.arguments.get("goal"))
+
+
+def recovery_active(query: SignalQuery) -> Array:
+    """Return whether the recovery behavior of the query, or any recovery behavior, is active."""
+    start, end = EventKind.RECOVERY_STARTED, EventKind.RECOVERY_ENDED
+    return _active_between_events(query.trace, start, (end,), query.arguments.get("recovery"))
+
+
+def is_active(query: SignalQuery) -> Array:
+    """Return whether the fault or event of the query is active."""
+    active = spans(query.trace, _label(query.arguments))
+    return _active_in_intervals(query.trace, [(span.start, span.end + (not span.has_end_event)) for span in active])
+
+
+def has_just_started(query: SignalQuery) -> Array:
+    """Return whether the fault or event of the query has started since the previous sample."""
+    starts = [(span.start, span.start) for span in spans(query.trace, _label(query.arguments))]
+    return _active_in_intervals(query.trace, starts)
+
+
+def collision_count(query: SignalQuery) -> Array:
+    """Return the number of contacts that have begun so far."""
+    return _count_until_samples(query.trace, query.trace.of_kind(EventKind.COLLISION_STARTED))
+
+
+def replan_count(query: SignalQuery) -> Array:
+    """Return the number of plans that were made so far for another reason than a new goal."""
+    plans = query.trace.of_kind(EventKind.PLAN_MADE)
+    return _count_until_samples(query.trace, [plan for plan in plans if plan.data.get("reason", "goal") != "goal"])
+
+
+def recovery_count(query: SignalQuery) -> Array:
+    """Return the number of recoveries that have started so far."""
+    return _count_until_samples(query.trace, query.trace.of_kind(EventKind.RECOVERY_STARTED))
+
+
+def _label(arguments: SignalArguments) -> str:
+    """Return the name of the fault or event in the arguments."""
+    return str(arguments.get("fault") or arguments["event"])
+
+
+def _active_between_events(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: object) -> Array:
+    """Return 1 (n,) for the samples between each event of the kind `start` and its end, and 0 for the others.
+
+    `ends` are the kinds of events that can end it. `name` is the name of the start events; None for any name.
+    """
+    intervals: list[tuple[int, float]] = []
+    for event in trace.of_kind(start):
+        is_goal = start is EventKind.GOAL_ACCEPTED
+        if name in (None, event.name) or (is_goal and matches_goal_name(event.name, str(name))):
+            later = (e.tick for e in trace.of_kind(*ends) if _ends(e, event) and e.tick > event.tick)
+            intervals.append((event.tick, next(later, np.inf)))
+    return _active_in_intervals(trace, intervals)
+
+
+def _ends(event: Event, start: Event) -> bool:
+    """Return whether a later event ends the goal, contact, or recovery that began with the event `start`."""
+    return event.name == start.name or event.kind in (EventKind.NAVIGATION_ENDED, EventKind.GOAL_ACCEPTED)
+
+
+def _active_in_intervals(trace: Trace, intervals: Iterable[tuple[int, float]]) -> Array:
+    """Return 1 (n,) for the samples in intervals from `start` to before `end`, both in ticks, and 0 for the others.
+
+    An interval without a sample selects the next sample.
+    """
+    clock = sample_ticks(trace)
+    active = np.zeros(len(clock))
+    for start, end in intervals:
+        first, last = np.searchsorted(clock, (start, end), side="left").tolist()
+        active[first : max(last, first + 1)] = 1.0
+    return active
+
+
+def _count_until_samples(trace: Trace, events: Iterable[Event]) -> Array:
+    """Return the number (n,) of events up to each sample."""
+    ticks = np.array(sorted(event.tick for event in events), dtype=np.int64)
+    return np.searchsorted(ticks, sample_ticks(trace), side="right").astype(np.float64)
