@@ -15,7 +15,9 @@ from simscen.core.records.disturbances import BELIEF, WHEELS
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Finding, Status, Verdict
-from simscen.judge.goal_failure_causes import Diagnosis, MovableObject, diagnose_goal_failure, movable_objects
+from simscen.judge.blocked_path import Diagnosis
+from simscen.judge.goal_failure_causes import diagnose_goal_failure
+from simscen.judge.movable_objects import MovableObject, movable_objects
 
 GOAL_CRITERIA = frozenset({"goals_reached", "result", "error_code", "time_to_goal", "stuck"})
 """Criteria that can fail because something blocks the robot."""
@@ -46,13 +48,14 @@ def causes(criterion: str, tick: int, trace: Trace, case: Case) -> list[str]:
     """Return at most MAX_LINES lines about the likely causes of the failure of a criterion at `tick`."""
     lines: list[str] = []
     named: set[str] = set()
-    diagnoses = [
-        diagnose_goal_failure(trace, case, tick) if criterion in GOAL_CRITERIA else ([], set()),
-        diagnose_collision(trace, tick) if criterion == "collisions" else ([], set()),
-        diagnose_localization(trace, tick, error_is_reported=criterion not in GOAL_CRITERIA)
-        if criterion in LOCALIZATION_CRITERIA
-        else ([], set()),
-    ]
+    diagnoses: list[Diagnosis] = []
+    if criterion in GOAL_CRITERIA:
+        diagnoses.append(diagnose_goal_failure(trace, case, tick))
+    if criterion == "collisions":
+        diagnoses.append(diagnose_collision(trace, tick))
+    if criterion in LOCALIZATION_CRITERIA:
+        error_is_reported = criterion not in GOAL_CRITERIA
+        diagnoses.append(diagnose_localization(trace, tick, error_is_reported))
     for sentences, disturbances in diagnoses:
         lines += [f"why: {text}" for text in sentences]
         named |= disturbances
@@ -129,18 +132,14 @@ def _describe_hit(trace: Trace, touched: MovableObject, hit: Event) -> str:
         if touched.was_moved:
             change = "moved it"
         else:
-            change = f"spawned it {_initial_distance(trace, touched):.2f} m from the robot's center"
+            distance = touched.distance(np.array([trace.place(touched.since)]))[0]
+            change = f"spawned it {distance:.2f} m from the robot's center"
         parts.append(f"event `{touched.event}` had {change} {ago}")
     if (speed := _speed(trace, touched.name, hit.tick)) >= OBJECT_MOVING_SPEED_M_S:
         parts.append(f"it moved at {speed:.2f} m/s")
     if hit.data.get("robot_caused") is False and parts:
         parts.append("and ran into the robot")
     return f"{touched.name}: {', '.join(parts)}" if parts else ""
-
-
-def _initial_distance(trace: Trace, spawned: MovableObject) -> float:
-    """Return the distance in m between an object and the robot's center when the object was spawned."""
-    return float(spawned.distance(np.array([trace.place(spawned.since)]))[0])
 
 
 def _speed(trace: Trace, name: str, tick: int) -> float:

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from simscen.core.records.disturbances import DisturbanceOutcome
 from simscen.core.records.events import Event
-from simscen.core.records.run_result import Outcome, RunFailure, RunResult
+from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import ExpectedFailure, Verdict
 from simscen.criteria.timeline import has_ended
@@ -34,17 +34,19 @@ def combine_robots(
     shared = {one.disturbance.name for one in first.disturbances if one.disturbance.kind == "event"}
     judged = [(verdict, line) for verdict, line in _verdicts_with_lines(first) if _is_about_world(verdict, shared)]
     for name, result in results.items():
-        own = (
-            (verdict, line) for verdict, line in _verdicts_with_lines(result) if not _is_about_world(verdict, shared)
-        )
+        own = [pair for pair in _verdicts_with_lines(result) if not _is_about_world(pair[0], shared)]
         judged += [(_with_robot_name(verdict, name), line) for verdict, line in own]
     verdicts = tuple(verdict for verdict, _ in judged)
-    outcome, expectation = apply_expectation(
-        expected, verdicts, _worst_outcome(results), all(map(has_ended, traces.values()))
-    )
+    outcomes = [result.outcome for result in results.values()]
+    worst = next((each for each in (Outcome.ERROR, Outcome.FAILED) if each in outcomes), Outcome.PASSED)
+    outcome, expectation = apply_expectation(expected, verdicts, worst, all(map(has_ended, traces.values())))
     if expected is not None and expectation is not None:
         judged.append((expectation, expected.line))
-    errors = [(name, result.error) for name, result in results.items() if result.error is not None]
+    errors = [
+        replace(result.error, message=f"{name}: {result.error.message}")
+        for name, result in results.items()
+        if result.error is not None
+    ]
     successes = [result.metrics.get(SUCCESS) for result in results.values()]
     success = None if None in successes else min(value for value in successes if value is not None)
     return replace(
@@ -55,8 +57,11 @@ def combine_robots(
         metrics={SUCCESS: success, **_with_robot_names({name: result.metrics for name, result in results.items()})},
         undefined=_with_robot_names({name: result.undefined for name, result in results.items()}),
         events=_events(traces),
-        disturbances=(*_disturbances_of_kind(first, "event"), *_faults_with_robot_names(results)),
-        error=_prefixed_failure(errors[0][0], errors[0][1]) if errors else None,
+        disturbances=(
+            *(one for one in first.disturbances if one.disturbance.kind == "event"),
+            *_faults_with_robot_names(results),
+        ),
+        error=errors[0] if errors else None,
         reason="" if expected is None else expected.reason,
     )
 
@@ -78,11 +83,6 @@ def _is_about_world(verdict: Verdict, events: set[str]) -> bool:
     return verdict.criterion == DISTURBANCE and not events.isdisjoint((verdict.id, verdict.id.rpartition("#")[0]))
 
 
-def _worst_outcome(results: Mapping[str, RunResult]) -> Outcome:
-    outcomes = [result.outcome for result in results.values()]
-    return next((worst for worst in (Outcome.ERROR, Outcome.FAILED) if worst in outcomes), Outcome.PASSED)
-
-
 def _with_robot_names(parts: Mapping[str, Mapping[str, T]]) -> dict[str, T]:
     return {f"{name}/{key}": value for name, part in parts.items() for key, value in part.items()}
 
@@ -100,17 +100,10 @@ def _is_world_event(event: Event) -> bool:
     return str(event.kind).startswith(WORLD_EVENT_PREFIXES)
 
 
-def _disturbances_of_kind(result: RunResult, kind: str) -> list[DisturbanceOutcome]:
-    return [one for one in result.disturbances if one.disturbance.kind == kind]
-
-
 def _faults_with_robot_names(results: Mapping[str, RunResult]) -> list[DisturbanceOutcome]:
     return [
         replace(one, disturbance=replace(one.disturbance, name=f"{name}/{one.disturbance.name}"))
         for name, result in results.items()
-        for one in _disturbances_of_kind(result, "fault")
+        for one in result.disturbances
+        if one.disturbance.kind == "fault"
     ]
-
-
-def _prefixed_failure(name: str, error: RunFailure | None) -> RunFailure | None:
-    return error and replace(error, message=f"{name}: {error.message}")

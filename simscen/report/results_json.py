@@ -16,7 +16,7 @@ from simscen.core.records.study import Study
 from simscen.judge.metrics.comparison import comparison_data
 from simscen.judge.metrics.session_summary import SessionSummary, SessionSummaryBuilder, session_summary_data
 from simscen.judge.result_json import result_data
-from simscen.judge.study import study_data
+from simscen.judge.study_json import study_data
 from simscen.report.display_text import escape_ci_markers_in_json, relative_path
 
 FORMAT = 1

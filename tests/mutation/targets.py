@@ -95,6 +95,7 @@ TESTS_OF_MODULE = {
     "judge/evaluation": [
         [f"tests/unit/judge/test_{of}.py" for of in ("required_evidence", "required_evidence_of_signals", "evaluation")]
     ],
+    "judge/study_json": [["tests/unit/judge/test_study.py"]],
     "judge/outcome": [[f"tests/unit/judge/test_{of}.py" for of in ("evaluation", "expected_failure")]],
     **{
         f"judge/{of}": [[f"tests/unit/judge/test_{of}.py"]]
@@ -106,7 +107,10 @@ TESTS_OF_MODULE = {
     ],
     "judge/metrics/compute": [[_METRICS], ["tests/unit/judge"]],
     **{f"judge/metrics/{of}": [[f"{_METRICS}/test_{of}.py"]] for of in ("session_summary", "comparison")},
-    **{f"judge/{of}": [DIAGNOSIS] for of in ("failure_causes", "goal_failure_causes")},
+    **{
+        f"judge/{of}": [DIAGNOSIS]
+        for of in ("blocked_path", "failure_causes", "goal_failure_causes", "movable_objects")
+    },
 }
 """Tests of single modules, in stages. The stage with all tests of the package follows."""
 IGNORED_FILES = {"__init__.py"}

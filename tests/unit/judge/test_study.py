@@ -11,7 +11,8 @@ from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResu
 from simscen.core.records.study import ClaimStatus, RateRow, Study
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.pass_rate_claims import anytime_limits, clopper_pearson_limits
-from simscen.judge.study import StudyPlan, evaluate_study, in_seed_order, study_data, value_text
+from simscen.judge.study import StudyPlan, evaluate_study, in_seed_order, value_text
+from simscen.judge.study_json import study_data
 from simscen.model.acceptance import PassRate
 
 

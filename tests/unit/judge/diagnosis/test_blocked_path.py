@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from diagnosis_cases import CASE, DOOR, STATIONARY, box, why, with_event
 
-from simscen.judge.goal_failure_causes import MovableObject, diagnose_blocked_path, movable_objects
+from simscen.judge.blocked_path import diagnose_blocked_path
+from simscen.judge.movable_objects import MovableObject, movable_objects
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 CLOSES = (

@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simscen.judge.goal_failure_causes import movable_objects
+from simscen.judge.movable_objects import movable_objects
 from simscen.testing.synthetic_trace import synthetic_trace
 
 SQUARE = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]

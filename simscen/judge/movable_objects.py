@@ -1,0 +1,89 @@
+"""Movable objects of a run: their outlines at a tick, and the events that spawned or moved them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry.polygons import points_in_polygon
+from simscen.core.records.events import Event, EventKind
+from simscen.core.records.trace import Trace
+
+
+@dataclass(frozen=True)
+class MovableObject:
+    """State of a movable object at a tick.
+
+    outlines:   corners (n, 2) in m of each part of the object in the world frame
+    event:      name of the event that spawned or last moved the object; "" if no event did
+    since:      tick at which the object was spawned or last moved
+    was_moved:  whether the object was moved after it was spawned
+    """
+
+    name: str
+    outlines: tuple[Array, ...]
+    event: str
+    since: int
+    was_moved: bool
+
+    def describe(self, trace: Trace) -> str:
+        """Return the name and the last change, e.g. "crate (spawned by event `crate falls` at t = 1.00 s)"."""
+        if not self.event:
+            return self.name
+        verb = "moved" if self.was_moved else "spawned"
+        return f"{self.name} ({verb} by event `{self.event}` at t = {trace.seconds(self.since):.2f} s)"
+
+    def distance(self, points: Array) -> Array:
+        """Return the distances in m (n,) from points (n, 2) to the object; 0 inside the object."""
+        nearest: Array = np.min([_distance(points, outline) for outline in self.outlines], axis=0)
+        return nearest
+
+
+def movable_objects(trace: Trace, tick: int) -> list[MovableObject]:
+    """Return the movable objects that exist at `tick`, in the order in which they were spawned."""
+    spawned: dict[str, Event] = {}
+    last: dict[str, tuple[str, Event]] = {}
+    current_event = ""
+    for event in trace.events:
+        if event.tick > tick:
+            continue
+        match event.kind:
+            case EventKind.EVENT_STARTED:
+                current_event = event.name
+            case EventKind.EVENT_ENDED:
+                current_event = ""
+            case EventKind.OBJECT_SPAWNED:
+                spawned[event.name], last[event.name] = event, (current_event, event)
+            case EventKind.OBJECT_MOVED | EventKind.OBJECT_PLACED:
+                last[event.name] = (current_event, event)
+            case EventKind.OBJECT_REMOVED:
+                spawned.pop(event.name, None)
+    return [
+        _movable_object(trace, tick, event, *last[name]) for name, event in spawned.items() if event.data.get("parts")
+    ]
+
+
+def _movable_object(trace: Trace, tick: int, spawned: Event, by: str, last: Event) -> MovableObject:
+    """Return the state of an object at `tick`. `by` is the name of the event that caused its last change `last`."""
+    x, y, yaw = (spawned.data.get(key) for key in ("x", "y", "yaw"))
+    samples = trace.objects.get(spawned.name)
+    if samples is not None:
+        # The sample at its own tick precedes the spawning and may be that of an earlier object of the same name.
+        now = (samples.ticks > spawned.tick) & (samples.ticks <= tick)
+        if now.any():
+            x, y, yaw = samples.values[now][-1].tolist()
+    assert isinstance(x, int | float) and isinstance(y, int | float) and isinstance(yaw, int | float)
+    parts = spawned.data["parts"]
+    assert isinstance(parts, list)
+    pose = Pose2(float(x), float(y), float(yaw))
+    outlines = tuple(pose.apply(np.array(part, dtype=np.float64)) for part in parts)
+    return MovableObject(spawned.name, outlines, by, last.tick, last.kind != EventKind.OBJECT_SPAWNED)
+
+
+def _distance(points: Array, corners: Array) -> Array:
+    """Return the distances in m (n,) from points (n, 2) to a filled polygon (m, 2)."""
+    step, apart = np.roll(corners, 1, axis=0) - corners, points[:, None] - corners
+    along, squared = np.sum(apart * step, axis=2), np.sum(step**2, axis=1)
+    along = np.clip(np.divide(along, squared, out=np.zeros_like(along), where=squared > 0), 0.0, 1.0)
+    away: Array = np.linalg.norm(apart - along[:, :, None] * step, axis=2).min(axis=1)
+    return np.where(points_in_polygon(corners.tolist(), points), 0.0, away)
