@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from heapq import nsmallest
-from types import TracebackType
 from typing import TextIO
 from urllib.parse import quote
 
@@ -13,6 +12,7 @@ from simscen.judge.finding_text import tightest_margin
 from simscen.report.comparison_markup import comparison_markdown, markdown_cell
 from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import relative_path, relative_to_checkout
+from simscen.report.reporters import Reporter
 from simscen.report.violations import (
     error_summary,
     reason_without_failure,
@@ -27,7 +27,7 @@ MAX_ROWS = 1000
 """Maximum number of runs in the summary; GitHub refuses a summary of more than 1 MiB."""
 
 
-class GitHubReporter:
+class GitHubReporter(Reporter):
     """Prints console lines and annotations to `out`, and at the end of the session the job summary to `summary`.
 
     `slow` is the number of slowest runs to list at the end (0: all runs, None: no list). `pictures_url` is the URL of
@@ -40,15 +40,6 @@ class GitHubReporter:
         self._out, self._summary, self._pictures_url = out, summary, pictures_url
         self._console = text_reporter(out, live=False, slow=slow)
         self._runs = RunStore()
-
-    def __enter__(self) -> "GitHubReporter":
-        self._console.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._console.__exit__(kind, error, traceback)
 
     def __call__(self, event: SessionEvent) -> None:
         """Print the event, with annotations for a finished run, and write the summary at the end."""

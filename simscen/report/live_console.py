@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from pathlib import Path
 from time import monotonic
-from types import TracebackType
 from typing import TextIO
 
 from rich.console import Console, Group
@@ -21,7 +20,8 @@ from simscen.core.records.session_events import (
     SessionStarted,
 )
 from simscen.report.display_text import StyledLine, TerminalStyle, escape_ci_commands, plain_text
-from simscen.report.text_reporters import PlainReporter, SessionFormatter
+from simscen.report.reporters import PlainReporter, Reporter
+from simscen.report.session_formatter import SessionFormatter
 
 MIN_FINISHED_RUNS = 2
 """Minimum number of finished runs for an estimate of the remaining time."""
@@ -99,7 +99,7 @@ class ColorReporter(PlainReporter):
             self._console.print(_rich_text(line))
 
 
-class LiveReporter:
+class LiveReporter(Reporter):
     """Prints lines in color, and below them a line for each current run, which is updated in place.
 
     `slow` is the number of slowest runs to list at the end (0: all runs, None: no list). `clock` returns seconds of
@@ -119,9 +119,7 @@ class LiveReporter:
         self._live.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._live.stop()
 
     def __call__(self, event: SessionEvent) -> None:

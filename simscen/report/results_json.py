@@ -5,19 +5,18 @@ The document contains no wall times, so that equal sessions give equal documents
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
-from types import TracebackType
-from typing import Any, TextIO
+from typing import Any
 
 from simscen.core.records.comparison import Comparison
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.run_store import RunStore
-from simscen.core.records.session_events import RunFinished, SessionEvent, SessionFinished
+from simscen.core.records.session_events import RunFinished
 from simscen.core.records.study import Study
 from simscen.judge.metrics.comparison import comparison_data
 from simscen.judge.metrics.session_summary import SessionSummary, SessionSummaryBuilder, session_summary_data
 from simscen.judge.result_json import result_data
 from simscen.judge.study_json import study_data
-from simscen.report.display_text import escape_ci_markers_in_json, relative_path
+from simscen.report.display_text import relative_path
 
 FORMAT = 1
 """Version of the format, which the document contains as `format`."""
@@ -49,12 +48,10 @@ def _json_text(data: dict[str, Any]) -> str:
     return json.dumps(data, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False)
 
 
-def as_document(
-    runs: Sequence[RunFinished], folder: str = "", comparison: Comparison | None = None, study: Study | None = None
-) -> dict[str, Any]:
-    """Return the document of `json_parts` as data instead of text."""
+def as_document(runs: Sequence[RunFinished]) -> dict[str, Any]:
+    """Return the document of `json_parts` as data instead of text, without a comparison or a study."""
     ordered = in_order(runs)
-    return {**_document(ordered, comparison, study), "runs": [_run_data(run, folder) for run in ordered]}
+    return {**_document(ordered, None, None), "runs": [_run_data(run, "") for run in ordered]}
 
 
 def _document(ordered: RunStore, comparison: Comparison | None, study: Study | None) -> dict[str, Any]:
@@ -110,28 +107,3 @@ def _artifacts(run: RunFinished, folder: str) -> dict[str, str]:
     """Return the paths of the artifacts relative to the output `folder`, by kind such as "mcap"."""
     files = {name: getattr(run.artifacts, name) for name in ("mcap", "picture", "replay", "result")}
     return {name: relative_path(path, folder) for name, path in files.items() if path}
-
-
-class JsonReporter:
-    """Reporter that writes results.json to `out` at the end of the session."""
-
-    def __init__(self, out: TextIO) -> None:
-        self._out = out
-        self._runs = RunStore()
-
-    def __enter__(self) -> "JsonReporter":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._out.flush()
-
-    def __call__(self, event: SessionEvent) -> None:
-        """Collect a finished run, or write the document at the end of the session."""
-        if isinstance(event, RunFinished):
-            self._runs.append(event)
-        if isinstance(event, SessionFinished):
-            for part in json_parts(self._runs, event.folder, event.comparison, event.study):
-                self._out.write(escape_ci_markers_in_json(part))
-            self._out.flush()

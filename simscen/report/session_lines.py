@@ -1,8 +1,7 @@
 """Console lines of a session: header, runs with their violations, list of failures, and footer."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from heapq import nsmallest
 
 from simscen.core.records.run_result import REPEAT_SUFFIX, Outcome, RunKey
 from simscen.core.records.session_events import RunFinished, SessionFinished, SessionStarted
@@ -11,7 +10,6 @@ from simscen.report.display_text import Role, StyledLine, StyledText, number_wit
 from simscen.report.violations import (
     error_details,
     error_summary,
-    first_violation,
     reason_without_failure,
     reported_violations,
     scenario_file,
@@ -135,6 +133,19 @@ def session_footer(session: SessionFinished, unfinished: Mapping[str, int]) -> I
         yield (StyledText("page: ", "quiet"), StyledText(one_line(session.page), file=session.page))
 
 
+def interruption_lines(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledLine]:
+    """Yield the last two lines of an interrupted session: outcomes, then report.html and the option --resume.
+
+    `unfinished` is as in `outcome_counts`.
+    """
+    yield (StyledText("interrupted: ", "warning"), *outcome_counts(session, unfinished))
+    page = (
+        [StyledText("page: ", "quiet"), StyledText(one_line(session.page), file=session.page)] if session.page else []
+    )
+    resume = StyledText(f"{'   ' if page else ''}resume with --resume {one_line(session.folder)}", "quiet")
+    yield (*page, *([resume] if session.folder else []))
+
+
 def outcome_counts(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledText]:
     """Yield the numbers of outcomes, for example "13 passed, 1 failed, 2 errors, 3 not run".
 
@@ -219,101 +230,3 @@ def _scenario_line(run: RunFinished) -> StyledLine:
 
 def _label(name: str) -> StyledText:
     return StyledText(f"      {name:9} ", "quiet")
-
-
-MAX_DETAILED_FAILURES = 20
-"""Maximum number of failures that are listed with paths. Further failures are listed only with their cause."""
-NONDETERMINISTIC = "nondeterministic"
-"""Error kind of a run whose log differs from the log of its repetition."""
-
-NameOfRun = Callable[[RunKey], str]
-"""Function that returns the name of a run for a list of runs."""
-
-
-def failure_lines(runs: Sequence[RunFinished], name: NameOfRun) -> Iterator[StyledLine]:
-    """Yield each run that did not pass, with its first violation or error, artifacts, and repeat command.
-
-    Yield nothing for a session with a single run. A run that --check-determinism repeated is listed once.
-    """
-    failed = {run.key for run in runs if not run.outcome.is_good}
-    failures = [
-        run for run in runs if run.key in failed and (run.key == run.key.original or run.key.original not in failed)
-    ]
-    if not failures or all(run.key.original == failures[0].key.original for run in runs):
-        return
-    yield (StyledText("did not pass:", "quiet"),)
-    for number, run in enumerate(failures):
-        symbol, _ = SYMBOLS[run.outcome]
-        role: Role = "warning" if run.outcome is Outcome.ERROR else "bad"
-        yield (StyledText("  "), StyledText(symbol, role), StyledText(f" {name(run.key)}", "name"))
-        yield (StyledText("      "), StyledText(_first_cause(run), role))
-        if number < MAX_DETAILED_FAILURES:
-            yield from artifact_lines(run)
-
-
-def slowest_run_lines(runs: Sequence[RunFinished], max_count: int, name: NameOfRun) -> Iterator[StyledLine]:
-    """Yield the runs with the longest wall times, the longest first; `max_count` 0 lists all."""
-    ordered = nsmallest(max_count or len(runs), (run for run in runs if run.wall), key=lambda run: (-run.wall, run.key))
-    yield (StyledText("slowest:", "quiet"),)
-    for run in ordered:
-        wall = f"{run.wall:8.2f} s"
-        simulated = f"   {run.result.simulated:.1f} s simulated"
-        yield (StyledText(wall), StyledText(f"  {name(run.key)}", "name"), StyledText(simulated, "quiet"))
-
-
-def determinism_lines(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
-    """Yield a statement whether the logs of runs that --check-determinism repeated are equal; nothing without logs."""
-    if not any(run.key.is_repetition for run in runs):
-        return
-    first_runs = {run.key: run for run in runs if not run.key.is_repetition}
-    pairs = [
-        (first_runs[run.key.original], run) for run in runs if run.key.is_repetition and run.key.original in first_runs
-    ]
-    compared = [pair for pair in pairs if all(run.artifacts.mcap for run in pair)]
-    if not compared:
-        return
-    differ = sum(any(_is_nondeterministic(run) for run in pair) for pair in compared)
-    pairs_text = f"{number_with_noun(len(compared), 'pair')} of runs, byte for byte"
-    if differ:
-        yield (StyledText(f"logs differ: in {differ} of {pairs_text}", "warning"),)
-        yield (StyledText(f"  {_difference_text(compared)}", "quiet"),)
-    else:
-        yield (StyledText(f"logs equal: {pairs_text}", "good"),)
-
-
-def _difference_text(pairs: Sequence[tuple[RunFinished, RunFinished]]) -> str:
-    """Return how much the runs of a pair differ over all pairs: verdicts, time to the goal, and path length."""
-    equal = sum(_statuses(first) == _statuses(second) for first, second in pairs)
-    parts = [f"verdicts equal in {equal} of {len(pairs)}"]
-    for metric, name, unit in (("time_to_goal", "time to goal", "s"), ("path_length", "path length", "m")):
-        both = [(first.result.metrics.get(metric), second.result.metrics.get(metric)) for first, second in pairs]
-        gaps = [abs(a - b) for a, b in both if a is not None and b is not None]
-        if gaps:
-            parts.append(f"{name} differs by up to {max(gaps):.2f} {unit}")
-    return ", ".join(parts)
-
-
-def _statuses(run: RunFinished) -> list[tuple[str, str]]:
-    return [(verdict.id, verdict.status.value) for verdict in run.result.verdicts]
-
-
-def interruption_lines(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledLine]:
-    """Yield the last two lines of an interrupted session: outcomes, then report.html and the option --resume.
-
-    `unfinished` is as in `outcome_counts`.
-    """
-    yield (StyledText("interrupted: ", "warning"), *outcome_counts(session, unfinished))
-    page = (
-        [StyledText("page: ", "quiet"), StyledText(one_line(session.page), file=session.page)] if session.page else []
-    )
-    resume = StyledText(f"{'   ' if page else ''}resume with --resume {one_line(session.folder)}", "quiet")
-    yield (*page, *([resume] if session.folder else []))
-
-
-def _first_cause(run: RunFinished) -> str:
-    """Return the error of a run, or the first violation."""
-    return error_summary(run) if run.outcome is Outcome.ERROR else first_violation(run) or "failed"
-
-
-def _is_nondeterministic(run: RunFinished) -> bool:
-    return run.result.error is not None and run.result.error.kind == NONDETERMINISTIC

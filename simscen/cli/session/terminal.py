@@ -17,8 +17,7 @@ from simscen.core.errors import Exit, UsageError
 from simscen.core.records.session_events import SessionEvent
 from simscen.report.console_reporter import text_reporter
 from simscen.report.github import GitHubReporter
-from simscen.report.results_json import JsonReporter
-from simscen.report.text_reporters import Reporter
+from simscen.report.reporters import JsonReporter, Reporter
 from simscen.run.sessions.output_folder import probe_writable
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"

@@ -13,7 +13,8 @@ from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import SessionStarted
 from simscen.report.console_reporter import text_reporter
 from simscen.report.github import GitHubReporter, annotations, summary_markdown
-from simscen.report.results_json import JsonReporter, json_parts
+from simscen.report.reporters import JsonReporter
+from simscen.report.results_json import json_parts
 
 EXPECTED = """\
 simscen 0.1.0 · 3 scenarios · 2 workers

@@ -13,7 +13,7 @@ from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import TerminalStyle, plain_text
 from simscen.report.live_console import ColorReporter, LiveReporter
-from simscen.report.text_reporters import SessionFormatter
+from simscen.report.session_formatter import SessionFormatter
 
 
 def of(run, **changes):
@@ -246,7 +246,7 @@ def test_progress_shows_the_number_of_finished_runs(session, monkeypatch):
     assert all(len(row.rstrip()) <= 40 for row in rows if "…" in row)
 
 
-def test_a_forced_color_reaches_a_pipe():
+def test_a_forced_color_reaches_a_pipe(monkeypatch):
     out = io.StringIO()
     out.isatty = lambda: False
 
@@ -254,7 +254,9 @@ def test_a_forced_color_reaches_a_pipe():
         encoding = "utf-8"
 
     stream = Utf8()
-    with text_reporter(stream, environ={"FORCE_COLOR": "1"}) as listen:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    with text_reporter(stream) as listen:
         listen(SessionStarted("0.1.0", 1, 1, 1))
         listen(SessionFinished(1, 0, 0, 1.0, 1.0))
     assert "\x1b[32m1 passed" in stream.getvalue()
