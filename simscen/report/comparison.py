@@ -81,22 +81,18 @@ def outcome_text(outcomes: OutcomeCounts) -> str:
     return f"{outcomes.passed}/{outcomes.decided}{errors}"
 
 
-def excluded_text(against: BaselineComparison) -> str:
-    """Return how many pairs have an error, and how many runs have no partner; "" if all runs are compared."""
-    parts = []
+def exclusion_notes(against: BaselineComparison) -> list[str]:
+    """Return notes on pairs whose metrics are not compared, on pairs with an error, and on runs without a partner."""
+    notes = []
+    if against.pairs_with_one_arrival:
+        pairs = number_with_noun(against.pairs_with_one_arrival, "pair")
+        notes.append(f"in {pairs} only one run reached its goals, so their metrics are not compared")
+    excluded = []
     if against.error_pairs:
-        parts.append(f"{number_with_noun(against.error_pairs, 'pair')} with an error")
+        excluded.append(f"{number_with_noun(against.error_pairs, 'pair')} with an error")
     if against.unpaired_runs:
-        parts.append(f"{number_with_noun(against.unpaired_runs, 'run')} without a partner")
-    return "left out: " + ", ".join(parts) if parts else ""
-
-
-def unequal_progress_text(against: BaselineComparison) -> str:
-    """Return the number of pairs in which only one run reached its goals, as text; "" if there are none."""
-    if not against.pairs_with_one_arrival:
-        return ""
-    pairs = number_with_noun(against.pairs_with_one_arrival, "pair")
-    return f"in {pairs} only one run reached its goals, so their metrics are not compared"
+        excluded.append(f"{number_with_noun(against.unpaired_runs, 'run')} without a partner")
+    return [*notes, f"left out: {', '.join(excluded)}"] if excluded else notes
 
 
 def comparison_headline(baseline: str, against: BaselineComparison) -> str:
@@ -130,11 +126,21 @@ def change_direction(change: ScenarioChange) -> str:
     return "other" if change.is_worse is None else "worse" if change.is_worse else "better"
 
 
-def difference_cells(metric: MetricDifference) -> tuple[str, str, str, str]:
-    """Return as text: mean of the baseline, mean of the other stack, difference, its 95 % interval ("" if unknown)."""
+def difference_cells(metric: MetricDifference) -> tuple[str, str, str, str, str, str]:
+    """Return the cells of a row of the table of metrics as text.
+
+    They are: name and unit, mean of the baseline, mean of the other stack, difference, its 95 % interval ("" if
+    unknown), and the numbers of pairs with a lower, equal, and higher value.
+    """
     digits = 3 if metric.unit and max(abs(metric.baseline), abs(metric.value)) < 1 else 2
-    interval = "" if metric.interval is None else " … ".join(f"{bound:+.{digits}f}" for bound in metric.interval)
-    return f"{metric.baseline:.{digits}f}", f"{metric.value:.{digits}f}", f"{metric.difference:+.{digits}f}", interval
+    return (
+        f"{metric.metric}, {metric.unit}".removesuffix(", "),
+        f"{metric.baseline:.{digits}f}",
+        f"{metric.value:.{digits}f}",
+        f"{metric.difference:+.{digits}f}",
+        "" if metric.interval is None else " … ".join(f"{bound:+.{digits}f}" for bound in metric.interval),
+        f"{metric.lower}/{metric.equal}/{metric.higher}",
+    )
 
 
 def listed_outcomes(comparison: Comparison, changed_only: bool) -> dict[str, Mapping[str, OutcomeCounts]]:
@@ -187,9 +193,8 @@ def _comparison_section(
         yield (StyledText(f"    and {len(against.flips) - MAX_FLIPS} more, in the JSON results", "quiet"),)
     yield from _metric_table(baseline, against)
     yield from _change_lines(against, prefix)
-    for note in (unequal_progress_text(against), excluded_text(against)):
-        if note:
-            yield (StyledText(f"    {note}", "quiet"),)
+    for note in exclusion_notes(against):
+        yield (StyledText(f"    {note}", "quiet"),)
 
 
 def _change_lines(against: BaselineComparison, prefix: str) -> Iterator[StyledLine]:
@@ -213,14 +218,7 @@ def _metric_table(baseline: str, against: BaselineComparison) -> Iterator[Styled
         return
     stacks = shorten(baseline), shorten(against.stack)
     head = ("mean over pairs", *stacks, "difference", "95 % interval", "-/=/+")
-    rows = [
-        (
-            f"{difference.metric}, {difference.unit}".removesuffix(", "),
-            *difference_cells(difference),
-            f"{difference.lower}/{difference.equal}/{difference.higher}",
-        )
-        for difference in against.differences
-    ]
+    rows = [difference_cells(difference) for difference in against.differences]
     columns = list(zip(head, *rows, strict=True))
     widths = [max(map(len, column)) for column in columns]
     for number, row in enumerate((head, *rows)):

@@ -15,11 +15,10 @@ from simscen.report.comparison import (
     change_text,
     comparison_headline,
     difference_cells,
-    excluded_text,
+    exclusion_notes,
     listed_outcomes,
     outcome_text,
     session_conclusion,
-    unequal_progress_text,
     with_changed_metrics,
 )
 from simscen.report.display_text import html_text, one_line
@@ -97,7 +96,7 @@ def comparison_markdown(comparison: Comparison, links: Links = NO_LINKS, changed
         ]
         more = len(against.changes) - MAX_CHANGES
         lines += [f"- and {more} more significant changes, in the JSON results"] if more > 0 else []
-        lines += [f"\n{cell(note)}" for note in (unequal_progress_text(against), excluded_text(against)) if note]
+        lines += [f"\n{cell(note)}" for note in exclusion_notes(against)]
     return [*lines, "", EXPLANATION]
 
 
@@ -138,11 +137,7 @@ def _comparison_section_html(baseline: str, against: BaselineComparison) -> str:
         f"<td>{html_text(change_text(change))}</td></tr>"
         for change in against.changes
     )
-    notes = "".join(
-        f'<p class="quiet">{html_text(note)}</p>'
-        for note in (unequal_progress_text(against), excluded_text(against))
-        if note
-    )
+    notes = "".join(f'<p class="quiet">{html_text(note)}</p>' for note in exclusion_notes(against))
     return (
         f"<h3>{html_text(comparison_headline(baseline, against))}</h3>"
         + (f"<table>{flips}</table>" if flips else "")
@@ -161,7 +156,5 @@ def _metric_row_html(metric: MetricDifference) -> str:
 
 def _metric_cells(metric: MetricDifference) -> tuple[str, ...]:
     """Return a row of the table of metrics, with one cell for each of `_HEADINGS`."""
-    before, after, difference, interval = difference_cells(metric)
-    name = f"{metric.metric}, {metric.unit}".removesuffix(", ")
-    signs = f"{metric.lower}/{metric.equal}/{metric.higher}"
-    return name, str(metric.pairs), before, after, difference, interval, signs, f"{metric.p:.2g}"
+    name, *cells = difference_cells(metric)
+    return name, str(metric.pairs), *cells, f"{metric.p:.2g}"

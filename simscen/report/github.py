@@ -15,6 +15,7 @@ from simscen.report.display_text import relative_path, relative_to_checkout
 from simscen.report.reporters import Reporter
 from simscen.report.violations import (
     error_summary,
+    failed_violations,
     reason_without_failure,
     reported_violations,
     scenario_file,
@@ -61,7 +62,7 @@ def annotations(run: RunFinished) -> list[str]:
     """
     name = short_run_name(run.key)
     if excuse := reason_without_failure(run):
-        line = next((each.line for each in reported_violations(run) if not each.is_warning), 0)
+        line = next((each.line for each in failed_violations(run)), 0)
         return [_workflow_command("notice", run, line, name, excuse)]
     lines = [
         _workflow_command(

@@ -1,7 +1,7 @@
 """Writer of junit.xml, with one testsuite per scenario file and one testcase per run."""
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import Literal
@@ -16,8 +16,8 @@ from simscen.report.display_text import escape_control, one_line, shell_command_
 from simscen.report.results_json import in_order
 from simscen.report.study import claim_text, claim_title
 from simscen.report.violations import (
-    Violation,
     error_details,
+    failed_violations,
     first_violation,
     reason_without_failure,
     reported_violations,
@@ -44,11 +44,10 @@ def xml_parts(
     if study is not None and study.claim is not None and ordered:
         yield _claim_xml(root, study, study.claim, ordered, family)
         return
-    counts = _counts_by_file(ordered)
-    total = SuiteCounts()
-    for suite in counts.values():
-        total.add(suite)
-    total.write_to(root)
+    counts: dict[str, SuiteCounts] = {}
+    for run in ordered:
+        counts.setdefault(run.result.path, SuiteCounts()).count(run)
+    _set_sums(root, counts.values())
     yield b"<?xml version='1.0' encoding='utf-8'?>\n"
     if not counts:
         yield ElementTree.tostring(root) + b"\n"
@@ -60,7 +59,7 @@ def xml_parts(
             yield b"" if path is None else b"\n  </testsuite>"
             path, used_names = run.result.path, set()
             element = Element("testsuite", {"name": escape_control(scenario_file(run))})
-            counts[path].write_to(element)
+            _set_sums(element, [counts[path]])
             element.set("skipped", str(counts[path].skipped))
             yield b"\n  " + _opening_tag(element)
         parent = Element("testsuite")
@@ -92,38 +91,19 @@ class SuiteCounts:
         self.skipped += bool(reason_without_failure(run))
         self.seconds += run.wall
 
-    def add(self, other: "SuiteCounts") -> None:
-        """Add the numbers of another suite, except `skipped`."""
-        self.tests += other.tests
-        self.failures += other.failures
-        self.errors += other.errors
-        self.seconds += other.seconds
 
-    def write_to(self, element: Element) -> None:
-        """Set the attributes of an element, except `skipped`, which the root element must not have."""
-        element.set("tests", str(self.tests))
-        element.set("failures", str(self.failures))
-        element.set("errors", str(self.errors))
-        element.set("time", f"{self.seconds:.3f}")
-
-
-def _counts_by_file(runs: Iterable[RunFinished]) -> dict[str, SuiteCounts]:
-    counts: dict[str, SuiteCounts] = {}
-    for run in runs:
-        counts.setdefault(run.result.path, SuiteCounts()).count(run)
-    return counts
+def _set_sums(element: Element, counts: Collection[SuiteCounts]) -> None:
+    """Set the attributes of an element to sums, except `skipped`, which the root element must not have."""
+    element.set("tests", str(sum(each.tests for each in counts)))
+    element.set("failures", str(sum(each.failures for each in counts)))
+    element.set("errors", str(sum(each.errors for each in counts)))
+    element.set("time", f"{sum(each.seconds for each in counts):.3f}")
 
 
 def _opening_tag(element: Element) -> bytes:
     """Return the start tag of an element that has no content yet."""
     text: bytes = ElementTree.tostring(element, encoding="utf-8")
     return text.removesuffix(b" />") + b">"
-
-
-def _indented_document(root: Element) -> bytes:
-    ElementTree.indent(root)
-    body: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
-    return body + b"\n"
 
 
 def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[RunFinished], family: Family) -> bytes:
@@ -158,14 +138,16 @@ def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[R
         element.set("errors", str(int(undecided) + len(incomplete)))
         element.set("time", seconds)
     suite.set("skipped", "0")
-    return _indented_document(root)
+    ElementTree.indent(root)
+    body: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return body + b"\n"
 
 
 def _add_case(suite: Element, run: RunFinished, name: str, family: Family) -> None:
     case = SubElement(suite, "testcase", {"classname": _classname(run), "name": name, "time": f"{run.wall:.3f}"})
     if family == "simscen":
         case.set("file", escape_control(scenario_file(run)))
-        lines = (each.line for each in reported_violations(run) if each.line and not each.is_warning)
+        lines = (each.line for each in failed_violations(run) if each.line)
         case.set("line", str(next(lines, 1)))
         _add_properties(case, run)
     match run.outcome:
@@ -207,25 +189,24 @@ def _add_properties(case: Element, run: RunFinished) -> None:
 
 
 def _add_failure(case: Element, run: RunFinished) -> None:
-    failures = [violation for violation in reported_violations(run) if not violation.is_warning]
+    failures = failed_violations(run)
     element = SubElement(case, "failure")
     element.set("type", escape_control(failures[0].verdict.criterion) if failures else "criterion")
     element.set("message", first_violation(run) or "failed")
-    element.text = _details(run, failures)
+    element.text = _details(run)
 
 
 def _add_error(case: Element, run: RunFinished) -> None:
     kind, message, tail = error_details(run)
     element = SubElement(case, "error", {"type": escape_control(kind), "message": message})
-    failures = [violation for violation in reported_violations(run) if not violation.is_warning]
-    parts = [f"{source_location(run)}: {message}", tail, _details(run, failures)]
+    parts = [f"{source_location(run)}: {message}", tail, _details(run)]
     element.text = "\n".join(part for part in parts if part)
 
 
-def _details(run: RunFinished, violations: list[Violation]) -> str:
+def _details(run: RunFinished) -> str:
     """Return the violations and the command that repeats the run, one per line."""
     lines = []
-    for violation in violations:
+    for violation in failed_violations(run):
         lines.append(f"{source_location(run, violation.line)}: {violation.message}")
         lines += [f"    {text}" for text in violation.detail]
     return "\n".join([*lines, *([f"again: {shell_command_text(run.again)}"] if run.again else [])])

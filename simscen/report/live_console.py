@@ -102,17 +102,14 @@ class ColorReporter(PlainReporter):
 class LiveReporter(Reporter):
     """Prints lines in color, and below them a line for each current run, which is updated in place.
 
-    `slow` is the number of slowest runs to list at the end (0: all runs, None: no list). `clock` returns seconds of
-    wall time.
+    `slow` is the number of slowest runs to list at the end (0: all runs, None: no list).
     """
 
-    def __init__(
-        self, out: TextIO, style: TerminalStyle, slow: int | None = None, clock: Callable[[], float] = monotonic
-    ) -> None:
+    def __init__(self, out: TextIO, style: TerminalStyle, slow: int | None = None) -> None:
         self._console = _console(out, style)
         self._live = Live(console=self._console, refresh_per_second=8, transient=True)
         self._formatter = SessionFormatter(slow, lambda: style.columns)
-        self._estimate = ProgressEstimate(clock)
+        self._estimate = ProgressEstimate(monotonic)
         self._running: dict[RunKey, tuple[RunStarted, float]] = {}
 
     def __enter__(self) -> "LiveReporter":

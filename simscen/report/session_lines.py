@@ -10,6 +10,7 @@ from simscen.report.display_text import Role, StyledLine, StyledText, number_wit
 from simscen.report.violations import (
     error_details,
     error_summary,
+    failed_violations,
     reason_without_failure,
     reported_violations,
     scenario_file,
@@ -224,7 +225,7 @@ def artifact_lines(run: RunFinished) -> Iterator[StyledLine]:
 
 def _scenario_line(run: RunFinished) -> StyledLine:
     """Return the scenario file with the line of the first violation."""
-    first = next((violation.line for violation in reported_violations(run) if not violation.is_warning), 0)
+    first = next((violation.line for violation in failed_violations(run)), 0)
     return (_label("scenario"), StyledText(source_location(run, first), file=scenario_file(run)))
 
 

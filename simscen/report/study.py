@@ -42,7 +42,9 @@ def pass_rate_text(study: Study) -> str:
     runs = study.passed + study.failed
     text = f"study of {one_line(study.scenario)}: {study.passed} of {number_with_noun(runs, 'run')} passed"
     if runs:
-        text += f" ({100 * study.passed / runs:.1f} %{interval_text(study.limits)})"
+        limits = study.limits
+        interval = "" if limits is None else f", 95 % interval {100 * limits[0]:.1f} … {100 * limits[1]:.1f} %"
+        text += f" ({100 * study.passed / runs:.1f} %{interval})"
     return text + (f", {number_with_noun(study.errors, 'run')} could not be completed" if study.errors else "")
 
 
@@ -68,36 +70,20 @@ def claim_title(claim: ClaimResult) -> str:
 def claim_text(claim: ClaimResult) -> str:
     """Return the claim and its result in one sentence."""
     statement = f"claim: pass rate of at least {_percent(claim.min_rate)} with {_percent(claim.confidence)} confidence"
-    runs = f"{claim.passed} of {number_with_noun(claim.runs, 'run')} passed{limits_text(claim)}"
+    runs = f"{claim.passed} of {number_with_noun(claim.runs, 'run')} passed"
+    if claim.limits is not None:
+        runs += f", which shows a rate of {100 * claim.limits[0]:.2f} … {100 * claim.limits[1]:.2f} %"
     match claim.status:
         case ClaimStatus.HELD:
             return f"{statement}: held, {runs}"
         case ClaimStatus.REFUTED:
             return f"{statement}: refuted, {runs}"
         case ClaimStatus.UNDECIDED:
-            return f"{statement}: undecided, {runs}; {undecided_hint(claim)}"
+            is_complete = claim.runs >= claim.max_runs
+            hint = "more `runs` may decide it" if is_complete else f"{claim.max_runs} are needed"
+            return f"{statement}: undecided, {runs}; {hint}"
         case ClaimStatus.BLOCKED:
             return f"{statement}: open, because {number_with_noun(claim.errors, 'run')} could not be completed; {runs}"
-
-
-def undecided_hint(claim: ClaimResult) -> str:
-    """Return the total number of runs that an undecided claim needs, or the advice to add runs."""
-    if claim.runs < claim.max_runs:
-        return f"{claim.max_runs} are needed"
-    return "more `runs` may decide it"
-
-
-def limits_text(claim: ClaimResult) -> str:
-    """Return the confidence limits of a claim, as ", which shows a rate of 94.12 … 99.80 %"; "" without limits."""
-    if claim.limits is None:
-        return ""
-    low, high = claim.limits
-    return f", which shows a rate of {100 * low:.2f} … {100 * high:.2f} %"
-
-
-def interval_text(limits: tuple[float, float] | None) -> str:
-    """Return ", 95 % interval 94.1 … 99.8 %" for `limits` (0.941, 0.998); "" for None."""
-    return "" if limits is None else f", 95 % interval {100 * limits[0]:.1f} … {100 * limits[1]:.1f} %"
 
 
 def effect_text(effect: ParameterEffect) -> str:

@@ -32,13 +32,26 @@ class Violation:
 
 
 def reported_violations(run: RunFinished) -> list[Violation]:
-    """Return all findings that did not pass, including warnings, in the order of the verdicts."""
+    """Return all findings that did not pass, including warnings, in the order of the verdicts.
+
+    The texts are safe for terminals.
+    """
     lines = run.result.lines or (0,) * len(run.result.verdicts)
     return [
-        _violation(run, verdict, line, finding)
+        Violation(
+            verdict,
+            line,
+            one_line(sentence(verdict, finding, run.result.tick_rate)),
+            tuple(one_line(text) for text in finding.detail),
+        )
         for verdict, line in zip(run.result.verdicts, lines, strict=True)
         for finding in violations(verdict) or _finding_of_unchecked(verdict)
     ]
+
+
+def failed_violations(run: RunFinished) -> list[Violation]:
+    """Return the violations that are not warnings, in the order of the verdicts."""
+    return [violation for violation in reported_violations(run) if not violation.is_warning]
 
 
 def short_run_name(key: RunKey, with_seed: bool = True, prefix: str = "") -> str:
@@ -85,7 +98,7 @@ def first_violation(run: RunFinished, more: str = " (and {} more)") -> str:
 
     If there are further violations, `more` follows, with their number in place of {}.
     """
-    messages = [violation.message for violation in reported_violations(run) if not violation.is_warning]
+    messages = [violation.message for violation in failed_violations(run)]
     return messages[0] + (more.format(len(messages) - 1) if len(messages) > 1 else "") if messages else ""
 
 
@@ -98,12 +111,6 @@ def reason_without_failure(run: RunFinished) -> str:
             return one_line(f"failed as expected: {run.result.reason} ({first_violation(run, ' and {} more')})")
         case _:
             return ""
-
-
-def _violation(run: RunFinished, verdict: Verdict, line: int, finding: Finding) -> Violation:
-    """Return a finding as a violation whose texts are safe for terminals."""
-    detail = tuple(one_line(text) for text in finding.detail)
-    return Violation(verdict, line, one_line(sentence(verdict, finding, run.result.tick_rate)), detail)
 
 
 def _finding_of_unchecked(verdict: Verdict) -> tuple[Finding, ...]:

@@ -27,6 +27,8 @@ SUPERSAMPLING = 2
 LABEL_CELL_PX = 4
 """Side of a label cell. In a grid of these cells, the canvas tracks which areas labels should not cover."""
 
+HATCH_SPACING_PX = 11.0
+"""Distance of the lines with which `hatch` fills a polygon."""
 MAX_ELLIPSE_RADIUS_PX, _SIDES_OF_LARGE_DISC = 4000.0, 2000
 """Maximum radius of a disc that is drawn as an ellipse, and number of sides of the polygon for a larger disc."""
 
@@ -121,14 +123,10 @@ class Canvas:
         if outline is not None:
             self._draw.line([*corners, corners[0]], fill=outline, width=_line_width(width), joint="curve")
         if blocks_labels:
-            self._block_pen.polygon(
-                [(u / SUPERSAMPLING / LABEL_CELL_PX, v / SUPERSAMPLING / LABEL_CELL_PX) for u, v in corners], fill=255
-            )
+            self._block_pen.polygon(_label_cells(corners), fill=255)
 
-    def hatch(
-        self, outlines: Sequence[Array], color: Fill, rising: bool, gap: float = 11.0, width: float = 1.2
-    ) -> None:
-        """Fill polygons with slanted lines, `gap` pixels apart. With `rising`, the lines rise to the right."""
+    def hatch(self, outlines: Sequence[Array], color: Fill, rising: bool) -> None:
+        """Fill polygons with slanted lines. With `rising`, the lines rise to the right."""
         corners = [self._corners(outline) for outline in outlines]
         points = np.array([corner for outline in corners for corner in outline]).reshape(-1, 2)
         if not len(points):
@@ -136,21 +134,18 @@ class Canvas:
         max_right, max_bottom = self.supersampled_size
         (left, top), (right, bottom) = np.floor(points.min(axis=0)), np.ceil(points.max(axis=0))
         left, top = max(left, 0), max(top, 0)
-        width_px, height_px = (
-            int(min(right, max_right) - left) + 1,
-            int(min(bottom, max_bottom) - top) + 1,
-        )
+        width_px, height_px = int(min(right, max_right) - left) + 1, int(min(bottom, max_bottom) - top) + 1
         if width_px < 1 or height_px < 1:
             return
         inside, lines = Image.new("L", (width_px, height_px), 0), Image.new("L", (width_px, height_px), 0)
         pen, fill = ImageDraw.Draw(lines), ImageDraw.Draw(inside)
         for outline in corners:
             fill.polygon([(u - left, v - top) for u, v in outline], fill=255)
-        step = gap * SUPERSAMPLING
+        step = HATCH_SPACING_PX * SUPERSAMPLING
         first = -height_px - ((left + (top if rising else -top)) % step)  # aligned between all polygons of the canvas
         for offset in np.arange(first, width_px + height_px, step).tolist():
             top_end, bottom_end = (offset, 0), (offset - height_px if rising else offset + height_px, height_px)
-            pen.line([top_end, bottom_end], fill=color[3] if len(color) > 3 else 255, width=_line_width(width))
+            pen.line([top_end, bottom_end], fill=color[3] if len(color) > 3 else 255, width=_line_width(1.2))
         lines.paste(0, (0, 0), inside.point(lambda value: 255 - value))
         self._image.paste(color[:3], (int(left), int(top)), lines)
 
@@ -160,11 +155,7 @@ class Canvas:
             corners = self._corners(points)
             self._draw.line(corners, fill=color, width=_line_width(width), joint="curve")
             if blocks_labels:
-                self._block_pen.line(
-                    [(u / SUPERSAMPLING / LABEL_CELL_PX, v / SUPERSAMPLING / LABEL_CELL_PX) for u, v in corners],
-                    fill=255,
-                    width=2,
-                )
+                self._block_pen.line(_label_cells(corners), fill=255, width=2)
 
     def dashes(self, points: Array, color: Color, width: float = 1.5, dash: float = 5.0) -> None:
         """Draw a dashed line; `dash` is the length of a dash and of a gap in pixels."""
@@ -229,6 +220,11 @@ class Canvas:
         u = (points[:, 0] - self.bounds[0]) * self.scale * SUPERSAMPLING
         v = (self.bounds[3] - points[:, 1]) * self.scale * SUPERSAMPLING
         return list(zip(u.tolist(), v.tolist(), strict=True))
+
+
+def _label_cells(corners: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Convert pixels of the supersampled image to coordinates in the grid of label cells."""
+    return [(u / SUPERSAMPLING / LABEL_CELL_PX, v / SUPERSAMPLING / LABEL_CELL_PX) for u, v in corners]
 
 
 def printable(text: str) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.messages.goals import Goal, matches_goal_name
-from simscen.core.records.events import Event, EventKind
+from simscen.core.records.events import GOAL_END_KINDS, Event, EventKind
 from simscen.core.records.verdict import Status
 from simscen.judge.finding_text import comparison, subject
 from simscen.report.picture import palette
@@ -20,8 +20,8 @@ from simscen.report.picture.palette import Color
 from simscen.report.picture.path_layer import driven_segments
 from simscen.report.picture.scene import Scene
 
-_GOAL_END_KINDS = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
-"""Events that end the drive to a goal."""
+MAX_VIOLATION_CHARACTERS = 60
+"""Maximum length of the label of a violation."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def goal_outcome(goal: Goal, scene: Scene) -> GoalOutcome:
 
     A goal that the stack reported as reached counts as failed if the criterion goals_reached found the robot elsewhere.
     """
-    ends = [event for event in scene.trace.of_kind(*_GOAL_END_KINDS) if event.name == goal.name]
+    ends = [event for event in scene.trace.of_kind(*GOAL_END_KINDS) if event.name == goal.name]
     if not ends:
         if any(event.name == goal.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED)):
             return GoalOutcome("not reached", palette.AMBER, "not reached")
@@ -197,7 +197,9 @@ def draw_violations(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         canvas.disc(x, y, 10, (255, 255, 255, 215), palette.RED, 2.0, blocks_labels=True)
         canvas.symbol(x, y, _CROSS, palette.RED)
         canvas.add_part(f"violation {verdict.id}", [(x, y)])
-        text = _truncate(printable(f"{subject(verdict, finding)}: {comparison(finding)}"))
+        text = printable(f"{subject(verdict, finding)}: {comparison(finding)}")
+        if len(text) > MAX_VIOLATION_CHARACTERS:
+            text = f"{text[: MAX_VIOLATION_CHARACTERS - 1].rstrip()}…"
         yield Label(0, x, y, text, palette.PAGE, 12, 11.0, palette.RED)
 
 
@@ -210,8 +212,3 @@ def draw_places(canvas: Canvas, scene: Scene) -> Iterator[Label]:
             canvas.symbol(pose.x, pose.y, [(0, -4), (4, 0), (0, 4), (-4, 0)], palette.PLACE)
             canvas.add_part(f"place {name}", np.array([(pose.x, pose.y)]))
             yield Label(9, pose.x, pose.y, printable(name), palette.FAINT_INK, 11, 5.0, is_optional=True)
-
-
-def _truncate(text: str, limit: int = 60) -> str:
-    """Truncate a text to `limit` characters."""
-    return text if len(text) <= limit else f"{text[: limit - 1].rstrip()}…"

@@ -16,7 +16,7 @@ from simscen.report.picture.scene import Scene
 
 WIDTH_PX = 360
 _PADDING_PX = 18
-_LINE_HEIGHT_PX = 17
+_LINE_HEIGHT_PX, _TEXT_SIZE_PX = 17, 13
 _STATUS_ORDER = (Status.ERROR, Status.FAIL, Status.INCONCLUSIVE, Status.PASS)
 Pen = ImageDraw.ImageDraw
 DrawSymbol = Callable[[Pen, float, float], None]
@@ -86,7 +86,7 @@ def _criteria(scene: Scene) -> list[CriterionRow]:
 def _draw_criteria(draw: Pen, reasons: list[str], rows: list[CriterionRow]) -> None:
     y = 24.0
     for line in reasons:
-        draw_text(draw, TextItem(_PADDING_PX, y, line, 13, palette.INK))
+        draw_text(draw, TextItem(_PADDING_PX, y, line, _TEXT_SIZE_PX, palette.INK))
         y += _LINE_HEIGHT_PX
     y += 14 if reasons else 0
     draw_text(draw, TextItem(_PADDING_PX, y, "criteria", 12, palette.FAINT_INK))
@@ -94,24 +94,23 @@ def _draw_criteria(draw: Pen, reasons: list[str], rows: list[CriterionRow]) -> N
     for status, color, lines in rows:
         (_draw_check_mark if status is Status.PASS else _draw_cross)(draw, _PADDING_PX + 5, y, color)
         for line in lines:
-            draw_text(draw, TextItem(_PADDING_PX + 20, y, line, 13, palette.INK))
+            draw_text(draw, TextItem(_PADDING_PX + 20, y, line, _TEXT_SIZE_PX, palette.INK))
             y += _LINE_HEIGHT_PX
         y += 8
 
 
-def _wrap(text: str, left: int = _PADDING_PX + 20, size: int = 13) -> list[str]:
-    """Wrap a text in the font `size` that starts at the pixel column `left`. Words longer than a line are split."""
-    available = WIDTH_PX - left - 12
+def _wrap(text: str, left: int = _PADDING_PX + 20) -> list[str]:
+    """Wrap a text that starts at the pixel column `left`. Words longer than a line are split."""
+    available, text_font = WIDTH_PX - left - 12, font(_TEXT_SIZE_PX)
     lines, current = [], ""
     for word in text.split(" "):
         longer = f"{current} {word}".strip()
-        if current and font(size).getlength(longer) > available:
+        if current and text_font.getlength(longer) > available:
             lines.append(current)
             longer = word
-        while font(size).getlength(longer) > available:
-            length = next(
-                k for k in range(len(longer) - 1, 0, -1) if k == 1 or font(size).getlength(longer[:k]) <= available
-            )
+        while text_font.getlength(longer) > available:
+            lengths = range(len(longer) - 1, 0, -1)
+            length = next(k for k in lengths if k == 1 or text_font.getlength(longer[:k]) <= available)
             lines.append(longer[:length])
             longer = longer[length:]
         current = longer

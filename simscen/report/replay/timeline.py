@@ -11,7 +11,7 @@ from itertools import count
 from typing import Any
 
 from simscen.core.errors import InvalidInput
-from simscen.core.records.events import Event, EventKind
+from simscen.core.records.events import GOAL_END_KINDS, Event, EventKind
 from simscen.core.records.run_result import RunResult
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Finding, Verdict
@@ -34,7 +34,7 @@ _LANES = {
 }  # fmt: skip
 """Lane (row) of the timeline by kind of event. Other kinds are in the lane "events"."""
 _INTERVAL_KINDS = {
-    K.GOAL_ACCEPTED: (K.GOAL_REACHED, K.GOAL_PASSED, K.GOAL_FAILED, K.GOAL_CANCELED),
+    K.GOAL_ACCEPTED: GOAL_END_KINDS,
     K.RECOVERY_STARTED: (K.RECOVERY_ENDED,),
     K.ROBOT_HELD: (K.ROBOT_RELEASED,),
     K.COLLISION_STARTED: (K.COLLISION_ENDED,),

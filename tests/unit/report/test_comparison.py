@@ -119,6 +119,6 @@ def test_comparison_in_results_json(comparison, passed) -> None:
 
 def test_small_numbers_have_one_more_digit() -> None:
     near = MetricDifference("min_clearance", "m", 6, 0.0716, 0.0309, -0.0407, (-0.0512, -0.0298), 6, 0, 0, 0.03)
-    assert difference_cells(near) == ("0.072", "0.031", "-0.041", "-0.051 … -0.030")
-    assert difference_cells(TIME) == ("25.34", "28.23", "+2.89", "+0.78 … +4.95")
-    assert difference_cells(REPLANS)[0] == "3.00"
+    assert difference_cells(near)[1:5] == ("0.072", "0.031", "-0.041", "-0.051 … -0.030")
+    assert difference_cells(TIME)[1:5] == ("25.34", "28.23", "+2.89", "+0.78 … +4.95")
+    assert difference_cells(REPLANS)[1] == "3.00"
