@@ -40,6 +40,11 @@ UNITS: dict[str, dict[str, float]] = {
 """Factors to SI units, by dimension and unit."""
 
 
+def with_article(noun: str) -> str:
+    """Return a noun with its indefinite article, e.g. "an angle"."""
+    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
+
+
 @dataclass(frozen=True)
 class Quantity:
     """Annotation of a float with a physical `dimension`, a key of UNITS. Validation converts text to SI units."""
@@ -50,16 +55,14 @@ class Quantity:
         return core_schema.no_info_before_validator_function(self.parse, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        number = dict(handler(schema))
+        number, units = dict(handler(schema)), ", ".join(UNITS[self.dimension])
         # Bounds apply only to numbers and the pattern only to text, so both fit into one schema.
         return {
             **number,
             "type": [number["type"], "string"],
             "pattern": _json_schema_pattern(UNITS[self.dimension]),
             "description": self.description,
-            "patternErrorMessage": (
-                f"expected {self._with_article}, e.g. {self.example}; units: {', '.join(UNITS[self.dimension])}"
-            ),
+            "patternErrorMessage": f"expected {with_article(self.dimension)}, e.g. {self.example}; units: {units}",
         }
 
     @property
@@ -71,10 +74,6 @@ class Quantity:
     def description(self) -> str:
         """Description of the field for the JSON schema."""
         return f"{self.dimension}, e.g. {self.example}"
-
-    @property
-    def _with_article(self) -> str:
-        return f"an {self.dimension}" if self.dimension[0] in "aeiou" else f"a {self.dimension}"
 
     def parse(self, value: Any) -> Any:
         """Convert text such as "90 deg" to SI units; return any other value unchanged.
@@ -89,11 +88,11 @@ class Quantity:
             return float(match[1]) * units[match[2]]
         if match and any(match[2] in others for others in UNITS.values()):
             other = next(name for name, others in UNITS.items() if match[2] in others)
-            problem = f"`{match[2]}` is a unit of {other}, but this is {self._with_article}"
+            problem = f"`{match[2]}` is a unit of {other}, but this is {with_article(self.dimension)}"
         elif match:
-            problem = f"unknown unit `{match[2]}` for {self._with_article}"
+            problem = f"unknown unit `{match[2]}` for {with_article(self.dimension)}"
         else:
-            problem = f"expected {self._with_article}, got the text `{value}`"
+            problem = f"expected {with_article(self.dimension)}, got the text `{value}`"
         raise PydanticCustomError(
             "quantity", "{problem}; units: {units}", {"problem": problem, "units": ", ".join(units)}
         )

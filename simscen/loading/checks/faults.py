@@ -13,6 +13,7 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import RobotSpec
 from simscen.model.stack import StackSpec
+from simscen.spec.quantities import with_article
 from simscen.triggers.base import Trigger
 
 TARGET_DESCRIPTIONS = {COMMAND: "a velocity command", WHEELS: "wheels", BELIEF: "a localizer", MAP: "a map"}
@@ -77,7 +78,7 @@ def unsuitable_faults(scope: NameScope) -> Iterator[CheckProblem]:
             known = fault_targets(loaded, loaded.robot.spec)
             suitable = [name for name, one in known.items() if one.kind in entry.fault.affects]
             hint = f"it can affect: {', '.join(suitable)}" if suitable else "it can affect nothing on this robot"
-            what = TARGET_DESCRIPTIONS.get(target.kind) or _with_article(loaded.robot.spec.sensors[entry.sensor].kind)
+            what = TARGET_DESCRIPTIONS.get(target.kind) or with_article(loaded.robot.spec.sensors[entry.sensor].kind)
             message = f"fault `{entry.kind}` cannot affect {what} (`{entry.sensor}`)"
             yield CheckProblem(keys, message, hint, at_key=True)
         elif unsuitable := entry.fault.unsuitable_key(target):
@@ -172,7 +173,3 @@ def faults_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
         if neutral and all(getattr(entry.chosen, key) == value for key, value in neutral.items()):
             message = f"fault `{entry.label}` changes nothing with these values"
             yield CheckProblem(("faults", index, entry.kind), message, at_key=True)
-
-
-def _with_article(noun: str) -> str:
-    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"

@@ -12,7 +12,7 @@ from simscen.core.version import PACKAGE
 from simscen.loading.files.paths import PathProblem
 from simscen.loading.loaded import CriterionMask, LoadedMap, LoadedRobot, LoadedWorld
 from simscen.loading.named_places import resolve_places, unknown_places
-from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.schema.messages import did_you_mean, quoted, suggestion
 from simscen.loading.schema.validate import check
 from simscen.loading.spec_walk import references
 from simscen.loading.yaml.library import Library
@@ -197,8 +197,7 @@ def _ignored_key_warnings(tree: Node) -> list[Problem]:
     warnings = []
     for key, entry in entries_of(tree).items():
         if key not in RosMapSpec.model_fields:
-            near = suggestion(key, RosMapSpec.model_fields)
-            hint = near if near.startswith("did you mean") else "it is ignored, as by map_server"
+            hint = did_you_mean(key, RosMapSpec.model_fields) or "it is ignored, as by map_server"
             message = f"{quoted(key)} has no meaning in a ROS map"
             warnings.append(Problem(*entry.key, "SC311", message, hint, "warning"))
     return warnings

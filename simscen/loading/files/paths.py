@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from simscen.core.errors import Problem
-from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.schema.messages import did_you_mean, quoted
 from simscen.loading.yaml.textfile import os_error_reason
 
 MODEL_SCHEME = "model://"
@@ -140,5 +140,4 @@ def _similar_name_hint(missing: Path) -> str:
         names = sorted(entry.name for entry in os.scandir(missing.parent))
     except OSError:
         return ""
-    hint = suggestion(missing.name, names)
-    return hint if hint.startswith("did") else ""
+    return did_you_mean(missing.name, names)

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from pydantic import BaseModel, ValidationError
 
 from simscen.loading.schema.lookup import has_no_required_keys, keys_of, models_at
-from simscen.loading.schema.messages import suggestion
+from simscen.loading.schema.messages import did_you_mean
 from simscen.loading.yaml.tree import Key, Keys, MappingNode, Node, ScalarNode, SequenceNode, dotted_path, existing_keys
 from simscen.spec.choice import Choice
 from simscen.spec.places import PoseSpec
@@ -120,8 +120,7 @@ def _missing_colon_hint(models: Iterable[type[BaseModel]], word: str, in_list: b
     for choice in (model for model in models if issubclass(model, Choice)):
         keys = [*choice.choices()]
         if word not in keys:
-            near = suggestion(word, keys)
-            return near.replace("`?", ": …`?") if near.startswith("did") else ""
+            return did_you_mean(word, keys).replace("`?", ": …`?")
         chosen = models_at(choice, [word])
         body = "{}" if chosen and all(has_no_required_keys(model) for model in chosen) else "…"
         written = f"`{word}: {body}`" if in_list else f"`{{{word}: {body}}}`"

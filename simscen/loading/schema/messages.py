@@ -73,13 +73,18 @@ def quoted(text: str, max_chars: int = 60) -> str:
     return f"`{printable if len(printable) <= max_chars else printable[: max_chars - 1] + '…'}`"
 
 
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return "did you mean …?" if a known word is similar; else ""."""
+    lowered = {choice.lower(): choice for choice in reversed(list(known))}
+    matches = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    return f"did you mean `{lowered[matches[0]]}`?" if matches else ""
+
+
 def suggestion(word: str, known: Iterable[str]) -> str:
     """Return "did you mean …?" if a known word is similar, else "expected one of: …"; "" if no word is known."""
     choices = list(known)
-    lowered = {choice.lower(): choice for choice in reversed(choices)}
-    matches = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
-    if matches:
-        return f"did you mean `{lowered[matches[0]]}`?"
+    if similar := did_you_mean(word, choices):
+        return similar
     more = len(choices) - MAX_LISTED_CHOICES
     listed = f"{', '.join(choices[:MAX_LISTED_CHOICES])}, and {more} more" if more > 1 else ", ".join(choices)
     return f"expected one of: {listed}" if choices else ""

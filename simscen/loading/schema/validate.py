@@ -132,7 +132,6 @@ def _unknown_key_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Probl
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     where = f" in `{holder}`" if holder else ""
     models = models_at(model, loc[:-1])
-    hint = messages.suggestion(key, keys_of(models))
     if lookalike := textfile.lookalike_hint(key):
         hint = lookalike
     elif key in Trigger.modifiers and models == [AnyCondition]:
@@ -141,12 +140,14 @@ def _unknown_key_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Probl
         hint = f"`{key}` is a parameter of type {' and '.join(f'`{name}`' for name in others)}"
     elif reserved_key_hint := common_mistakes.hint_for_reserved_key(loc[:-1], key):
         hint = reserved_key_hint
-    elif not hint.startswith("did") and (
-        move_hint := common_mistakes.hint_for_misplaced_key(model, tree, loc[:-1], key)
-    ):
+    elif similar := messages.did_you_mean(key, keys_of(models)):
+        hint = similar
+    elif move_hint := common_mistakes.hint_for_misplaced_key(model, tree, loc[:-1], key):
         hint = move_hint
-    elif not hint.startswith("did") and any(issubclass(one, Choice) and one.group for one in models):
-        hint = "; ".join(filter(None, (hint, "`simscen plugins` lists what installed packages add")))
+    else:
+        hint = messages.suggestion(key, keys_of(models))
+        if any(issubclass(one, Choice) and one.group for one in models):
+            hint = f"{hint}; `simscen plugins` lists what installed packages add".removeprefix("; ")
     return Problem(*key_position(tree, loc), "SC012", f"unknown key {messages.quoted(key)}{where}", hint)
 
 

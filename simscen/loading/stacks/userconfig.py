@@ -10,7 +10,7 @@ from simscen.core.external_command import ExternalCommand
 from simscen.loading.files.paths import PathSandbox, exists
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.multirobot import external_stack_name
-from simscen.loading.schema.messages import quoted, suggestion
+from simscen.loading.schema.messages import did_you_mean, quoted
 from simscen.loading.schema.validate import check
 from simscen.loading.stacks.choice import EXTERNAL
 from simscen.loading.stacks.external_commands import parse_command
@@ -79,9 +79,8 @@ def undefined_stack(
     if not isinstance(stack, ExternalStackSpec) or loaded.external_command is not None:
         return None
     name = stack.external
-    near = suggestion(name, defined_names)
     there = f", or under `stacks:` in {config_file}" if config_file is not None else ""
-    hint = near if near.startswith("did") else f"give it with --stack {name}='COMMAND'{there}"
+    hint = did_you_mean(name, defined_names) or f"give it with --stack {name}='COMMAND'{there}"
     message = f"the external stack {quoted(name)} has no command"
     return loaded.problem(("stack", EXTERNAL), "SC060", message, hint)
 

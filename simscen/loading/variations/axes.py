@@ -17,7 +17,6 @@ from simscen.loading.variations.conditions import (
     ConditionError,
     all_hold,
     parse_condition,
-    plain_values,
     written_value,
 )
 from simscen.loading.variations.naming import NAME_HINT, name_error
@@ -112,7 +111,7 @@ class AxisBuilder:
         decidable = [one for one in conditions if paths.issuperset(set(one.paths) & set(self.targets))]
 
         def is_allowed(row: Row) -> bool:
-            return all_hold(decidable, plain_values(self.tree, decidable, option(row).changes))
+            return all_hold(decidable, self.tree, option(row).changes)
 
         return [option(row) for row in covering_array([len(column) for column in columns], is_allowed)]
 

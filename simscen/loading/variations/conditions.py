@@ -7,7 +7,7 @@ never executed as Python. The function `value` takes a path as text: `pass.clear
 import ast
 import math
 import operator
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -151,15 +151,11 @@ def _evaluate_boolean(node: ast.expr, values: Mapping[str, Any]) -> bool:
     return result
 
 
-def plain_values(tree: MappingNode, conditions: Iterable[Condition], changes: Iterable[Change]) -> dict[str, Any]:
-    """Return the values of all paths in the conditions: the value in `changes`, or else the value in `tree`."""
+def all_hold(conditions: Sequence[Condition], tree: MappingNode, changes: Iterable[Change]) -> bool:
+    """Return whether all conditions hold for the scenario `tree` with these changes. Raises ConditionError."""
     changed = {change.target.path: change.value.plain for change in changes}
     paths = {path for condition in conditions for path in condition.paths}
-    return {path: changed[path] if path in changed else written_value(tree, path) for path in sorted(paths)}
-
-
-def all_hold(conditions: Iterable[Condition], values: Mapping[str, Any]) -> bool:
-    """Return whether all conditions hold for these values by path. Raises ConditionError."""
+    values = {path: changed[path] if path in changed else written_value(tree, path) for path in sorted(paths)}
     return all(condition.holds(values) for condition in conditions)
 
 

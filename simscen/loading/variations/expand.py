@@ -12,7 +12,7 @@ from typing import Any
 from simscen.core.errors import Problem
 from simscen.loading.schema.validate import check
 from simscen.loading.variations.axes import AxisBuilder
-from simscen.loading.variations.conditions import Condition, ConditionError, all_hold, plain_values
+from simscen.loading.variations.conditions import Condition, ConditionError, all_hold
 from simscen.loading.variations.naming import derive_name, make_unique, name_error, numbered_name, short_names
 from simscen.loading.variations.options import Axis, Change, Option, typical_options
 from simscen.loading.variations.paths import Target
@@ -163,8 +163,7 @@ class VariationSpace:
             if index < block.count or self.is_random:
                 options = block.options(index)
                 changes = [change for option in options for change in option.changes]
-                is_allowed = all_hold(block.conditions, plain_values(self.tree, block.conditions, changes))
-                return options if is_allowed else None
+                return options if all_hold(block.conditions, self.tree, changes) else None
             index -= block.count
         raise IndexError(number)
 
@@ -253,9 +252,7 @@ def _variation_name(options: Sequence[Option], keys: dict[str, str], number: int
     parts = []
     for option in options:
         shown = [change for change in option.changes if change.target.path in keys]
-        values = {change.target.path: change.value for change in shown}
-        numbers = {change.target.path: change.number for change in shown}
-        parts.append(option.name or (derive_name(keys, values, numbers, number) if values else ""))
+        parts.append(option.name or (derive_name(keys, shown, number) if shown else ""))
     name = ",".join(part for part in parts if part)
     return name if name and name_error(name) is None else numbered_name(number)
 

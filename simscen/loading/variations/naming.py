@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from simscen.loading.schema.messages import quoted
+from simscen.loading.variations.options import Change
 from simscen.loading.variations.paths import Target, split_path
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
 
@@ -43,14 +44,14 @@ def short_names(targets: Sequence[Target]) -> dict[str, str]:
         part_counts |= {path: part_counts[path] + 1 for path in ambiguous}
 
 
-def derive_name(keys: dict[str, str], values: dict[str, Node], value_numbers: dict[str, int], number: int) -> str:
-    """Return the name of a variation with these values, such as `speed=0.5,mass=10`.
+def derive_name(keys: dict[str, str], changes: Sequence[Change], number: int) -> str:
+    """Return the name of a variation with these changes, such as `speed=0.5,mass=10`.
 
-    The mappings contain, by path: the short name (`keys`), the value, and the number of the value in the list of the
-    path, which replaces a value that is too long. A name that is too long becomes `variation-<number>`.
+    `keys` are the short names of the paths. The number of a value in the list of its path replaces a value that is too
+    long. A name that is too long becomes `variation-<number>`.
     """
-    texts = {path: _value_text(value) or f"no{value_numbers[path]}" for path, value in values.items()}
-    name = ",".join(f"{keys[path]}={text}" for path, text in texts.items())
+    values = {keys[change.target.path]: _value_text(change.value) or f"no{change.number}" for change in changes}
+    name = ",".join(f"{key}={value}" for key, value in values.items())
     name = name if name[:1].isalnum() else f"x{name}"
     return name if len(name) <= MAX_NAME_CHARS else numbered_name(number)
 

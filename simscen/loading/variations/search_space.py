@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from simscen.core.errors import Problem
 from simscen.loading.schema.validate import check
 from simscen.loading.variations.axes import AxisBuilder
-from simscen.loading.variations.conditions import Condition, all_hold, plain_values
+from simscen.loading.variations.conditions import Condition, all_hold
 from simscen.loading.variations.expand import VARIATIONS, Variation
 from simscen.loading.variations.options import Change, value_node
 from simscen.loading.variations.paths import Target
@@ -45,7 +45,7 @@ class SearchSpace:
         for target, probability in zip(self.targets, point, strict=True):
             value = quantile(self.sampled.values[target.path], probability)
             changes.append(Change(target, value_node(self.distributions.entries[target.path].value, value), 1))
-        if not all_hold(self.conditions, plain_values(self.tree, self.conditions, changes)):
+        if not all_hold(self.conditions, self.tree, changes):
             return None
         return Variation.with_changes(name, self.tree, changes)
 

@@ -9,7 +9,7 @@ from yaml import events as ev
 from simscen.core.errors import Problem
 from simscen.loading.yaml.scalars import parse_scalar
 from simscen.loading.yaml.textfile import LOOKALIKES, describe_lookalike, find_lookalike
-from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode
+from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode, nodes_with_keys
 
 MAX_DEPTH = 40
 """Largest level of a value in nested mappings and lists. The level of the top-level value is 1."""
@@ -44,24 +44,9 @@ def parse_yaml(text: str, path: str, *, allow_duplicates: bool = False) -> tuple
     return root, composer.problems
 
 
-@dataclass(frozen=True)
-class _Anchor:
-    """Node with an anchor. Its values and levels count again at each alias."""
-
-    node: Node
-    value_count: int
-    """Number of keys and values in the node."""
-    height: int
-    """Number of levels below the node."""
-
-
 @dataclass
 class _Composer:
-    """Builds the tree of a text from PyYAML's events, and collects problems.
-
-    `depth` is the level of a node, from 1. Methods that return a node also return its height, the number of levels
-    below the node.
-    """
+    """Builds the tree of a text from PyYAML's events, and collects problems. `depth` is the level of a node, from 1."""
 
     path: str
     text: str
@@ -70,7 +55,7 @@ class _Composer:
 
     def __post_init__(self) -> None:
         self._events = self._parse_events()
-        self._anchors: dict[str, _Anchor | None] = {}
+        self._anchors: dict[str, Node | None] = {}  # None for a node that is not complete yet
         self._value_count = 0
 
     def compose_document(self) -> Node | None:
@@ -79,7 +64,7 @@ class _Composer:
         if isinstance(next(self._events), ev.StreamEndEvent):
             raise _ParseError(self._problem(None, "SC004", "the file is empty"))
         start = next(self._events)
-        root, _ = self._compose_node(start, 1)
+        root = self._compose_node(start, 1)
         next(self._events)  # the end of the document
         after = next(self._events)
         if not isinstance(after, ev.StreamEndEvent):
@@ -103,8 +88,8 @@ class _Composer:
         except yaml.YAMLError as error:
             raise _ParseError(self._problem(None, "SC003", str(error).splitlines()[0])) from None
 
-    def _compose_node(self, event: ev.Event, depth: int) -> tuple[Node, int]:
-        """Return the node that begins with `event`, and its height. Raises _ParseError."""
+    def _compose_node(self, event: ev.Event, depth: int) -> Node:
+        """Return the node that begins with `event`. Raises _ParseError."""
         if isinstance(event, ev.AliasEvent):
             return self._compose_alias(event, depth)
         if depth > MAX_DEPTH:
@@ -112,20 +97,18 @@ class _Composer:
         assert isinstance(event, ev.NodeEvent)
         self._report_tag(event)
         self._count_values(event, 1)
-        before = self._value_count
         if event.anchor is not None:
             self._anchors[event.anchor] = None
-        node, height = self._compose_content(event, depth)
-        if event.anchor is not None:
-            self._anchors[event.anchor] = _Anchor(node, self._value_count - before + 1, height)
-        return node, height
-
-    def _compose_content(self, event: ev.NodeEvent, depth: int) -> tuple[Node, int]:
+        node: Node
         if isinstance(event, ev.ScalarEvent):
-            return ScalarNode(self._position_of(event), self._scalar_value(event)), 0
-        if isinstance(event, ev.SequenceStartEvent):
-            return self._compose_sequence(event, depth)
-        return self._compose_mapping(event, depth)
+            node = ScalarNode(self._position_of(event), self._scalar_value(event))
+        elif isinstance(event, ev.SequenceStartEvent):
+            node = self._compose_sequence(event, depth)
+        else:
+            node = self._compose_mapping(event, depth)
+        if event.anchor is not None:
+            self._anchors[event.anchor] = node
+        return node
 
     def _scalar_value(self, event: ev.ScalarEvent) -> str | int | float | bool | None:
         """Return the value of a scalar; for an integer that is too large, report a problem and return 0."""
@@ -137,22 +120,18 @@ class _Composer:
             self.problems.append(self._problem(event, "SC008", str(error)))
             return 0
 
-    def _compose_sequence(self, start: ev.Event, depth: int) -> tuple[Node, int]:
-        items, height = [], 0
+    def _compose_sequence(self, start: ev.Event, depth: int) -> SequenceNode:
+        items = []
         while not isinstance(event := next(self._events), ev.SequenceEndEvent):
-            item, below = self._compose_node(event, depth + 1)
-            items.append(item)
-            height = max(height, below)
-        return SequenceNode(self._position_of(start), tuple(items)), height + 1
+            items.append(self._compose_node(event, depth + 1))
+        return SequenceNode(self._position_of(start), tuple(items))
 
-    def _compose_mapping(self, start: ev.Event, depth: int) -> tuple[Node, int]:
+    def _compose_mapping(self, start: ev.Event, depth: int) -> MappingNode:
         entries: dict[str, Entry] = {}
         merged: list[Node] = []
-        height = 0
         while not isinstance(event := next(self._events), ev.MappingEndEvent):
             key = self._read_key(event)
-            value, below = self._compose_node(next(self._events), depth + 1)
-            height = max(height, below)
+            value = self._compose_node(next(self._events), depth + 1)
             if key == "<<" and isinstance(value, MappingNode | SequenceNode):
                 merged.extend(value.items if isinstance(value, SequenceNode) else [value])
                 continue
@@ -160,7 +139,7 @@ class _Composer:
                 self._report_duplicate(event, key, entries[key].key)
             if self.allow_duplicates or key not in entries:
                 entries[key] = Entry(self._position_of(event), value)
-        return MappingNode(self._position_of(start), self._apply_merge_keys(start, entries, merged)), height + 1
+        return MappingNode(self._position_of(start), self._apply_merge_keys(start, entries, merged))
 
     def _apply_merge_keys(self, start: ev.Event, entries: dict[str, Entry], merged: list[Node]) -> dict[str, Entry]:
         """Return `entries` with the keys of the mappings `merged`, which are the values of the merge key `<<`.
@@ -182,20 +161,22 @@ class _Composer:
         self._count_values(event, 1)
         return str(event.value)
 
-    def _compose_alias(self, event: ev.AliasEvent, depth: int) -> tuple[Node, int]:
-        """Return the node to which an alias refers, and its height.
+    def _compose_alias(self, event: ev.AliasEvent, depth: int) -> Node:
+        """Return the node to which an alias refers. Its values and levels count again.
 
         Raises _ParseError if there is no such node, or if the node contains the alias itself.
         """
         if event.anchor not in self._anchors:
             raise _ParseError(self._problem(event, "SC006", f"alias `*{event.anchor}` has no anchor before it"))
-        anchor = self._anchors[event.anchor]
-        if anchor is None:
+        node = self._anchors[event.anchor]
+        if node is None:
             raise _ParseError(self._problem(event, "SC006", f"alias `*{event.anchor}` contains itself"))
-        if depth + anchor.height > MAX_DEPTH:
+        keys_below = [keys for keys, _ in nodes_with_keys(node)]
+        if depth + max(map(len, keys_below)) > MAX_DEPTH:
             raise _ParseError(self._problem(event, "SC006", f"nested deeper than {MAX_DEPTH}"))
-        self._count_values(event, anchor.value_count)
-        return anchor.node, anchor.height
+        named = sum(isinstance(keys[-1], str) for keys in keys_below[1:])  # their keys count as well
+        self._count_values(event, len(keys_below) + named)
+        return node
 
     def _count_values(self, event: ev.Event, count: int) -> None:
         """Add `count` to the number of values. Raises _ParseError if there are too many."""

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from simscen.core.errors import Problem
+from simscen.spec.quantities import with_article
 
 MAX_FILE_BYTES = 1 << 20
 """Largest size of a text file: 1 MiB."""
@@ -127,5 +128,5 @@ def lookalike_hint(text: str) -> str:
     index = find_lookalike(text)
     if index is None:
         return ""
-    article = "an" if LOOKALIKES[text[index]][0][0] in "aeiou" else "a"
-    return f"it contains {article} {describe_lookalike(text[index])}; write {LOOKALIKES[text[index]][1]} instead"
+    character = text[index]
+    return f"it contains {with_article(describe_lookalike(character))}; write {LOOKALIKES[character][1]} instead"
