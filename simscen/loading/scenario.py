@@ -14,8 +14,9 @@ from simscen.loading.loaded import KEEPOUT_MASK_KEYS, SPEED_MASK_KEYS, LoadedMap
 from simscen.loading.named_places import places_of, resolve_places, unknown_places
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check, not_a_mapping
-from simscen.loading.stacks.choice import StackChoice, not_a_scenario, recognize_stack_file
+from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.stacks.nav2_expansion import with_nav2_parameters
+from simscen.loading.stacks.stack_files import not_a_scenario, recognize_stack_file
 from simscen.loading.variations.expand import VARIATIONS, Variation, VariationSpace, expand_variations, variation_space
 from simscen.loading.variations.naming import number_of
 from simscen.loading.variations.options import Change

@@ -134,7 +134,7 @@ def with_stack(file: Path, experiments: list["Experiment"], generated: Path, pro
     Their scenarios are written to the folder `generated`. `project` is the root folder of the stack file.
     """
     from simscen.bench.navigation.experiments import with_stack_parameters
-    from simscen.loading.stacks.choice import load_stack_file
+    from simscen.loading.stacks.stack_files import load_stack_file
 
     choice = load_stack_file(file.name.split(".")[0], str(file), file, project)
     if choice.notes:

@@ -146,7 +146,7 @@ def _parse_choice(text: str, root: Path, world_path: Sequence[Path], stacks: Sta
     if value == REFERENCE or (_NAME.fullmatch(value) and find_type("stack", value)):
         return StackChoice(name, value, type=value)
     if value.endswith(STACK_SUFFIXES) or (value.endswith(YAML_SUFFIXES) and Path(value).is_file()):
-        from simscen.loading.stacks.choice import load_stack_file
+        from simscen.loading.stacks.stack_files import load_stack_file
 
         try:
             return load_stack_file(name, value, Path(value), root, world_path)

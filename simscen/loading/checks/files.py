@@ -17,7 +17,7 @@ from simscen.loading.files.discovery import (
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.scenario import try_variations
 from simscen.loading.schema.validate import check_partial
-from simscen.loading.stacks.choice import NAV2_FILE_KIND, STACK_FILE_KIND, read_stack_file, recognize_stack_file
+from simscen.loading.stacks.stack_files import NAV2_FILE_KIND, STACK_FILE_KIND, read_stack_file, recognize_stack_file
 from simscen.loading.variations.variation_problems import VariationProblems, merge_problems
 from simscen.loading.yaml.library import APPEND_SUFFIX, DEFAULTS_FILE, Library
 from simscen.loading.yaml.tree import MappingNode, ScalarNode, child, entries_of, node_at

@@ -1,19 +1,13 @@
-"""Choice of a stack for all scenarios by `--stack`, and stack files (`*.stack.yaml` or Nav2 parameter files)."""
+"""Choice of a stack for all scenarios by `--stack`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from simscen.core.errors import InvalidInput, Problem
+from simscen.core.errors import Problem
 from simscen.core.external_command import ExternalCommand
-from simscen.loading.files.paths import PathSandbox, path_in_messages
-from simscen.loading.schema.validate import check
-from simscen.loading.stacks.nav2_expansion import NAV2_PARAMS, with_nav2_parameters
-from simscen.loading.stacks.nav2_parameters import is_nav2_parameter_file
-from simscen.loading.yaml.library import Library
-from simscen.loading.yaml.textfile import read_text
-from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, child, entries_of
-from simscen.model.stack_files import StackFileSpec
+from simscen.loading.files.paths import path_in_messages
+from simscen.loading.yaml.tree import Entry, MappingNode, Position, ScalarNode, child
 
 SCENARIO_KEYS = ("keepout", "keepout_mask", "speed_zones", "speed_mask")
 """Keys under `stack` for zones and masks. Their values belong to the scenario, and apply to every stack."""
@@ -111,87 +105,3 @@ def _has_type(section: MappingNode, stack_type: str) -> bool:
     written = child(section, "type")
     selected = REFERENCE if written is None else written.plain
     return EXTERNAL not in section.entries and selected == stack_type
-
-
-def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: Sequence[Path] = ()) -> StackChoice:
-    """Return the choice `--stack name=value` of the stack file `path`, which may be outside `root`.
-
-    Raises InvalidInput with all problems of the file.
-    """
-    library = Library(PathSandbox.around(root, [*world_path, path.parent]))
-    found = read_stack_file(path, library)
-    if isinstance(found, list):
-        raise InvalidInput(found)
-    section, notes = found
-    return StackChoice(
-        name, value, "", path.absolute(), section, dict(library.texts), dict(library.files), notes=tuple(notes)
-    )
-
-
-def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Problem]] | list[Problem]:
-    """Return the section `stack` of a stack file and warnings about the file; or all problems of the file.
-
-    `path` can also be a Nav2 parameter file. In the section, the path of each Nav2 file is replaced by the parameters
-    in this file.
-    """
-    file = library.sandbox.resolve_argument(path)
-    if isinstance(file, Problem):
-        return [file]
-    tree, problems = _read_tree(file, library)
-    if problems or tree is None:
-        return library.with_source(problems)
-    notes: list[Problem] = []
-    if isinstance(tree, MappingNode):
-        expanded = with_nav2_parameters(tree, library)
-        notes = library.with_source(expanded.notes)
-        if expanded.problems:
-            return library.with_source(sorted(expanded.problems))
-        tree = expanded.tree
-    spec = check(StackFileSpec, tree)
-    section = child(tree, "stack")
-    problems = spec if isinstance(spec, list) else []
-    for name in SCENARIO_KEYS:
-        if (entry := entries_of(section).get(name)) is not None:
-            message = f"`{name}` belongs to a scenario, not to a stack file"
-            hint = "write it under `stack:` of the scenario, where it applies to every stack"
-            problems.append(Problem(*entry.key, "SC016", message, hint))
-    if problems or not isinstance(section, MappingNode):
-        return library.with_source(sorted(problems))
-    return section.without_keys(NAV2_PARAMS), notes
-
-
-def _read_tree(file: Path, library: Library) -> tuple[Node | None, list[Problem]]:
-    """Return the YAML tree and problems of a stack file. For a Nav2 file, the tree is `stack: {nav2_params: FILE}`."""
-    display_name = library.sandbox.display_name(file)
-    text = read_text(file, display_name)
-    if isinstance(text, Problem) or not is_nav2_parameter_file(text, display_name):
-        return library.read(file)
-    library.add({display_name: text}, {display_name: file})
-    start = Position(display_name, 1, 1)
-    stack = MappingNode(start, {NAV2_PARAMS: Entry(start, ScalarNode(start, file.name))})
-    entries = {"simscen": Entry(start, ScalarNode(start, 1)), "stack": Entry(start, stack)}
-    return MappingNode(start, entries), []
-
-
-STACK_FILE_KIND, NAV2_FILE_KIND = "stack file", "parameter file of Nav2"
-"""Kinds of files with the parameters of a stack, as in messages."""
-_STACK_FILE_KEYS = frozenset({"simscen", "name", "description", "stack"})
-"""Top-level keys that a stack file can have."""
-
-
-def recognize_stack_file(tree: Node | None, text: str, display_name: str) -> str:
-    """Recognize a stack file by its content: return STACK_FILE_KIND, NAV2_FILE_KIND, or "" for other files.
-
-    `tree` and `text` are the content of the file, and `display_name` is its path in messages.
-    """
-    if is_nav2_parameter_file(text, display_name):
-        return NAV2_FILE_KIND
-    keys = entries_of(tree).keys()
-    return STACK_FILE_KIND if "stack" in keys and keys <= _STACK_FILE_KEYS else ""
-
-
-def not_a_scenario(kind: str, display_name: str) -> Problem:
-    """Return the problem that a stack file is used as a scenario. `kind` is STACK_FILE_KIND or NAV2_FILE_KIND."""
-    alternative = f", or name it in a scenario: `stack: {{nav2_params: {display_name.rpartition('/')[2]}}}`"
-    hint = f"run scenarios with `--stack NAME={display_name}`{alternative if kind == NAV2_FILE_KIND else ''}"
-    return Problem(display_name, 0, 0, "SC025", f"this is a {kind}, not a scenario", hint)

@@ -8,7 +8,8 @@ from simscen.core.errors import InvalidInput
 from simscen.loading.named_places import resolve_places
 from simscen.loading.scenario import load_scenario
 from simscen.loading.scenario_text import resolved_text
-from simscen.loading.stacks.choice import StackChoice, load_stack_file
+from simscen.loading.stacks.choice import StackChoice
+from simscen.loading.stacks.stack_files import load_stack_file
 from simscen.model.stack import StackSpec
 from tests.scenario_files import spec_of_text
 

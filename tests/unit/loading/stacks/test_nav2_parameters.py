@@ -7,7 +7,7 @@ import pytest
 from simscen.core.errors import InvalidInput
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
-from simscen.loading.stacks.choice import load_stack_file
+from simscen.loading.stacks.stack_files import load_stack_file
 
 SCENARIO = """\
 simscen: 1
