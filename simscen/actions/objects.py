@@ -14,9 +14,10 @@ from simscen.core.geometry.shapes import Body
 from simscen.core.messages.navigation import Path
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
-from simscen.spec.moving_objects import Motion, ShapedObject
+from simscen.spec.motions import Motion
 from simscen.spec.places import MovableName, Name, PlaceOrPose
 from simscen.spec.quantities import Angle, Length, Mass, NonNegativeLength, PositiveDuration
+from simscen.spec.shapes import ShapedObject
 
 
 class Spawn(ShapedObject, Action):

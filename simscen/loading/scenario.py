@@ -9,7 +9,7 @@ from simscen.loading import multirobot
 from simscen.loading.checks.runner import check_robot_names, check_scenario
 from simscen.loading.codes import UNSUPPORTED_BY_STACK
 from simscen.loading.files.assets import Assets, find_criterion_masks
-from simscen.loading.files.paths import PathSandbox
+from simscen.loading.files.paths import PathSandbox, is_unusable_name, scenario_id
 from simscen.loading.loaded import KEEPOUT_MASK_KEYS, SPEED_MASK_KEYS, LoadedMap, LoadedScenario
 from simscen.loading.named_places import places_of, resolve_places, unknown_places
 from simscen.loading.schema.messages import quoted, suggestion
@@ -24,9 +24,6 @@ from simscen.loading.variations.variation_problems import VariationProblems, mer
 from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.tree import Keys, MappingNode, ScalarNode, child, node_at, value_position
 from simscen.model.scenario import ScenarioSpec
-
-SUFFIXES = (".scenario.yaml", ".scenario.yml", ".yaml", ".yml")
-"""Suffixes that are not part of the id of a scenario."""
 
 
 def load_scenario(
@@ -290,17 +287,3 @@ def _map_at(keys: Keys, tree: MappingNode, assets: Assets) -> LoadedMap | None:
     """Load the ROS map whose path is at `keys` of a valid scenario; None if there is no path."""
     node = node_at(tree, keys)
     return assets.map(node) if isinstance(node, ScalarNode) else None
-
-
-def is_unusable_name(name: str) -> bool:
-    """Return whether the name cannot be the name of an output folder."""
-    return name in ("", ".", "..")
-
-
-def scenario_id(file: Path, root: Path) -> str:
-    """Return the id of a scenario: its path relative to the root, without suffix; outside the root, its file name."""
-    display_name = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
-    return next(
-        (display_name.removesuffix(suffix) for suffix in SUFFIXES if display_name.endswith(suffix)),
-        display_name,
-    )

@@ -11,7 +11,6 @@ from simscen.core.records.disturbances import READING_KINDS
 from simscen.model.stack_base import RobotLatency
 from simscen.spec.base import Component, LanguageVersion, Ranged, Spec, by_default
 from simscen.spec.choice import Choice
-from simscen.spec.moving_objects import ShapedObject
 from simscen.spec.places import Name, PoseSpec, Ring
 from simscen.spec.quantities import (
     Angle,
@@ -33,6 +32,7 @@ from simscen.spec.quantities import (
     PositiveSpeed,
     Quantity,
 )
+from simscen.spec.shapes import ShapedObject
 
 FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
 Argument = Annotated[str, Field(max_length=4096)] | int | float | bool

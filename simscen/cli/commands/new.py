@@ -14,7 +14,8 @@ from simscen.cli.session.user_files import create_file
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.version import PACKAGE
 from simscen.loading.files.discovery import BASE_SUFFIXES, SCENARIO_SUFFIXES, default_root
-from simscen.loading.scenario import is_unusable_name, try_variations
+from simscen.loading.files.paths import is_unusable_name
+from simscen.loading.scenario import try_variations
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.yaml.library import DEFAULTS_FILE
 

@@ -25,7 +25,7 @@ from simscen.loading.checks.scene import (
 from simscen.loading.goals import expects_start_failure
 from simscen.loading.yaml.tree import Keys, MappingNode
 from simscen.sim.body.outline import radius_and_height
-from simscen.spec.moving_objects import Motion
+from simscen.spec.motions import Motion
 from simscen.triggers.base import Trigger
 from simscen.triggers.timing import Time
 from simscen.worlds.extent import top_height

@@ -5,8 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput, NothingSelected, Problem
-from simscen.loading.files.paths import exists, is_folder, path_in_messages
-from simscen.loading.scenario import scenario_id
+from simscen.loading.files.paths import exists, is_folder, path_in_messages, scenario_id
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
 

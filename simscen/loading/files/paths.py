@@ -1,4 +1,7 @@
-"""Resolution of paths in YAML files. They must be relative, and lead into the root or a folder of --world-path."""
+"""Paths in YAML files, and ids of scenarios, which are paths.
+
+Paths in YAML files must be relative, and lead into the root or a folder of --world-path.
+"""
 
 import errno
 import os
@@ -16,6 +19,9 @@ MODEL_SCHEME = "model://"
 
 _INVALID_IN_IDS = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
 """Characters that the id of a scenario cannot contain: control characters, bidirectional characters, and surrogates."""
+
+_SCENARIO_SUFFIXES = (".scenario.yaml", ".scenario.yml", ".yaml", ".yml")
+"""Suffixes that are not part of the id of a scenario."""
 
 
 @dataclass(frozen=True)
@@ -141,3 +147,17 @@ def _similar_name_hint(missing: Path) -> str:
     except OSError:
         return ""
     return did_you_mean(missing.name, names)
+
+
+def is_unusable_name(name: str) -> bool:
+    """Return whether the name cannot be the name of an output folder."""
+    return name in ("", ".", "..")
+
+
+def scenario_id(file: Path, root: Path) -> str:
+    """Return the id of a scenario: its path relative to the root, without suffix; outside the root, its file name."""
+    display_name = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
+    return next(
+        (display_name.removesuffix(suffix) for suffix in _SCENARIO_SUFFIXES if display_name.endswith(suffix)),
+        display_name,
+    )

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 from simscen.core.errors import Problem
 from simscen.loading.schema import common_mistakes, messages
 from simscen.loading.schema.lookup import has_no_required_keys, keys_of, models_at, type_values_at, type_values_with_key
-from simscen.loading.yaml import textfile
+from simscen.loading.yaml.lookalikes import lookalike_hint
 from simscen.loading.yaml.tree import (
     Keys,
     MappingNode,
@@ -132,7 +132,7 @@ def _unknown_key_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Probl
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     where = f" in `{holder}`" if holder else ""
     models = models_at(model, loc[:-1])
-    if lookalike := textfile.lookalike_hint(key):
+    if lookalike := lookalike_hint(key):
         hint = lookalike
     elif key in Trigger.modifiers and models == [AnyCondition]:
         hint = f"`{key}` applies to the whole trigger: write it next to `all`, `any` or `not` under `when`"

@@ -19,6 +19,7 @@ from simscen.loading.variations.conditions import (
     parse_condition,
     written_value,
 )
+from simscen.loading.variations.covering_arrays import Row, covering_array
 from simscen.loading.variations.naming import NAME_HINT, name_error
 from simscen.loading.variations.options import Axis, Change, Option, RandomOptions, typical_options, value_node
 from simscen.loading.variations.paths import PathError, Target, resolve_path
@@ -98,8 +99,6 @@ class AxisBuilder:
 
     def _pairwise_options(self, node: Node | None, conditions: Sequence[Condition]) -> list[Option]:
         """Return options in which each pair of values of two paths occurs, unless the conditions exclude it."""
-        from simscen.loading.variations.sampling import Row, covering_array
-
         columns = self._changes_by_path(node, True)
         if self.problems or not columns:
             return []

@@ -7,8 +7,8 @@ import yaml
 from yaml import events as ev
 
 from simscen.core.errors import Problem
+from simscen.loading.yaml.lookalikes import LOOKALIKES, describe_lookalike, find_lookalike
 from simscen.loading.yaml.scalars import parse_scalar
-from simscen.loading.yaml.textfile import LOOKALIKES, describe_lookalike, find_lookalike
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode, nodes_with_keys
 
 MAX_DEPTH = 40

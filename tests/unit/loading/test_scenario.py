@@ -4,8 +4,9 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import InvalidInput
+from simscen.loading.files.paths import scenario_id
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.scenario import load_scenario, scenario_id
+from simscen.loading.scenario import load_scenario
 from tests.scenario_files import try_scenario
 
 Write = Callable[[str, str], Path]

@@ -15,7 +15,7 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.motion_paths import pose_at
 from simscen.core.geometry.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, Mesh, MotionPath, Solid, Sphere
 from simscen.model.world import WorldSpec
-from simscen.spec.moving_objects import path_through_waypoints
+from simscen.spec.motions import path_through_waypoints
 from simscen.worlds.conversion import convert_world
 from simscen.worlds.geometry.cross_section import cross_section
 from simscen.worlds.geometry.section_polygons import rings_from_segments

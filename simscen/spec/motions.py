@@ -1,4 +1,4 @@
-"""Specifications of objects with a simple shape, and of scripted motions."""
+"""Specification of scripted motions."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field, model_validator
 
-from simscen.core.geometry import Pose2, Pose3, wrap
-from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, MotionPath, Shape, Solid
+from simscen.core.geometry import Pose2, wrap
+from simscen.core.geometry.shapes import MotionPath
 from simscen.spec.base import Spec
-from simscen.spec.places import PlaceOrPoint, Ring
-from simscen.spec.quantities import Angle, Duration, Length, NonNegativeLength, PositiveLength, PositiveSpeed
+from simscen.spec.places import PlaceOrPoint
+from simscen.spec.quantities import Angle, Duration, Length, PositiveSpeed
 
 CORNER_TURN_S = 0.25
 """Half of the duration of a turn at a corner. Motions without stops shorten it to a quarter of the duration of a short
@@ -170,41 +170,3 @@ def _poses_with_stops(legs: list[_Leg], speed: float, repeat: str) -> list[tuple
             time += 2 * CORNER_TURN_S
             stops.append((time, leg.end._replace(yaw=next_leg.begin.yaw)))
     return stops
-
-
-class ShapedObject(Spec):
-    """Object with exactly one shape: a box, a cylinder, or a prism over a polygon."""
-
-    box: Annotated[list[PositiveLength], Field(min_length=3, max_length=3)] | None = None
-    """Box: length along x, width along y, height."""
-    cylinder: Annotated[list[PositiveLength], Field(min_length=2, max_length=2)] | None = None
-    """Upright cylinder: radius, height."""
-    polygon: Ring | None = None
-    """Upright prism over a polygon with these corners."""
-    height: PositiveLength = 1.0
-    """Height of the prism over `polygon`."""
-    z: NonNegativeLength = 0.0
-    """Height of the underside above the ground."""
-
-    @model_validator(mode="after")
-    def _check_shape(self) -> ShapedObject:
-        if sum(shape is not None for shape in (self.box, self.cylinder, self.polygon)) != 1:
-            raise ValueError("expected exactly one of: box, cylinder, polygon")
-        return self
-
-    @property
-    def total_height(self) -> float:
-        """Height in m from the underside of the object to its top."""
-        return self.box[2] if self.box is not None else self.cylinder[1] if self.cylinder is not None else self.height
-
-    def solid(self, name: str) -> Solid:
-        """Return the object as a named solid. The origin of its frame is on the ground below the object."""
-        shape: Shape
-        if self.box is not None:
-            shape, middle = Box((self.box[0], self.box[1], self.box[2])), self.box[2] / 2
-        elif self.cylinder is not None:
-            shape, middle = Cylinder(self.cylinder[0], self.cylinder[1]), self.cylinder[1] / 2
-        else:
-            assert self.polygon is not None
-            shape, middle = Extrusion(tuple((x, y) for x, y in self.polygon), self.height), 0.0
-        return Solid(shape, Pose3(z=self.z + middle), name)

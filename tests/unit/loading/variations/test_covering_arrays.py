@@ -5,7 +5,7 @@ from itertools import combinations, product
 
 import pytest
 
-from simscen.loading.variations.sampling import Row, covering_array, pairs_of
+from simscen.loading.variations.covering_arrays import Row, covering_array, pairs_of
 
 
 @pytest.mark.parametrize(
