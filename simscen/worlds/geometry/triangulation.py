@@ -108,6 +108,12 @@ def triangulate(shape: Shape) -> Mesh:
             return shape
 
 
+def enclosed_volume(mesh: Mesh | TriangleMesh) -> float:
+    """Return the volume in m³ that a closed mesh encloses; negative if its faces point inwards."""
+    a, b, c = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+
+
 def _ellipsoid(radii: tuple[float, float, float]) -> Mesh:
     # Facets of a sphere are chords in two directions, so each direction may use half of the tolerance.
     count = facet_count(max(radii), MAX_SAGITTA_M / 2)

@@ -9,9 +9,9 @@ from dataclasses import replace
 
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid
-from simscen.worlds.sdf.bodies import read_link
 from simscen.worlds.sdf.elements import Element, read_bool, read_numbers, read_pose
 from simscen.worlds.sdf.link_poses import place_links
+from simscen.worlds.sdf.links import read_link
 from simscen.worlds.sdf.model_tree import ModelNode
 from simscen.worlds.sdf.report import ImportReport
 from simscen.worlds.sdf.shapes import ShapeReader

@@ -1,6 +1,8 @@
 """Find and read the files that an SDF world refers to by URI, and parse included models."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from simscen.assets.folders import AllowedFolders, NoSuchFile, UnusableFile
@@ -75,10 +77,11 @@ class IncludedFiles:
         _check_root(root)
         return root
 
-    def enter(self, include: Element) -> Element:
-        """Return the root element of the file that an `<include>` refers to. Raises UnusableElement.
+    @contextmanager
+    def opened(self, include: Element) -> Iterator[Element]:
+        """Yield the root element of the file that an `<include>` refers to. Raises UnusableElement.
 
-        Call `leave` after the content of the file was read.
+        The file counts as open during the `with` block, in which it must not be included again.
         """
         uri = include.child("uri")
         if uri is None:
@@ -90,11 +93,10 @@ class IncludedFiles:
         if path not in self._roots:
             self._roots[path] = self._read_root(path, uri)
         self._open_paths.append(path)
-        return self._roots[path]
-
-    def leave(self) -> None:
-        """Finish the include that was entered last."""
-        self._open_paths.pop()
+        try:
+            yield self._roots[path]
+        finally:
+            self._open_paths.pop()
 
     def _read_root(self, path: str, uri: Element) -> Element:
         """Return the root element of the file `path` or of a built-in model. `uri` is the element that refers to it."""

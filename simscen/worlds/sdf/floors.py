@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
+from simscen.core.geometry.meshes import face_normals
 from simscen.core.geometry.shapes import Solid, TriangleMesh
 from simscen.worlds.extent import top_height
 from simscen.worlds.geometry.cross_section import CrossSection
@@ -48,7 +49,7 @@ def floor_height(placed: Sequence[Solid], static_count: int, bounds: Bounds, has
     geometry in a world without a ground plane.
     """
     mesh = merge_solids(placed)
-    top, is_level = mesh.vertices[mesh.faces, 2].max(axis=1), _level_faces(mesh)
+    top, is_level = mesh.vertices[mesh.faces, 2].max(axis=1), face_normals(mesh)[:, 2] >= MIN_LEVEL_NORMAL_Z
     heights_mm = np.round(top * 1000).astype(np.int64)
     is_candidate = is_level & (top > MIN_FLOOR_HEIGHT_M) & (top <= MAX_FLOOR_HEIGHT_M) & (mesh.owners < static_count)
     for height_mm in np.unique(heights_mm[is_candidate])[::-1]:
@@ -62,15 +63,6 @@ def could_be_floor(solid: Solid) -> bool:
     """Return whether a solid is low enough to be a floor, and as wide as a floor covering."""
     left, bottom, right, top = bounding_rectangle(solid)
     return min(right - left, top - bottom) >= MIN_COVERING_WIDTH_M and top_height(solid) <= MAX_FLOOR_HEIGHT_M
-
-
-def _level_faces(mesh: TriangleMesh) -> FaceMask:
-    """Return the mask of the faces that are level and face upwards."""
-    corners = mesh.vertices[mesh.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1)
-    is_level: FaceMask = (lengths > 0) & (normals[:, 2] >= MIN_LEVEL_NORMAL_Z * lengths)
-    return is_level
 
 
 def _is_floor(mesh: TriangleMesh, faces: FaceMask, bounds: Bounds, has_ground: bool) -> bool:

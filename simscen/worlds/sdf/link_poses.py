@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 
 from simscen.core.geometry import Pose3
 from simscen.worlds.sdf.elements import MAX_COORDINATE_M, Element, read_numbers, read_pose
-from simscen.worlds.sdf.model_tree import Frame, ModelNode
+from simscen.worlds.sdf.frames import Frame
+from simscen.worlds.sdf.model_tree import ModelNode
 from simscen.worlds.sdf.report import ImportReport
 
 Scale = tuple[float, float, float]
@@ -111,28 +112,23 @@ def _read_scale(element: Element) -> Scale:
 
 
 def place_links(
-    model: ModelNode, pose: Pose3, report: ImportReport, state: ModelState | None = None
+    model: ModelNode, pose: Pose3, report: ImportReport, state: ModelState | None = None, scoped_name: str = ""
 ) -> Iterator[PlacedLink]:
     """Yield all links of a model at `pose` in the world, including the links of nested models.
 
     Poses in `state` override the poses in the model. Links without a valid pose are added to the report and left out.
+    `scoped_name` is the name of a nested model, for example outer::nested.
     """
-    yield from _place_links_below(model, pose, model.name, report, state or ModelState())
-
-
-def _place_links_below(
-    model: ModelNode, pose: Pose3, scoped_name: str, report: ImportReport, state: ModelState
-) -> Iterator[PlacedLink]:
-    """Yield the links of `place_links`; `scoped_name` is the name of the model, for example outer::nested."""
+    state = state or ModelState()
     model_pose = state.pose if state.pose is not None else pose
     for part in model.parts:
         with report.skip_unusable():
             frame = part.frame if isinstance(part, ModelNode) else part
             part_pose = model_pose.compose(model.scope.pose_of(frame))
-            name = f"{scoped_name}::{part.name}"
+            name = f"{scoped_name or model.name}::{part.name}"
             if isinstance(part, ModelNode):
                 nested_state = state.models.get(part.name, _state_of_included_model(state, part))
-                yield from _place_links_below(part, part_pose, name, report, nested_state)
+                yield from place_links(part, part_pose, report, nested_state, name)
             else:
                 yield PlacedLink(name, part, model, state.links.get(part.name, part_pose), state.scale)
 

@@ -14,11 +14,12 @@ from simscen.worlds.extent import model_name, placed_solids, top_height, union
 from simscen.worlds.geometry.prisms import bounding_rectangle
 from simscen.worlds.maps.map_size import Bounds, map_size_error
 from simscen.worlds.sdf.actors import read_actor
-from simscen.worlds.sdf.bodies import read_link, split_model, with_unique_names
+from simscen.worlds.sdf.bodies import split_model, with_unique_names
 from simscen.worlds.sdf.elements import Element
 from simscen.worlds.sdf.files import IncludedFiles, WorldFiles
 from simscen.worlds.sdf.floors import could_be_floor, floor_height
 from simscen.worlds.sdf.link_poses import ModelState, WorldState, place_links, read_state
+from simscen.worlds.sdf.links import read_link
 from simscen.worlds.sdf.model_tree import ModelNode, TreeReader
 from simscen.worlds.sdf.report import ImportReport, UnusableElement
 from simscen.worlds.sdf.shapes import ShapeReader

@@ -87,10 +87,10 @@ class MeshReader:
             raise element.unusable("<uri> is missing")
         request = _mesh_request(element, self._files.locate(uri))
         if request not in self._meshes:
-            parts = _select_submesh(self._read_file(request.path, uri), request, element)
-            if _largest_coordinate(parts, request) > MAX_COORDINATE_M:
+            mesh = _merge_parts(_select_submesh(self._read_file(request.path, uri), request, element), request)
+            if np.abs(mesh.vertices).max() > MAX_COORDINATE_M:
                 raise element.unusable(f"the mesh reaches farther than {MAX_COORDINATE_M:g} m")
-            self._meshes[request] = _merge_parts(parts, request)
+            self._meshes[request] = mesh
         if element.attributes.get("optimization") or element.child("convex_decomposition"):
             self._report.note(element.location, "convex hulls are not computed; the mesh is used unchanged")
         return self._meshes[request]
@@ -141,26 +141,15 @@ def _select_submesh(parts: tuple[MeshPart, ...], request: MeshRequest, element: 
     return selected
 
 
-def _largest_coordinate(parts: tuple[MeshPart, ...], request: MeshRequest) -> float:
-    """Return the largest absolute coordinate in m of the requested mesh."""
-    # With Python floats, huge coordinates and scales overflow to infinity without a warning of NumPy.
-    reach = 0.0
-    for axis, factor in enumerate(request.scale):
-        low = min(float(part.vertices[:, axis].min()) for part in parts)
-        high = max(float(part.vertices[:, axis].max()) for part in parts)
-        center = (low + high) / 2 if request.is_centered else 0.0
-        reach = max(reach, abs((low - center) * factor), abs((high - center) * factor))
-    return reach
-
-
 def _merge_parts(parts: tuple[MeshPart, ...], request: MeshRequest) -> Mesh:
     """Return one read-only mesh of all parts, centered and scaled as requested."""
     vertices = np.vstack([part.vertices for part in parts])
     starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     faces = np.vstack([part.faces + start for part, start in zip(parts, starts, strict=True)]).astype(np.int32)
-    if request.is_centered:
-        vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    vertices = vertices * request.scale
+    with np.errstate(over="ignore"):  # huge coordinates and scales become infinite
+        if request.is_centered:
+            vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+        vertices = vertices * request.scale
     if sum(factor < 0 for factor in request.scale) % 2:  # a mirrored triangle runs clockwise
         faces = faces[:, ::-1]
     mesh = Mesh(np.ascontiguousarray(vertices), np.ascontiguousarray(faces))

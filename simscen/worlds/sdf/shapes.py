@@ -6,16 +6,9 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Shape, Solid, Sphere
-from simscen.worlds.sdf.elements import (
-    MAX_COORDINATE_M,
-    SHAPES,
-    Element,
-    read_numbers,
-    read_size,
-    read_sizes,
-    report_unknown_children,
-)
+from simscen.worlds.sdf.elements import MAX_COORDINATE_M, Element, read_numbers, read_size, read_sizes
 from simscen.worlds.sdf.files import WorldFiles
+from simscen.worlds.sdf.known_elements import SHAPES, report_unknown_children
 from simscen.worlds.sdf.meshes import MeshReader, read_heightmap
 from simscen.worlds.sdf.report import ImportReport
 

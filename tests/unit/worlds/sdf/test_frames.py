@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from simscen.core.geometry import Pose3
 from simscen.worlds.sdf.elements import parse
-from simscen.worlds.sdf.model_tree import Frame, FrameScope
+from simscen.worlds.sdf.frames import Frame, FrameScope
 
 BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
 
