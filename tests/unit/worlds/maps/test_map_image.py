@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from simscen.core.errors import InvalidInput
-from simscen.worlds.maps.ros_map import read_image
+from simscen.worlds.maps.map_image import read_image
 
 
 def assert_refused(path, reason):
