@@ -196,15 +196,11 @@ class MovingMesh:
 
         `axes` are the unit vectors of the x-axis and the y-axis of `pose`, in the world frame.
         """
-        for packets in packets_towards_sphere(fan, pose, self.center, self.scene.radius):
-            self._sweep_packets(fan, packets, pose, axes)
-
-    def _sweep_packets(self, fan: RayFan, packets: slice, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
-        """Transform the rays in a range of packets to the frame of the mesh, and shorten them."""
         (px, py, pz, *_), (ahead, left), (x, y, z, i, j, k, w) = pose, axes, self.pose
         inverse = -i, -j, -k, w
-        fan.set_directions(rotated(inverse, ahead), rotated(inverse, left), packets)
-        self.scene.sweep(fan, rotated(inverse, (px - x, py - y, pz - z)), packets)
+        for packets in packets_towards_sphere(fan, pose, self.center, self.scene.radius):
+            fan.set_directions(rotated(inverse, ahead), rotated(inverse, left), packets)
+            self.scene.sweep(fan, rotated(inverse, (px - x, py - y, pz - z)), packets)
 
 
 def packets_towards_sphere(fan: RayFan, pose: Pose3, center: Vector, radius: float) -> list[slice]:
@@ -213,9 +209,8 @@ def packets_towards_sphere(fan: RayFan, pose: Pose3, center: Vector, radius: flo
     offset = x - px, y - py, z - pz
     distance = math.hypot(*offset)
     ahead, left, _ = rotated((-i, -j, -k, w), offset)
-    cone = fan.rays_towards(
-        ahead, left, math.sqrt(distance * distance - radius * radius) if distance > radius else -math.inf
-    )
+    tangent_length = math.sqrt(distance * distance - radius * radius) if distance > radius else -math.inf
+    cone = fan.rays_towards(ahead, left, tangent_length)
     ends = fan.rays.lengths
     found = [slice(rays.start // PACKET_SIZE, -(-rays.stop // PACKET_SIZE)) for rays in cone]
     # `max` would take ten times as long as `item(argmax())`.

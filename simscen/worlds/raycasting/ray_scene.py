@@ -56,7 +56,11 @@ class RestingBodies:
     def set_bodies(self, bodies: Mapping[str, PlacedMesh]) -> None:
         """Set the bodies that are at rest now, by name."""
         previous, self._bodies = self._bodies, bodies
-        unchanged = {name for name, body in previous.items() if name in bodies and _are_equal(body, bodies[name])}
+        unchanged = {
+            name
+            for name, (mesh, pose) in previous.items()
+            if name in bodies and bodies[name][0] is mesh and bodies[name][1] == pose
+        }
         if len(unchanged) < len(previous):
             removed = previous.keys() - unchanged
             self._groups = [part for group in self._groups for part in group.split_without(removed)]
@@ -83,10 +87,6 @@ class RestingBodies:
         """
         for group in self._groups:
             group.cast(origins, directions, heights, ends)
-
-
-def _are_equal(one: PlacedMesh, other: PlacedMesh) -> bool:
-    return one[0] is other[0] and one[1] == other[1]
 
 
 class RestingGroup:
