@@ -10,16 +10,16 @@ import numpy.typing as npt
 from simscen.core.environment.world_model import PedestrianAction, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2
 from simscen.pedestrians import forces
-from simscen.pedestrians.forces import RELAXATION_TIME_S, Indices, MoveLimits, clip_moves, move_limits
+from simscen.pedestrians.forces import RELAXATION_TIME_S, Indices
+from simscen.pedestrians.move_limits import clip_moves, move_limits
 from simscen.pedestrians.pedestrian import SCARED_FORCE_M2_S2, THREATENING_SPEED_M_S, Intent, Pedestrian
 from simscen.pedestrians.surroundings import (
-    OBSTACLE_RANGE_M,
     NearestPoints,
     ObservedRobot,
     Surroundings,
     WallMap,
-    edges,
-    nearest_points_on,
+    nearest_by_solid,
+    nearest_points_of,
 )
 
 INTERACTION_RANGE_M = 10.0
@@ -39,11 +39,6 @@ PathPlanner = Callable[[Point, Point, float], list[Point]]
 """Function (start, goal, radius in m) that returns the corners of a path around walls; the last corner is the goal."""
 
 
-def plan_straight_path(_start: Point, goal: Point, _radius: float) -> list[Point]:
-    """Plan a straight path, for worlds without walls."""
-    return [goal]
-
-
 class _Neighbors(NamedTuple):
     """All pedestrians, followed by all robots.
 
@@ -60,22 +55,19 @@ class _Neighbors(NamedTuple):
 class Crowd:
     """All pedestrians of a world, sorted by name, and their motion, which uses no random numbers."""
 
-    def __init__(self, walls: WallMap, plan_path: PathPlanner = plan_straight_path) -> None:
+    def __init__(self, walls: WallMap, plan_path: PathPlanner) -> None:
         self._walls, self._plan_path = walls, plan_path
         self._people: dict[str, Pedestrian] = {}
         self._steps = 0
-
-    def __len__(self) -> int:
-        return len(self._people)
 
     def add(self, spec: WalkingPedestrian) -> None:
         """Add a pedestrian at its initial pose, or replace the one with the same name."""
         self._people[spec.name] = Pedestrian.at_start(spec)
         self._people = dict(sorted(self._people.items()))
 
-    def remove(self, name: str) -> bool:
-        """Remove a pedestrian, and return whether it existed."""
-        return self._people.pop(name, None) is not None
+    def remove(self, name: str) -> None:
+        """Remove a pedestrian."""
+        del self._people[name]
 
     def poses(self) -> dict[str, Pose2]:
         """Return the poses of all pedestrians by name."""
@@ -107,7 +99,7 @@ class Crowd:
         walls = self._walls.nearest_points(positions)
         external = self._external_forces(people, reacting, intents, positions, velocities, surroundings, walls)
         moves, after = _integrate(intents, positions, velocities, external, seconds)
-        allowed = clip_moves(moves, self._move_limits(people, positions, surroundings, walls))
+        allowed = clip_moves(moves, move_limits(people, positions, surroundings, walls))
         clipped = (allowed != moves).any(axis=1)
         after[clipped] = allowed[clipped] / seconds
         for person, move, velocity, intent in zip(people, allowed, after, intents, strict=True):
@@ -128,14 +120,14 @@ class Crowd:
         for person in people:
             visible: dict[str, ObservedRobot] = {}
             if person.spec.reacts_within and "robots" not in person.spec.blind_to:
-                visible = {robot.name: robot for robot in surroundings.robots if self._in_view(person, robot)}
+                visible = {r.name: r for r in surroundings.robots if self._sees(person, r.pose[:2])}
                 actions += person.update_reaction(visible, seconds)
             reacting.append(None if person.reacts_to is None else visible.get(person.reacts_to))
         return reacting, actions
 
-    def _in_view(self, person: Pedestrian, robot: ObservedRobot) -> bool:
-        """Return whether no wall hides a robot from a pedestrian."""
-        return bool(self._walls.visible(np.array([person.position]), np.array([robot.pose[:2]]))[0])
+    def _sees(self, person: Pedestrian, point: Point) -> bool:
+        """Return whether no wall hides a point from a pedestrian."""
+        return bool(self._walls.visible(np.array([person.position]), np.array([point]))[0])
 
     def _update_path(self, person: Pedestrian, number: int) -> None:
         """Plan a path if the goal is new or if the pedestrian no longer sees the next corner of its path.
@@ -145,7 +137,7 @@ class Crowd:
         goal = person.destination
         is_outdated = person.planned_goal != goal
         if not is_outdated and person.path and (self._steps + number) % VIEW_CHECK_STEPS == 0:
-            is_outdated = not self._walls.visible(np.array([person.position]), np.array([person.path[0]]))[0]
+            is_outdated = not self._sees(person, person.path[0])
         if is_outdated:
             person.path, person.planned_goal = self._plan_path(person.position, goal, person.spec.radius), goal
 
@@ -204,45 +196,20 @@ class Crowd:
         Robots act as objects on pedestrians with the behavior `impassive`.
         """
         person, solid, nearest = walls
-        first = _nearest_by_solid(person, solid, np.hypot(*(nearest - positions[person]).T))
+        first = nearest_by_solid(person, solid, np.hypot(*(nearest - positions[person]).T))
         contacts = [(person[first], nearest[first])]
-        for item in surroundings.objects:
-            aware = np.array([k for k, p in enumerate(people) if "objects" not in p.spec.blind_to], np.int64)
-            contacts.append(_nearest_points(aware, positions, edges(item.outlines)))
+        aware = np.array([k for k, p in enumerate(people) if "objects" not in p.spec.blind_to], np.int64)
+        contacts += [nearest_points_of(item.outlines, aware, positions) for item in surroundings.objects]
+        impassive = np.array([k for k, p in enumerate(people) if p.spec.behavior == "impassive"
+                              and "robots" not in p.spec.blind_to], np.int64)  # fmt: skip
         for robot in surroundings.robots:
-            impassive = np.array([k for k, p in enumerate(people) if p.spec.behavior == "impassive"
-                                  and "robots" not in p.spec.blind_to], np.int64)  # fmt: skip
-            contacts.append(_nearest_points(impassive, positions, edges([robot.pose.apply(robot.outline)])))
+            contacts.append(nearest_points_of([robot.pose.apply(robot.outline)], impassive, positions))
         person = np.concatenate([indices for indices, _ in contacts])
         away = positions[person] - np.concatenate([points for _, points in contacts])
         distance = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
         radii = np.array([p.spec.radius for p in people])
         force = forces.wall_forces(away / distance[:, np.newaxis], distance - radii[person])
         return _sum_by_person(person, force, len(people))
-
-    def _move_limits(
-        self, people: list[Pedestrian], positions: Array, surroundings: Surroundings, walls: NearestPoints
-    ) -> list[MoveLimits]:
-        """Return limits of the moves of one step that prevent contact.
-
-        A pedestrian may use the entire gap to a wall, but only half of the gap to an object, robot, or pedestrian.
-        """
-        radii = np.array([person.spec.radius for person in people])
-        indices, _, nearest = walls
-        limits = [_limits_towards(indices, nearest, positions, radii, 1.0)]
-        for kind, outlines in [
-            *(("objects", item.outlines) for item in surroundings.objects),
-            *(("robots", (robot.pose.apply(robot.outline),)) for robot in surroundings.robots),
-        ]:
-            aware = np.array([k for k, person in enumerate(people) if kind not in person.spec.blind_to], np.int64)
-            near, points = _nearest_points(aware, positions, edges(outlines), of_each_segment=True)
-            limits.append(_limits_towards(near, points, positions, radii, 0.5))
-        towards = positions[np.newaxis] - positions[:, np.newaxis]
-        distance = np.hypot(towards[..., 0], towards[..., 1])
-        one, other = np.nonzero((distance < 2 * OBSTACLE_RANGE_M) & ~np.eye(len(people), dtype=np.bool_))
-        length = np.maximum(distance[one, other], 1e-9)
-        unit = towards[one, other] / length[:, np.newaxis]
-        return [*limits, move_limits(one, unit, length - radii[one] - radii[other], 0.5)]
 
 
 def _neighbors(people: list[Pedestrian], positions: Array, velocities: Array, surroundings: Surroundings) -> _Neighbors:
@@ -318,47 +285,3 @@ def _sum_by_person(person: Indices, force: Array, count: int) -> Array:
     """Return the sum (count, 2) of the forces (n, 2) on each pedestrian. `person` (n,) are indices of pedestrians."""
     sums = [np.bincount(person, force[:, axis], minlength=count) for axis in (0, 1)]
     return np.stack(sums, axis=1).astype(np.float64)  # without any force, bincount returns integers
-
-
-def _nearest_by_solid(person: Indices, solid: Indices, distance: Array) -> Indices:
-    """Return the index of the nearest of the given points for each pair of a pedestrian and a solid.
-
-    Point k belongs to the solid `solid[k]` and is `distance[k]` m away from the pedestrian `person[k]`.
-    """
-    order = np.lexsort((distance, solid, person))
-    pairs = np.stack((person[order], solid[order]), axis=1)
-    is_first = np.ones(len(order), dtype=np.bool_)
-    is_first[1:] = (pairs[1:] != pairs[:-1]).any(axis=1)
-    first: Indices = order[is_first]
-    return first
-
-
-def _nearest_points(
-    indices: Indices, positions: Array, segments: Array, of_each_segment: bool = False
-) -> tuple[Indices, Array]:
-    """Return indices (k,) of pedestrians, and for each the nearest point (k, 2) in m of an outline.
-
-    Pedestrians farther than OBSTACLE_RANGE_M are left out. With `of_each_segment`, each segment of the outline in range
-    has its own entry.
-
-    indices:             pedestrians to examine
-    positions (n, 2):    positions of all pedestrians in m
-    segments (m, 2, 2):  segments of the outline
-    """
-    repeated = np.repeat(indices, len(segments))
-    points = nearest_points_on(np.tile(segments, (len(indices), 1, 1)), positions[repeated])
-    distance = np.hypot(*(points - positions[repeated]).T)
-    near = np.flatnonzero(distance <= OBSTACLE_RANGE_M)
-    if not of_each_segment:
-        near = near[_nearest_by_solid(repeated[near], np.zeros_like(near), distance[near])]
-    return repeated[near], points[near]
-
-
-def _limits_towards(indices: Indices, points: Array, positions: Array, radii: Array, ratio: float) -> MoveLimits:
-    """Return limits that allow the pedestrians `indices` (k,) to use a `ratio` of their gaps to `points` (k, 2).
-
-    `positions` (n, 2) and `radii` (n,) in m belong to all pedestrians.
-    """
-    towards = points - positions[indices]
-    distance = np.maximum(np.hypot(towards[:, 0], towards[:, 1]), 1e-9)
-    return move_limits(indices, towards / distance[:, np.newaxis], distance - radii[indices], ratio)

@@ -1,4 +1,4 @@
-"""Forces of the social force model as accelerations in m/s², and limits of moves that prevent contact.
+"""Forces of the social force model as accelerations in m/s².
 
 Sources: [HM95] Helbing and Molnár, Social force model for pedestrian dynamics, Physical Review E 51, 1995.
 [M09] Moussaïd, Helbing, Garnier, Johansson, Combe, Theraulaz, Experimental study of the behavioral mechanisms
@@ -8,8 +8,6 @@ ONE 5(4), 2010.
 """
 
 import math
-from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -43,8 +41,6 @@ HALF_VISION_RAD = math.pi / 2
 """Angle to each side in which a pedestrian sees its group without turning the head [M10]."""
 MIN_GROUP_GAP_M = 0.8
 """Distance between the centers of two members of a group below which they repel each other [M10]."""
-MAX_PROJECTIONS = 8
-"""Maximum number of limits that a move is projected onto. A move that still exceeds a limit is scaled down."""
 
 
 def social_forces(offsets: Array, relative_velocities: Array, extra_radii: Array) -> Array:
@@ -116,49 +112,3 @@ def _head_turn(vx: float, vy: float, x: float, y: float) -> float:
     if (vx == 0 and vy == 0) or (x == 0 and y == 0):
         return 0.0
     return max(0.0, abs(math.atan2(vx * y - vy * x, vx * x + vy * y)) - HALF_VISION_RAD)
-
-
-class MoveLimits(NamedTuple):
-    """Limits of the moves of pedestrians in one step, one per row.
-
-    pedestrians (n,):   index of the pedestrian that the limit applies to
-    directions (n, 2):  unit vector along which the move is limited
-    limits (n,):        maximum displacement in m along this vector
-    """
-
-    pedestrians: Indices
-    directions: Array
-    limits: Array
-
-
-def move_limits(pedestrians: Indices, directions: Array, gaps: Array, ratio: float = 1.0) -> MoveLimits:
-    """Return limits that allow each pedestrian to use a `ratio` of its gap in m to an obstacle in this direction."""
-    return MoveLimits(pedestrians, directions, ratio * np.maximum(gaps, 0.0))
-
-
-def clip_moves(moves: Array, all_limits: Iterable[MoveLimits]) -> Array:
-    """Return the moves (n, 2) in m, restricted to the limits. Pedestrians slide along obstacles if possible."""
-    parts = list(all_limits)
-    pedestrians = np.concatenate([each.pedestrians for each in parts])
-    directions = np.concatenate([each.directions for each in parts])
-    limits = np.concatenate([each.limits for each in parts])
-    exceeds = np.sum(moves[pedestrians] * directions, axis=1) > limits
-    clipped: Array = moves.copy()
-    for pedestrian in np.unique(pedestrians[exceeds]).tolist():
-        own = pedestrians == pedestrian
-        clipped[pedestrian] = _clip_move(clipped[pedestrian], directions[own], limits[own])
-    return clipped
-
-
-def _clip_move(move: Array, directions: Array, limits: Array) -> Array:
-    """Return a move (2,) in m, restricted to the limits (k,) in m along the unit vectors `directions` (k, 2)."""
-    for _ in range(MAX_PROJECTIONS):
-        excess: Array = (directions * move).sum(axis=1) - limits
-        worst = int(np.argmax(excess))
-        if excess[worst] <= 0:
-            break
-        move = np.subtract(move, excess[worst] * directions[worst])
-    along = (directions * move).sum(axis=1)
-    exceeded = along > limits
-    shortened: Array = move * float((limits[exceeded] / along[exceeded]).min(initial=1.0))
-    return shortened

@@ -61,12 +61,6 @@ class Surroundings:
     objects: tuple[ObservedObject, ...] = ()
 
 
-def edges(outlines: Sequence[Array]) -> Array:
-    """Return the edges of closed outlines, given by their corners (m, 2), as segments (n, 2, 2)."""
-    rings = [np.stack((ring, np.roll(ring, -1, axis=0)), axis=1) for ring in outlines]
-    return np.concatenate(rings) if rings else np.empty((0, 2, 2))
-
-
 class WallMap:
     """Walls that block pedestrians. Opaque walls also block their view."""
 
@@ -96,7 +90,7 @@ class WallMap:
         return (
             point_index,
             self._owners[segment_index],
-            nearest_points_on(self._segments[segment_index], points[point_index]),
+            _nearest_points_on(self._segments[segment_index], points[point_index]),
         )
 
     def _segments_near(self, column: int, row: int) -> Indices:
@@ -153,10 +147,46 @@ class _SightGrid:
         return is_clear
 
 
-def nearest_points_on(segments: Array, points: Array) -> Array:
+def _nearest_points_on(segments: Array, points: Array) -> Array:
     """Return for each pair of a segment (n, 2, 2) and a point (n, 2) the nearest point (n, 2) on the segment."""
     start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     squared = np.maximum(np.sum(along * along, axis=1), 1e-18)
     ratio = np.clip(np.sum((points - start) * along, axis=1) / squared, 0.0, 1.0)
     nearest: Array = start + ratio[:, np.newaxis] * along
     return nearest
+
+
+def nearest_by_solid(person: Indices, solid: Indices, distance: Array) -> Indices:
+    """Return the index of the nearest of the given points for each pair of a pedestrian and a solid.
+
+    Point k belongs to the solid `solid[k]` and is `distance[k]` m away from the pedestrian `person[k]`.
+    """
+    order = np.lexsort((distance, solid, person))
+    pairs = np.stack((person[order], solid[order]), axis=1)
+    is_first = np.ones(len(order), dtype=np.bool_)
+    is_first[1:] = (pairs[1:] != pairs[:-1]).any(axis=1)
+    first: Indices = order[is_first]
+    return first
+
+
+def nearest_points_of(
+    outlines: Sequence[Array], indices: Indices, positions: Array, of_each_segment: bool = False
+) -> tuple[Indices, Array]:
+    """Return indices (k,) of pedestrians, and for each the nearest point (k, 2) in m of closed outlines.
+
+    Pedestrians farther than OBSTACLE_RANGE_M are left out. With `of_each_segment`, each segment in range has its own
+    entry.
+
+    outlines:          corners (m, 2) of each outline
+    indices:           pedestrians to examine
+    positions (n, 2):  positions of all pedestrians in m
+    """
+    rings = [np.stack((ring, np.roll(ring, -1, axis=0)), axis=1) for ring in outlines]
+    segments = np.concatenate(rings) if rings else np.empty((0, 2, 2))
+    repeated = np.repeat(indices, len(segments))
+    points = _nearest_points_on(np.tile(segments, (len(indices), 1, 1)), positions[repeated])
+    distance = np.hypot(*(points - positions[repeated]).T)
+    near = np.flatnonzero(distance <= OBSTACLE_RANGE_M)
+    if not of_each_segment:
+        near = near[nearest_by_solid(repeated[near], np.zeros_like(near), distance[near])]
+    return repeated[near], points[near]

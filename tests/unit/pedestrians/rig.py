@@ -23,7 +23,7 @@ def corridor(width: float, length: float = 100.0) -> WallMap:
 
 
 def people(*walkers: WalkingPedestrian, around: WallMap | None = None) -> Crowd:
-    crowd = Crowd(around or walls())
+    crowd = Crowd(around or walls(), lambda _start, goal, _radius: [goal])
     for walker in walkers:
         crowd.add(walker)
     return crowd
