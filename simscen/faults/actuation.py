@@ -70,11 +70,9 @@ class _SlippingWheels(OdometryDistortion):
     changes_motion = True
 
     def __init__(self, slip: Slip, separation: float) -> None:
-        super().__init__()
         self._left, self._right, self._separation = 1 - slip.left, 1 - slip.right, separation
-
-    def distort_twist(self, step: Twist) -> Twist:
-        return self._scaled(step, 1 / self._left, 1 / self._right)
+        inverse = 1 / self._left, 1 / self._right
+        super().__init__(lambda step, velocity, _: (self._scaled(step, *inverse), self._scaled(velocity, *inverse)))
 
     def command(self, command: Twist) -> Twist | None:
         return command if self._ended else self._scaled(command, self._left, self._right)

@@ -1,6 +1,5 @@
 """Helpers for several faults: change distances of lidars and cameras, the localizer's correction, or odometry."""
 
-from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -67,6 +66,17 @@ def ranges_with_scan_errors(scan: Scan, new_distances: Array, scan_distances: Ar
     return clip_to_sensor_range(scan, ranges)
 
 
+class ChangedReadings(FaultEffect):
+    """Effect that changes only readings. `change` returns the changed reading."""
+
+    def __init__(self, change: Callable[[Reading], Reading]) -> None:
+        self._change = change
+
+    def reading(self, reading: Reading) -> Reading:
+        """Return the changed reading."""
+        return self._change(reading)
+
+
 class ChangedRanges(FaultEffect):
     """Effect that changes only the ranges of scans. `ranges` returns the changed ranges (n,) in m of a scan."""
 
@@ -90,23 +100,21 @@ class ChangedCommands(FaultEffect):
 
 
 class OdometryDistortion(FaultEffect):
-    """Base class of odometry faults. Distorts each increment and integrates the distorted increments to a pose.
+    """Effect on odometry. Distorts each increment and integrates the distorted increments to a pose.
 
     The reported pose does not jump when the fault begins. The accumulated error remains when the fault ends.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, distort: Callable[[Twist, Twist, int], tuple[Twist, Twist]]) -> None:
+        """Create the effect.
+
+        `distort` takes an increment (m, m, rad), the velocity (m/s, m/s, rad/s) at its end, and its duration in ticks.
+        It returns the distorted increment and velocity.
+        """
+        self._distort = distort
         self._previous: dict[str, tuple[Odometry, Pose2]] = {}
         """Last true reading and last reported pose by sensor."""
         self._ended = False
-
-    @abstractmethod
-    def distort_twist(self, step: Twist) -> Twist:
-        """Return the distorted value of a true increment (m, m, rad) or velocity (m/s, m/s, rad/s)."""
-
-    def distort(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
-        """Return the distorted increment `step` over `ticks`, and the distorted `velocity` at its end."""
-        return self.distort_twist(step), self.distort_twist(velocity)
 
     def reading(self, reading: Reading) -> Reading:
         """Return the distorted odometry. Other readings are returned unchanged."""
@@ -115,7 +123,7 @@ class OdometryDistortion(FaultEffect):
         previous, pose = self._previous.get(reading.sensor, (reading, reading.pose))
         step, velocity = Twist(*previous.pose.between(reading.pose)), reading.twist
         if not self._ended:
-            step, velocity = self.distort(step, velocity, reading.tick - previous.tick)
+            step, velocity = self._distort(step, velocity, reading.tick - previous.tick)
         pose = pose.compose(Pose2(*step))
         self._previous[reading.sensor] = reading, pose
         return replace(reading, pose=pose, twist=velocity)

@@ -14,6 +14,7 @@ from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Image, Imu, Odometry, Reading, Scan
 from simscen.faults.base import Fault, FaultEffect, FaultSetting, FaultTarget
+from simscen.faults.common import ChangedReadings
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Probability
 
@@ -53,22 +54,15 @@ class Garbage(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to replace messages at random."""
-        return _RandomGarbage(rng, self)
+        return ChangedReadings(lambda reading: self._garbage(rng, reading))
 
-
-class _RandomGarbage(FaultEffect):
-    """Effect of `garbage`."""
-
-    def __init__(self, rng: np.random.Generator, garbage: Garbage) -> None:
-        self._rng, self._garbage = rng, garbage
-
-    def reading(self, reading: Reading) -> Reading | None:
+    def _garbage(self, rng: np.random.Generator, reading: Reading) -> Reading:
         has_size = isinstance(reading, Scan | Image)
         contents = (*GARBAGE_NUMBERS, *(WRONG_SIZES if has_size else ()))
-        draw, random_content = self._rng.random(), contents[int(self._rng.integers(len(contents)))]
-        if draw >= self._garbage.probability:
+        draw, random_content = rng.random(), contents[int(rng.integers(len(contents)))]
+        if draw >= self.probability:
             return reading
-        content = random_content if self._garbage.value == "anything" else self._garbage.value
+        content = random_content if self.value == "anything" else self.value
         match reading:
             case Scan(ranges=ranges):
                 return replace(reading, ranges=_garbage_values(ranges, content))

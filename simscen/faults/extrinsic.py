@@ -11,7 +11,7 @@ import numpy as np
 from simscen.core.geometry import Pose3
 from simscen.core.messages.sensor_data import Image, Imu, Reading, Scan
 from simscen.faults.base import Fault, FaultEffect, FaultSetting
-from simscen.faults.common import ranges_with_scan_errors
+from simscen.faults.common import ChangedReadings, ranges_with_scan_errors
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, Length
 
@@ -49,27 +49,21 @@ class Extrinsic(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to measure from the wrong pose."""
-        return _WrongPose(Pose3.from_rpy(self.x, self.y, self.z, self.roll, self.pitch, self.yaw), setting)
+        error = Pose3.from_rpy(self.x, self.y, self.z, self.roll, self.pitch, self.yaw)
+        simulator = setting.simulator
 
+        def measured(reading: Reading) -> Reading:
+            match reading:
+                case Scan() if simulator is not None:
+                    nominal, actual = simulator.distances(reading), simulator.distances(reading, error)
+                    return replace(reading, ranges=ranges_with_scan_errors(reading, actual, nominal))
+                case Image() if simulator is not None:
+                    image = simulator.image(error)
+                    return replace(reading, rgb=image.rgb, depth=image.depth)
+                case Imu(angular_velocity=angular, linear_acceleration=linear):
+                    (x, y, z), (a, b, c) = (np.array([angular, linear]) @ error.rotation()).tolist()
+                    return replace(reading, angular_velocity=(x, y, z), linear_acceleration=(a, b, c))
+                case _:
+                    return reading
 
-class _WrongPose(FaultEffect):
-    """Effect of `extrinsic`."""
-
-    def __init__(self, error: Pose3, setting: FaultSetting) -> None:
-        self._error, self._simulator = error, setting.simulator
-
-    def reading(self, reading: Reading) -> Reading | None:
-        match reading:
-            case Scan() if self._simulator is not None:
-                nominal = self._simulator.distances(reading)
-                actual = self._simulator.distances(reading, self._error)
-                return replace(reading, ranges=ranges_with_scan_errors(reading, actual, nominal))
-            case Image() if self._simulator is not None:
-                image = self._simulator.image(self._error)
-                return replace(reading, rgb=image.rgb, depth=image.depth)
-            case Imu(angular_velocity=angular, linear_acceleration=linear):
-                rotated = np.array([angular, linear]) @ self._error.rotation()
-                (x, y, z), (a, b, c) = rotated.tolist()
-                return replace(reading, angular_velocity=(x, y, z), linear_acceleration=(a, b, c))
-            case _:
-                return reading
+        return ChangedReadings(measured)

@@ -13,7 +13,7 @@ from pydantic import Field
 from simscen.core.geometry import Array
 from simscen.core.messages.sensor_data import Image, Reading, Scan
 from simscen.faults.base import Fault, FaultEffect, FaultSetting, FaultTarget
-from simscen.faults.common import ChangedRanges
+from simscen.faults.common import ChangedRanges, ChangedReadings
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, PositiveAngle, PositiveLength, Probability
 
@@ -90,22 +90,15 @@ class RangeLimit(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to limit the range of readings."""
-        return _LimitedRange(self.max)
+        return ChangedReadings(self._limited)
 
-
-class _LimitedRange(FaultEffect):
-    """Effect of `range_limit`."""
-
-    def __init__(self, max_range: float) -> None:
-        self._max_range = max_range
-
-    def reading(self, reading: Reading) -> Reading | None:
+    def _limited(self, reading: Reading) -> Reading:
         match reading:
             case Scan(ranges=ranges):
                 with np.errstate(invalid="ignore"):
-                    return replace(reading, ranges=np.where(ranges > self._max_range, np.inf, ranges))
+                    return replace(reading, ranges=np.where(ranges > self.max, np.inf, ranges))
             case Image(depth=depth):
-                return replace(reading, depth=np.where(depth > self._max_range, np.float32(np.inf), depth))
+                return replace(reading, depth=np.where(depth > self.max, np.float32(np.inf), depth))
             case _:
                 return reading
 

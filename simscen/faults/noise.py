@@ -61,7 +61,20 @@ class Noise(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to draw noise for each message."""
-        return _NoisyOdometry(rng, self, setting) if setting.kind == "Odometry" else _NoisyValues(rng, self)
+        if setting.kind != "Odometry":
+            return _NoisyValues(rng, self)
+
+        def noisy(step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
+            along, turn = rng.standard_normal(2).tolist()
+            forward = step.vx + self.linear * math.sqrt(math.hypot(step.vx, step.vy)) * along
+            turned = step.wz + self.angular * math.sqrt(abs(step.wz)) * turn
+            if ticks:
+                seconds = setting.clock.seconds(ticks)
+                vx, wz = velocity.vx + (forward - step.vx) / seconds, velocity.wz + (turned - step.wz) / seconds
+                velocity = Twist(vx, velocity.vy, wz)
+            return Twist(forward, step.vy, turned), velocity
+
+        return OdometryDistortion(noisy)
 
 
 class _NoisyValues(FaultEffect):
@@ -96,28 +109,3 @@ class _NoisyValues(FaultEffect):
         noisy = Pose2(pose.x + std * x, pose.y + std * y, pose.yaw + self._noise.angular * turn)
         odometry = belief.map_from_odom.between(pose)
         return replace(belief, pose=noisy, map_from_odom=noisy.compose(odometry.inverse()))
-
-
-class _NoisyOdometry(OdometryDistortion):
-    """Effect of `noise` on odometry."""
-
-    def __init__(self, rng: np.random.Generator, noise: Noise, setting: FaultSetting) -> None:
-        super().__init__()
-        self._rng, self._noise, self._clock = rng, noise, setting.clock
-
-    def distort_twist(self, step: Twist) -> Twist:
-        driven, turned = math.hypot(step.vx, step.vy), abs(step.wz)
-        along, turn = self._rng.standard_normal(2).tolist()
-        return Twist(
-            step.vx + self._noise.linear * math.sqrt(driven) * along,
-            step.vy,
-            step.wz + self._noise.angular * math.sqrt(turned) * turn,
-        )
-
-    def distort(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
-        noisy = self.distort_twist(step)
-        if not ticks:
-            return noisy, velocity
-        seconds = self._clock.seconds(ticks)
-        along, turn = (noisy.vx - step.vx) / seconds, (noisy.wz - step.wz) / seconds
-        return noisy, Twist(velocity.vx + along, velocity.vy, velocity.wz + turn)

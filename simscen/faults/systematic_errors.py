@@ -14,7 +14,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Image, Imu, Reading
 from simscen.faults.base import Fault, FaultEffect, FaultSetting
-from simscen.faults.common import OdometryDistortion, apply_pose_error, change_distances
+from simscen.faults.common import ChangedReadings, OdometryDistortion, apply_pose_error, change_distances
 from simscen.spec.base import Spec
 from simscen.spec.quantities import (
     Acceleration,
@@ -64,38 +64,24 @@ class Bias(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to add the error to each reading."""
-        return _BiasedReadings(self) if setting.kind in ("Scan", "Imu", "Image") else _BiasedOdometry(self)
+        if setting.kind == "Odometry":
+            return OdometryDistortion(lambda step, velocity, _: (self._distorted(step), self._distorted(velocity)))
+        return ChangedReadings(self._biased_reading)
 
+    def _distorted(self, twist: Twist) -> Twist:
+        turn = twist.wz * self.angular_scale + twist.vx * self.turn_per_metre
+        return Twist(twist.vx * self.linear_scale, twist.vy * self.linear_scale, turn)
 
-class _BiasedOdometry(OdometryDistortion):
-    """Effect of `bias` on odometry."""
-
-    def __init__(self, bias: Bias) -> None:
-        super().__init__()
-        self._bias = bias
-
-    def distort_twist(self, step: Twist) -> Twist:
-        turn = step.wz * self._bias.angular_scale + step.vx * self._bias.turn_per_metre
-        return Twist(step.vx * self._bias.linear_scale, step.vy * self._bias.linear_scale, turn)
-
-
-class _BiasedReadings(FaultEffect):
-    """Effect of `bias` on a lidar, IMU, or camera."""
-
-    def __init__(self, bias: Bias) -> None:
-        self._bias = bias
-
-    def reading(self, reading: Reading) -> Reading | None:
-        bias = self._bias
+    def _biased_reading(self, reading: Reading) -> Reading:
         if isinstance(reading, Imu):
             x, y, z = reading.angular_velocity
             a, b, c = reading.linear_acceleration
             return replace(
-                reading, angular_velocity=(x, y, z + bias.gyro), linear_acceleration=(a + bias.accelerometer, b, c)
+                reading, angular_velocity=(x, y, z + self.gyro), linear_acceleration=(a + self.accelerometer, b, c)
             )
-        changed = change_distances(reading, lambda distances: distances + bias.range)
-        if isinstance(changed, Image) and bias.brightness:
-            return replace(changed, rgb=np.clip(np.rint(changed.rgb + 255 * bias.brightness), 0, 255).astype(np.uint8))
+        changed = change_distances(reading, lambda distances: distances + self.range)
+        if isinstance(changed, Image) and self.brightness:
+            return replace(changed, rgb=np.clip(np.rint(changed.rgb + 255 * self.brightness), 0, 255).astype(np.uint8))
         return changed
 
 
@@ -115,32 +101,19 @@ class Scale(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start to scale each value or each odometry increment."""
-        return _ScaledOdometry(self.factor) if setting.kind == "Odometry" else _ScaledReadings(self.factor)
+        if setting.kind == "Odometry":
+            return OdometryDistortion(lambda step, velocity, _: (self._distorted(step), self._distorted(velocity)))
+        return ChangedReadings(self._scaled_reading)
 
+    def _distorted(self, twist: Twist) -> Twist:
+        return Twist(*(self.factor * value for value in twist))
 
-class _ScaledOdometry(OdometryDistortion):
-    """Effect of `scale` on odometry."""
-
-    def __init__(self, factor: float) -> None:
-        super().__init__()
-        self._factor = factor
-
-    def distort_twist(self, step: Twist) -> Twist:
-        return Twist(*(self._factor * value for value in step))
-
-
-class _ScaledReadings(FaultEffect):
-    """Effect of `scale` on a lidar, IMU, or camera."""
-
-    def __init__(self, factor: float) -> None:
-        self._factor = factor
-
-    def reading(self, reading: Reading) -> Reading | None:
+    def _scaled_reading(self, reading: Reading) -> Reading:
         if isinstance(reading, Imu):
-            x, y, z = (self._factor * value for value in reading.angular_velocity)
-            a, b, c = (self._factor * value for value in reading.linear_acceleration)
+            x, y, z = (self.factor * value for value in reading.angular_velocity)
+            a, b, c = (self.factor * value for value in reading.linear_acceleration)
             return replace(reading, angular_velocity=(x, y, z), linear_acceleration=(a, b, c))
-        return change_distances(reading, lambda distances: distances * self._factor)
+        return change_distances(reading, lambda distances: distances * self.factor)
 
 
 class Drift(Spec, Fault):
@@ -172,23 +145,17 @@ class Drift(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         """Start with an error of zero."""
-        return _DriftingOdometry(self, setting) if setting.kind == "Odometry" else _DriftingValues(self, setting)
+        if setting.kind != "Odometry":
+            return _DriftingValues(self, setting)
 
+        def drifted(step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
+            seconds = setting.clock.seconds(ticks)
+            return (
+                Twist(step.vx + self.linear * seconds, step.vy, step.wz + self.angular * seconds),
+                Twist(velocity.vx + self.linear, velocity.vy, velocity.wz + self.angular),
+            )
 
-class _DriftingOdometry(OdometryDistortion):
-    """Effect of `drift` on odometry."""
-
-    def __init__(self, drift: Drift, setting: FaultSetting) -> None:
-        super().__init__()
-        self._drift, self._clock = drift, setting.clock
-
-    def distort_twist(self, step: Twist) -> Twist:
-        return Twist(step.vx + self._drift.linear, step.vy, step.wz + self._drift.angular)
-
-    def distort(self, step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
-        seconds = self._clock.seconds(ticks)
-        drifted = Twist(step.vx + self._drift.linear * seconds, step.vy, step.wz + self._drift.angular * seconds)
-        return drifted, self.distort_twist(velocity)
+        return OdometryDistortion(drifted)
 
 
 class _DriftingValues(FaultEffect):
