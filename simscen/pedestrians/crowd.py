@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -39,19 +38,6 @@ PathPlanner = Callable[[Point, Point, float], list[Point]]
 """Function (start, goal, radius in m) that returns the corners of a path around walls; the last corner is the goal."""
 
 
-class _Neighbors(NamedTuple):
-    """All pedestrians, followed by all robots.
-
-    positions (n, 2):   in m
-    velocities (n, 2):  in m/s
-    extra_radii (n,):   radius in m minus REFERENCE_RADIUS_M
-    """
-
-    positions: Array
-    velocities: Array
-    extra_radii: Array
-
-
 class Crowd:
     """All pedestrians of a world, sorted by name, and their motion, which uses no random numbers."""
 
@@ -62,7 +48,7 @@ class Crowd:
 
     def add(self, spec: WalkingPedestrian) -> None:
         """Add a pedestrian at its initial pose, or replace the one with the same name."""
-        self._people[spec.name] = Pedestrian.at_start(spec)
+        self._people[spec.name] = Pedestrian(spec, spec.pose, has_arrived=not spec.goals)
         self._people = dict(sorted(self._people.items()))
 
     def remove(self, name: str) -> None:
@@ -174,18 +160,22 @@ class Crowd:
         surroundings: Surroundings,
     ) -> Array:
         """Return the forces (n, 2) in m/s² with which pedestrians evade each other and robots."""
-        others = _neighbors(people, positions, velocities, surroundings)
-        towards = others.positions[np.newaxis] - positions[:, np.newaxis]
+        # The others are all pedestrians, followed by all robots.
+        robots = surroundings.robots
+        other_positions = np.concatenate((positions, np.array([robot.pose[:2] for robot in robots]).reshape(-1, 2)))
+        other_velocities = np.concatenate((velocities, np.array([robot.velocity for robot in robots]).reshape(-1, 2)))
+        radii = np.array([*(person.spec.radius for person in people), *(robot.radius for robot in robots)])
+        towards = other_positions[np.newaxis] - positions[:, np.newaxis]
         interacts = np.hypot(towards[..., 0], towards[..., 1]) <= INTERACTION_RANGE_M
         np.fill_diagonal(interacts, False)
         interacts &= _interactions(people, reacting, surroundings)
         person, other = np.nonzero(interacts)
         force = forces.social_forces(
-            towards[person, other], velocities[person] - others.velocities[other], others.extra_radii[other]
+            towards[person, other], velocities[person] - other_velocities[other], radii[other] - REFERENCE_RADIUS_M
         )
         is_strong = np.hypot(force[:, 0], force[:, 1]) > MIN_SOCIAL_FORCE_M_S2
         person, other, force = person[is_strong], other[is_strong], force[is_strong]
-        visible = self._walls.visible(positions[person], others.positions[other])
+        visible = self._walls.visible(positions[person], other_positions[other])
         return _sum_by_person(person[visible], force[visible], len(people))
 
     def _obstacle_forces(
@@ -210,17 +200,6 @@ class Crowd:
         radii = np.array([p.spec.radius for p in people])
         force = forces.wall_forces(away / distance[:, np.newaxis], distance - radii[person])
         return _sum_by_person(person, force, len(people))
-
-
-def _neighbors(people: list[Pedestrian], positions: Array, velocities: Array, surroundings: Surroundings) -> _Neighbors:
-    """Return the positions, velocities, and radii of all pedestrians and robots."""
-    robots = surroundings.robots
-    radii = [*(p.spec.radius - REFERENCE_RADIUS_M for p in people), *(r.radius - REFERENCE_RADIUS_M for r in robots)]
-    return _Neighbors(
-        np.concatenate((positions, np.array([robot.pose[:2] for robot in robots]).reshape(-1, 2))),
-        np.concatenate((velocities, np.array([robot.velocity for robot in robots]).reshape(-1, 2))),
-        np.array(radii),
-    )
 
 
 def _interactions(

@@ -55,9 +55,8 @@ class Pedestrian:
     """A pedestrian with its current state in the world frame."""
 
     spec: WalkingPedestrian
-    x: float
-    y: float
-    yaw: float
+    pose: Pose2
+    """Position and heading."""
     velocity: tuple[float, float] = (0.0, 0.0)
     """In m/s along x and y."""
     goal_index: int = 0
@@ -78,20 +77,10 @@ class Pedestrian:
     """Whether the last reaction ended after `total_reaction_s` had reached `spec.reacts_for`. Only scared pedestrians
     react again afterwards."""
 
-    @classmethod
-    def at_start(cls, spec: WalkingPedestrian) -> "Pedestrian":
-        """Return the pedestrian at rest at its initial pose."""
-        return cls(spec, spec.pose.x, spec.pose.y, spec.pose.yaw, has_arrived=not spec.goals)
-
     @property
     def position(self) -> tuple[float, float]:
         """Position (x, y) in m."""
-        return self.x, self.y
-
-    @property
-    def pose(self) -> Pose2:
-        """Position and heading."""
-        return Pose2(self.x, self.y, self.yaw)
+        return self.pose.x, self.pose.y
 
     @property
     def destination(self) -> tuple[float, float]:
@@ -131,8 +120,8 @@ class Pedestrian:
         """Return whether a robot is within the reaction distance and in the field of view, regardless of walls."""
         if math.dist(self.position, robot.pose[:2]) > self.spec.reacts_within:
             return False
-        bearing = math.atan2(robot.pose.y - self.y, robot.pose.x - self.x)
-        return abs(wrap(bearing - self.yaw)) <= HALF_FIELD_OF_VIEW_RAD
+        bearing = math.atan2(robot.pose.y - self.pose.y, robot.pose.x - self.pose.x)
+        return abs(wrap(bearing - self.pose.yaw)) <= HALF_FIELD_OF_VIEW_RAD
 
     def update_reaction(self, visible: dict[str, ObservedRobot], seconds: float) -> list[PedestrianAction]:
         """Begin, continue, or end a reaction in a step of `seconds`. Return one action if a reaction began or ended.
@@ -208,15 +197,16 @@ class Pedestrian:
 
         The pedestrian turns to the point `looks_at`, or to the direction of motion if `looks_at` is None.
         """
-        self.x, self.y = self.x + float(displacement[0]), self.y + float(displacement[1])
+        x, y, yaw = self.pose
+        x, y = x + float(displacement[0]), y + float(displacement[1])
         self.velocity = float(velocity[0]), float(velocity[1])
-        facing = self.yaw
+        facing = yaw
         if looks_at is not None:
-            facing = math.atan2(looks_at[1] - self.y, looks_at[0] - self.x)
+            facing = math.atan2(looks_at[1] - y, looks_at[0] - x)
         elif math.hypot(*self.velocity) > MIN_TURNING_SPEED_M_S:
             facing = math.atan2(self.velocity[1], self.velocity[0])
-        turn, max_turn = wrap(facing - self.yaw), MAX_TURN_RATE_RAD_S * seconds
-        self.yaw = wrap(self.yaw + max(-max_turn, min(max_turn, turn)))
+        turn, max_turn = wrap(facing - yaw), MAX_TURN_RATE_RAD_S * seconds
+        self.pose = Pose2(x, y, wrap(yaw + max(-max_turn, min(max_turn, turn))))
 
 
 def _braking_speed(distance: float) -> float:
