@@ -13,10 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.geometry.meshes import SolidIndices, drivable_solids, face_normals, is_convex, submesh
+from simscen.core.geometry.meshes import drivable_solids, face_normals, is_convex, submesh
 from simscen.core.geometry.shapes import Box, Mesh, Solid, TriangleMesh
 from simscen.worlds.geometry.prisms import has_no_drivable_solids
 from simscen.worlds.geometry.triangulation import merge_solids
+
+FaceMask = npt.NDArray[np.bool_]
+"""Mask (n,) of the faces of a mesh."""
 
 EDGE_PIECE_M = 0.1
 """Maximum length of the pieces into which edges are divided. The height of an edge is measured once per piece."""
@@ -44,46 +47,43 @@ def drive_obstacles(
     if max_slope <= 0 or has_no_drivable_solids(solids, wheel_radius):
         return solids
     mesh = merge_solids(solids)
+    normals = face_normals(mesh)
     drivable = drivable_solids(mesh, wheel_radius)
-    ground = frozenset(owner for owner in drivable if _is_convex_or_height_field(mesh, owner))
+    ground = [owner for owner in drivable if _is_convex_or_height_field(mesh, normals, owner)]
     if not ground:
         return solids
     obstacles = [solid for number, solid in enumerate(solids) if number not in ground]
-    return (*obstacles, *_walls_at_edges(mesh, ground, max_step), *_steep_faces(mesh, ground, max_slope))
+    is_ground = np.isin(mesh.owners, ground)
+    walls = _walls_at_edges(mesh, normals, is_ground, max_step)
+    return (*obstacles, *walls, *_steep_faces(mesh, normals, is_ground, max_slope))
 
 
-def _is_convex_or_height_field(mesh: TriangleMesh, owner: int) -> bool:
+def _is_convex_or_height_field(mesh: TriangleMesh, normals: Array, owner: int) -> bool:
     """Return whether the solid with the index `owner` is convex or a height field, which has no overhangs."""
     is_own = mesh.owners == owner
-    return is_convex(submesh(mesh.vertices, mesh.faces[is_own])) or bool((face_normals(mesh)[is_own, 2] >= 0).all())
+    return is_convex(submesh(mesh.vertices, mesh.faces[is_own])) or bool((normals[is_own, 2] >= 0).all())
 
 
-def _steep_faces(mesh: TriangleMesh, ground: SolidIndices, max_slope: float) -> Iterator[Solid]:
+def _steep_faces(mesh: TriangleMesh, normals: Array, is_ground: FaceMask, max_slope: float) -> Iterator[Solid]:
     """Yield a prism below each sloping face of the ground that is steeper than `max_slope` rad."""
-    normal_z = face_normals(mesh)[:, 2]
-    is_steep = (normal_z > MAX_WALL_NORMAL_Z) & (normal_z < math.cos(max_slope) - 1e-9)
-    for face in np.flatnonzero(_is_ground_face(mesh, ground) & is_steep).tolist():
+    is_steep = (normals[:, 2] > MAX_WALL_NORMAL_Z) & (normals[:, 2] < math.cos(max_slope) - 1e-9)
+    for face in np.flatnonzero(is_ground & is_steep).tolist():
         corners = mesh.vertices[mesh.faces[face]]
         base = corners.copy()
         base[:, 2] = corners[:, 2].min() - WALL_THICKNESS_M
         yield Solid(Mesh(np.concatenate((base, corners)), _PRISM_FACES), name=mesh.names[int(mesh.owners[face])])
 
 
-def _is_ground_face(mesh: TriangleMesh, ground: SolidIndices) -> npt.NDArray[np.bool_]:
-    """Return the mask of the faces that belong to solids in `ground`."""
-    return np.isin(mesh.owners, sorted(ground))
-
-
-def _walls_at_edges(mesh: TriangleMesh, ground: SolidIndices, max_step: float) -> Iterator[Solid]:
+def _walls_at_edges(mesh: TriangleMesh, normals: Array, is_ground: FaceMask, max_step: float) -> Iterator[Solid]:
     """Yield thin walls at the edges of the ground where it drops by more than `max_step` m."""
-    is_wall = np.abs(face_normals(mesh)[:, 2]) <= MAX_WALL_NORMAL_Z
-    pieces = list(_edge_pieces(mesh, np.flatnonzero(_is_ground_face(mesh, ground) & is_wall)))
+    is_wall = np.abs(normals[:, 2]) <= MAX_WALL_NORMAL_Z
+    pieces = list(_edge_pieces(mesh, normals, np.flatnonzero(is_ground & is_wall)))
     if not pieces:
         return
     middles = np.array([(edge.start + edge.end) / 2 for edge in pieces])
     outward = np.array([edge.outward for edge in pieces])
     inside = middles - (SAMPLE_OFFSET_M + np.array([[edge.depth] for edge in pieces])) * outward
-    heights = _ground_heights(mesh, ground, np.concatenate((inside, middles + SAMPLE_OFFSET_M * outward)))
+    heights = _ground_heights(mesh, is_ground, np.concatenate((inside, middles + SAMPLE_OFFSET_M * outward)))
     walls: list[tuple[_EdgePiece, float, float]] = []
     for edge, high, low in zip(pieces, *np.round(np.split(heights, 2), 4).tolist(), strict=True):
         if high - low > max_step:
@@ -122,10 +122,10 @@ class _EdgePiece(NamedTuple):
         return Solid(Box((float(np.linalg.norm(along)), WALL_THICKNESS_M, high - low)), pose, name)
 
 
-def _edge_pieces(mesh: TriangleMesh, faces: npt.NDArray[np.int64]) -> Iterator[_EdgePiece]:
+def _edge_pieces(mesh: TriangleMesh, normals: Array, faces: npt.NDArray[np.int64]) -> Iterator[_EdgePiece]:
     """Divide the edges of upright `faces` (indices) into pieces. An edge of several faces counts once."""
     seen = set()
-    horizontal_normals = face_normals(mesh)[:, :2]
+    horizontal_normals = normals[:, :2]
     for face in faces.tolist():
         length = np.linalg.norm(horizontal_normals[face])
         if length == 0:  # a triangle without area has no normal
@@ -144,11 +144,10 @@ def _edge_pieces(mesh: TriangleMesh, faces: npt.NDArray[np.int64]) -> Iterator[_
         yield from (_EdgePiece(a, b, outward, owner, float(np.ptp(offsets))) for a, b in pairwise(ends))
 
 
-def _ground_heights(mesh: TriangleMesh, ground: SolidIndices, points: Array) -> Array:
+def _ground_heights(mesh: TriangleMesh, is_ground: FaceMask, points: Array) -> Array:
     """Return the heights (n,) in m of the highest ground at points (n, 2); 0 where there is only the floor."""
     from simscen.worlds.raycasting.ray_scene import RayScene
 
-    is_ground = _is_ground_face(mesh, ground)
     scene = RayScene(TriangleMesh(mesh.vertices, mesh.faces[is_ground], mesh.owners[is_ground], mesh.names))
     top = float(mesh.vertices[mesh.faces[is_ground], 2].max()) + 1.0
     origins = np.column_stack((points, np.full(len(points), top)))

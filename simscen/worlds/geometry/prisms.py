@@ -106,11 +106,6 @@ def bounding_rectangle(solid: Solid, frame: Pose3 | None = None) -> tuple[float,
     prism = upright_prism(solid, frame)
     if prism is not None:
         return prism.rectangle
-    return mesh_rectangle(solid, frame)
-
-
-def mesh_rectangle(solid: Solid, frame: Pose3 | None = None) -> tuple[float, float, float, float]:
-    """Return the bounding rectangle as `bounding_rectangle` does, but always from the triangles of the solid."""
     from simscen.worlds.geometry.triangulation import triangulate
 
     pose = frame.compose(solid.pose) if frame else solid.pose

@@ -15,6 +15,8 @@ from simscen.worlds.maps.rasterization import CellMask, filled_cells, touched_ce
 
 MIN_OCCUPIED_VALUE = 65
 """Minimum value of an occupied cell, for maps in mode scale or raw: Nav2's occupied_thresh in percent."""
+WALLS_NAME = "map"
+"""Name of the solid that represents all walls of a map."""
 MAX_EDGES = 500_000
 """Maximum number of straight wall edges in one direction. A building of 16 million cells has about 10 000 in total."""
 
@@ -34,7 +36,7 @@ def draw_map(world: World, mesh: TriangleMesh, height: float, resolution: float 
     bounds = _map_bounds(world, section.segments)
     if message := map_size_error(bounds, resolution):
         raise InvalidInput([Problem(world.name, 0, 0, "SC330", message, oversize_hint(world))])
-    grid = empty_grid(bounds, resolution, world.name)
+    grid = empty_grid(bounds, resolution)
     occupied = occupied_cells(grid, section)
     cells = np.where(occupied, np.int8(OCCUPIED), np.int8(FREE))
     cells[_cells_outside_building(occupied, _cells_of_places(world, grid))] = UNKNOWN
@@ -47,13 +49,8 @@ def occupied_cells(grid: OccupancyGrid, section: CrossSection) -> CellMask:
     return touched_cells(CrossSection(points_in_cells.reshape(-1, 2, 2), section.owners), grid.shape)
 
 
-def empty_grid(bounds: Bounds, resolution: float, name: str) -> OccupancyGrid:
-    """Return a grid of free cells of `resolution` m over `bounds` and MAP_MARGIN_M around it.
-
-    Raises InvalidInput with `name` as the name of the world if the grid would have more than MAX_MAP_CELLS cells.
-    """
-    if message := map_size_error(bounds, resolution):
-        raise InvalidInput([Problem(name, 0, 0, "SC330", message, "is something placed far away from the rest?")])
+def empty_grid(bounds: Bounds, resolution: float) -> OccupancyGrid:
+    """Return a grid of free cells of `resolution` m over `bounds` and MAP_MARGIN_M around it."""
     size = map_size(bounds, resolution)
     cells = np.zeros((size.height, size.width), dtype=np.int8)
     return OccupancyGrid(cells, resolution, Pose2(size.left * resolution, size.bottom * resolution))
@@ -116,7 +113,7 @@ def _cells_in_convex_hull(occupied: CellMask) -> CellMask:
     return filled_cells(CrossSection(segments, np.zeros(len(segments), np.int32)), occupied.shape)
 
 
-def walls_from_map(grid: OccupancyGrid, height: float, name: str = "map") -> list[Solid]:
+def walls_from_map(grid: OccupancyGrid, height: float) -> list[Solid]:
     """Return the occupied cells of a map as one closed mesh, `height` m tall; [] if no cell is occupied.
 
     Each straight edge becomes one rectangle. Raises InvalidInput for more than MAX_EDGES edges in one direction.
@@ -124,14 +121,14 @@ def walls_from_map(grid: OccupancyGrid, height: float, name: str = "map") -> lis
     occupied = grid.cells >= MIN_OCCUPIED_VALUE
     if not occupied.any():
         return []
-    corners = np.concatenate((_side_rectangles(occupied, name), _top_and_bottom_rectangles(occupied, name)))
+    corners = np.concatenate((_side_rectangles(occupied), _top_and_bottom_rectangles(occupied)))
     vertices = corners.reshape(-1, 3) * (grid.resolution, grid.resolution, height)
     first = 4 * np.arange(len(corners))[:, None]
     faces = np.concatenate((first + np.array([0, 1, 2]), first + np.array([0, 2, 3]))).astype(np.int32)
-    return [Solid(Mesh(vertices, faces), Pose3.planar(grid.origin), name)]
+    return [Solid(Mesh(vertices, faces), Pose3.planar(grid.origin), WALLS_NAME)]
 
 
-def _side_rectangles(occupied: CellMask, name: str) -> Array:
+def _side_rectangles(occupied: CellMask) -> Array:
     """Return the corners (n, 4, 3) of the upright rectangles of the walls, one for each straight edge of the outline.
 
     x and y are in cells; z is 0 or 1.
@@ -140,7 +137,7 @@ def _side_rectangles(occupied: CellMask, name: str) -> Array:
     for swapped, cells in ((False, occupied), (True, occupied.T)):
         change = np.diff(np.pad(cells.astype(np.int8), ((1, 1), (0, 0))), axis=0)
         for sign in (1, -1):
-            line, start, stop = _intervals(change == sign, name).T
+            line, start, stop = _intervals(change == sign).T
             # The wall must be on the left of the line from a to b.
             a, b = (start, stop) if (sign == 1) != swapped else (stop, start)
             ends = [np.column_stack((end, line) if not swapped else (line, end)) for end in (a, b, b, a)]
@@ -150,12 +147,12 @@ def _side_rectangles(occupied: CellMask, name: str) -> Array:
     return np.concatenate(sides).astype(np.float64)
 
 
-def _top_and_bottom_rectangles(occupied: CellMask, name: str) -> Array:
+def _top_and_bottom_rectangles(occupied: CellMask) -> Array:
     """Return the corners (n, 4, 3) of the rectangles of the top and the bottom; units as in `_side_rectangles`.
 
     Each rectangle covers equal intervals of occupied cells in consecutive rows.
     """
-    row, start, stop = _intervals(occupied, name).T
+    row, start, stop = _intervals(occupied).T
     order = np.lexsort((row, stop, start))
     row, start, stop = row[order], start[order], stop[order]
     new = np.ones(len(row), dtype=np.bool_)
@@ -170,15 +167,15 @@ def _top_and_bottom_rectangles(occupied: CellMask, name: str) -> Array:
     return np.concatenate((top, under)).astype(np.float64)
 
 
-def _intervals(lines: CellMask, name: str) -> npt.NDArray[np.int64]:
+def _intervals(lines: CellMask) -> npt.NDArray[np.int64]:
     """Return the intervals of True in the rows of a mask, as (n, 3): row, first column, column after the interval.
 
-    Raises InvalidInput for the map `name` if there are more than MAX_EDGES intervals.
+    Raises InvalidInput if there are more than MAX_EDGES intervals.
     """
     steps = np.diff(np.pad(lines.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     count = int(np.count_nonzero(steps == 1))
     if count > MAX_EDGES:
         message = f"map too ragged for walls: more than {MAX_EDGES} separate edges"
-        raise InvalidInput([Problem(name, 0, 0, "SC331", message, "remove the speckles from the map")])
+        raise InvalidInput([Problem(WALLS_NAME, 0, 0, "SC331", message, "remove the speckles from the map")])
     begin, end = np.argwhere(steps == 1), np.argwhere(steps == -1)
     return np.column_stack((begin, end[:, 1]))

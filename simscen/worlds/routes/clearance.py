@@ -107,7 +107,7 @@ def search_grid(bounds: Bounds, radius: float, min_resolution: float = MIN_RESOL
     margin = 2 * radius
     width, height = (side + 2 * margin + 2 * MAP_MARGIN_M for side in (x1 - x0, y1 - y0))
     resolution = max(min_resolution, math.sqrt(width * height / MAX_CELLS))
-    return empty_grid((x0 - margin, y0 - margin, x1 + margin, y1 + margin), resolution, "paths")
+    return empty_grid((x0 - margin, y0 - margin, x1 + margin, y1 + margin), resolution)
 
 
 def clearance_field(mesh: TriangleMesh, grid: OccupancyGrid, z_range: tuple[float, float]) -> ClearanceField:
@@ -120,9 +120,8 @@ def clearance_field(mesh: TriangleMesh, grid: OccupancyGrid, z_range: tuple[floa
         local = CrossSection((cut.segments - (grid.origin.x, grid.origin.y)) / grid.resolution, cut.owners)
         blocked |= touched_cells(local, grid.shape)
         inside |= filled_cells(local, grid.shape)
-    samples, owners = _sample_segments(
-        *(np.concatenate([getattr(cut, part) for cut in cuts]) for part in ("segments", "owners"))
-    )
+    segments, segment_owners = np.concatenate([c.segments for c in cuts]), np.concatenate([c.owners for c in cuts])
+    samples, owners = _sample_segments(segments, segment_owners)
     if not blocked.any():
         return ClearanceField(grid, np.full(grid.shape, CLEARANCE_WITHOUT_SOLIDS_M), inside, None, owners)
     cell_clearance = ndimage.distance_transform_edt(~blocked) * grid.resolution

@@ -99,19 +99,13 @@ def _body(name: str, pose: Pose3, group: list[LinkContent], report: ImportReport
     """Return the body of a group of links, with its frame at `pose`."""
     body_from_world = pose.inverse()
     solids = tuple(replace(s, pose=body_from_world.compose(s.pose)) for content in group for s in content.solids)
-    mass = 0.0 if _is_kinematic(group, report) else _movable_mass(group, report)
+    mass = 0.0 if _is_kinematic(group, report) else sum(content.mass for content in group)
+    if mass > MAX_MOVABLE_MASS_KG:
+        heaviest = max(group, key=lambda content: content.mass).link.frame.element
+        message = f"has a mass of {mass:g} kg; at most {MAX_MOVABLE_MASS_KG:g} kg can move"
+        report.add_error(heaviest.unusable(message, "if it never moves, make its model <static>"))
+        mass = 0.0
     return Body(name, solids, pose, mass)
-
-
-def _movable_mass(group: list[LinkContent], report: ImportReport) -> float:
-    """Return the total mass of a group in kg; 0 with an error in the report above MAX_MOVABLE_MASS_KG."""
-    mass = sum(content.mass for content in group)
-    if mass <= MAX_MOVABLE_MASS_KG:
-        return mass
-    heaviest = max(group, key=lambda content: content.mass).link.frame.element
-    message = f"has a mass of {mass:g} kg; at most {MAX_MOVABLE_MASS_KG:g} kg can move"
-    report.add_error(heaviest.unusable(message, "if it never moves, make its model <static>"))
-    return 0.0
 
 
 def _is_kinematic(group: list[LinkContent], report: ImportReport) -> bool:

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Box, Cone, Cylinder, Extrusion, Solid, Sphere
 from simscen.worlds.geometry.mesh_overlaps import horizontal_distance
-from simscen.worlds.geometry.prisms import bounding_rectangle, mesh_rectangle, upright_prism
-from simscen.worlds.geometry.triangulation import merge_solids
+from simscen.worlds.geometry.prisms import bounding_rectangle, upright_prism
+from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 
 L_SHAPE = ((0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
 STAR = tuple((math.cos(4 * math.pi * k / 5), math.sin(4 * math.pi * k / 5)) for k in range(5))
@@ -40,6 +40,11 @@ def test_distances_are_those_of_the_triangle_mesh(shape, pose, point):
     assert prism.distance(point, slab) == pytest.approx(
         horizontal_distance(merge_solids([solid]), point, slab), abs=1e-9
     )
+
+
+def mesh_rectangle(solid, frame=None):
+    """Return the bounding rectangle of the triangles of a solid."""
+    return bounding_rectangle(Solid(triangulate(solid.shape), solid.pose), frame)
 
 
 @given(shape=shapes, pose=poses, frame=poses)

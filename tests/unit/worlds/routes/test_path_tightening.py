@@ -12,7 +12,7 @@ from simscen.worlds.routes.clearance import clearance_field
 from simscen.worlds.routes.shortest_paths import is_line_clear, tighten_path
 
 POST = merge_solids([Solid(Cylinder(0.5, 1.0), Pose3(0, 0, 0.5))])
-FIELD = clearance_field(POST, empty_grid((-3, -3, 3, 3), 0.05, "w"), (0.03, 0.4))
+FIELD = clearance_field(POST, empty_grid((-3, -3, 3, 3), 0.05), (0.03, 0.4))
 
 
 def test_detour_around_a_post_is_tightened_on_its_side_of_the_post():
