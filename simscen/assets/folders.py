@@ -9,14 +9,7 @@ from pathlib import Path, PurePath, PurePosixPath
 
 from typing_extensions import Self
 
-from simscen.assets.uris import (
-    PACKAGE_SCHEMES,
-    SCHEMES,
-    candidate_paths,
-    is_package_name,
-    package_folder_candidates,
-    parse_fuel_uri,
-)
+from simscen.assets.uris import PACKAGE_SCHEMES, SCHEMES, candidate_paths, is_package_name, parse_fuel_uri
 from simscen.core.files import record_read_file
 
 MAX_PATH_LENGTH = 1000
@@ -99,19 +92,15 @@ class AllowedFolders:
         return Path(os.path.realpath(path.parent)) / path.name
 
     def package_folder(self, name: str, near: Path) -> Path:
-        """Return the folder of the ROS package `name` for a file in the folder `near`.
+        """Return the folder of the ROS package `name` for a file in the folder `near`; see `uris.candidate_paths`.
 
-        If it is not in `packages`, looks in the search folders first, then at the `uris.package_folder_candidates`.
         Raises UnusableFile, or NoSuchFile if there is no such package.
         """
         if name in self.packages:
             return self.packages[name]
         if not is_package_name(name):
             raise UnusableFile(f"{name[:60]!r} is not the name of a package")
-        for folder in (
-            *(folder / name for folder in self.search_folders),
-            *package_folder_candidates(name, near, self.roots),
-        ):
+        for _, folder in candidate_paths(f"package://{name}", near, self.roots, self.packages):
             real = Path(os.path.realpath(folder))
             if self._contains(real) and real.is_dir():
                 return real

@@ -89,7 +89,7 @@ def candidate_paths(
     search folders are all roots except the first.
 
     - model:// and package:// with a name in `packages`: only that folder.
-    - model:// and package:// with another name: the search folders, then `package_folder_candidates`.
+    - model:// and package:// with another name: the search folders, then `_package_folders`.
     - file:// and paths: relative to `base`, then to the search folders. The path of a file:// URI may start with the
       name of a search folder (`file://models/crate` in a folder `models`).
     - Fuel: the search folders.
@@ -102,7 +102,14 @@ def candidate_paths(
     scheme = next((scheme for scheme in SCHEMES if uri.startswith(scheme)), "")
     rest = uri.removeprefix(scheme)
     if scheme in PACKAGE_SCHEMES:
-        yield from _in_packages(rest.lstrip("/"), base, roots, packages)
+        path = rest.lstrip("/")
+        name, _, below = path.partition("/")
+        if name in packages:
+            yield packages[name], packages[name] / below.lstrip("/")
+            return
+        yield from ((folder, folder / path) for folder in search)
+        if is_package_name(name):
+            yield from ((folder, folder / below.lstrip("/")) for folder in _package_folders(name, base, roots))
         return
     yield base, base / rest
     first, _, below = rest.partition("/")
@@ -112,25 +119,12 @@ def candidate_paths(
             yield folder, folder / below
 
 
-def _in_packages(
-    path: str, base: Path, roots: Sequence[Path], packages: Mapping[str, Path]
-) -> Iterator[tuple[Path, Path]]:
-    """Yield the pairs of `candidate_paths` for the path of a model:// or package:// URI."""
-    name, _, below = path.partition("/")
-    if name in packages:
-        yield packages[name], packages[name] / below.lstrip("/")
-        return
-    yield from ((folder, folder / path) for folder in roots[1:])
-    if is_package_name(name):
-        yield from ((folder, folder / below.lstrip("/")) for folder in package_folder_candidates(name, base, roots))
-
-
 def is_package_name(name: str) -> bool:
     """Return whether a name consists of the characters of ROS package names (REP 144)."""
     return name.replace("_", "").replace("-", "").isalnum()
 
 
-def package_folder_candidates(name: str, near: Path, roots: Sequence[Path]) -> Iterator[Path]:
+def _package_folders(name: str, near: Path, roots: Sequence[Path]) -> Iterator[Path]:
     """Yield folders that may be the ROS package `name`, to which a file in the folder `near` refers.
 
     First come folders of this name: `near`, its parents, their subfolders, and folders up to three levels below the
