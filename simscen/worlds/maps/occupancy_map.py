@@ -39,7 +39,8 @@ def draw_map(world: World, mesh: TriangleMesh, height: float, resolution: float 
     grid = empty_grid(bounds, resolution)
     occupied = occupied_cells(grid, section)
     cells = np.where(occupied, np.int8(OCCUPIED), np.int8(FREE))
-    cells[_cells_outside_building(occupied, _cells_of_places(world, grid))] = UNKNOWN
+    places = grid.cell_of(np.array([(pose.x, pose.y) for pose in world.places.values()]).reshape(-1, 2))
+    cells[_cells_outside_building(occupied, places[grid.inside(places)])] = UNKNOWN
     return OccupancyGrid(cells, resolution, grid.origin)
 
 
@@ -65,13 +66,6 @@ def _map_bounds(world: World, segments: Array) -> Bounds:
     points = segments.reshape(-1, 2)
     (left, bottom), (right, top) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
     return left, bottom, right, top
-
-
-def _cells_of_places(world: World, grid: OccupancyGrid) -> npt.NDArray[np.int64]:
-    """Return the cells (n, 2) of the named places that lie on the grid, as (row, column)."""
-    points = np.array([(pose.x, pose.y) for pose in world.places.values()]).reshape(-1, 2)
-    cells = grid.cell_of(points)
-    return cells[grid.inside(cells)]
 
 
 def _cells_outside_building(occupied: CellMask, places: npt.NDArray[np.int64]) -> CellMask:

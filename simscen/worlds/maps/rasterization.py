@@ -11,8 +11,6 @@ from simscen.worlds.geometry.cross_section import CrossSection
 
 CellMask = npt.NDArray[np.bool_]
 """Mask (rows, columns) of grid cells."""
-Flags = npt.NDArray[np.bool_]
-"""One boolean for each item (n,)."""
 Integers = npt.NDArray[np.int64]
 """One integer for each item (n,)."""
 
@@ -63,7 +61,12 @@ def filled_cells(section: CrossSection, shape: tuple[int, int]) -> CellMask:
     filled. A solid whose mesh has holes is not filled in rows in which its outline is not closed.
     """
     rows, columns, signs, owners = _crossings(section, shape)
-    keep = _is_balanced(rows + shape[0] * owners.astype(np.int64), signs) & ~_is_inside_out(section)[owners]
+    # If the signs of the crossings of a row and a solid do not have the sum 0, the outline is not closed there.
+    _, row_and_owner = np.unique(rows + shape[0] * owners.astype(np.int64), return_inverse=True)
+    is_closed = (np.bincount(row_and_owner, weights=signs) == 0)[row_and_owner]
+    (x0, y0), (x1, y1) = section.segments[:, 0].T, section.segments[:, 1].T
+    is_inverted = (np.bincount(section.owners, weights=x0 * y1 - x1 * y0) < 0)[owners]
+    keep = is_closed & ~is_inverted
     flat = rows[keep] * (shape[1] + 1) + np.clip(columns[keep], 0, shape[1])
     steps = np.bincount(flat, weights=signs[keep], minlength=shape[0] * (shape[1] + 1))
     winding = np.cumsum(steps.reshape(shape[0], shape[1] + 1), axis=1)[:, :-1]
@@ -88,25 +91,6 @@ def _crossings(
     # A solid is on the left of its outline: beyond an upward segment (at larger x) is the outside.
     signs = np.where((y1 > y0)[which], -1.0, 1.0)
     return rows, np.ceil(x - 0.5).astype(np.int64), signs, section.owners[which]
-
-
-def _is_balanced(keys: Integers, signs: Array) -> Flags:
-    """Return for each crossing whether the signs of all crossings with the same key have the sum 0.
-
-    A key is a number for a row and a solid. If the sum is not 0, the outline of the solid is not closed in this row.
-    """
-    _, group = np.unique(keys, return_inverse=True)
-    balanced: Flags = (np.bincount(group, weights=signs) == 0)[group]
-    return balanced
-
-
-def _is_inside_out(section: CrossSection) -> Flags:
-    """Return for each solid, by its index, whether its outline is clockwise."""
-    if not len(section.owners):
-        return np.zeros(0, dtype=np.bool_)
-    (x0, y0), (x1, y1) = section.segments[:, 0].T, section.segments[:, 1].T
-    clockwise: Flags = np.bincount(section.owners, weights=x0 * y1 - x1 * y0) < 0
-    return clockwise
 
 
 def expand_ranges(first: Integers, stop: Integers) -> tuple[Integers, Integers]:
