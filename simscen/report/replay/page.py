@@ -24,7 +24,8 @@ from simscen.report.display_text import csp_hash, escape_control, one_line
 from simscen.report.picture.palette import css_variables
 from simscen.report.replay.packed_columns import PackedColumns
 from simscen.report.replay.robot_data import moving_objects, occupancy_grid_data, robot_data
-from simscen.report.replay.timeline import disturbance_data, read_source_lines, timeline_entries, verdict_data
+from simscen.report.replay.source_lines import read_source_lines
+from simscen.report.replay.timeline import disturbance_data, timeline_entries, verdict_data
 
 PAGE_FOLDER = PACKAGE / "data" / "replay"
 FORMAT = 1

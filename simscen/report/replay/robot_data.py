@@ -11,7 +11,6 @@ import numpy as np
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
-from simscen.core.messages.navigation import Path
 from simscen.core.records.case import Case
 from simscen.core.records.trace import Samples, Trace
 from simscen.core.records.verdict import Verdict
@@ -22,8 +21,8 @@ from simscen.record.sensor_messages import LoggedMessages, SensorMessages
 from simscen.report.display_text import one_line
 from simscen.report.replay.packed_columns import PackedColumns, evenly_spaced, spaced_in_time
 from simscen.report.replay.signal_plots import signal_limits, signal_plots
+from simscen.report.replay.source_lines import SourceLines
 from simscen.report.replay.stack_report import behavior_tree_data, log_lines_data, parameters_data
-from simscen.report.replay.timeline import SourceLines
 
 MAX_BEAMS, MAX_RANGES = 360, 300_000
 """Maximum number of beams per scan, and of ranges in all scans of a lidar."""
@@ -39,13 +38,11 @@ _POINT_STEP_M, _PARTICLE_YAW_STEP_RAD = 0.01, 0.02
 """Rounding steps of positions and ranges, and of the headings of particles."""
 
 
-def scans_data(sensors: SensorMessages, columns: PackedColumns) -> list[dict[str, Any]]:
-    """Return the scans of each lidar, with the ticks at which the scans were received and measured."""
-    return [_lidar(topic, messages, sensors, columns) for topic, messages in sorted(sensors.scans.items()) if messages]
-
-
 def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any]:
-    """Return the scans of one lidar. Scans whose number of beams differs from the first scan are omitted."""
+    """Return the scans of one lidar, with the ticks at which the scans were received and measured.
+
+    Scans whose number of beams differs from the first scan are omitted.
+    """
     first = sensors.decode_scan(messages[0][1])
     stride = -(-max(1, len(first.ranges)) // MAX_BEAMS)
     beams = -(-len(first.ranges) // stride)
@@ -70,7 +67,7 @@ def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, column
     }
 
 
-def particles_data(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
+def _particles(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
     """Return at most MAX_CLOUDS particle clouds with at most MAX_PARTICLES particles; None if the log has none."""
     if not sensors.particles:
         return None
@@ -89,18 +86,12 @@ def particles_data(sensors: SensorMessages, columns: PackedColumns) -> dict[str,
     }
 
 
-def plans_data(plans: Sequence[Path], columns: PackedColumns) -> dict[str, Any] | None:
-    """Return the planner's plans, with the ticks at which they were made; None without plans."""
-    return _paths([(plan.tick, plan.points[:, :2]) for plan in plans], columns)
-
-
-def local_plans_data(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
+def _local_plans(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
     """Return the controller's local plans; None without local plans."""
     indices = evenly_spaced(len(sensors.local_plans), MAX_LOCAL_PLANS).tolist()
     columns.note_reduction("local plans", len(indices), len(sensors.local_plans))
-    return _paths(
-        [(sensors.local_plans[k][0], sensors.decode_path(sensors.local_plans[k][1])) for k in indices], columns
-    )
+    messages = [sensors.local_plans[k] for k in indices]
+    return _paths([(tick, sensors.decode_path(message)) for tick, message in messages], columns)
 
 
 def _paths(paths: list[tuple[int, Array]], columns: PackedColumns) -> dict[str, Any] | None:
@@ -202,10 +193,10 @@ def robot_data(
         "truth": _poses(trace.truth, columns),
         "belief": _belief(trace.belief, columns),
         "map": None if log.header.map is None else occupancy_grid_data(log.header.map, columns),
-        "scans": scans_data(log.sensors, columns),
-        "particles": particles_data(log.sensors, columns),
-        "plans": plans_data(trace.plans, columns),
-        "local": local_plans_data(log.sensors, columns),
+        "scans": [_lidar(*scans, log.sensors, columns) for scans in sorted(log.sensors.scans.items()) if scans[1]],
+        "particles": _particles(log.sensors, columns),
+        "plans": _paths([(plan.tick, plan.points[:, :2]) for plan in trace.plans], columns),
+        "local": _local_plans(log.sensors, columns),
         "costmaps": costmaps_data(log.sensors, trace, columns),
         "tree": behavior_tree_data(log, columns),
         "lines": log_lines_data(log, columns),
@@ -254,8 +245,8 @@ def _belief(samples: Samples, columns: PackedColumns) -> dict[str, Any] | None:
         return None
     indices = evenly_spaced(len(samples), MAX_POSES)
     xx, xy, _, yy, _, aa = samples.values[indices, 3:9].T
-    covariance = {"xx": (xx, 1e-5), "xy": (xy, 1e-5), "yy": (yy, 1e-5), "aa": (aa, 1e-5)}
-    return {**_poses(samples, columns), **{key: columns.add(part, step) for key, (part, step) in covariance.items()}}
+    covariance = {"xx": xx, "xy": xy, "yy": yy, "aa": aa}
+    return {**_poses(samples, columns), **{key: columns.add(part, 1e-5) for key, part in covariance.items()}}
 
 
 def moving_objects(trace: Trace, columns: PackedColumns, robots: frozenset[str]) -> list[dict[str, Any]]:

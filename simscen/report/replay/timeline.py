@@ -3,25 +3,18 @@
 A disturbance is an event or a fault of the scenario.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import count
 from typing import Any
 
-from simscen.core.errors import InvalidInput
 from simscen.core.records.events import GOAL_END_KINDS, Event, EventKind
 from simscen.core.records.run_result import RunResult
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Finding, Verdict
-from simscen.criteria.registry import verdict_names
 from simscen.judge.finding_text import DISTURBANCE, comparison, disturbance_times, subject
 from simscen.judge.several_robots import WORLD_EVENT_PREFIXES
-from simscen.loading.scenario_text import criteria_and_tree
-from simscen.loading.yaml.tree import Key, MappingNode, key_position
-from simscen.model.scenario import ScenarioSpec
 from simscen.report.display_text import one_line
+from simscen.report.replay.source_lines import SourceLines
 
 K = EventKind
 """Abbreviation for the tables below."""
@@ -218,55 +211,3 @@ def _finding(verdict: Verdict, finding: Finding) -> dict[str, Any]:
         "place": None if finding.place is None else [round(axis, 3) for axis in finding.place],
         "detail": [one_line(text) for text in finding.detail],
     }
-
-
-@dataclass(frozen=True)
-class SourceLines:
-    """Line numbers in a scenario file: of criteria and goals by name, of events and faults by index."""
-
-    criteria: dict[str, int] = field(default_factory=dict)
-    goals: dict[str, int] = field(default_factory=dict)
-    events: dict[int, int] = field(default_factory=dict)
-    faults: dict[int, int] = field(default_factory=dict)
-
-
-def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, ScenarioSpec | None]:
-    """Return the line numbers for a robot ("" for a single robot) and the specification of a scenario, from its text.
-
-    Return no line numbers and None if the scenario is missing or invalid.
-    """
-    if not text:
-        return SourceLines(), None
-    try:
-        spec, tree = criteria_and_tree(text, "scenario.yaml", robot)
-    except InvalidInput:
-        return SourceLines(), None
-    names = verdict_names(spec.pass_)
-    sent = {
-        action.chosen.name: _source_line(tree, *keys)
-        for step in spec.steps
-        for keys, action in step.located_actions()
-        if action.kind == "new_goal" and hasattr(action.chosen, "name")
-    }
-    return SourceLines(
-        criteria={name: _source_line(tree, "pass", index) for index, name in enumerate(names)},
-        goals=sent | {name: _source_line(tree, "goals", index) for index, name in enumerate(_goal_names(spec))},
-        events={number: _source_line(tree, *step.keys) for number, step in enumerate(spec.steps)},
-        faults={index: _source_line(tree, "faults", index) for index in range(len(spec.faults))},
-    ), spec
-
-
-def _goal_names(spec: ScenarioSpec) -> list[str]:
-    """Return the names of all goals. Unlike ScenarioSpec.goal_names, accept names of places as poses."""
-    used_names, names = {goal.name for goal in spec.goals}, list[str]()
-    for number, goal in enumerate(spec.goals, start=1):
-        pose: Any = goal.pose
-        default = pose if isinstance(pose, str) else f"goal-{number}"
-        others = (name for number in count(2) if (name := f"{default}-{number}") not in used_names)
-        names.append(goal.name or (default if default not in used_names else next(others)))
-        used_names.add(names[-1])
-    return names
-
-
-def _source_line(tree: MappingNode, *keys: Key) -> int:
-    return key_position(tree, keys).line
