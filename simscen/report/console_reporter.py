@@ -30,7 +30,6 @@ def print_lines(lines: Iterable[StyledLine], out: TextIO) -> None:
 
 
 def _line_reporter(out: TextIO, style: TerminalStyle, slow: int | None = None) -> PlainReporter:
-    """Return a reporter without live progress."""
     if not style.has_color:
         return PlainReporter(out, style, slow)
     from simscen.report.live_console import ColorReporter

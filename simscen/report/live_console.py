@@ -131,17 +131,13 @@ class LiveReporter(Reporter):
                 self._running.pop(event.key, None)
             case _:
                 pass
-        self._live.update(self._current_runs())
+        rows = [self._row(*state) for _, state in sorted(self._running.items())]
+        progress = self._estimate.text
+        self._live.update(Group(*rows, *([Text(f"  {progress}", style="dim")] if progress and rows else [])))
         if isinstance(event, SessionFinished):
             self._live.stop()
         for line in self._formatter(event):
             self._console.print(_rich_text(line, links=True))
-
-    def _current_runs(self) -> Group:
-        """Return a line for each current run, and a line with the progress of the session."""
-        rows = [self._row(*state) for _, state in sorted(self._running.items())]
-        progress = self._estimate.text
-        return Group(*rows, *([Text(f"  {progress}", style="dim")] if progress and rows else []))
 
     def _row(self, started: RunStarted, simulated: float) -> Text:
         """Return the line of a current run with its simulated time in s."""

@@ -55,7 +55,10 @@ def as_document(runs: Sequence[RunFinished]) -> dict[str, Any]:
 
 
 def _document(ordered: RunStore, comparison: Comparison | None, study: Study | None) -> dict[str, Any]:
-    """Return the document without its runs."""
+    """Return the document without its runs. `suite` has the statistics of all runs, `suites` those of each stack."""
+    summaries = {stack: session_summary_data(summary) for stack, summary in summaries_by_stack(ordered).items()}
+    no_summary = session_summary_data(SessionSummaryBuilder().summary())
+    suite = next(iter(summaries.values()), no_summary)
     counts = dict.fromkeys((outcome.value for outcome in Outcome), 0)
     simulated = 0.0
     for run in ordered:
@@ -66,7 +69,7 @@ def _document(ordered: RunStore, comparison: Comparison | None, study: Study | N
         "total": len(ordered),
         **counts,
         "simulated_seconds": simulated,
-        **_summaries(ordered),
+        **({"suites": summaries} if len(summaries) > 1 else {"suite": suite}),
         **({} if comparison is None else {"comparison": comparison_data(comparison)}),
         **({} if study is None else {"study": study_data(study)}),
         "runs": [],
@@ -74,16 +77,10 @@ def _document(ordered: RunStore, comparison: Comparison | None, study: Study | N
 
 
 def _run_data(run: RunFinished, folder: str) -> dict[str, Any]:
+    files = {name: getattr(run.artifacts, name) for name in ("mcap", "picture", "replay", "result")}
+    artifacts = {name: relative_path(path, folder) for name, path in files.items() if path}
     resumed = {"resumed": True} if run.resumed else {}
-    return {**result_data(run.result), "artifacts": _artifacts(run, folder), **resumed}
-
-
-def _summaries(runs: Iterable[RunFinished]) -> dict[str, Any]:
-    """Return {"suite": statistics of all runs}, or for several stacks {"suites": statistics by stack}."""
-    summaries = {stack: session_summary_data(summary) for stack, summary in summaries_by_stack(runs).items()}
-    if len(summaries) > 1:
-        return {"suites": summaries}
-    return {"suite": next(iter(summaries.values()), session_summary_data(SessionSummaryBuilder().summary()))}
+    return {**result_data(run.result), "artifacts": artifacts, **resumed}
 
 
 def summaries_by_stack(runs: Iterable[RunFinished]) -> dict[str, SessionSummary]:
@@ -101,9 +98,3 @@ def summaries_by_stack(runs: Iterable[RunFinished]) -> dict[str, SessionSummary]
 def in_order(runs: Sequence[RunFinished]) -> RunStore:
     """Return the runs sorted by file, scenario, variation, seed, and stack."""
     return (runs if isinstance(runs, RunStore) else RunStore(runs)).in_order()
-
-
-def _artifacts(run: RunFinished, folder: str) -> dict[str, str]:
-    """Return the paths of the artifacts relative to the output `folder`, by kind such as "mcap"."""
-    files = {name: getattr(run.artifacts, name) for name in ("mcap", "picture", "replay", "result")}
-    return {name: relative_path(path, folder) for name, path in files.items() if path}

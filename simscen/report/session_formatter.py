@@ -58,18 +58,14 @@ class SessionFormatter:
                 self._runs.append(event)
                 if _error_kind(event) not in (INTERRUPTED, NOT_RUN):
                     yield from run_lines(event, self.naming)
-                    yield from self._new_warnings(event)
+                    for text in event.warnings:  # of the external stack; each is printed once per session
+                        if text not in self._warned:
+                            self._warned.add(text)
+                            yield (StyledText(f"      warning: {one_line(text)}", "warning"),)
             case SessionFinished():
                 yield from self._final_lines(event)
             case RunStarted() | RunProgress():
                 pass
-
-    def _new_warnings(self, run: RunFinished) -> Iterator[StyledLine]:
-        """Yield the warnings of the external stack in this run that did not occur in earlier runs of the session."""
-        for text in run.warnings:
-            if text not in self._warned:
-                self._warned.add(text)
-                yield (StyledText(f"      warning: {one_line(text)}", "warning"),)
 
     def _final_lines(self, event: SessionFinished) -> Iterator[StyledLine]:
         kinds = Counter(_error_kind(run) for run in self._runs)
@@ -150,7 +146,7 @@ def determinism_lines(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
     compared = [pair for pair in pairs if all(run.artifacts.mcap for run in pair)]
     if not compared:
         return
-    differ = sum(any(_is_nondeterministic(run) for run in pair) for pair in compared)
+    differ = sum(any(_error_kind(run) == NONDETERMINISTIC for run in pair) for pair in compared)
     pairs_text = f"{number_with_noun(len(compared), 'pair')} of runs, byte for byte"
     if differ:
         yield (StyledText(f"logs differ: in {differ} of {pairs_text}", "warning"),)
@@ -173,7 +169,3 @@ def _difference_text(pairs: Sequence[tuple[RunFinished, RunFinished]]) -> str:
 
 def _statuses(run: RunFinished) -> list[tuple[str, str]]:
     return [(verdict.id, verdict.status.value) for verdict in run.result.verdicts]
-
-
-def _is_nondeterministic(run: RunFinished) -> bool:
-    return run.result.error is not None and run.result.error.kind == NONDETERMINISTIC

@@ -80,16 +80,11 @@ def session_header(started: SessionStarted) -> StyledLine:
     """Return the header, for example "simscen 0.1.0 · 14 scenarios · 2 workers"."""
     runs = "" if started.total == started.scenarios else f" · {number_with_noun(started.total, 'run')}"
     workers = number_with_noun(started.workers, "worker")
-    head = (
-        f"simscen {started.version} · {number_with_noun(started.scenarios, 'scenario')}{_stacks_text(started.stacks)}"
-    )
+    head = f"simscen {started.version} · {number_with_noun(started.scenarios, 'scenario')}"
+    if started.stacks:
+        is_single = len(started.stacks) == 1
+        head += f" · stack {one_line(started.stacks[0])}" if is_single else f" · {len(started.stacks)} stacks"
     return (StyledText(f"{head}{runs} · {workers}", "quiet"),)
-
-
-def _stacks_text(stacks: Sequence[str]) -> str:
-    """Return " · stack NAME=VALUE" for one stack of --stack, " · 2 stacks" for several, and "" for none."""
-    text = f"stack {one_line(stacks[0])}" if len(stacks) == 1 else f"{len(stacks)} stacks"
-    return f" · {text}" if stacks else ""
 
 
 def run_lines(run: RunFinished, naming: RunNaming) -> Iterator[StyledLine]:
@@ -120,7 +115,8 @@ def violation_lines(run: RunFinished) -> Iterator[StyledLine]:
         yield from (((StyledText(f"        {text}", "quiet")),) for text in violation.detail)
     if run.outcome is not Outcome.PASSED:
         yield from _disturbance_lines(run)
-        yield _scenario_line(run)
+        line = next((violation.line for violation in failed_violations(run)), 0)
+        yield (_label("scenario"), StyledText(source_location(run, line), file=scenario_file(run)))
         yield from artifact_lines(run)
 
 
@@ -221,12 +217,6 @@ def artifact_lines(run: RunFinished) -> Iterator[StyledLine]:
             yield (_label(name), StyledText(one_line(path), file=path))
     if run.again:
         yield (_label("again"), StyledText(shell_command_text(run.again), is_shell=True))
-
-
-def _scenario_line(run: RunFinished) -> StyledLine:
-    """Return the scenario file with the line of the first violation."""
-    first = next((violation.line for violation in failed_violations(run)), 0)
-    return (_label("scenario"), StyledText(source_location(run, first), file=scenario_file(run)))
 
 
 def _label(name: str) -> StyledText:

@@ -155,5 +155,4 @@ def _smallest_margins(study: Study) -> Iterator[StyledLine]:
 
 
 def _percent(rate: float) -> str:
-    """Return a rate from 0 to 1 in percent."""
     return f"{100 * rate:.6g} %"

@@ -32,7 +32,6 @@ def foxglove_layout(log: Log | None = None) -> str:
 
 
 def _read_shipped(name: str) -> str:
-    """Return the text of a shipped layout file."""
     return files("simscen").joinpath(f"data/viewers/{name}").read_text("utf-8")
 
 

@@ -37,16 +37,13 @@ def reported_violations(run: RunFinished) -> list[Violation]:
     The texts are safe for terminals.
     """
     lines = run.result.lines or (0,) * len(run.result.verdicts)
-    return [
-        Violation(
-            verdict,
-            line,
-            one_line(sentence(verdict, finding, run.result.tick_rate)),
-            tuple(one_line(text) for text in finding.detail),
-        )
-        for verdict, line in zip(run.result.verdicts, lines, strict=True)
-        for finding in violations(verdict) or _finding_of_unchecked(verdict)
-    ]
+    found = []
+    for verdict, line in zip(run.result.verdicts, lines, strict=True):
+        unchecked = Finding(Status.ERROR, verdict.criterion, "it checked nothing", "")
+        for finding in violations(verdict) if verdict.findings else [unchecked]:
+            message = one_line(sentence(verdict, finding, run.result.tick_rate))
+            found.append(Violation(verdict, line, message, tuple(one_line(text) for text in finding.detail)))
+    return found
 
 
 def failed_violations(run: RunFinished) -> list[Violation]:
@@ -111,8 +108,3 @@ def reason_without_failure(run: RunFinished) -> str:
             return one_line(f"failed as expected: {run.result.reason} ({first_violation(run, ' and {} more')})")
         case _:
             return ""
-
-
-def _finding_of_unchecked(verdict: Verdict) -> tuple[Finding, ...]:
-    """Return an error finding if a verdict has no findings because its criterion checked nothing; otherwise ()."""
-    return () if verdict.findings else (Finding(Status.ERROR, verdict.criterion, "it checked nothing", ""),)

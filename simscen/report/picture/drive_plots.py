@@ -59,7 +59,6 @@ def _panel(title: str, drive: DrivePaths, footprint: Array) -> Image.Image:
 
 
 def _points(path: Sequence[Pose2]) -> Array:
-    """Return the positions (n, 2) of poses."""
     return np.array([(pose.x, pose.y) for pose in path])
 
 

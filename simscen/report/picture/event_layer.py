@@ -63,15 +63,10 @@ def goal_outcome(goal: Goal, scene: Scene) -> GoalOutcome:
         case EventKind.GOAL_CANCELED:
             return GoalOutcome("canceled", palette.GRAY, "canceled")
         case _:
-            if _is_false_success(goal, scene):
+            findings = [f for v in scene.result.verdicts if v.criterion == "goals_reached" for f in v.findings]
+            if any(f.status is Status.FAIL and f.what.endswith(f"goal {goal.name}") for f in findings):
                 return GoalOutcome("failed", palette.RED, "not there")
             return GoalOutcome("reached", palette.GREEN)
-
-
-def _is_false_success(goal: Goal, scene: Scene) -> bool:
-    """Return whether the criterion goals_reached failed at a goal that the stack reported as reached."""
-    findings = [f for v in scene.result.verdicts if v.criterion == "goals_reached" for f in v.findings]
-    return any(f.status is Status.FAIL and f.what.endswith(f"goal {goal.name}") for f in findings)
 
 
 def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:

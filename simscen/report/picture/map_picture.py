@@ -84,7 +84,10 @@ def write_picture(scene: Scene, path: Path) -> None:
 
 def draw_map_canvas(scene: Scene) -> Canvas:
     """Draw the map with all layers and labels, without header and sidebar."""
-    bounds = map_extent(scene.map, _required_points(scene))
+    # The picture shows all goals and true paths, even outside of the map.
+    goals = [(goal.pose.x, goal.pose.y) for robot in scene.per_robot for goal in robot.case.every_goal]
+    paths = [robot.trace.truth.values[:, :2] for robot in scene.per_robot]
+    bounds = map_extent(scene.map, np.vstack((np.array(goals).reshape(-1, 2), *paths)))
     canvas = Canvas(bounds, map_scale(bounds), None)
     draw_map(canvas, scene.map)
     draw_grid(canvas)
@@ -105,13 +108,6 @@ def _wall_cells(canvas: Canvas, scene: Scene) -> Array:
     values = scene.map.values_at(np.column_stack((x.ravel(), y.ravel())))
     occupied: Array = (values > 50).reshape(rows, columns).astype(np.float64)
     return occupied
-
-
-def _required_points(scene: Scene) -> Array:
-    """Return the points (n, 2) that the picture must show even if they are outside of the map: goals and true paths."""
-    goals = [(goal.pose.x, goal.pose.y) for robot in scene.per_robot for goal in robot.case.every_goal]
-    paths = [robot.trace.truth.values[:, :2] for robot in scene.per_robot]
-    return np.vstack((np.array(goals).reshape(-1, 2), *paths))
 
 
 def _draw_header(image: Image.Image, scene: Scene) -> None:

@@ -105,15 +105,11 @@ def _active_zones(scene: Scene) -> Iterator[tuple[FilterZone, str]]:
     for event in scene.trace.of_kind(EventKind.ZONE_SWITCHED):
         switched.setdefault((str(event.data["filter"]), event.name), []).append(event)
     for key in dict.fromkeys((*initial, *switched)):
-        zone = initial.get(key) or _added_zone(scene, key)
+        zone = initial.get(key)
+        if zone is None and (outline := scene.case.regions.get(key[1])):  # a zone that was added during the run
+            zone = FilterZone("speed" if key[0] == "speed" else "keepout", key[1], outline)
         if zone is not None:
             yield zone, _zone_text(scene, zone, switched.get(key, []))
-
-
-def _added_zone(scene: Scene, key: tuple[str, str]) -> FilterZone | None:
-    """Return the zone (filter, region) that was added during the run; None if the region is unknown."""
-    outline = scene.case.regions.get(key[1])
-    return FilterZone("speed" if key[0] == "speed" else "keepout", key[1], outline) if outline else None
 
 
 def _zone_text(scene: Scene, zone: FilterZone, events: list[Event]) -> str:
@@ -209,7 +205,6 @@ def _draw_door_positions(canvas: Canvas, door: MovableObject, shape: Outlines) -
 
 
 def _draw_heading(canvas: Canvas, pose: Pose2, outline: Array) -> None:
-    """Draw the heading of a pedestrian."""
     radius = float(np.hypot(*(outline - (pose.x, pose.y)).T).max())
     canvas.line(pose.apply(np.array([(0.0, 0.0), (1.5 * radius, 0.0)])), palette.PEDESTRIAN, 2.0)
 

@@ -89,7 +89,6 @@ def log_lines_data(log: Log, columns: PackedColumns) -> list[list[Any]]:
 
 
 def _is_tree_change(line: LogLine) -> bool:
-    """Return whether a log line reports a change of the behavior tree."""
     return line.name == BEHAVIOR_TREE_LOGGER and _TREE_CHANGE.fullmatch(line.text) is not None
 
 

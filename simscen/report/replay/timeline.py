@@ -99,7 +99,6 @@ def timeline_entries(trace: Trace, lines: SourceLines, with_world: bool) -> list
 
 
 def _is_world_event(event: Event) -> bool:
-    """Return whether an event concerns the world instead of one robot."""
     return str(event.kind).startswith(WORLD_EVENT_PREFIXES) and event.kind != EventKind.RUN_ENDED
 
 

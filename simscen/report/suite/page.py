@@ -209,7 +209,6 @@ def _outcome_counts(totals: Totals) -> str:
 
 @cache
 def _asset(name: str) -> str:
-    """Return the text of a style or script that simscen ships."""
     return files("simscen").joinpath("data").joinpath("suite").joinpath(name).read_text("utf-8")
 
 

@@ -180,7 +180,6 @@ def _links(run: RunFinished, folder: str) -> str:
 
 
 def _has_content(path: str) -> bool:
-    """Return whether a file exists and is not empty."""
     file = Path(path)
     return file.is_file() and file.stat().st_size > 0
 
