@@ -171,7 +171,6 @@ def _judge_time(trace: Trace, outcome: GoalOutcome, within: float) -> Finding:
 
 
 def _judge_expected_failure(trace: Trace, outcome: GoalOutcome) -> Finding:
-    """Return the finding for a goal that the scenario expects to fail."""
     expected = FAILED if outcome.failure == FAILED else f"failed with {outcome.failure}"
     if outcome.end is None and not has_ended(trace):
         return _truncated_log_finding(trace, outcome, expected)

@@ -78,7 +78,6 @@ class Smoothness(Spec, Criterion):
 
 
 def _judge_largest(trace: Trace, case: Case, name: SignalName, limit: float, unit: str) -> Finding:
-    """Return the finding for the largest magnitude of a signal."""
     try:
         values = read_signal(name, trace, case, {})
     except SignalUnavailable as reason:

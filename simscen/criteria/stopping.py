@@ -69,7 +69,8 @@ class StoppedWithin(Spec, Criterion):
         if not happened:
             because, detail = never_started(trace, self.after)
             return [undecided("stopped_within", because, self._limit_text, detail)]
-        is_standing = self._standing_samples(trace)
+        is_slow = speed(trace).values[:, 0] <= self.speed
+        is_standing = is_slow & (turn_rate(trace).values[:, 0] <= self.turn_rate)
         if all(_stood_before(trace, is_standing, span.start) for span in happened):
             because = f"the robot was not moving when `{self.after}` started, so nothing had to stop"
             return [undecided("stopped_within", because, self._limit_text)]
@@ -78,12 +79,6 @@ class StoppedWithin(Spec, Criterion):
     @property
     def _limit_text(self) -> str:
         return f"≤ {self.time:.2f} s after {self.after}"
-
-    def _standing_samples(self, trace: Trace) -> Flags:
-        """Return a mask (n,) of the samples of the velocity at which the robot is slow enough to stand."""
-        slow = speed(trace).values[:, 0] <= self.speed
-        steady = turn_rate(trace).values[:, 0] <= self.turn_rate
-        return slow & steady
 
     def _judge_span(self, trace: Trace, span: Span, is_standing: Flags) -> list[Finding]:
         """Return the findings for one interval in which the fault or event was active."""

@@ -5,7 +5,7 @@ Lines with "why" state a cause that follows from geometry or physics, such as an
 """
 
 import math
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -56,10 +56,11 @@ def causes(criterion: str, tick: int, trace: Trace, case: Case) -> list[str]:
     if criterion in LOCALIZATION_CRITERIA:
         error_is_reported = criterion not in GOAL_CRITERIA
         diagnoses.append(diagnose_localization(trace, tick, error_is_reported))
-    for sentences, disturbances in diagnoses:
+    for sentences, names in diagnoses:
         lines += [f"why: {text}" for text in sentences]
-        named |= disturbances
-    lines += [f"meanwhile: {text}" for text in concurrent_disturbances(trace, tick, named)]
+        named |= names
+    disturbances = (*_recent_faults(trace, tick), *_recent_events(trace, tick))
+    lines += [f"meanwhile: {text}" for name, text in disturbances if name not in named]
     return lines[:MAX_LINES]
 
 
@@ -67,17 +68,12 @@ RECENT_FAULT_S, RECENT_EVENT_S = 3.0, 5.0
 """Time for which a fault is listed after its end, and time for which an event is listed after it happened."""
 
 
-def concurrent_disturbances(trace: Trace, tick: int, excluded: Set[str] = frozenset()) -> list[str]:
-    """Return sentences on the faults and events at or shortly before `tick`, except disturbances named `excluded`."""
-    texts = (*_recent_faults(trace, tick), *_recent_events(trace, tick))
-    return [text for name, text in texts if name not in excluded]
-
-
 def _recent_faults(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
     """Yield name and description of each fault that had an effect and was active at or shortly before `tick`."""
     effects = [event for event in trace.of_kind(EventKind.FAULT_TOOK_EFFECT) if event.tick <= tick]
     for start in trace.of_kind(EventKind.FAULT_STARTED):
-        end = _end_tick(trace, start)
+        ends = [event.tick for event in trace.of_kind(EventKind.FAULT_ENDED) if _is_same_entry(event, start)]
+        end = next((end for end in ends if end > start.tick), None)
         if start.tick > tick or not any(_is_same_entry(start, event) and event.tick >= start.tick for event in effects):
             continue
         if end is None or end > tick:
@@ -86,12 +82,6 @@ def _recent_faults(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
         elif trace.seconds(tick - end) <= RECENT_FAULT_S:
             after = f"after {trace.seconds(end - start.tick):.2f} s"
             yield start.name, f"{start.name} had ended {trace.seconds(tick - end):.2f} s before, {after}"
-
-
-def _end_tick(trace: Trace, start: Event) -> int | None:
-    """Return the tick at which the fault with this start event ended, or None."""
-    ends = [event.tick for event in trace.of_kind(EventKind.FAULT_ENDED) if _is_same_entry(event, start)]
-    return next((end for end in ends if end > start.tick), None)
 
 
 def _is_same_entry(one: Event, other: Event) -> bool:

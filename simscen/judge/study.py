@@ -223,7 +223,6 @@ def _is_number(value: Any) -> bool:
 
 
 def _paths(plan: StudyPlan) -> list[str]:
-    """Return the paths of all varied parameters."""
     return sorted({path for values in plan.values.values() for path in values})
 
 

@@ -93,16 +93,12 @@ class Condition(Spec):
         if (self.whenever is None) != (self.then is None):
             raise ValueError("`whenever` and `then` belong together")
         if self.signal is None:
-            self._reject_signal_keys(given[0])
+            wrong = [name for name in ("op", "value", "scale", *ARGUMENT_KEYS) if getattr(self, name) is not None]
+            if wrong:
+                raise ValueError(f"`{wrong[0].rstrip('_')}` belongs to a signal, not to `{given[0]}`")
         else:
             _check_signal(self, self.signal, SIGNALS[self.signal])
         return self
-
-    def _reject_signal_keys(self, operator: str) -> None:
-        """Raise ValueError if a key that belongs to `signal` is given for another operator."""
-        wrong = [name for name in ("op", "value", "scale", *ARGUMENT_KEYS) if getattr(self, name) is not None]
-        if wrong:
-            raise ValueError(f"`{wrong[0].rstrip('_')}` belongs to a signal, not to `{operator}`")
 
     @property
     def definition(self) -> Signal:

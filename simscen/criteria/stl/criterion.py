@@ -13,7 +13,7 @@ from simscen.criteria.findings import undecided
 from simscen.criteria.stl.condition import Condition, decision_horizon
 from simscen.criteria.stl.description import describe, describe_limit, describe_signal, describe_value
 from simscen.criteria.stl.evaluation import EvaluationContext, robustness
-from simscen.criteria.stl.robustness import TIE_MARGIN, Bound, ResponseRobustness, Robustness, Witness
+from simscen.criteria.stl.robustness import TIE_MARGIN, Bound, ResponseRobustness, Robustness
 from simscen.criteria.timeline import end_reason, has_ended
 from simscen.criteria.trace_signals.catalog import signal_evidence
 from simscen.criteria.trace_signals.sampling import SignalUnavailable
@@ -71,6 +71,8 @@ class TemporalCriterion(Criterion):
     def _decisive_finding(self, trace: Trace, result: Robustness, bound: Bound, value: float) -> Finding:
         """Return the finding of a decided condition. `value` is its robustness: `bound` of `result` at the start."""
         witness = result.witness(0, bound)
+        times = [(what, trace.seconds(int(trace.truth.ticks[sample]))) for what, sample in witness.notes]
+        notes = [f"{what} at t = {seconds:.2f} s" for what, seconds in times]
         tick = int(trace.truth.ticks[witness.sample])
         signal, unit, margin = witness.comparison.definition, _margin_unit(list(self.condition.comparisons())), None
         if unit is None or math.isinf(value):
@@ -87,7 +89,7 @@ class TemporalCriterion(Criterion):
             value=None if signal.is_boolean else witness.value,
             tick=tick,
             place=trace.place(tick),
-            detail=_detail_lines(trace, describe(self.condition), witness),
+            detail=(f"condition: {describe(self.condition)}", *notes),
         )
 
 
@@ -102,12 +104,6 @@ def _untested_finding(response: ResponseRobustness, formula: str, with_hint: boo
     else:
         because = f"`{premise}` was never true, so nothing was tested"
     return undecided("", because, formula, ["`required: false` lets such a run pass"] if with_hint else [])
-
-
-def _detail_lines(trace: Trace, formula: str, witness: Witness) -> tuple[str, ...]:
-    """Return the condition and the notes of the witness with their times."""
-    times = [(what, trace.seconds(int(trace.truth.ticks[sample]))) for what, sample in witness.notes]
-    return (f"condition: {formula}", *(f"{what} at t = {seconds:.2f} s" for what, seconds in times))
 
 
 def _margin_unit(compared: list[Condition]) -> str | None:

@@ -159,7 +159,6 @@ def _combine(parts: Sequence[Robustness], operator: Literal["all", "any"]) -> Ro
 
 
 def _compare(condition: Condition, context: EvaluationContext) -> Robustness:
-    """Return the robustness of a comparison."""
     assert condition.signal is not None
     trace = context.trace
     values = read_signal(condition.signal, trace, context.case, condition.arguments)

@@ -72,17 +72,12 @@ def _compare(results: Iterable[RunResult], stacks: Mapping[str, str], significan
     baseline, *others = stacks
     return Comparison(
         stacks,
-        {scenario: _outcomes_by_stack(scenario, stacks, runs) for scenario in sorted({key.test for key in runs})},
+        {
+            scenario: {name: _outcomes(runs, scenario, name) for name in stacks}
+            for scenario in sorted({key.test for key in runs})
+        },
         tuple(_compare_with_baseline(runs, baseline, other, significance) for other in others),
     )
-
-
-def _outcomes_by_stack(
-    scenario: str, stacks: Iterable[str], runs: Mapping[RunKey, RunResult]
-) -> dict[str, OutcomeCounts]:
-    """Return the numbers of outcomes of a scenario or variation, by stack."""
-    own = [run for key, run in runs.items() if key.test == scenario]
-    return {name: _outcomes(run for run in own if run.key.stack_name == name) for name in stacks}
 
 
 def _own_outcome(run: RunResult) -> Outcome:
@@ -94,8 +89,9 @@ def _own_outcome(run: RunResult) -> Outcome:
     return Outcome.PASSED if has_passed or run.outcome is Outcome.PASSED else Outcome.FAILED
 
 
-def _outcomes(runs: Iterable[RunResult]) -> OutcomeCounts:
-    count = Counter(_own_outcome(run) for run in runs)
+def _outcomes(runs: Mapping[RunKey, RunResult], scenario: str, stack: str) -> OutcomeCounts:
+    """Return the numbers of outcomes of a scenario or variation with a stack."""
+    count = Counter(_own_outcome(run) for key, run in runs.items() if (key.test, key.stack_name) == (scenario, stack))
     return OutcomeCounts(count[Outcome.PASSED], count[Outcome.FAILED], count[Outcome.ERROR])
 
 
@@ -111,7 +107,7 @@ def _compare_with_baseline(
     same_arrival = [(one, two) for one, two in completed if _arrived(one) == _arrived(two)]
     flips = tuple(flip for pair in completed if (flip := _flip(pair)))
     won = sum(flip.passed == other for flip in flips)
-    names = (*_compared_names(completed), *_plugin_names(completed))
+    names = _compared_names(completed)
     return BaselineComparison(
         stack=other,
         pairs=len(completed),
@@ -130,7 +126,6 @@ def _compare_with_baseline(
 
 
 def _by_scenario(pairs: Iterable[Pair]) -> dict[str, list[Pair]]:
-    """Return the pairs grouped by scenario or variation."""
     found: dict[str, list[Pair]] = {}
     for pair in pairs:
         found.setdefault(pair[0].key.test, []).append(pair)
@@ -179,14 +174,11 @@ def _metric_unit(name: str) -> str:
 
 
 def _compared_names(pairs: Sequence[Pair]) -> list[str]:
-    """Return the names of the COMPARED_METRICS of the runs, grouped by robot."""
-    names = {name for pair in pairs for run in pair for name in run.metrics if _base_name(name) in COMPARED_METRICS}
-    return sorted(names, key=lambda name: (name.rpartition("/")[0], COMPARED_METRICS.index(_base_name(name))))
-
-
-def _plugin_names(pairs: Sequence[Pair]) -> list[str]:
-    """Return the names of metrics of plugins."""
-    return sorted({name for pair in pairs for run in pair for name in run.metrics if _base_name(name) not in METRICS})
+    """Return the names of the COMPARED_METRICS of the runs, grouped by robot, and then those of metrics of plugins."""
+    names = {name for pair in pairs for run in pair for name in run.metrics}
+    compared = [name for name in names if _base_name(name) in COMPARED_METRICS]
+    compared.sort(key=lambda name: (name.rpartition("/")[0], COMPARED_METRICS.index(_base_name(name))))
+    return [*compared, *sorted(name for name in names if _base_name(name) not in METRICS)]
 
 
 def _arrived(run: RunResult) -> set[str]:
@@ -262,10 +254,9 @@ def _baseline_data(against: BaselineComparison) -> dict[str, Any]:
         "pairs_of_which_one_arrived": against.pairs_with_one_arrival,
         "flips": [asdict(flip) for flip in against.flips],
         "flips_p": against.p,
-        "differences": [_difference_data(one) for one in against.differences],
+        "differences": [
+            {**asdict(one), "interval": None if one.interval is None else list(one.interval)}
+            for one in against.differences
+        ],
         "changes": [asdict(one) for one in against.changes],
     }
-
-
-def _difference_data(one: MetricDifference) -> dict[str, Any]:
-    return {**asdict(one), "interval": None if one.interval is None else list(one.interval)}
