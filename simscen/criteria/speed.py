@@ -62,19 +62,11 @@ class Speed(Spec, Criterion):
     may also accelerate this long before it leaves such cells. Entering the region `in` gives the robot no such time."""
 
     @model_validator(mode="after")
-    def _check_bounds(self) -> Speed:
+    def _check_keys(self) -> Speed:
         if self.max is None and self.max_turn_rate is None and self.mask is None:
             raise ValueError("expected max, max_turn_rate or mask")
-        return self
-
-    @model_validator(mode="after")
-    def _check_zone(self) -> Speed:
         if self.while_on and (self.in_ is None or self.mask is not None):
             raise ValueError("while_on only applies to the zone of a region: give `in` and no mask")
-        return self
-
-    @model_validator(mode="after")
-    def _check_reference_speed(self) -> Speed:
         percent = self.mask is not None and self.mask.type == "percent"
         if percent and self.full_speed is None:
             raise ValueError("expected full_speed, to which the percentages of the mask refer (or `type: absolute`)")

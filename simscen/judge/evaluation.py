@@ -20,8 +20,6 @@ from simscen.criteria.findings import MissingEvidence, undecided
 from simscen.criteria.registry import AnyCriterion, verdict_names
 from simscen.criteria.timeline import has_ended
 
-_STATUSES = (Status.PASS, Status.FAIL, Status.INCONCLUSIVE, Status.ERROR)
-
 
 def judge(
     criteria: Sequence[AnyCriterion], trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_COVERAGE
@@ -109,7 +107,7 @@ def _is_empty(trace: Trace) -> bool:
 
 def _defect(finding: object) -> str:
     """Return a description of what is wrong with one finding; "" if it is valid."""
-    if not isinstance(finding, Finding) or finding.status not in _STATUSES:
+    if not isinstance(finding, Finding) or finding.status not in tuple(Status):
         return f"it returned an invalid finding of type {type(finding).__name__}"
     if not all(isinstance(text, str) for text in (finding.what, finding.measured, finding.limit, finding.unit)):
         return "a text of its finding is not a string"

@@ -25,8 +25,8 @@ MAX_VIOLATION_CHARACTERS = 60
 
 
 @dataclass(frozen=True)
-class GoalOutcome:
-    """Outcome of a goal, as shown on the picture.
+class GoalMark:
+    """Color and text that show the outcome of a goal on the picture.
 
     `word` is reached, failed, canceled, "not reached", or "not tried". `text` is the label behind the name of the goal;
     "" for a goal that was reached.
@@ -45,28 +45,28 @@ def error_code_text(event: Event) -> str:
     return f"{name} ({code})" if code else str(name)
 
 
-def goal_outcome(goal: Goal, scene: Scene) -> GoalOutcome:
-    """Return the outcome of a goal according to its last event.
+def _goal_mark(goal: Goal, scene: Scene) -> GoalMark:
+    """Return the mark of a goal according to its last event.
 
     A goal that the stack reported as reached counts as failed if the criterion goals_reached found the robot elsewhere.
     """
     ends = [event for event in scene.trace.of_kind(*GOAL_END_KINDS) if event.name == goal.name]
     if not ends:
         if any(event.name == goal.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED)):
-            return GoalOutcome("not reached", palette.AMBER, "not reached")
-        return GoalOutcome("not tried", palette.GRAY, "not tried")
+            return GoalMark("not reached", palette.AMBER, "not reached")
+        return GoalMark("not tried", palette.GRAY, "not tried")
     match ends[-1].kind:
         case EventKind.GOAL_FAILED:
             expected = "as expected" if goal.name in scene.case.expected else ""
             text = ", ".join(part for part in (f"failed {expected}".strip(), error_code_text(ends[-1])) if part)
-            return GoalOutcome("failed", palette.AMBER if expected else palette.RED, text)
+            return GoalMark("failed", palette.AMBER if expected else palette.RED, text)
         case EventKind.GOAL_CANCELED:
-            return GoalOutcome("canceled", palette.GRAY, "canceled")
+            return GoalMark("canceled", palette.GRAY, "canceled")
         case _:
             findings = [f for v in scene.result.verdicts if v.criterion == "goals_reached" for f in v.findings]
             if any(f.status is Status.FAIL and f.what.endswith(f"goal {goal.name}") for f in findings):
-                return GoalOutcome("failed", palette.RED, "not there")
-            return GoalOutcome("reached", palette.GREEN)
+                return GoalMark("failed", palette.RED, "not there")
+            return GoalMark("reached", palette.GREEN)
 
 
 def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
@@ -78,30 +78,30 @@ def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     goals = [goal for goal in scene.case.every_goal if goal.name in sent or goal not in scene.case.sent]
     names: dict[tuple[float, float], list[str]] = {}
     for goal in goals:
-        outcome = goal_outcome(goal, scene)
+        mark = _goal_mark(goal, scene)
         entries = names.setdefault((goal.pose.x, goal.pose.y), [])
         known = any(matches_goal_name(goal.name, other.partition(":")[0]) for other in entries)
-        if not known or outcome.text:  # goals of a second loop have the same position
-            entries.append(f"{goal.name}: {outcome.text}" if outcome.text else goal.name)
+        if not known or mark.text:  # goals of a second loop have the same position
+            entries.append(f"{goal.name}: {mark.text}" if mark.text else goal.name)
     for goal in goals:
-        outcome = goal_outcome(goal, scene)
+        mark = _goal_mark(goal, scene)
         x, y, yaw = goal.pose
         radius = max(goal.xy_tolerance * canvas.scale, 5.0)
-        is_hollow = outcome.word in ("not tried", "canceled")
-        canvas.disc(x, y, radius, None if is_hollow else (*outcome.color, 46), outcome.color, 1.8, blocks_labels=True)
+        is_hollow = mark.word in ("not tried", "canceled")
+        canvas.disc(x, y, radius, None if is_hollow else (*mark.color, 46), mark.color, 1.8, blocks_labels=True)
         tip = (radius + 10) / canvas.scale
         heading = np.array([(x, y), (x + tip * math.cos(yaw), y + tip * math.sin(yaw))])
-        canvas.line(heading, outcome.color, 2.2, blocks_labels=True)
-        if outcome.word == "failed":
+        canvas.line(heading, mark.color, 2.2, blocks_labels=True)
+        if mark.word == "failed":
             bar = 0.72 * radius / canvas.scale
             for dy in (bar, -bar):
-                canvas.line(np.array([(x - bar, y - dy), (x + bar, y + dy)]), outcome.color, 2.0)
+                canvas.line(np.array([(x - bar, y - dy), (x + bar, y + dy)]), mark.color, 2.0)
         else:
-            canvas.disc(x, y, 2.6, outcome.color)
-        canvas.add_part(f"goal {scene.label(goal.name)} {outcome.word}", heading)
+            canvas.disc(x, y, 2.6, mark.color)
+        canvas.add_part(f"goal {scene.label(goal.name)} {mark.word}", heading)
         if texts := names.pop((x, y), None):
             rim = max(radius, 8.0)
-            yield Label(1, x, y, printable(scene.label(", ".join(texts))), outcome.color, 14, rim)
+            yield Label(1, x, y, printable(scene.label(", ".join(texts))), mark.color, 14, rim)
 
 
 _STAR = [(r * math.cos(a), r * math.sin(a)) for k in range(16) for r, a in [((16, 7)[k % 2], k * math.pi / 8)]]
