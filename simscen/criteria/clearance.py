@@ -8,10 +8,9 @@ import numpy as np
 
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.findings import at_least, undecided
+from simscen.criteria.findings import MissingEvidence, at_least, undecided
 from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, pedestrian_gap
 from simscen.criteria.trace_signals.ground_truth import clearance, speed
-from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.spec.base import Spec
 from simscen.spec.quantities import NonNegativeLength
 
@@ -92,7 +91,7 @@ class PersonalSpace(Spec, Criterion):
         limit = f"≥ {self.min:.2f} m"
         try:
             gaps = pedestrian_gap(trace, case)
-        except SignalUnavailable as reason:
+        except MissingEvidence as reason:
             return [undecided("distance to people", str(reason), limit)]
         if self.while_driving:
             gaps = np.where(speed(trace).at(trace.truth.ticks)[:, 0] > DRIVING_SPEED_M_S, gaps, np.inf)

@@ -26,7 +26,7 @@ class InvalidTrace(ValueError):
 
 
 class MissingEvidence(ValueError):
-    """The trace lacks data that a criterion needs, so that the criterion is inconclusive."""
+    """The trace lacks data that a criterion or a signal needs, so that the criterion is inconclusive."""
 
 
 def at_most(

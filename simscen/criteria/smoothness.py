@@ -9,10 +9,9 @@ from pydantic import Field, model_validator
 
 from simscen.core.records.verdict import Evidence, Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.findings import at_least, at_most, undecided
+from simscen.criteria.findings import MissingEvidence, at_least, at_most, undecided
 from simscen.criteria.trace_signals.catalog import SignalName, read_signal
 from simscen.criteria.trace_signals.ground_truth import speed
-from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.criteria.trace_signals.sparc_ldlj import MIN_MOVING_SPEED_M_S, evenly_sampled_speed, ldlj, sparc
 from simscen.spec.base import Spec
 from simscen.spec.quantities import PositiveAcceleration, PositiveJerk
@@ -80,7 +79,7 @@ class Smoothness(Spec, Criterion):
 def _judge_largest(trace: Trace, case: Case, name: SignalName, limit: float, unit: str) -> Finding:
     try:
         values = read_signal(name, trace, case, {})
-    except SignalUnavailable as reason:
+    except MissingEvidence as reason:
         return undecided(name, str(reason), f"≤ {limit:g} {unit}")
     k = int(np.argmax(np.abs(values)))
     return at_most(name, float(abs(values[k])), limit, unit, at=(trace, int(trace.truth.ticks[k])))
@@ -89,7 +88,7 @@ def _judge_largest(trace: Trace, case: Case, name: SignalName, limit: float, uni
 def _judge_mean_jerk(trace: Trace, case: Case, limit: float) -> Finding:
     try:
         values = read_signal("jerk", trace, case, {})
-    except SignalUnavailable as reason:
+    except MissingEvidence as reason:
         return undecided("mean jerk", str(reason), f"≤ {limit:g} m/s^3")
     return at_most("mean jerk", float(values.mean()), limit, "m/s^3")
 
@@ -100,7 +99,7 @@ def _judge_sparc_or_ldlj(trace: Trace, name: Literal["sparc", "ldlj"], limit: fl
         return undecided(name, "the robot never moved", f"≥ {limit:g}")
     try:
         even_speeds, rate = evenly_sampled_speed(trace)
-    except SignalUnavailable as reason:
+    except MissingEvidence as reason:
         return undecided(name, str(reason), f"≥ {limit:g}")
     value = (sparc if name == "sparc" else ldlj)(even_speeds, rate)
     if value is None:

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING
 from simscen.core.records.verdict import Evidence, Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.criteria.clearance import SEARCH_MARGIN_M
-from simscen.criteria.findings import undecided
+from simscen.criteria.findings import MissingEvidence, undecided
 from simscen.criteria.stl.condition import Condition, decision_horizon
 from simscen.criteria.stl.description import describe, describe_limit, describe_signal, describe_value
 from simscen.criteria.stl.evaluation import EvaluationContext, robustness
 from simscen.criteria.stl.robustness import TIE_MARGIN, Bound, ResponseRobustness, Robustness
 from simscen.criteria.timeline import end_reason, has_ended
 from simscen.criteria.trace_signals.catalog import signal_evidence
-from simscen.criteria.trace_signals.sampling import SignalUnavailable
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
@@ -55,7 +54,7 @@ class TemporalCriterion(Criterion):
         formula = describe(condition)
         try:
             result = robustness(condition, EvaluationContext(trace, case, has_ended(trace)))
-        except SignalUnavailable as missing:
+        except MissingEvidence as missing:
             return [undecided("", str(missing), formula)]
         low, high = float(result.low[0]), float(result.high[0])
         if low > 0:

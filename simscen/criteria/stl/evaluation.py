@@ -68,7 +68,7 @@ class EvaluationContext:
 def robustness(condition: Condition, context: EvaluationContext, begin: int = 0) -> Robustness:
     """Return the robustness of a condition at each sample.
 
-    The premise of a `whenever` is checked from sample `begin` on. Raises SignalUnavailable if the trace lacks a signal,
+    The premise of a `whenever` is checked from sample `begin` on. Raises MissingEvidence if the trace lacks a signal,
     and InvalidTrace if a signal is not finite.
     """
     if condition.signal is not None:

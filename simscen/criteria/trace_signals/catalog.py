@@ -283,6 +283,6 @@ def signal_evidence(name: SignalName) -> frozenset[Evidence]:
 def read_signal(name: SignalName, trace: Trace, case: Case, arguments: SignalArguments) -> Array:
     """Return the values (n,) of a signal at each sample of the truth, in SI units; 0 or 1 for a yes-or-no signal.
 
-    Raises SignalUnavailable if the trace lacks the data of the signal, and InvalidTrace if they are not finite.
+    Raises MissingEvidence if the trace lacks the data of the signal, and InvalidTrace if they are not finite.
     """
     return SIGNALS[name].read(SignalQuery(trace, case, arguments))

@@ -14,9 +14,10 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.core.geometry.polygon_separation import POINT, separation
 from simscen.core.records.events import EventKind
+from simscen.criteria.findings import MissingEvidence
 from simscen.criteria.trace_signals.ground_truth import check_samples
 from simscen.criteria.trace_signals.readers import goal_distance, true_poses
-from simscen.criteria.trace_signals.sampling import SignalQuery, SignalUnavailable
+from simscen.criteria.trace_signals.sampling import SignalQuery
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
@@ -42,7 +43,7 @@ def distance_to(query: SignalQuery) -> Array:
         return present_distance
     goals = {known.name: known.pose for known in query.case.every_goal}
     if goal not in goals:
-        raise SignalUnavailable(f"the scenario has no goal `{goal}`")
+        raise MissingEvidence(f"the scenario has no goal `{goal}`")
     pose = goals[str(goal)]
     return np.hypot(poses[:, 0] - pose.x, poses[:, 1] - pose.y)
 
@@ -50,7 +51,7 @@ def distance_to(query: SignalQuery) -> Array:
 def object_positions(trace: Trace, name: str) -> Array:
     """Return the poses (n, 3) of an object at the samples of the truth, or the position (1, 2) of a static object.
 
-    Raises SignalUnavailable if the trace does not contain the object.
+    Raises MissingEvidence if the trace does not contain the object.
     """
     if name in trace.objects:
         return check_samples(trace.objects[name], f"the pose of {name}", trace).at(trace.truth.ticks)
@@ -58,7 +59,7 @@ def object_positions(trace: Trace, name: str) -> Array:
         x, y = event.data.get("x"), event.data.get("y")
         if event.name == name and isinstance(x, int | float) and isinstance(y, int | float):
             return np.array([[x, y]], dtype=np.float64)
-    raise SignalUnavailable(f"`{name}` never existed, or does not move")
+    raise MissingEvidence(f"`{name}` never existed, or does not move")
 
 
 def is_present(trace: Trace, name: str) -> Array:
@@ -82,7 +83,7 @@ def distance_remaining(query: SignalQuery) -> Array:
     """
     belief, clock = check_samples(query.trace.belief, "the belief", query.trace), query.trace.truth.ticks
     if not len(belief):
-        raise SignalUnavailable("no belief was recorded")
+        raise MissingEvidence("no belief was recorded")
     believed = belief.at(clock)[:, :2]
     remaining = goal_distance(query)
     for first, last, points in _newest_plans(query.trace, clock):
@@ -93,13 +94,13 @@ def distance_remaining(query: SignalQuery) -> Array:
 def plan_deviation(query: SignalQuery) -> Array:
     """Return the distance from the true position to the newest plan; 0 before the first plan.
 
-    Raises SignalUnavailable if there is no plan.
+    Raises MissingEvidence if there is no plan.
     """
     poses = true_poses(query.trace)
     deviation = np.zeros(len(poses))
     plans = _newest_plans(query.trace, query.trace.truth.ticks)
     if not plans:
-        raise SignalUnavailable("no plan was recorded")
+        raise MissingEvidence("no plan was recorded")
     for first, last, points in plans:
         deviation[first:last] = _project_on_path(poses[first:last, :2], points)[0]
     return deviation
@@ -161,11 +162,11 @@ def pedestrian_radii(trace: Trace) -> dict[str, float]:
 def pedestrian_gap(trace: Trace, case: Case) -> Array:
     """Return the distance between the robot's footprint and the nearest pedestrian's body; inf while there is none.
 
-    Raises SignalUnavailable if the run has no pedestrians.
+    Raises MissingEvidence if the run has no pedestrians.
     """
     radii = pedestrian_radii(trace)
     if not radii:
-        raise SignalUnavailable("there were no people")
+        raise MissingEvidence("there were no people")
     poses = true_poses(trace)
     nearest = np.full(len(poses), np.inf)
     for name, radius in sorted(radii.items()):

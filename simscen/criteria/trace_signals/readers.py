@@ -2,7 +2,7 @@
 
 A reader is a function that computes the values (n,) of a signal at the n samples of the truth.
 
-The value of a yes-or-no signal is 0 or 1. Readers raise SignalUnavailable if the trace lacks the data of the signal,
+The value of a yes-or-no signal is 0 or 1. Readers raise MissingEvidence if the trace lacks the data of the signal,
 and InvalidTrace if the data are not finite. A belief is an estimated pose with its covariance.
 """
 
@@ -16,17 +16,12 @@ from simscen.core.geometry import Array, wrap_array
 from simscen.core.geometry.polygons import points_in_polygon
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Samples, Ticks
+from simscen.criteria.findings import MissingEvidence
 from simscen.criteria.trace_signals.estimation_errors import BELIEF_TIMEOUT_S, nees_samples, pose_error
 from simscen.criteria.trace_signals.ground_truth import check_samples, drive, speed, teleport_samples, truth
 from simscen.criteria.trace_signals.ground_truth import clearance as hull_clearance
 from simscen.criteria.trace_signals.ground_truth import turn_rate as unsigned_turn_rate
-from simscen.criteria.trace_signals.sampling import (
-    SignalQuery,
-    SignalUnavailable,
-    evenly_spaced,
-    sample_and_hold,
-    sample_ticks,
-)
+from simscen.criteria.trace_signals.sampling import SignalQuery, evenly_spaced, sample_and_hold, sample_ticks
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
@@ -160,7 +155,7 @@ def in_region(query: SignalQuery) -> Array:
     """Return whether the robot's true position is in the region of the query."""
     name = str(query.arguments["region"])
     if name not in query.case.regions:
-        raise SignalUnavailable(f"the world has no region `{name}`")
+        raise MissingEvidence(f"the world has no region `{name}`")
     inside = points_in_polygon(query.case.regions[name], true_poses(query.trace)[:, :2])
     return np.where(inside, 1.0, 0.0)
 
@@ -180,7 +175,7 @@ def _covariance(trace: Trace) -> Array:
     """Return the upper triangle (n, 6) of the covariance of the newest belief: xx, xy, xyaw, yy, yyaw, yawyaw."""
     belief = check_samples(trace.belief, "the belief", trace)
     if not len(belief) or belief.values.shape[1] < 9:
-        raise SignalUnavailable("no covariance of the belief was recorded")
+        raise MissingEvidence("no covariance of the belief was recorded")
     return sample_and_hold(trace, belief, "belief")[:, 3:]
 
 
@@ -188,7 +183,7 @@ def _newest_command(trace: Trace) -> Array:
     """Return the newest command (n, 3): vx, vy (m/s) and wz (rad/s); zeros before the first command."""
     clock, command = sample_ticks(trace), check_samples(trace.command, "the command", trace)
     if not len(command):
-        raise SignalUnavailable("no command was recorded")
+        raise MissingEvidence("no command was recorded")
     return np.where((clock >= command.ticks[0])[:, np.newaxis], command.at(clock), 0.0)
 
 
@@ -200,7 +195,7 @@ def _finite_difference(trace: Trace, values: Array, order: int) -> Array:
     ticks = sample_ticks(trace)
     even = evenly_spaced(Samples(ticks, values[:, np.newaxis]), trace.tick_rate)
     if len(even) <= order:
-        raise SignalUnavailable(f"the run is too short: {len(even)} samples of the truth")
+        raise MissingEvidence(f"the run is too short: {len(even)} samples of the truth")
     step = float(even.ticks[1] - even.ticks[0]) / trace.tick_rate
     first = np.diff(even.values[:, 0]) / step
     placed = [k - 1 for k in teleport_samples(trace, even.ticks) if 0 < k < len(even)]
@@ -237,7 +232,7 @@ def _current_goals(trace: Trace, case: Case) -> Array:
             ticks.append(event.tick)
             poses.append(pose if known else pose_by_name[event.name])
     if not poses and not case.goals:
-        raise SignalUnavailable("there was no goal")
+        raise MissingEvidence("there was no goal")
     if not poses:
         return np.array([case.goals[0].pose], dtype=np.float64)
     return Samples(np.array(ticks, dtype=np.int64), np.array(poses, dtype=np.float64)).at(clock)

@@ -10,6 +10,7 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.core.records.trace import Samples, Ticks
+from simscen.criteria.findings import MissingEvidence
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
@@ -23,10 +24,6 @@ SignalArguments = Mapping[str, object]
 """Arguments of a signal by YAML key: object, point, goal, region, fault, event, recovery, or with."""
 
 
-class SignalUnavailable(ValueError):
-    """The trace lacks the data of a signal. Criteria that need the signal are inconclusive."""
-
-
 @dataclass(frozen=True, eq=False)
 class SignalQuery:
     """Input of a function that computes a signal: the trace and the case of a run, and the arguments of the signal."""
@@ -37,20 +34,20 @@ class SignalQuery:
 
 
 def sample_ticks(trace: Trace) -> Ticks:
-    """Return the ticks of the samples of the truth. Raises SignalUnavailable if there are none."""
+    """Return the ticks of the samples of the truth. Raises MissingEvidence if there are none."""
     if not len(trace.truth):
-        raise SignalUnavailable("the true pose was not recorded")
+        raise MissingEvidence("the true pose was not recorded")
     return trace.truth.ticks
 
 
 def sample_and_hold(trace: Trace, samples: Samples, what: str) -> Array:
     """Return the newest values (n, k) of `samples` at each sample of the truth.
 
-    Raises SignalUnavailable if `samples` are empty; `what` is the name of the signal in the message.
+    Raises MissingEvidence if `samples` are empty; `what` is the name of the signal in the message.
     """
     ticks = sample_ticks(trace)
     if not len(samples):
-        raise SignalUnavailable(f"no {what} was recorded")
+        raise MissingEvidence(f"no {what} was recorded")
     return samples.at(ticks)
 
 
@@ -62,20 +59,20 @@ def usual_period(ticks: Ticks) -> int:
 def evenly_spaced(samples: Samples, tick_rate: int) -> Samples:
     """Return the samples, resampled to their median spacing by linear interpolation unless they are evenly spaced.
 
-    Raises SignalUnavailable if there are fewer than two samples, if their ticks do not increase, or if a gap is longer
+    Raises MissingEvidence if there are fewer than two samples, if their ticks do not increase, or if a gap is longer
     than MAX_INTERPOLATED_GAP_S.
     """
     if len(samples) < 2:
-        raise SignalUnavailable(f"the run is too short: {len(samples)} sample{'s' * (len(samples) != 1)} of the truth")
+        raise MissingEvidence(f"the run is too short: {len(samples)} sample{'s' * (len(samples) != 1)} of the truth")
     ticks, steps = samples.ticks, np.diff(samples.ticks)
     if (steps <= 0).any():
-        raise SignalUnavailable("the samples of the truth are not in chronological order")
+        raise MissingEvidence("the samples of the truth are not in chronological order")
     if (steps == steps[0]).all():
         return samples
     longest = int(np.argmax(steps))
     if steps[longest] > MAX_INTERPOLATED_GAP_S * tick_rate:
         begin, end = ticks[longest] / tick_rate, ticks[longest + 1] / tick_rate
-        raise SignalUnavailable(
+        raise MissingEvidence(
             f"the truth has no sample from t = {begin:.2f} s to {end:.2f} s; differences over time need one every "
             f"{MAX_INTERPOLATED_GAP_S:g} s"
         )

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.geometry import Array
+from simscen.criteria.findings import MissingEvidence
 from simscen.criteria.trace_signals.ground_truth import speed
-from simscen.criteria.trace_signals.sampling import SignalUnavailable, evenly_spaced
+from simscen.criteria.trace_signals.sampling import evenly_spaced
 
 if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
@@ -34,14 +35,12 @@ PADDING_LEVEL = 4
 def evenly_sampled_speed(trace: Trace) -> tuple[Array, float]:
     """Return the true speed over ground (m,) in m/s, sampled at evenly spaced times, and the sample rate in Hz.
 
-    Raises SignalUnavailable if there is no velocity, or if the sample rate is too low for SPARC and LDLJ.
+    Raises MissingEvidence if there is no velocity, or if the sample rate is too low for SPARC and LDLJ.
     """
     even = evenly_spaced(speed(trace), trace.tick_rate)
     rate = trace.tick_rate / float(even.ticks[1] - even.ticks[0])
     if rate < MIN_RATE_HZ:
-        raise SignalUnavailable(
-            f"the truth has {rate:.1f} samples a second, too few for changes up to {CUTOFF_HZ:g} Hz"
-        )
+        raise MissingEvidence(f"the truth has {rate:.1f} samples a second, too few for changes up to {CUTOFF_HZ:g} Hz")
     return even.values[:, 0], rate
 
 

@@ -21,7 +21,6 @@ from simscen.criteria.goals_reached import GoalsReached
 from simscen.criteria.trace_signals.catalog import read_signal
 from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M, pedestrian_gap
 from simscen.criteria.trace_signals.ground_truth import clearance, drive, speed, truth, turn_rate
-from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.criteria.trace_signals.sparc_ldlj import MIN_MOVING_SPEED_M_S, evenly_sampled_speed, ldlj, sparc
 from simscen.judge.evaluation import missing_evidence_reason, partial_evidence_reason
 from simscen.judge.metrics.catalog import METRICS
@@ -88,7 +87,7 @@ def _compute_or_explain(names: Sequence[str], compute: Callable[[], Values]) -> 
     """Return the metrics `names` from `compute`, or for each of them the reason why it cannot be computed."""
     try:
         return compute()
-    except (InvalidTrace, MissingEvidence, SignalUnavailable) as reason:
+    except (InvalidTrace, MissingEvidence) as reason:
         return dict.fromkeys(names, str(reason))
 
 

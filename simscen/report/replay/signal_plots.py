@@ -10,10 +10,10 @@ from simscen.core.geometry import Array
 from simscen.core.records.case import Case
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Finding, Verdict
-from simscen.criteria.findings import InvalidTrace
+from simscen.criteria.findings import InvalidTrace, MissingEvidence
 from simscen.criteria.stl.criterion import TemporalCriterion
 from simscen.criteria.trace_signals.catalog import SIGNALS, SignalName, read_signal
-from simscen.criteria.trace_signals.sampling import SignalArguments, SignalUnavailable
+from simscen.criteria.trace_signals.sampling import SignalArguments
 from simscen.model.scenario import ScenarioSpec
 from simscen.report.display_text import one_line
 from simscen.report.replay.packed_columns import PackedColumns, keep_extremes
@@ -84,7 +84,7 @@ def _plot_data(plot: SignalPlot, trace: Trace, case: Case, columns: PackedColumn
     signal = SIGNALS[plot.signal]
     try:
         values = read_signal(plot.signal, trace, case, plot.arguments)
-    except (SignalUnavailable, InvalidTrace):
+    except (MissingEvidence, InvalidTrace):
         return None
     if not len(values) or not np.isfinite(values).any():
         return None

@@ -4,8 +4,8 @@ import pytest
 from moments import CASE, CLOCK, moments, sample_header
 
 from simscen.core.records.trace import Trace
+from simscen.criteria.findings import MissingEvidence
 from simscen.criteria.trace_signals.catalog import SIGNALS, read_signal
-from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.record.log_reader import read_log
 from simscen.record.recorder import Recorder
 from simscen.record.trace_builder import TraceBuilder
@@ -34,7 +34,7 @@ def test_signal_of_a_run_equals_that_of_its_log(name: str, both: tuple[Trace, Tr
 def _bits(name: str, trace: Trace, arguments: dict[str, str]) -> bytes | str:
     try:
         return read_signal(name, trace, CASE, arguments).tobytes()
-    except SignalUnavailable as error:
+    except MissingEvidence as error:
         return str(error)
 
 

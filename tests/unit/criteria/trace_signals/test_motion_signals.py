@@ -7,8 +7,8 @@ import pytest
 
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Samples
+from simscen.criteria.findings import MissingEvidence
 from simscen.criteria.trace_signals.catalog import read_signal
-from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.criteria.trace_signals.sparc_ldlj import evenly_sampled_speed
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
@@ -51,9 +51,9 @@ def test_jerk_needs_three_samples_and_acceleration_two():
     case = synthetic_case({})
     assert len(read_signal("acceleration", driving([[0, 0, 0], [1, 0, 0]]), case, {})) == 2
     assert len(read_signal("jerk", driving([[0, 0, 0], [1, 0, 0], [1, 0, 0]]), case, {})) == 3
-    with pytest.raises(SignalUnavailable, match="too short: 2 samples"):
+    with pytest.raises(MissingEvidence, match="too short: 2 samples"):
         read_signal("jerk", driving([[0, 0, 0], [1, 0, 0]]), case, {})
-    with pytest.raises(SignalUnavailable, match="too short: 1 sample of"):
+    with pytest.raises(MissingEvidence, match="too short: 1 sample of"):
         read_signal("acceleration", driving([[0, 0, 0]]), case, {})
 
 
@@ -109,7 +109,7 @@ def test_differences_of_uneven_samples_are_those_of_the_interpolated_signal():
 def test_differences_are_not_known_across_a_long_gap():
     steady = uneven([0, 12, 24, 36, 97, 108], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert read_signal("speed", steady, synthetic_case({}), {}).tolist() == [0.0] * 6
-    with pytest.raises(SignalUnavailable, match=r"no sample from t = 0.15 s to 0.40 s; .* need one every 0.25 s"):
+    with pytest.raises(MissingEvidence, match=r"no sample from t = 0.15 s to 0.40 s; .* need one every 0.25 s"):
         read_signal("acceleration", steady, synthetic_case({}), {})
     bridged = uneven([0, 12, 24, 36, 96, 108], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert read_signal("acceleration", bridged, synthetic_case({}), {}).tolist() == [0.0] * 6
@@ -130,5 +130,5 @@ def test_smoothness_needs_samples_at_its_lowest_rate(rate: int, is_known: bool) 
     if is_known:
         assert evenly_sampled_speed(moved)[1] == rate
     else:
-        with pytest.raises(SignalUnavailable, match="too few"):
+        with pytest.raises(MissingEvidence, match="too few"):
             evenly_sampled_speed(moved)

@@ -12,9 +12,8 @@ import shapely
 from simscen.core.geometry.polygons import points_in_polygon
 from simscen.core.messages.navigation import Path
 from simscen.core.records.trace import Samples, Trace
-from simscen.criteria.findings import InvalidTrace
+from simscen.criteria.findings import InvalidTrace, MissingEvidence
 from simscen.criteria.trace_signals.catalog import SIGNALS, SignalName, read_signal
-from simscen.criteria.trace_signals.sampling import SignalUnavailable
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 STEP = 6 / 240
@@ -60,7 +59,7 @@ def test_uncertainty_is_unknown_without_a_covariance():
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     bare = replace(trace, belief=Samples(trace.belief.ticks, trace.belief.values[:, :3]))
     for name in ("position_std", "yaw_std"):
-        with pytest.raises(SignalUnavailable, match="no covariance of the belief was recorded"):
+        with pytest.raises(MissingEvidence, match="no covariance of the belief was recorded"):
             read_signal(name, bare, synthetic_case({}), {})
 
 
@@ -100,7 +99,7 @@ def test_the_first_goal_counts_before_any_is_accepted_and_without_goals_there_is
     words = {"seconds": 1, "truth": [[0, 0, 0]]}
     goals = [{"name": "a", "pose": [3, 4, 0]}, {"name": "b", "pose": [1, 0, 0]}]
     assert signal("goal_distance", words, {"goals": goals})[0] == 5.0
-    with pytest.raises(SignalUnavailable, match="no goal"):
+    with pytest.raises(MissingEvidence, match="no goal"):
         signal("goal_distance", words)
 
 
@@ -154,7 +153,7 @@ def test_without_a_belief_a_robot_is_not_localized_and_has_no_error():
     words = {"seconds": 1, "truth": [[0, 0, 0]], "belief": None}
     assert not signal("localized", words).any()
     for name in ("localization_error", "position_std", "nees", "distance_remaining"):
-        with pytest.raises(SignalUnavailable, match="recorded"):
+        with pytest.raises(MissingEvidence, match="recorded"):
             signal(name, words, {"goals": [{"name": "a", "pose": [1, 0, 0]}]})
 
 
@@ -184,9 +183,9 @@ def test_distance_to_static_objects():
     assert signal("distance_to", words, case, goal="shelf")[0] == 5.0
     assert signal("distance_to", words, case, point=[7, 6])[0] == 10.0
     assert signal("distance_to", words, case, object="box")[0] == 2.0
-    with pytest.raises(SignalUnavailable, match="`cart` never existed"):
+    with pytest.raises(MissingEvidence, match="`cart` never existed"):
         signal("distance_to", words, case, object="cart")
-    with pytest.raises(SignalUnavailable, match="no goal `self`"):
+    with pytest.raises(MissingEvidence, match="no goal `self`"):
         signal("distance_to", words, case, goal="self")
 
 
@@ -206,14 +205,14 @@ def test_remaining_plan_length_starts_at_the_estimated_position():
 def test_newer_plan_replaces_the_old_one():
     words = {"seconds": 4, "truth": [[0, 1, 1]], "plans": [[1, [[0, 0], [2, 0]]], [2, [[0, 4], [2, 4]]]]}
     assert [at(signal("plan_deviation", words), t) for t in (0.975, 1.0, 1.975, 2.0)] == [0, 1, 1, 3]
-    with pytest.raises(SignalUnavailable, match="no plan"):
+    with pytest.raises(MissingEvidence, match="no plan"):
         signal("plan_deviation", {"seconds": 1, "truth": [[0, 0, 0]]})
 
 
 def test_plan_after_the_last_sample_is_ignored():
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 1, 1]]})
     late = Path(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]), 241)
-    with pytest.raises(SignalUnavailable, match="no plan"):
+    with pytest.raises(MissingEvidence, match="no plan"):
         read_signal("plan_deviation", replace(trace, plans=(late,)), synthetic_case({}), {})
 
 
@@ -227,7 +226,7 @@ def test_a_robot_is_in_a_region_with_its_center():
     case = {"regions": {"hall": [[1, -1], [3, -1], [3, 1], [2, 0], [1, 1]]}}
     values = signal("in_region", {"seconds": 4, "truth": [[0, 0, 0.5], [4, 4, 0.5]]}, case, region="hall")
     assert [at(values, t) for t in (0.5, 1.2, 2.0, 2.8, 3.5)] == [0, 1, 0, 1, 0]
-    with pytest.raises(SignalUnavailable, match="no region `hal`"):
+    with pytest.raises(MissingEvidence, match="no region `hal`"):
         signal("in_region", {"seconds": 4, "truth": [[0, 0, 0.5]]}, case, region="hal")
 
 
@@ -316,7 +315,7 @@ def test_signals_need_the_truth_for_their_clock(name):
     trace = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]})
     nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
     blind: Trace = replace(trace, truth=nothing)
-    with pytest.raises(SignalUnavailable, match="true pose"):
+    with pytest.raises(MissingEvidence, match="true pose"):
         read_signal(name, blind, synthetic_case({"goals": [{"name": "a", "pose": [1, 0, 0]}]}), {})
 
 

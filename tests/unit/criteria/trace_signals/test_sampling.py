@@ -7,8 +7,8 @@ import pytest
 
 from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import Evidence
-from simscen.criteria.findings import InvalidTrace
-from simscen.criteria.trace_signals.sampling import SignalUnavailable, evenly_spaced, usual_period
+from simscen.criteria.findings import InvalidTrace, MissingEvidence
+from simscen.criteria.trace_signals.sampling import evenly_spaced, usual_period
 from simscen.criteria.trace_signals.sparc_ldlj import evenly_sampled_speed
 from simscen.criteria.trace_signals.trace_checks import check_recorded_signals, time_gaps
 from simscen.testing.synthetic_trace import synthetic_trace
@@ -46,13 +46,13 @@ def test_resampling_ends_at_the_last_grid_point() -> None:
 
 
 def test_too_few_samples_are_refused() -> None:
-    with pytest.raises(SignalUnavailable, match="1 sample of the truth"):
+    with pytest.raises(MissingEvidence, match="1 sample of the truth"):
         evenly_spaced(samples(5), RATE)
 
 
 @pytest.mark.parametrize("ticks", [(0, 0, 0), (0, 10, 10, 20), (0, 20, 10)])
 def test_spacing_of_unordered_samples_is_undefined(ticks: tuple[int, ...]) -> None:
-    with pytest.raises(SignalUnavailable, match="chronological order"):
+    with pytest.raises(MissingEvidence, match="chronological order"):
         evenly_spaced(samples(*ticks), RATE)
 
 
@@ -100,5 +100,5 @@ def test_smoothness_needs_18_samples_a_second(period: int, is_enough: bool) -> N
     if is_enough:
         assert evenly_sampled_speed(with_truth_at(*ticks))[1] == pytest.approx(RATE / period)
     else:
-        with pytest.raises(SignalUnavailable, match="too few for changes up to 10 Hz"):
+        with pytest.raises(MissingEvidence, match="too few for changes up to 10 Hz"):
             evenly_sampled_speed(with_truth_at(*ticks))
