@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from simscen.testing.contracts.base import Promise
@@ -62,18 +61,14 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Add one test item for each promise before other plug-ins select items."""
-    items.extend(_items(session, config.stash.get(_PROMISES, []), config.getoption("--simscen-contract-limit")))
-
-
-def _items(session: pytest.Session, promises: list[Promise], limit: float) -> Iterator[pytest.Item]:
-    """Yield a test item for each promise, below one collector for each component. `limit` is in s."""
-    for subject in dict.fromkeys((promise.role, promise.subject) for promise in promises):
-        title = f"{subject[0]} {subject[1]}"
-        node = SubjectCollector.from_parent(session, name=title, nodeid=title)
-        for promise in promises:
-            if (promise.role, promise.subject) == subject:
-                yield PromiseItem.from_parent(node, name=promise.name, promise=promise, limit=limit)
+    """Add one test item for each promise before other plug-ins select items. Each component has a collector."""
+    limit = config.getoption("--simscen-contract-limit")
+    collectors: dict[str, SubjectCollector] = {}
+    for promise in config.stash.get(_PROMISES, []):
+        title = f"{promise.role} {promise.subject}"
+        if title not in collectors:
+            collectors[title] = SubjectCollector.from_parent(session, name=title, nodeid=title)
+        items.append(PromiseItem.from_parent(collectors[title], name=promise.name, promise=promise, limit=limit))
 
 
 class SubjectCollector(pytest.Collector):

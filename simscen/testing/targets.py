@@ -1,7 +1,5 @@
 """Find the contracts of a component by its specification or name.
 
-A contract is a set of promises: rules that all components of this kind must keep.
-
 A target is a component named on the command line with --simscen-contract.
 """
 
@@ -24,7 +22,7 @@ from simscen.model.planners import PlannerSpec
 from simscen.model.recovery import BehaviorSpec
 from simscen.model.robot import SensorSpec
 from simscen.model.stack_base import ControllerSpec, StackBase
-from simscen.spec.registry import GROUPS, BrokenPlugin, RegisteredType, find_type
+from simscen.spec.registry import GROUPS, BrokenPlugin, find_type
 from simscen.stack.protocols import RobotModel
 from simscen.testing.contracts.actions_and_triggers import ActionContract, TriggerContract
 from simscen.testing.contracts.base import Contract, Promise
@@ -104,28 +102,21 @@ def promises_of_target(target: str) -> list[Promise]:
 def _specification_classes(component: str) -> Sequence[Any]:
     """Return the specification class of `package.module:Class`, or the classes of all entry points with this name."""
     if ":" in component:
-        return [specification_of(_import_class(component), component)]
+        module, _, name = component.partition(":")
+        try:
+            component_class = getattr(import_module(module), name)
+        except (ImportError, AttributeError) as error:
+            raise InvalidTarget(f"{component}: {error}") from error
+        return [specification_of(component_class, component)]
     entries = [entry for group in GROUPS if (entry := find_type(group, component)) is not None]
     if not entries:
         raise InvalidTarget(
             f"{component}: no installed package adds anything of that name, and it is not package.module:Class"
         )
-    return [_load_entry(entry) for entry in entries]
-
-
-def _load_entry(entry: RegisteredType) -> Any:
     try:
-        return entry.load()
+        return [entry.load() for entry in entries]
     except BrokenPlugin as broken:
         raise InvalidTarget(str(broken)) from broken
-
-
-def _import_class(component: str) -> Any:
-    module, _, name = component.partition(":")
-    try:
-        return getattr(import_module(module), name)
-    except (ImportError, AttributeError) as error:
-        raise InvalidTarget(f"{component}: {error}") from error
 
 
 def specification_of(component_class: Any, component: str) -> Any:

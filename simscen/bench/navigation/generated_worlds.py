@@ -3,7 +3,7 @@
 Office maps are ROS maps with cells of 5 to 25 cm, thin walls, and some unknown cells, like maps made by SLAM.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -125,22 +125,21 @@ HALL_WIDTH_M = 2.4
 
 
 def write_two_robots(folder: Path, numbers: Iterable[int]) -> Experiment:
-    """Write one scenario for each number: two robots drive through a corridor in opposite directions."""
-    return _numbered_experiment("two robots in a corridor", folder / "corridor", numbers, _meeting_scenario)
+    """Write one scenario for each number, which is its seed: two robots meet in a corridor."""
+    drives = [
+        Drive(write_text(folder / f"corridor_{number}.scenario.yaml", _meeting_scenario(number)), [number])
+        for number in numbers
+    ]
+    return Experiment("two robots in a corridor", tuple(drives), folder)
 
 
 def write_ramps(folder: Path, numbers: Iterable[int]) -> Experiment:
-    """Write one scenario for each number: a robot drives up a ramp, along a platform, and down a ramp."""
-    return _numbered_experiment("ramps", folder / "ramp", numbers, _ramp_scenario)
-
-
-def _numbered_experiment(name: str, stem: Path, numbers: Iterable[int], text_of: Callable[[int], str]) -> Experiment:
-    """Write the scenario `text_of(number)` to `<stem>_<number>.scenario.yaml` for each number, which is the seed."""
+    """Write one scenario for each number, which is its seed: a robot drives up a ramp, along a platform, and down."""
     drives = [
-        Drive(write_text(stem.with_name(f"{stem.name}_{number}.scenario.yaml"), text_of(number)), [number])
+        Drive(write_text(folder / f"ramp_{number}.scenario.yaml", _ramp_scenario(number)), [number])
         for number in numbers
     ]
-    return Experiment(name, tuple(drives), stem.parent)
+    return Experiment("ramps", tuple(drives), folder)
 
 
 def _meeting_scenario(number: int) -> str:

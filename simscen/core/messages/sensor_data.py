@@ -129,8 +129,6 @@ MIN_HEIGHT_M = 0.05
 """Minimum height of hits that `level_scan` uses; half the height of the lidar if that is lower."""
 MAX_HEIGHT_M = 2.0
 """Maximum height of hits that `level_scan` uses: `max_obstacle_height` of Nav2's costmap."""
-AT_BASE = Pose3()
-"""Mount of a sensor whose frame is the base frame."""
 
 
 def level_scan(scan: Scan) -> Scan:
@@ -160,14 +158,15 @@ def level_scan(scan: Scan) -> Scan:
 
 def imu_in_base_frame(imu: Imu) -> Imu:
     """Rotate a reading to the axes of the base frame. It still applies to the position of the sensor."""
-    if imu.mount == AT_BASE:
+    at_base = Pose3()
+    if imu.mount == at_base:
         return imu
     quaternion = imu.mount.quaternion
     return replace(
         imu,
         angular_velocity=rotated(quaternion, imu.angular_velocity),
         linear_acceleration=rotated(quaternion, imu.linear_acceleration),
-        mount=AT_BASE,
+        mount=at_base,
     )
 
 
