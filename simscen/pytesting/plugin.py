@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from simscen.pytesting import OUT_OPTION
+from simscen.pytesting import OUT_OPTION, positive_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -32,12 +32,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
     group.addoption(
         "--simscen-seed",
-        type=int,
+        type=positive_number,
         metavar="N",
         help="run scenarios with this seed instead of their own (ini: simscen_seed)",
     )
     group.addoption(
-        "--simscen-repeat", type=int, default=1, metavar="N", help="run scenarios with this many seeds in a row"
+        "--simscen-repeat",
+        type=positive_number,
+        default=1,
+        metavar="N",
+        help="run scenarios with this many seeds in a row",
     )
     group.addoption(
         "--simscen-stack",

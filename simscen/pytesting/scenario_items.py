@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+from argparse import ArgumentTypeError
 from collections.abc import Iterator
 from datetime import datetime, timezone
 from itertools import count
@@ -24,7 +25,7 @@ from simscen.core.records.session_events import RunFinished
 from simscen.loading.files.discovery import default_root
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of
-from simscen.pytesting import OUT_OPTION
+from simscen.pytesting import OUT_OPTION, positive_number
 from simscen.report.display_text import plain_text
 from simscen.report.session_lines import violation_lines
 from simscen.report.violations import error_summary, reported_violations, scenario_file, short_run_name
@@ -186,13 +187,14 @@ def _raise_errors(problems: list[Problem]) -> None:
 
 def _seed(config: pytest.Config) -> int | None:
     """Return the seed from the command line or the ini option; None to use the scenario's own. Raises UsageError."""
-    given = config.getoption("--simscen-seed")
+    given: int | None = config.getoption("--simscen-seed")
     setting = config.getini("simscen_seed")
     if given is not None or not setting:
-        return None if given is None else int(given)
-    if not (setting.isascii() and setting.isdecimal()):
-        raise UsageError(f"simscen_seed: {setting!r} is not a whole number")
-    return int(setting)
+        return given
+    try:
+        return positive_number(setting)
+    except ArgumentTypeError as error:
+        raise UsageError(f"simscen_seed: {error}") from error
 
 
 def _properties(run: RunFinished) -> list[tuple[str, object]]:

@@ -21,7 +21,6 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.spec.base import Component
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
-from simscen.stack.setting import Setting
 from simscen.testing.flatland import TICK_RATE_HZ, Flatland, setting
 
 DEFAULT_LIMIT_S = 60.0
@@ -129,14 +128,10 @@ class ComponentContract(Contract):
 
     robot: RobotModel = field(kw_only=True)
 
-    def setting(self) -> Setting:
-        """Return the Setting for building the component: robot, random streams with a fixed seed, and no map."""
-        return setting(self.robot, name=self.role)
-
     def build(self) -> Any:
-        """Build a new component. Raises PromiseBroken if that fails."""
+        """Build a new component with a fixed seed and without a map. Raises PromiseBroken if that fails."""
         spec: Component = self.spec
-        return call_component("is built", lambda: spec.implementation()(spec, self.setting()))
+        return call_component("is built", lambda: spec.implementation()(spec, setting(self.robot, name=self.role)))
 
 
 def call_component(action: str, call: Callable[..., T], *args: Any, **kwargs: Any) -> T:

@@ -149,6 +149,13 @@ def test_invalid_stack_and_seed_are_usage_errors(run, project: Path, ini: str, a
     assert code == 2 and message in output and "Traceback" not in output
 
 
+@pytest.mark.parametrize("option", ["--simscen-seed", "--simscen-repeat"])
+def test_seed_and_number_of_seeds_are_at_least_1(run, option: str) -> None:
+    code, output = run("-p", "no:xdist", "scenarios/good.scenario.yaml", option, "0")
+    assert code == pytest.ExitCode.USAGE_ERROR
+    assert f"argument {option}: '0' is not a whole number of at least 1" in output
+
+
 def test_fixture_runs_a_scenario_in_a_test_and_reports_why_it_failed(run, project: Path) -> None:
     (project / "test_own.py").write_text(TEST)
     code, output = run("-p", "no:xdist", "test_own.py")
