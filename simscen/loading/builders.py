@@ -122,15 +122,11 @@ def robot_from_file(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotS
     try:
         return spec, build_robot_body(spec, robot.path, roots, read_mesh, files)
     except UnknownArgument as error:
-        raise InvalidInput([_unknown_argument_problem(robot, error.name, error.declared)]) from error
-
-
-def _unknown_argument_problem(robot: LoadedRobot, argument: str, declared: Sequence[str]) -> Problem:
-    """Return the problem that a robot file sets an unknown xacro argument. `declared` are the known arguments."""
-    assert robot.tree is not None and robot.urdf is not None  # only robot files with xacro have arguments
-    message = f"{quoted(robot.urdf.name)} declares no argument {quoted(argument)}"
-    hint = suggestion(argument, declared) or "it has no <xacro:arg>"
-    return Problem(*key_position(robot.tree, ("arguments", argument)), "SC403", message, hint)
+        assert robot.tree is not None and robot.urdf is not None  # only robot files with xacro have arguments
+        message = f"{quoted(robot.urdf.name)} declares no argument {quoted(error.name)}"
+        hint = suggestion(error.name, error.declared) or "it has no <xacro:arg>"
+        position = key_position(robot.tree, ("arguments", error.name))
+        raise InvalidInput([Problem(*position, "SC403", message, hint)]) from error
 
 
 MAX_RECTANGLES = 100_000

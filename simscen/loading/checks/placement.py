@@ -44,8 +44,19 @@ MotionStop = tuple[Keys, str, tuple[float, float]]
 
 
 def blocked_poses(scene: Scene) -> dict[Keys, CheckProblem]:
-    """Return the problems of blocked starts, goals, and kidnap poses, by keys of the pose."""
-    found = [*_blocked_start(scene), *_blocked_goals(scene), *_blocked_kidnap_poses(scene)]
+    """Return the problems of a blocked start, and of blocked goals and kidnap poses, by keys of the pose.
+
+    Fixed solids block all poses. Movable bodies at their initial poses also block the start.
+    """
+    found: list[CheckProblem] = []
+    if not expects_start_failure(scene.loaded.spec):
+        solids = (*scene.world.solids, *scene.bodies)
+        found += _pose_problem(scene, START, "the robot's start", scene.start, solids, FREE_SPACE_HINT)
+    found += _blocked_goals(scene)
+    for keys, action in scene.actions:
+        if isinstance(action, Kidnap):
+            pose, what = action.pose.pose, "the pose to which the robot is kidnapped"
+            found += _pose_problem(scene, (*keys, "pose"), what, pose, scene.world.solids, FREE_SPACE_HINT)
     return {problem.keys: problem for problem in found}
 
 
@@ -53,13 +64,6 @@ def blocked_poses(scene: Scene) -> dict[Keys, CheckProblem]:
 def blocked_robot_poses(scene: Scene) -> Iterator[CheckProblem]:
     """Find starts, goals, and kidnap poses inside an obstacle or outside the map."""
     yield from scene.cached(blocked_poses).values()
-
-
-def _blocked_start(scene: Scene) -> Iterator[CheckProblem]:
-    """Yield a problem if a fixed solid, or a movable body at its initial pose, blocks the start."""
-    if not expects_start_failure(scene.loaded.spec):
-        solids = (*scene.world.solids, *scene.bodies)
-        yield from _pose_problem(scene, START, "the robot's start", scene.start, solids, FREE_SPACE_HINT)
 
 
 def _blocked_goals(scene: Scene) -> Iterator[CheckProblem]:
@@ -93,16 +97,6 @@ def _fits_nearby(scene: Scene, goal: Goal) -> bool:
     return any(scene.footprint_conflict(pose, scene.world.solids) is None for pose in near)
 
 
-def _blocked_kidnap_poses(scene: Scene) -> Iterator[CheckProblem]:
-    """Yield a problem for each blocked pose to which an event moves (kidnaps) the robot."""
-    for keys, _, action in scene.actions:
-        if isinstance(action, Kidnap):
-            what = "the pose to which the robot is kidnapped"
-            yield from _pose_problem(
-                scene, (*keys, "pose"), what, action.pose.pose, scene.world.solids, FREE_SPACE_HINT
-            )
-
-
 def _pose_problem(
     scene: Scene, keys: Keys, what: str, pose: Pose2, solids: tuple[Solid, ...], hint: str
 ) -> Iterator[CheckProblem]:
@@ -128,7 +122,7 @@ def _hint_in_gazebo_world(scene: Scene, pose: Pose2, solids: tuple[Solid, ...], 
 @WORLD.check("SC304")
 def blocked_spawns(scene: Scene) -> Iterator[CheckProblem]:
     """Find objects that would be spawned inside an obstacle or on the robot."""
-    for keys, _, action in scene.actions:
+    for keys, action in scene.actions:
         if isinstance(action, Spawn):
             is_event = keys[2] == "do"  # the time of a later step counts from the step before it
             when = scene.loaded.spec.events[int(keys[1])].when if is_event else None
@@ -178,7 +172,7 @@ def _outline(spawn: Spawn) -> Polygon:
 def blocked_pedestrians(scene: Scene) -> Iterator[CheckProblem]:
     """Find pedestrians with a start or goal that is closer to an obstacle than the radius of the pedestrian."""
     solids = (*scene.world.solids, *scene.immovable_bodies)
-    for keys, _, action in scene.actions:
+    for keys, action in scene.actions:
         if not isinstance(action, Pedestrian):
             continue
         stops: list[MotionStop] = [(("pose",), f"the start of `{action.name}`", (action.pose.x, action.pose.y))]
@@ -192,7 +186,7 @@ def blocked_pedestrians(scene: Scene) -> Iterator[CheckProblem]:
 @WORLD.check("SC304", severity="warning")
 def motions_into_walls(scene: Scene) -> Iterator[CheckProblem]:
     """Find `move` actions with keyframes or waypoints, and `teleport` actions with poses, inside fixed obstacles."""
-    for keys, _, action in scene.actions:
+    for keys, action in scene.actions:
         stops: list[MotionStop] = []
         if isinstance(action, Move):
             stops = [(below, f"{what} of `{action.name}`", position) for below, what, position in motion_stops(action)]
@@ -230,8 +224,8 @@ def _motions(scene: Scene) -> Iterator[tuple[Keys, MappingNode | None, str, Moti
             yield ("objects", own.index(body.name), "move"), file.tree, body.name, body.path, body.solids
         elif body.path is not None:  # an actor of a Gazebo world
             yield ("world",), None, body.name, body.path, body.solids
-    spawned = {action.name: action for _, _, action in scene.actions if isinstance(action, Spawn)}
-    for keys, _, action in scene.actions:
+    spawned = {action.name: action for _, action in scene.actions if isinstance(action, Spawn)}
+    for keys, action in scene.actions:
         if isinstance(action, OpenDoor | CloseDoor) and action.name in scene.world.doors:
             path = panel_path(*scene.world.doors[action.name], action.duration)
             key = "duration" if "duration" in action.model_fields_set else "name"

@@ -85,7 +85,7 @@ class Scene:
     @property
     def start_poses(self) -> list[Pose2]:
         """Start pose, and poses to which events move (kidnap) the robot."""
-        return [self.start, *(action.pose.pose for _, _, action in self.actions if isinstance(action, Kidnap))]
+        return [self.start, *(action.pose.pose for _, action in self.actions if isinstance(action, Kidnap))]
 
     @cached_property
     def _map(self) -> OccupancyGrid | None:
@@ -131,7 +131,7 @@ class Scene:
     def _unmoved(self) -> list[Body]:
         if self.loaded.may_do():
             return []
-        moved = {getattr(action, "name", "") for _, kind, action in self.actions if kind in MOVING_ACTIONS}
+        moved = {getattr(action, "name", "") for keys, action in self.actions if keys[-1] in MOVING_ACTIONS}
         return [body for body in self.world.bodies if body.path is None and body.name not in moved]
 
     @cached_property
@@ -153,11 +153,11 @@ class Scene:
         return [((*keys, "pose"), goal) for keys, goal in goals.items() if not expects_failure(spec, goal.name)]
 
     @cached_property
-    def actions(self) -> list[tuple[Keys, str, BaseModel]]:
-        """Keys, kind, and specification of each action of an event that applies to this robot."""
+    def actions(self) -> list[tuple[Keys, BaseModel]]:
+        """Keys and specification of each action of an event that applies to this robot. The last key is the kind."""
         located = [found for step in self.loaded.spec.steps for found in step.located_actions()]
         relevant = [(keys, action) for keys, action in located if self.loaded.includes_robot(action.robot)]
-        return [((*keys, action.kind), action.kind, action.chosen) for keys, action in relevant]
+        return [((*keys, action.kind), action.chosen) for keys, action in relevant]
 
     def footprint_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
         """Return text such as "inside obstacle …" if the robot at a pose overlaps a solid; else None."""

@@ -22,7 +22,7 @@ TICK_RATE_KEYS = ("physics", "tick_rate")
 
 @NAMES.check("SC034")
 def uneven_rates(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find rates that do not divide the tick rate."""
+    """Find rates that do not divide the tick rate. The problem marks the tick rate if the scenario sets it."""
     loaded = scope.loaded
     rates: list[tuple[MappingNode, Keys, float]] = [
         (loaded.tree, ("stack", "controller_frequency"), loaded.spec.stack.controller_frequency),
@@ -38,19 +38,12 @@ def uneven_rates(scope: NameScope) -> Iterator[CheckProblem]:
         try:
             clock.period(rate)
         except ValueError as error:
-            yield _uneven_rate(loaded, tree, keys, str(error))
-
-
-def _uneven_rate(loaded: LoadedScenario, tree: MappingNode, keys: Keys, error: str) -> CheckProblem:
-    """Return the problem of the rate at `keys` in `tree`, the YAML tree of the scenario or of the robot file.
-
-    The message marks the tick rate if the scenario sets it, else the rate.
-    """
-    owner = "" if tree is loaded.tree else f" of robot `{loaded.robot.name}`"
-    message = f"{'.'.join(str(key) for key in keys)}{owner}: {error}"
-    if existing_keys(loaded.tree, TICK_RATE_KEYS) == TICK_RATE_KEYS:
-        return CheckProblem(TICK_RATE_KEYS, message)
-    return CheckProblem(keys, message, at_key=existing_keys(tree, keys) != keys, tree=tree)
+            owner = "" if tree is loaded.tree else f" of robot `{loaded.robot.name}`"
+            message = f"{'.'.join(map(str, keys))}{owner}: {error}"
+            if existing_keys(loaded.tree, TICK_RATE_KEYS) == TICK_RATE_KEYS:
+                yield CheckProblem(TICK_RATE_KEYS, message)
+            else:
+                yield CheckProblem(keys, message, at_key=existing_keys(tree, keys) != keys, tree=tree)
 
 
 @NAMES.check("SC016")

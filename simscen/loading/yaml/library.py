@@ -10,7 +10,7 @@ from simscen.core.errors import Problem
 from simscen.loading.files.paths import PathProblem, PathSandbox
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.textfile import read_text, with_source_line
-from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode
+from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode, child
 
 DEFAULTS_FILE = "defaults.yaml"
 """Name of the file whose values apply to all scenarios in its folder."""
@@ -149,36 +149,27 @@ def merge_mappings(own: MappingNode, base: MappingNode) -> MappingNode:
     """
     entries = dict(own.entries)
     for key, base_entry in base.entries.items():
-        entry = entries.get(key)
+        entry, base_value = entries.get(key), base_entry.value
         if entry is None:
             entries[key] = base_entry
         elif (
             isinstance(entry.value, MappingNode)
-            and isinstance(base_entry.value, MappingNode)
-            and _are_mergeable(key, entry, base_entry)
+            and isinstance(base_value, MappingNode)
+            and _are_mergeable(key, entry.value, base_value)
         ):
-            entries[key] = Entry(entry.key, merge_mappings(entry.value, base_entry.value))
+            entries[key] = Entry(entry.key, merge_mappings(entry.value, base_value))
     return MappingNode(own.position, entries)
 
 
-def _are_mergeable(key: str, own: Entry, base: Entry) -> bool:
+def _are_mergeable(key: str, own: MappingNode, base: MappingNode) -> bool:
     """Return whether two mappings under the same key describe a thing of the same type, by their keys `type`.
 
     A `type` that is missing in one of them matches all types. An external stack does not match a `stack` with a `type`,
     and does not extend another stack.
     """
-    if key == "stack" and (
-        (_has_key(own, "external") and not _has_key(base, "external"))
-        or (_has_key(own, "type") and _has_key(base, "external"))
-    ):
+    own_type, base_type = child(own, "type"), child(base, "type")
+    if key == "stack" and "external" in own.entries and "external" not in base.entries:
         return False
-    types = [
-        entry.value.entries["type"].value.plain
-        for entry in (own, base)
-        if isinstance(entry.value, MappingNode) and "type" in entry.value.entries
-    ]
-    return len(types) < 2 or types[0] == types[1]
-
-
-def _has_key(entry: Entry, key: str) -> bool:
-    return isinstance(entry.value, MappingNode) and key in entry.value.entries
+    if key == "stack" and own_type is not None and "external" in base.entries:
+        return False
+    return own_type is None or base_type is None or own_type.plain == base_type.plain

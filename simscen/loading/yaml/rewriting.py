@@ -22,15 +22,15 @@ def changed_text(text: str, path: str, content: Mapping[str, Any], comment: str 
     written as a comment at the top.
     """
     original, _ = parse_yaml(text, path)
+    assert isinstance(original, MappingNode), "the text of a valid scenario is a mapping"
     lines = text.splitlines()
-    known = original.plain if isinstance(original, MappingNode) else {}
-    segments = _segments(original, lines) if isinstance(original, MappingNode) else {}
+    known, segments = original.plain, _segments(original, lines)
     head = "".join(f"# {line}\n" for line in comment.splitlines())
     parts = [head]
     for key, value in content.items():
         if key in segments and known.get(key) == value:
             parts.append(_joined_lines(segments[key]))
-        elif isinstance(original, MappingNode) and key in segments and isinstance(value, list):
+        elif key in segments and isinstance(value, list):
             parts.append(_list_text(key, value, original, lines, segments[key]))
         else:
             parts.append(_entry(key, value))
