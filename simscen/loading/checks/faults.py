@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
 
 from simscen.core.records.disturbances import BELIEF, COMMAND, KIND_BY_TARGET_NAME, MAP, WHEELS
 from simscen.faults.base import FaultTarget
@@ -23,14 +22,6 @@ RESAMPLING_FAULTS = frozenset({"glass", "extrinsic"})
 before faults that delay messages."""
 
 
-class ListedFault(NamedTuple):
-    """Fault with its index `number` in `faults` and its target. The target is None if the robot does not have it."""
-
-    number: int
-    entry: FaultEntry
-    target: FaultTarget | None
-
-
 def fault_targets(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, FaultTarget]:
     """Return all targets of faults by name: sensors of the robot, `cmd_vel`, `wheels`, and so on."""
     frequency = loaded.spec.stack.controller_frequency
@@ -45,22 +36,21 @@ def fault_targets(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Faul
     return {**sensors, **{name: other for name, other in others.items() if name not in sensors}}
 
 
-def _listed_faults(loaded: LoadedScenario) -> Iterator[ListedFault]:
-    """Yield all faults of the scenario; nothing if the sensors of the robot are not known yet."""
+def _listed_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, Mapping[str, FaultTarget]]]:
+    """Yield the index and the entry of each fault, and all targets; nothing if the sensors are not known yet."""
     if loaded.robot.spec is not None:
-        known = fault_targets(loaded, loaded.robot.spec)
+        targets = fault_targets(loaded, loaded.robot.spec)
         for index, entry in enumerate(loaded.spec.faults):
-            yield ListedFault(index, entry, known.get(entry.sensor))
+            yield index, entry, targets
 
 
 @NAMES.check("SC031")
 def unknown_sensors(scope: NameScope) -> Iterator[CheckProblem]:
     """Find faults of a sensor that the robot does not have."""
     loaded = scope.loaded
-    for index, entry, target in _listed_faults(loaded):
-        if target is None:
-            assert loaded.robot.spec is not None
-            hint = suggestion(entry.sensor, fault_targets(loaded, loaded.robot.spec))
+    for index, entry, targets in _listed_faults(loaded):
+        if entry.sensor not in targets:
+            hint = suggestion(entry.sensor, targets)
             message = f"robot `{loaded.robot.name}` has no sensor called {quoted(entry.sensor)}"
             yield CheckProblem(("faults", index, "sensor"), message, hint)
 
@@ -69,14 +59,14 @@ def unknown_sensors(scope: NameScope) -> Iterator[CheckProblem]:
 def unsuitable_faults(scope: NameScope) -> Iterator[CheckProblem]:
     """Find faults that cannot affect their target, and faults with values that do not fit the target."""
     loaded = scope.loaded
-    for index, entry, target in _listed_faults(loaded):
+    for index, entry, targets in _listed_faults(loaded):
+        target = targets.get(entry.sensor)
         if target is None:
             continue
-        assert loaded.robot.spec is not None
         keys = ("faults", index, entry.kind)
         if target.kind not in entry.fault.affects:
-            known = fault_targets(loaded, loaded.robot.spec)
-            suitable = [name for name, one in known.items() if one.kind in entry.fault.affects]
+            assert loaded.robot.spec is not None
+            suitable = [name for name, one in targets.items() if one.kind in entry.fault.affects]
             hint = f"it can affect: {', '.join(suitable)}" if suitable else "it can affect nothing on this robot"
             what = TARGET_DESCRIPTIONS.get(target.kind) or with_article(loaded.robot.spec.sensors[entry.sensor].kind)
             message = f"fault `{entry.kind}` cannot affect {what} (`{entry.sensor}`)"
@@ -117,7 +107,8 @@ def faults_of_foreign_localizers(scope: NameScope) -> Iterator[CheckProblem]:
 
 def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, FaultTarget]]:
     """Yield the index, the entry, and the target of each fault that can affect its target."""
-    for index, entry, target in _listed_faults(loaded):
+    for index, entry, targets in _listed_faults(loaded):
+        target = targets.get(entry.sensor)
         if target is not None and target.kind in entry.fault.affects and not entry.fault.unsuitable_key(target):
             yield index, entry, target
 
@@ -127,7 +118,8 @@ def resampling_after_delay(scope: NameScope) -> Iterator[CheckProblem]:
     """Find faults that simulate the measurement again, but are listed after a fault that delays the messages."""
     loaded = scope.loaded
     faults = loaded.spec.faults
-    for index, entry, target in _listed_faults(loaded):
+    for index, entry, targets in _listed_faults(loaded):
+        target = targets.get(entry.sensor)
         before = [
             fault.label for fault in faults[:index] if fault.sensor == entry.sensor and fault.kind in ("delay", "stuck")
         ]

@@ -21,11 +21,8 @@ RENAME_HINT = "rename one of them"
 @NAMES.check("SC030")
 def unknown_names(scope: NameScope) -> Iterator[CheckProblem]:
     """Find names that refer to nothing."""
-    loaded = scope.loaded
-    known = known_names(loaded, scope.world)
-    for reference in references(loaded.spec, includes_robot=loaded.includes_robot):
-        names = known.get(reference.target)
-        if names is not None and reference.name not in names and not _is_immovable(scope, reference):
+    for reference, names, is_immovable in _unknown_references(scope):
+        if not is_immovable:
             hint = suggestion(reference.name, dict.fromkeys(names)) or "there is none"
             message = f"no {KIND_NAMES[reference.target]} is called {quoted(reference.name)}"
             yield CheckProblem(reference.keys, message, hint)
@@ -34,27 +31,25 @@ def unknown_names(scope: NameScope) -> Iterator[CheckProblem]:
 @NAMES.check("SC035")
 def names_of_immovable_things(scope: NameScope) -> Iterator[CheckProblem]:
     """Find names of fixed objects or robots where the name of a movable object is expected."""
-    loaded = scope.loaded
-    known = known_names(loaded, scope.world)
+    for reference, _, is_immovable in _unknown_references(scope):
+        if is_immovable:
+            is_robot = reference.name in _forbidden_robots(scope, reference)
+            what = "one of the robots" if is_robot else "a fixed part of the world"
+            message = f"{quoted(reference.name)} is {what}, which cannot be moved or followed"
+            yield CheckProblem(reference.keys, message, "name an object, a door or something that an event spawns")
+
+
+def _unknown_references(scope: NameScope) -> Iterator[tuple[Reference, list[str], bool]]:
+    """Yield each reference with an invalid name, the valid names, and whether it names an immovable thing.
+
+    A reference to a movable object must not name a fixed object, or one of certain robots.
+    """
+    loaded, known = scope.loaded, known_names(scope.loaded, scope.world)
     for reference in references(loaded.spec, includes_robot=loaded.includes_robot):
         names = known.get(reference.target)
-        if names is None or reference.name in names or not _is_immovable(scope, reference):
-            continue
-        what = (
-            "one of the robots"
-            if reference.name in _forbidden_robots(scope, reference)
-            else "a fixed part of the world"
-        )
-        message = f"{quoted(reference.name)} is {what}, which cannot be moved or followed"
-        yield CheckProblem(reference.keys, message, "name an object, a door or something that an event spawns")
-
-
-def _is_immovable(scope: NameScope, reference: Reference) -> bool:
-    """Return whether a reference to a movable object names a fixed object, or a robot that is not allowed."""
-    if reference.target not in ("movable", "mover"):
-        return False
-    objects = known_names(scope.loaded, scope.world)["object"] or ()
-    return reference.name in (*_forbidden_robots(scope, reference), *objects)
+        if names is not None and reference.name not in names:
+            immovable = (*_forbidden_robots(scope, reference), *(known["object"] or ()))
+            yield reference, names, reference.target in ("movable", "mover") and reference.name in immovable
 
 
 def _forbidden_robots(scope: NameScope, reference: Reference) -> tuple[str, ...]:

@@ -42,15 +42,7 @@ def _translate_controller_server(parameters: Parameters) -> Iterator[Translation
         yield from _note_unused_plugins(parameters, kind, chosen)
         for key, value in parameters_below(parameters, chosen):
             yield from translate_same_name(f"{chosen}.{key}", value, (kind,), kind, key)
-    controller = _first_plugin(parameters, "controller", "FollowPath")
-    yield from _note_unused_plugins(parameters, "controller", controller)
-    yield from _translate_plugin(parameters, controller, "controller", CONTROLLERS)
-
-
-def _translate_planner_server(parameters: Parameters) -> Iterator[Translation]:
-    planner = _first_plugin(parameters, "planner", "GridBased")
-    yield from _note_unused_plugins(parameters, "planner", planner)
-    yield from _translate_plugin(parameters, planner, "planner", PLANNERS)
+    yield from _translate_plugin(parameters, "controller", "FollowPath", CONTROLLERS)
 
 
 def _first_plugin(parameters: Parameters, kind: str, default: str) -> str:
@@ -70,12 +62,15 @@ def _note_unused_plugins(parameters: Parameters, kind: str, chosen: str) -> Iter
 
 
 def _translate_plugin(
-    parameters: Parameters, name: str, section: str, types: Mapping[str, str]
+    parameters: Parameters, section: str, default: str, types: Mapping[str, str]
 ) -> Iterator[Translation]:
-    """Translate the type and the parameters of the plugin `name`. `types` are the types in simscen, by class in Nav2.
+    """Translate the type and the parameters of the first controller or planner, which is `section`.
 
-    For a rotation shim controller, only its primary controller is translated.
+    `default` is the name of the plugin if the file lists none. `types` are the types in simscen, by class in Nav2. For
+    a rotation shim controller, only its primary controller is translated.
     """
+    name = _first_plugin(parameters, section, default)
+    yield from _note_unused_plugins(parameters, section, name)
     inner = f"{name}.primary_controller"
     shimmed = f"{inner}.plugin" in parameters
     plugin_key = f"{inner}.plugin" if shimmed else inner if inner in parameters else f"{name}.plugin"
@@ -86,11 +81,10 @@ def _translate_plugin(
             why = f"{plugin} is not supported; the default {section} is used"
             yield Translation(plugin_key, (), plugin, why, covers=f"{name}.")
         return
+    why = ""
     if plugin_key != f"{name}.plugin":
         why = f"{parameters.get(f'{name}.plugin')} is not supported; {plugin} is used without it"
-        yield Translation(plugin_key, (section, "type"), kind, why)
-    else:
-        yield Translation(plugin_key, (section, "type"), kind)
+    yield Translation(plugin_key, (section, "type"), kind, why)
     prefix = inner if shimmed else name
     model = _motion_model(parameters, prefix) if kind == "mppi" else ""
     for key, written in parameters_below(parameters, prefix):
@@ -223,7 +217,7 @@ def _translate_behavior_server(parameters: Parameters) -> Iterator[Translation]:
 TRANSLATORS: dict[str, Callable[[Parameters], Iterator[Translation]]] = {
     "amcl": _translate_amcl,
     "controller_server": _translate_controller_server,
-    "planner_server": _translate_planner_server,
+    "planner_server": partial(_translate_plugin, section="planner", default="GridBased", types=PLANNERS),
     "local_costmap": partial(translate_costmap, section="local_costmap"),
     "global_costmap": partial(translate_costmap, section="costmap"),
     "behavior_server": _translate_behavior_server,
