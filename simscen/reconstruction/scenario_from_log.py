@@ -16,10 +16,10 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.drive.run_description import choose_robot, read_description
 from simscen.reconstruction.estimators import run_estimators
 from simscen.reconstruction.objects.find_objects import object_of_robot
-from simscen.reconstruction.scenario.contents import EstimatedParts, GivenParts, scenario_contents
+from simscen.reconstruction.scenario.contents import EstimatedParts, GivenParts, ScenarioContents, scenario_contents
 from simscen.reconstruction.scenario.given_parts import GivenFiles, choose_world, prepare_given_parts, scenario_stem
 from simscen.reconstruction.scenario.robot_file import robot_properties
-from simscen.reconstruction.scenario.scenario_text import ScenarioContents, scenario_text
+from simscen.reconstruction.scenario.scenario_text import scenario_text
 from simscen.reconstruction.static_world import StaticWorld
 
 
@@ -42,12 +42,11 @@ class ReconstructionOptions:
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """Result of a reconstruction: the log, written files (the scenario first), the drive, and the scenario's parts."""
+    """Result of a reconstruction: the log, the written files (the scenario first), the drive, and the contents."""
 
     log: Path
     files: tuple[Path, ...]
     drive: RecordedDrive
-    estimated: EstimatedParts
     contents: ScenarioContents
     static_world: StaticWorld
 
@@ -58,31 +57,32 @@ class Reconstruction:
 
     def summary(self) -> Iterator[str]:
         """Yield lines for the user: the number of goals and found objects, then each fault and each incident."""
-        people = sum(thing.pedestrian is not None for thing in self.estimated.objects)
-        moving = sum(thing.is_moving for thing in self.estimated.objects) - people
-        standing = len(self.estimated.objects) - moving - people
+        estimated = self.contents.estimated
+        people = sum(thing.pedestrian is not None for thing in estimated.objects)
+        moving = sum(thing.is_moving for thing in estimated.objects) - people
+        standing = len(estimated.objects) - moving - people
         counts = (
             (len(self.contents.goals), "goal"),
             (people, "pedestrian"),
             (moving, "moving object"),
             (standing, "standing object"),
-            (len(self.estimated.faults), "fault"),
+            (len(estimated.faults), "fault"),
         )
         yield "found " + ", ".join(f"{count} {name}{'' if count == 1 else 's'}" for count, name in counts)
-        for fault in self.estimated.faults:
+        for fault in estimated.faults:
             yield f"  {fault.target}.{fault.kind}: {fault.reason.comment}"
-        for incident in self.estimated.incidents:
+        for incident in estimated.incidents:
             yield f"  incident at {incident.time:.2f} s: {incident.kind}, {incident.detail}"
 
 
 def _write_valid(
     drive: RecordedDrive, given: GivenParts, estimated: EstimatedParts, log: Path, out: Path
-) -> tuple[ScenarioContents, EstimatedParts]:
+) -> ScenarioContents:
     """Write the scenario without objects and faults that make it invalid, such as an object inside the robot.
 
     An invalid pedestrian first becomes a scripted object. Omitted parts and remaining problems are added to the
-    unknowns, which the file lists for the user. Return the written contents and the remaining parts. Raise InvalidInput
-    if the scenario cannot be loaded.
+    unknowns, which the file lists for the user. Return the written contents. Raise InvalidInput for a file that cannot
+    be loaded.
     """
     name = scenario_stem(out).replace("_", " ")
     while True:
@@ -112,7 +112,7 @@ def _write_valid(
         estimated = replace(estimated, unknowns=[*estimated.unknowns, *sorted(unknowns)])
         contents = scenario_contents(drive, given, estimated, name, log.name)
         out.write_text(scenario_text(contents), encoding="utf-8")
-    return contents, estimated
+    return contents
 
 
 def _without_refused_faults(estimated: EstimatedParts, problems: list[Problem]) -> EstimatedParts:
@@ -146,5 +146,5 @@ def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> R
         for name, outline, times, poses in described.other_robots
     ]
     estimated = run_estimators(drive, static_world, robot, others, choice.is_built)
-    contents, estimated = _write_valid(drive, given, estimated, log, out)
-    return Reconstruction(log, (out, *choice.files), drive, estimated, contents, static_world)
+    contents = _write_valid(drive, given, estimated, log, out)
+    return Reconstruction(log, (out, *choice.files), drive, contents, static_world)

@@ -11,6 +11,7 @@ from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, Occ
 from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.geometry import Array, Pose2
 from simscen.reconstruction.drive.recorded_drive import Indices, Mask, RecordedDrive, Scans
+from simscen.worlds.extent import placed_solids
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.occupancy_map import draw_map, walls_from_map
 from simscen.worlds.raycasting.ray_scene import RayScene
@@ -26,11 +27,11 @@ class StaticWorld:
 
     def __init__(self, world: World, height: float) -> None:
         """Draw the map at `height` m. Bodies of the world, such as doors, are walls at their initial poses."""
-        bodies = [replace(solid, pose=body.pose.compose(solid.pose)) for body in world.bodies for solid in body.solids]
+        solids = tuple(placed_solids(world.solids, world.bodies))
         self.world, self.height = world, height
-        mesh = merge_solids((*world.solids, *bodies))
+        mesh = merge_solids(solids)
         self._scene = RayScene(mesh)
-        self.grid: OccupancyGrid = draw_map(replace(world, solids=(*world.solids, *bodies)), mesh, height)
+        self.grid: OccupancyGrid = draw_map(replace(world, solids=solids), mesh, height)
         self.built = BuiltWorld(world, mesh, self.grid)
         distances = distance_transform_edt(self.grid.cells != OCCUPIED)
         self._distances: Array = np.asarray(distances) * self.grid.resolution

@@ -25,7 +25,7 @@ def main() -> None:
         made = scenario_from_log(log, Path(folder) / "goal_blocked.scenario.yaml", ReconstructionOptions(root=ROOT))
         simulate(prepare(load_scenario(made.file, ROOT)), log=again)
         verified = compare_with_run(made, again)
-        page.write_text(verification_page("goal blocked", made.static_world, made.estimated.objects, verified))
+        page.write_text(verification_page("goal blocked", made.static_world, made.contents.estimated.objects, verified))
         shown = running.new_context(viewport={"width": 1100, "height": 930}, color_scheme="light").new_page()
         shown.goto(page.as_uri())
         save(shown.screenshot(), IMAGES / "verified.png")

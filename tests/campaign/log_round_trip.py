@@ -105,16 +105,16 @@ def compare(file: Path, out: Path, truth: str | None = None) -> Row:
     assert tree is not None
     spec = ScenarioSpec.model_validate(tree.plain, by_alias=True, by_name=False)
     row.ordered = {(fault.sensor, fault.kind) for fault in spec.faults}
-    row.found = {(fault.target, fault.kind) for fault in made.estimated.faults}
+    row.found = {(fault.target, fault.kind) for fault in made.contents.estimated.faults}
     if ("map", "shift") in row.ordered or ("map", "outdated") in row.ordered:
-        row.found |= {one for one in row.ordered if one[0] == "map"} if made.contents.map else set()
+        row.found |= {one for one in row.ordered if one[0] == "map"} if made.contents.given.map else set()
     _compare_objects(row, log, made)
     return row
 
 
 def _compare_objects(row: Row, log: Log, made: Reconstruction) -> None:
     moved = {name: track for name, track in log.trace.objects.items() if _moved(track)}
-    moving = [found for found in made.estimated.objects if found.is_moving]
+    moving = [found for found in made.contents.estimated.objects if found.is_moving]
     for name, track in sorted(moved.items()):
         seen = _times_seen(track, log, made)
         if len(seen) * 0.1 >= MIN_SEEN_S and _moved_while(track, log, seen):

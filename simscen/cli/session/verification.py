@@ -48,7 +48,7 @@ def verify_reconstruction(reconstruction: Reconstruction) -> None:
     print_text(escaped(f"criteria that fail in the run: {failed}" if failed else "all criteria hold in the run"))
     page = reconstruction.file.with_name(f"{name}{PAGE_SUFFIX}")
     text = verification_page(
-        reconstruction.contents.name, reconstruction.static_world, reconstruction.estimated.objects, verified
+        reconstruction.contents.name, reconstruction.static_world, reconstruction.contents.estimated.objects, verified
     )
     save(page, lambda path: _write(path, text), [reconstruction.file, reconstruction.log])
     recorded, run = (escaped(shlex.quote(str(file))) for file in (reconstruction.log, log))

@@ -13,9 +13,8 @@ from simscen.core.geometry import Pose2, wrap
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.reasons import FoundFault, Reason
-from simscen.reconstruction.scenario.criteria import propose_criteria
+from simscen.reconstruction.scenario.criteria import ProposedCriterion, propose_criteria
 from simscen.reconstruction.scenario.incidents import Incident
-from simscen.reconstruction.scenario.scenario_text import ScenarioContents, ScenarioGoal
 
 INVALID_GOAL_CODES = frozenset({"GOAL_OCCUPIED", "GOAL_OUTSIDE_MAP"})
 """Error codes of goals that no robot can reach. The scenario expects these errors."""
@@ -70,12 +69,62 @@ class GivenParts:
     unknowns: Sequence[str] = ()
 
 
+@dataclass(frozen=True)
+class ScenarioGoal:
+    """Goal of the reconstructed scenario: pose in the map frame, timeout in s, and wait at the goal in s.
+
+    `expect` is the name of the error code with which the goal must fail; "" if the robot must reach the goal.
+    """
+
+    name: str
+    pose: Pose2
+    timeout: float
+    reason: Reason
+    expect: str = ""
+    wait: float = 0.0
+
+
+@dataclass(frozen=True)
+class ScenarioContents:
+    """Contents of a scenario file.
+
+    Attributes:
+        source: Name of the log.
+        summary: Sentences about the drive.
+        given: Parts that are not estimated.
+        estimated: Parts that the estimators found.
+        start: True initial pose of the robot in the map frame.
+        estimate: Initial estimate with standard deviations of x, y (m), and yaw (rad); "unknown" for global
+            localization; None for the default.
+        passing_radius: Distance in m at which goals count as passed; None if the robot stops at each goal.
+        goals: Goals in the order in which they are sent.
+        stops_at_failure: Whether the run ends at the first failed goal.
+        reasons: Reasons for world, map, robot, start, estimate, stack, and navigation, by key.
+        unknowns: Phrases about information that the log does not contain, for all parts.
+    """
+
+    name: str
+    source: str
+    summary: Sequence[str]
+    given: GivenParts
+    estimated: EstimatedParts
+    start: Pose2
+    estimate: tuple[Pose2, tuple[float, float, float]] | str | None
+    passing_radius: float | None
+    goals: Sequence[ScenarioGoal]
+    stops_at_failure: bool
+    time_limit: float
+    criteria: Sequence[ProposedCriterion]
+    reasons: Mapping[str, Reason]
+    unknowns: Sequence[str]
+
+
 def scenario_contents(
     drive: RecordedDrive, given: GivenParts, estimated: EstimatedParts, name: str, source: str
 ) -> ScenarioContents:
     """Return the contents of the scenario file of the scenario `name`. `source` is the name of the log."""
     start = Pose2(*drive.poses.poses_at(np.zeros(1))[0].tolist())
-    estimate, estimate_reason = _estimate(drive, start, bool(given.map == "none"))
+    estimate, estimate_reason = _estimate(drive, start, given.map == "none")
     goals = [*_goals(drive)]
     is_refusal_expected = bool(goals) and all(goal.expect for goal in goals)
     reasons = dict(given.reasons)
@@ -92,20 +141,14 @@ def scenario_contents(
         name=name,
         source=source,
         summary=[*_summary(drive, estimated)],
-        seed=given.seed,
-        world=given.world,
-        map=given.map,
-        robot=given.robot,
+        given=given,
+        estimated=estimated,
         start=start,
         estimate=estimate,
-        stack=given.stack,
         passing_radius=passing,
         goals=goals,
         stops_at_failure=not any(goal.status == "failed" for goal in drive.goals[:-1]),
         time_limit=time_limit,
-        objects=estimated.objects,
-        kidnaps=estimated.kidnaps,
-        faults=estimated.faults,
         criteria=[*propose_criteria(drive, estimated.incidents, estimated.faults, is_refusal_expected)],
         reasons=reasons,
         unknowns=[*given.unknowns, *estimated.unknowns, *drive.notes],

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Array
+from simscen.criteria.trace_signals.ground_truth import MIN_MOVE_M
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.reasons import FoundFault, Reason
 from simscen.reconstruction.scenario.incidents import LOST_ERROR_M, STUCK_S, Incident
@@ -17,8 +18,6 @@ TIME_MARGIN, PATH_MARGIN, ERROR_MARGIN = 1.25, 1.25, 1.5
 """Ratios of the limits of time, path length, and localization error to the values in the drive."""
 MIN_ERROR_LIMIT_M, MIN_TIME_LIMIT_S = 0.25, 10.0
 """Minimum limits of the localization error and of the time to the goal."""
-MIN_STEP_M = 0.01
-"""Minimum move that counts for the length of a path, as in the criterion path_length."""
 SPEED_PERCENTILE, SPEED_MARGIN = 99.5, 1.25
 """Percentile that is used as the maximum of the noisy speeds, and ratio of the speed limit to this maximum."""
 STOP_TIME_FACTOR, MAX_STOP_S = 1.5, 3.0
@@ -120,12 +119,12 @@ def time_to_rest(drive: RecordedDrive, begin: float, end: float) -> float | None
 
 
 def path_length(positions: Array) -> float:
-    """Return the length in m of the path through positions (n, 2), without moves shorter than MIN_STEP_M."""
+    """Return the length in m of the path through positions (n, 2), without moves shorter than MIN_MOVE_M."""
     if not len(positions):
         return 0.0
     length, last = 0.0, positions[0]
     for place in positions[1:]:
         step = float(np.hypot(*(place - last)))
-        if step >= MIN_STEP_M:
+        if step >= MIN_MOVE_M:
             length, last = length + step, place
     return length

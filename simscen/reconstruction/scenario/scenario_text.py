@@ -9,16 +9,15 @@ import json
 import math
 import re
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from simscen.core.geometry import Pose2
 from simscen.loading.yaml.writing import CompactDumper, to_yaml
 from simscen.reconstruction.objects.found_object import FittedPedestrian, FoundObject
 from simscen.reconstruction.objects.pedestrians import is_person
-from simscen.reconstruction.reasons import FoundFault, Reason
-from simscen.reconstruction.scenario.criteria import ProposedCriterion
+from simscen.reconstruction.reasons import FoundFault
+from simscen.reconstruction.scenario.contents import ScenarioContents
 
 MAX_COLUMNS = 118
 """Maximum length of a line."""
@@ -28,65 +27,6 @@ NO_BREAK_SPACE = "\x00"
 """Placeholder for a space at which lines must not be broken."""
 _PLAIN = re.compile(r"[\w./ %-]+")
 """Scalars that need no quotes in flow style."""
-
-
-@dataclass(frozen=True)
-class ScenarioGoal:
-    """Goal of the reconstructed scenario: pose in the map frame, timeout in s, and wait at the goal in s.
-
-    `expect` is the name of the error code with which the goal must fail; "" if the robot must reach the goal.
-    """
-
-    name: str
-    pose: Pose2
-    timeout: float
-    reason: Reason
-    expect: str = ""
-    wait: float = 0.0
-
-
-@dataclass(frozen=True)
-class ScenarioContents:
-    """Contents of a scenario file.
-
-    Attributes:
-        source: Name of the log.
-        summary: Sentences about the drive.
-        world: World file, or an inline world.
-        map: Map file or "none"; "" for the map of the world.
-        robot: Robot file or name of a shipped robot.
-        start: True initial pose of the robot in the map frame.
-        estimate: Initial estimate with standard deviations of x, y (m), and yaw (rad); "unknown" for global
-            localization; None for the default.
-        passing_radius: Distance in m at which goals count as passed; None if the robot stops at each goal.
-        goals: Goals in the order in which they are sent.
-        stops_at_failure: Whether the run ends at the first failed goal.
-        objects: Objects and pedestrians that the scenario spawns.
-        kidnaps: Time in s, new pose in the map frame, and reason of each kidnapping.
-        reasons: Reasons for world, map, robot, start, estimate, stack, and navigation, by key.
-        unknowns: Phrases about information that the log does not contain.
-    """
-
-    name: str
-    source: str
-    summary: Sequence[str]
-    seed: int
-    world: str | Mapping[str, Any]
-    map: str
-    robot: str
-    start: Pose2
-    estimate: tuple[Pose2, tuple[float, float, float]] | str | None
-    stack: Mapping[str, Any]
-    passing_radius: float | None
-    goals: Sequence[ScenarioGoal]
-    stops_at_failure: bool
-    time_limit: float
-    objects: Sequence[FoundObject]
-    kidnaps: Sequence[tuple[float, Pose2, Reason]]
-    faults: Sequence[FoundFault]
-    criteria: Sequence[ProposedCriterion]
-    reasons: Mapping[str, Reason]
-    unknowns: Sequence[str]
 
 
 def scenario_text(contents: ScenarioContents) -> str:
@@ -106,17 +46,17 @@ def _lines(contents: ScenarioContents) -> Iterator[str]:
     for line in textwrap.wrap(" ".join(contents.summary), MAX_COLUMNS - 2, break_long_words=False):
         yield f"  {line}"
     yield "tags: [from-log]"
-    yield f"seed: {contents.seed}"
+    yield f"seed: {contents.given.seed}"
     yield ""
     yield from _reason(contents, "world")
-    yield from _entry("world", contents.world)
-    if contents.map:
+    yield from _entry("world", contents.given.world)
+    if contents.given.map:
         yield from _reason(contents, "map")
-        yield from _entry("map", contents.map)
+        yield from _entry("map", contents.given.map)
     yield from _robot(contents)
-    if contents.stack:
+    if contents.given.stack:
         yield from _reason(contents, "stack")
-        yield from _entry("stack", dict(contents.stack))
+        yield from _entry("stack", dict(contents.given.stack))
     if contents.passing_radius is not None:
         yield from _reason(contents, "navigation")
         yield f"navigation: {{mode: navigate_through_poses, radius: {contents.passing_radius:g} m}}"
@@ -125,10 +65,10 @@ def _lines(contents: ScenarioContents) -> Iterator[str]:
     yield from _goals(contents)
     yield f"time_limit: {contents.time_limit:.0f} s"
     yield from _events(contents)
-    if contents.faults:
+    if contents.estimated.faults:
         yield ""
         yield "faults:"
-        for fault in contents.faults:
+        for fault in contents.estimated.faults:
             yield from _comment(fault.reason.comment, "  ")
             yield f"  - {_flow(_fault_entry(fault))}"
     yield ""
@@ -160,7 +100,7 @@ def _robot(contents: ScenarioContents) -> Iterator[str]:
     yield ""
     yield from _reason(contents, "robot")
     yield "robot:"
-    yield f"  model: {_text(contents.robot)}"
+    yield f"  model: {_text(contents.given.robot)}"
     if (start := contents.reasons.get("start")) is not None:
         yield from _comment(start.comment, "  ")
     yield f"  pose: {_pose(contents.start)}"
@@ -188,14 +128,14 @@ def _goals(contents: ScenarioContents) -> Iterator[str]:
 
 
 def _events(contents: ScenarioContents) -> Iterator[str]:
-    if not contents.objects and not contents.kidnaps:
+    if not contents.estimated.objects and not contents.estimated.kidnaps:
         return
     yield ""
     yield "events:"
-    for thing in contents.objects:
+    for thing in contents.estimated.objects:
         yield from _comment(thing.comment, "  ")
         yield from _object(thing)
-    for time, pose, reason in contents.kidnaps:
+    for time, pose, reason in contents.estimated.kidnaps:
         yield from _comment(reason.comment, "  ")
         yield f"  - name: robot is carried off at {time:.1f} s"
         yield f"    when: {{time: {time:.2f} s}}"

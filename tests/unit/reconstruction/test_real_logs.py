@@ -117,11 +117,11 @@ def test_a_bag_becomes_a_scenario_with_its_goal_person_and_outage(plugin, tmp_pa
     assert made.contents.start.distance(drives.Pose2(1.0, 3.0)) < 0.1
     (only,) = made.contents.goals
     assert math.dist(only.pose[:2], GOAL) < 0.1
-    (person,) = [thing for thing in made.estimated.objects if thing.is_moving]
+    (person,) = [thing for thing in made.contents.estimated.objects if thing.is_moving]
     frames = np.array(person.keyframes)
     true = np.array([walk(time) for time in frames[:, 0].tolist()])
     assert float(np.sqrt(np.mean(np.sum((frames[:, 1:3] - true) ** 2, axis=1)))) < 0.3
-    (fault,) = [fault for fault in made.estimated.faults if fault.target == "lidar"]
+    (fault,) = [fault for fault in made.contents.estimated.faults if fault.target == "lidar"]
     assert (fault.kind, fault.begin) == ("off", pytest.approx(LIDAR_SILENT[0], abs=0.15))
     assert fault.duration == pytest.approx(1.5, abs=0.2)
 
@@ -205,7 +205,7 @@ def test_a_fault_that_does_not_fit_the_sensor_is_only_mentioned(tmp_path, monkey
     bag = logs.write_bag(tmp_path / "bag", messages())
     made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
     load_scenario(made.file, tmp_path)
-    assert [fault.kind for fault in made.estimated.faults] == ["off"]
+    assert [fault.kind for fault in made.contents.estimated.faults] == ["off"]
     assert any("too slow" in unknown for unknown in made.contents.unknowns)
 
 
@@ -264,7 +264,7 @@ def test_log_without_scans_lists_what_could_not_be_reconstructed(tmp_path):
     without = [said for said in messages() if said.topic != "/scan"]
     bag = logs.write_bag(tmp_path / "bag", without)
     made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
-    assert made.estimated.objects == []
+    assert made.contents.estimated.objects == []
     assert any("no scans" in unknown for unknown in made.contents.unknowns)
 
 

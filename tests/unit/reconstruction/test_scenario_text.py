@@ -6,8 +6,9 @@ from simscen.core.geometry import Pose2
 from simscen.loading.scenario import load_scenario
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.reasons import FoundFault, Reason
+from simscen.reconstruction.scenario.contents import EstimatedParts, GivenParts, ScenarioContents, ScenarioGoal
 from simscen.reconstruction.scenario.criteria import ProposedCriterion
-from simscen.reconstruction.scenario.scenario_text import ScenarioContents, ScenarioGoal, scenario_text
+from simscen.reconstruction.scenario.scenario_text import scenario_text
 
 WORLD = {"simscen": 1, "walls": [{"points": [[0, 0], [9, 0], [9, 6], [0, 6], [0, 0]]}]}
 SEEN = Reason("seen in 40 scans", 1.0, 5.0)
@@ -18,20 +19,14 @@ def contents(**changes):
         "name": "drive: 3, #4",
         "source": "run.mcap",
         "summary": ["Reconstructed from a drive."],
-        "seed": 7,
-        "world": WORLD,
-        "map": "",
-        "robot": "turtlebot",
+        "given": GivenParts(WORLD, "", "turtlebot", 7),
+        "estimated": EstimatedParts([]),
         "start": Pose2(1.0, 3.0, 0.5),
         "estimate": None,
-        "stack": {},
         "passing_radius": None,
         "goals": [ScenarioGoal("a, b: {c}", Pose2(7.0, 3.0), 60.0, Reason("/goal_pose", 0.0, 20.0))],
         "stops_at_failure": True,
         "time_limit": 100.0,
-        "objects": [],
-        "kidnaps": [],
-        "faults": [],
         "criteria": [ProposedCriterion("goals_reached", {}, Reason("held: all goals were reached"))],
         "reasons": {},
         "unknowns": ["the footprint"],
@@ -67,7 +62,7 @@ def test_the_initial_estimate_is_written(tmp_path, estimate):
 def test_objects_become_events_with_their_reasons(tmp_path):
     box = FoundObject("cart", (0.9, 0.6), ((2.0, 4.0, 1.0, 1.57), (4.0, 4.0, 3.0, 1.57)), 2.0, 6.0, SEEN)
     column = FoundObject("column", (0.2,), ((0.0, 5.0, 5.0, 0.0),), None, None, SEEN)
-    scenario, text = loaded(tmp_path, objects=[box, column])
+    scenario, text = loaded(tmp_path, estimated=EstimatedParts([], objects=[box, column]))
     names = [event.name for event in scenario.spec.events]
     assert names == ["cart appears", "cart disappears", "column is there"]
     times = [event.when.time.root for event in scenario.spec.events]
@@ -77,13 +72,14 @@ def test_objects_become_events_with_their_reasons(tmp_path):
 
 def test_faults_have_their_time_and_duration(tmp_path):
     fault = FoundFault("lidar", "off", {}, 3.0, 2.5, SEEN)
-    scenario, _ = loaded(tmp_path, faults=[fault])
+    scenario, _ = loaded(tmp_path, estimated=EstimatedParts([], faults=[fault]))
     (entry,) = scenario.spec.faults
     assert (entry.sensor, entry.kind, entry.for_) == ("lidar", "off", 2.5)
 
 
 def test_a_carried_robot_is_kidnapped(tmp_path):
-    scenario, _ = loaded(tmp_path, kidnaps=[(4.0, Pose2(2.0, 5.0, 0.0), SEEN)])
+    kidnap = 4.0, Pose2(2.0, 5.0, 0.0), SEEN
+    scenario, _ = loaded(tmp_path, estimated=EstimatedParts([], kidnaps=[kidnap]))
     (event,) = scenario.spec.events
     assert event.do is not None
 

@@ -41,7 +41,7 @@ def test_the_scenario_has_the_chosen_robot_and_the_other_one_as_a_moving_object(
     assert made.contents.start.distance(Pose2(1.0, 1.0)) < 0.01
     (goal,) = made.contents.goals
     assert goal.pose.distance(Pose2(2.5, 1.0)) < 0.01
-    (blue,) = made.estimated.objects
+    (blue,) = made.contents.estimated.objects
     assert blue.name == "blue" and blue.is_moving and blue.pedestrian is None
     x, y, _ = blue.poses_at(np.array([0.0]))[0]
     assert (x, y) == pytest.approx((8.0, 4.0), abs=0.05)
