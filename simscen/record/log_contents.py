@@ -149,7 +149,6 @@ class LogContents:
             contents._set_metadata({**log_header.robot_metadata(metadata, name), log_header.ROBOTS_KEY: "[]"})
 
     def _set_stack(self, facts: dict[str, str]) -> None:
-        """Process the metadata record STACK_RECORD."""
         if self.stack:
             raise ValueError(f"it has two metadata records `{log_header.STACK_RECORD}`{_MERGED}")
         self.stack = facts

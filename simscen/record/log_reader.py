@@ -16,8 +16,7 @@ from simscen.core.records.verdict import COMPLETE_COVERAGE, LogCoverage
 from simscen.record.log_contents import LogContents, NotSimscenLog
 from simscen.record.log_file import PARTIAL_SUFFIX
 from simscen.record.log_header import LogHeader
-from simscen.record.mcap_reader import RecordReader, open_log
-from simscen.record.mcap_writer import MAGIC
+from simscen.record.mcap_reader import RecordReader, is_mcap, open_log
 from simscen.record.sensor_messages import SensorMessages
 
 _READ_ERRORS = (
@@ -119,9 +118,8 @@ def read_log(path: "str | Path", partial: bool | None = None, with_sensors: bool
 
 def _read(stream: IO[bytes], contents: LogContents) -> bool:
     """Add all records to `contents`. Return whether the log is complete."""
-    if stream.read(len(MAGIC)) != MAGIC:
+    if not is_mcap(stream):
         raise NotSimscenLog("it is not an MCAP file")
-    stream.seek(0)
     records = RecordReader(stream)
     for record in records:
         contents.add(record)

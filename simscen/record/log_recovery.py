@@ -9,7 +9,7 @@ from mcap import records
 from simscen.record.log_contents import NotSimscenLog
 from simscen.record.log_file import write_error
 from simscen.record.log_reader import unreadable_log_as_invalid_input
-from simscen.record.mcap_reader import RecordReader, open_log
+from simscen.record.mcap_reader import RecordReader, is_mcap, open_log
 from simscen.record.mcap_writer import MAGIC, Channel, McapWriter
 from simscen.record.topics import MessageType
 
@@ -40,7 +40,7 @@ def recover(path: Path) -> bool:
 
 def _ends_with_magic(stream: IO[bytes]) -> bool:
     """Return whether the file ends with the MCAP magic bytes. Raises NotSimscenLog if it is not an MCAP file."""
-    if stream.read(len(MAGIC)) != MAGIC:
+    if not is_mcap(stream):
         raise NotSimscenLog("it is not an MCAP file")
     size = stream.seek(0, os.SEEK_END)
     stream.seek(max(len(MAGIC), size - len(MAGIC)))

@@ -17,6 +17,7 @@ from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from simscen.record.log_header import RESULT_FILE
+from simscen.record.mcap_writer import MAGIC
 
 MAX_RECORD_BYTES = 1 << 28
 """Maximum size of a record or decompressed chunk."""
@@ -29,6 +30,13 @@ def open_log(path: Path) -> IO[bytes]:
         os.close(descriptor)
         raise OSError(errno.EINVAL, "not a regular file", str(path))
     return os.fdopen(descriptor, "rb")
+
+
+def is_mcap(stream: IO[bytes]) -> bool:
+    """Return whether a file begins with the MCAP magic bytes. The stream is at its start before and afterwards."""
+    magic = stream.read(len(MAGIC))
+    stream.seek(0)
+    return magic == MAGIC
 
 
 def attached_result(path: Path) -> dict[str, Any] | None:

@@ -199,7 +199,6 @@ class TraceBuilder:
                 rows.events.append(event_text.from_json(event_text.to_json(event)))
 
     def _add_objects(self, tick: int, moved: Mapping[str, Pose3]) -> None:
-        """Add the poses of moving objects."""
         if type(moved) is PosesAtTick:
             self._rows.joint_objects(moved.predicted.names).append(tick, moved.table)
             return

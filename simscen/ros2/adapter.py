@@ -224,7 +224,6 @@ class Adapter:
     def _begin(self) -> None:
         """Subscribe to the topics of the nodes. Called when all nodes are ready."""
         self.is_ready = True
-        self._bring_up.end()
         self._unused_masks = self._filter_info.unused_masks(
             lambda topic: bool(self._graph.subscribers_of(self._graph.names(topic)))
         )
@@ -259,7 +258,6 @@ class Adapter:
         return remaining[: next(stops, len(remaining)) + 1]
 
     def _report_outcomes(self, now: int) -> None:
-        """Report reached and failed goals."""
         assert self._sender is not None
         for outcome in self._sender.outcomes(self._state(now)) if self._goals.current is not None else ():
             if self._goals.current is None:
@@ -275,7 +273,6 @@ class Adapter:
             self._goals.accept()
 
     def _state(self, now: int) -> StackState:
-        """Return the state of the stack for the goal sender."""
         is_stopped = all(abs(number) < 1e-3 for number in self._velocity)
         return StackState(now, is_stopped, self._estimate.pose)
 

@@ -160,10 +160,6 @@ class BringUp:
         waited, ahead = time.monotonic() - self._started_at, self._graph.offset_ns / NS_PER_S
         print(f"simscen ros2: ready after {waited:.1f} s; ROS time = time of the run + {ahead:g} s", file=sys.stderr)
 
-    def end(self) -> None:
-        """Delete the kept readings."""
-        self._latest.clear()
-
     def _reasons(self, missing: Sequence[str]) -> str:
         """Return the error message for nodes that are not ready."""
         waited = time.monotonic() - self._started_at

@@ -177,10 +177,6 @@ class Graph:
         except rclpy.node.NodeNameNonExistentError:
             return set()
 
-    def topics(self) -> Dict[str, List[str]]:
-        """Return the names of all topics in the graph, with their types."""
-        return dict(self.node.get_topic_names_and_types())
-
     def service_type(self, node: Node, name: str) -> Optional[str]:
         """Return the type of a node's service `~/name`; None if it has no such service."""
         try:

@@ -73,7 +73,6 @@ class FrameNames:
         return bytes(serialize_message(message))
 
     def _rename(self, part: Any) -> None:
-        """Rename the frames of a message or a transform."""
         if hasattr(part, "header"):
             part.header.frame_id = self._names.get(part.header.frame_id, part.header.frame_id)
         if hasattr(part, "child_frame_id"):

@@ -165,7 +165,7 @@ class Readiness:
         """Return pairs (topic, endpoint) of all topics that simscen does not use, for endpoints of these types."""
         own = {self._graph.names(topic.name) for topic in self._topics} | {self._graph.names(COMMAND)}
         found = []
-        for name, existing in sorted(self._graph.topics().items()):
+        for name, existing in sorted(self._graph.node.get_topic_names_and_types()):
             if name not in own and set(existing) & set(types):
                 found += [(name, end) for end in endpoints_of(name) if end.type in types]
         return found

@@ -54,7 +54,6 @@ def claim_domain(requested: Optional[int], environment: Mapping[str, str]) -> Do
 
 
 def _lock_folder(environment: Mapping[str, str]) -> Path:
-    """Return the folder of the user's lock files."""
     runtime = environment.get("XDG_RUNTIME_DIR")
     if not runtime or not os.access(runtime, os.W_OK):
         runtime = str(Path(tempfile.gettempdir(), f"simscen-{os.getuid()}"))

@@ -56,7 +56,6 @@ class StepTime:
             self._waited[node] = self._waited.get(node, 0.0) + time.monotonic() - start
 
     def _message(self) -> str:
-        """Return the error message with the slowest nodes."""
         slowest = sorted(self._waited, key=lambda node: (-self._waited[node], node))[:MAX_LISTED_NODES]
         times = ", ".join(f"{node} ({self._waited[node]:.1f} s)" for node in slowest)
         return (

@@ -126,11 +126,9 @@ class PacedSynchronization:
 
 
 def _last_command(received: Sequence[ReceivedMessage]) -> Optional[ReceivedMessage]:
-    """Return the last velocity command, if any."""
     return next((message for message in reversed(received) if message.topic == COMMAND), None)
 
 
 def _take_inbox(graph: Graph) -> List[ReceivedMessage]:
-    """Return all messages of the inbox, and empty it."""
     received, graph.inbox[:] = list(graph.inbox), []
     return received

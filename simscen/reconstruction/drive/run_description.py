@@ -66,12 +66,15 @@ def read_description(log: Path, root: Path, robot: str = "") -> RunDescription:
     if log.is_dir() or not is_simscen_log(log):
         return RunDescription()
     recorded = read_log(log, partial=True)
-    header, written = recorded.header, _parse_scenario(recorded.header.scenario)
-    if robot:
-        header, written = header.robots[robot], _for_single_robot(written, robot)
-        described = _described_run(header, written, root)
-        return replace(described, other_robots=tuple(_other_robots(recorded, robot)))
-    return _described_run(header, written, root)
+    tree, problems = parse_yaml(recorded.header.scenario, "scenario.yaml")
+    if not isinstance(tree, MappingNode):
+        raise InvalidInput(problems)
+    if not robot:
+        return _described_run(recorded.header, tree.plain, root)
+    own = tree.plain.get("robots", {}).get(robot, {})
+    written = {**tree.plain, "robot": own, "stack": own.get("stack", tree.plain.get("stack", {}))}
+    described = _described_run(recorded.header.robots[robot], written, root)
+    return replace(described, other_robots=tuple(_other_robots(recorded, robot)))
 
 
 def _other_robots(recorded: Log, robot: str) -> Iterator[tuple[str, Polygon, Array, Array]]:
@@ -103,17 +106,3 @@ def _described_run(header: LogHeader, written: Mapping[str, Any], root: Path) ->
         model = file if file.is_file() else None
     has_map, stack = header.map is not None, written.get("stack", {})
     return RunDescription(header.seed, world, has_map, model, stack, notes=tuple(notes))
-
-
-def _for_single_robot(written: Mapping[str, Any], robot: str) -> Mapping[str, Any]:
-    """Convert the data of a scenario with several robots to the data of a scenario with only this robot."""
-    own = written.get("robots", {}).get(robot, {})
-    return {**written, "robot": own, "stack": own.get("stack", written.get("stack", {}))}
-
-
-def _parse_scenario(text: str) -> Mapping[str, Any]:
-    """Return the data of a scenario from YAML text."""
-    tree, problems = parse_yaml(text, "scenario.yaml")
-    if not isinstance(tree, MappingNode):
-        raise InvalidInput(problems)
-    return tree.plain

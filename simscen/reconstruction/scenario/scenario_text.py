@@ -194,7 +194,6 @@ def _scripted_object(thing: FoundObject) -> Iterator[str]:
 
 
 def _fault_entry(fault: FoundFault) -> dict[str, Any]:
-    """Return a fault as an entry of `faults`."""
     entry: dict[str, Any] = {"sensor": fault.target, fault.kind: dict(fault.values)}
     if fault.begin is not None:
         entry["when"] = {"time": f"{fault.begin:.2f} s"}
@@ -204,7 +203,6 @@ def _fault_entry(fault: FoundFault) -> dict[str, Any]:
 
 
 def _pose(pose: Pose2) -> str:
-    """Return a pose in YAML's flow style."""
     return f"{{x: {pose.x:.3f}, y: {pose.y:.3f}, yaw: {math.degrees(pose.yaw):.1f} deg}}"
 
 

@@ -11,6 +11,7 @@ from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.reader import read_drive
@@ -135,8 +136,8 @@ def compare_drives(recorded: RecordedDrive, repeated: RecordedDrive) -> Iterator
     if len(apart):
         rms = float(np.sqrt(np.mean(apart**2)))
         yield ComparedQuantity("distance at the same time", "", "", f"{rms:.2f} m RMS, at most {apart.max():.2f} m")
-    off = distances_to_path(repeated.poses.values[:, :2], recorded.poses.values[:, :2])
-    yield ComparedQuantity("distance from the log's path", "", "", f"at most {float(off.max()):.2f} m")
+    off, _ = cKDTree(recorded.poses.values[:, :2]).query(repeated.poses.values[:, :2])
+    yield ComparedQuantity("distance from the log's path", "", "", f"at most {float(np.max(off)):.2f} m")
     lengths = [path_length(drive.poses.values[:, :2]) for drive in (recorded, repeated)]
     yield _numbers("path length", lengths[0], lengths[1], "m")
     yield _numbers("duration", recorded.duration, repeated.duration, "s")
@@ -176,13 +177,6 @@ def distances_between(recorded: RecordedDrive, repeated: RecordedDrive, times: A
     """Return the distances (n,) in m between the robots of both drives at `times` (n,)."""
     apart: Array = np.hypot(*(recorded.poses.poses_at(times)[:, :2] - repeated.poses.poses_at(times)[:, :2]).T)
     return apart
-
-
-def distances_to_path(points: Array, path: Array) -> Array:
-    """Return the distances (n,) in m between `points` (n, 2) and the nearest point of `path` (m, 2)."""
-    from scipy.spatial import cKDTree
-
-    return np.asarray(cKDTree(path).query(points)[0], dtype=np.float64)
 
 
 def nearest_returns(drive: RecordedDrive) -> tuple[Array, Array] | None:

@@ -113,7 +113,6 @@ def _maps(world: StaticWorld, objects: Sequence[FoundObject], verified: Verifica
 
 
 def _legend(has_objects: bool, has_incidents: bool) -> Iterator[str]:
-    """Yield the list items of the legend."""
     line = '<line class="{}" x1="0" y1="6" x2="24" y2="6"/>'
     symbols = [
         (line.format("path log"), "path in the log"),
@@ -158,7 +157,6 @@ def _figure(label: str, series: Sequence[Series]) -> str:
 
 
 def _table(verified: Verification) -> Iterator[str]:
-    """Yield the table of compared quantities."""
     yield '<h2>Numbers</h2>\n<div class="wide" role="region" aria-label="Numbers" tabindex="0">'
     yield '<table>\n<tr><th scope="col">quantity</th><th scope="col">log</th><th scope="col">run</th>'
     yield '<th scope="col">difference</th></tr>'

@@ -11,8 +11,7 @@ from mcap import records
 
 from simscen.record.log_header import ROBOTS_KEY
 from simscen.record.log_reader import invalid_log, unreadable_log_as_invalid_input
-from simscen.record.mcap_reader import RecordReader, open_log
-from simscen.record.mcap_writer import MAGIC
+from simscen.record.mcap_reader import RecordReader, is_mcap, open_log
 from simscen.record.messages.decode import MessageReader, decode_checked
 
 T = TypeVar("T")
@@ -68,9 +67,8 @@ class McapMessages:
     def __iter__(self) -> Iterator[RawMessage]:
         """Yield the messages in the order of the file."""
         with open_log(self._path) as stream:
-            if stream.read(len(MAGIC)) != MAGIC:
+            if not is_mcap(stream):
                 raise UnusableLog("it is not an MCAP file")
-            stream.seek(0)
             reader = RecordReader(stream)
             yield from self._messages(reader)
             self.complete = not reader.is_truncated

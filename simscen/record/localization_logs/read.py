@@ -14,7 +14,7 @@ from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.records.trace import Ticks
 from simscen.record.foreign.raw_messages import UnusableLog, unusable_log_as_invalid_input
 from simscen.record.localization_logs.rosbag import read_rosbag_rows
-from simscen.record.localization_logs.rows import TICK_RATE_HZ, LocalizationRows, ScanRow
+from simscen.record.localization_logs.rows import TICK_RATE_HZ, LocalizationRows
 from simscen.record.localization_logs.text_formats import read_carmen_rows, read_csv_rows
 from simscen.record.log_reader import invalid_log
 
@@ -71,7 +71,7 @@ def _to_log(rows: LocalizationRows) -> LocalizationLog:
     ordered: list[tuple[int, int, Odometry | Scan]] = [
         (row.order, 0, Odometry("odom", tick(row.time), row.pose, Twist())) for row in rows.odometry
     ]
-    ordered += [(row.order, 1, _scan(row, tick(row.time))) for row in rows.scans]
+    ordered += [(row.order, 1, Scan("lidar", tick(row.time), row.ranges, *row.layout, row.mount)) for row in rows.scans]
     ordered.sort(key=lambda item: item[:2])
     truth = {tick(row.time): row.pose for row in rows.truth}
     ticks = np.array(sorted(truth), dtype=np.int64)
@@ -106,8 +106,3 @@ def _check_readings(readings: Sequence[Odometry | Scan]) -> Iterator[str]:
         raise UnusableLog("no scan was measured while there was odometry", hint)
     if outside:
         yield f"{outside} of {len(scans)} scans were measured before the odometry starts or after it ends"
-
-
-def _scan(row: ScanRow, tick: int) -> Scan:
-    first, increment, range_min, range_max = row.layout
-    return Scan("lidar", tick, row.ranges, first, increment, range_min, range_max, row.mount)

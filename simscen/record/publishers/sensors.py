@@ -150,7 +150,6 @@ class SensorPublisher:
                 self._out.publish(topic, now, encode.image(frame, stamp, pixels))
 
     def _publish_mounts(self, now: int) -> None:
-        """Publish the mounts of all sensors in one message."""
         base = self._frames.base
         links = [(base, self._frames.sensor_frame(name), _START, pose) for name, pose in self._mounts.items()]
         if links:
