@@ -50,8 +50,12 @@ def _differences(first: Trace, second: Trace) -> Iterator[Difference]:
     for name in ("belief", "command"):
         yield from _sample_differences(name, getattr(first, name), getattr(second, name))
     for a, b in zip(first.plans, second.plans, strict=False):
-        if a.tick != b.tick or a.points.tobytes() != b.points.tobytes():
-            yield min(a.tick, b.tick), f"plan: {len(a.points)} against {len(b.points)} poses, or second poses"
+        if a.tick != b.tick:
+            yield min(a.tick, b.tick), f"plan: at tick {a.tick} against {b.tick}"
+        elif len(a.points) != len(b.points):
+            yield a.tick, f"plan: {len(a.points)} against {len(b.points)} poses"
+        elif a.points.tobytes() != b.points.tobytes():
+            yield a.tick, f"plan: the {len(a.points)} poses differ"
     yield from _length_difference("plan", [p.tick for p in first.plans], [p.tick for p in second.plans])
     for event, other_event in zip(first.events, second.events, strict=False):
         if repr(event) != repr(other_event):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from moments import CLOCK, moments
 
+from simscen.core.messages.navigation import Path
 from simscen.core.records.events import Event
 from simscen.core.records.trace import Samples, Trace
 from simscen.record.trace_builder import TraceBuilder
@@ -53,6 +54,20 @@ def test_at_the_same_tick_the_cause_is_reported(trace: Trace) -> None:
 def test_nan_does_not_differ_from_nan(trace: Trace) -> None:
     blind = dataclasses.replace(trace, odometry=changed(trace.odometry, 2, 0, float("nan")))
     assert first_difference(blind, blind) is None
+
+
+@pytest.mark.parametrize(
+    ("tick", "points", "expected"),
+    [
+        (1, 3, "tick 0 (t = 0.000 s): plan: at tick 0 against 1"),
+        (0, 4, "tick 0 (t = 0.000 s): plan: 3 against 4 poses"),
+        (0, 3, "tick 0 (t = 0.000 s): plan: the 3 poses differ"),
+    ],
+)
+def test_difference_of_plans_states_what_differs(trace: Trace, tick: int, points: int, expected: str) -> None:
+    first = dataclasses.replace(trace, plans=(Path(np.zeros((3, 3)), 0),))
+    second = dataclasses.replace(trace, plans=(Path(np.ones((points, 3)), tick),))
+    assert first_difference(first, second) == expected
 
 
 @pytest.mark.parametrize(
