@@ -7,14 +7,7 @@ from dataclasses import replace
 from simscen.core.records.case import Case
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Trace
-from simscen.core.records.verdict import (
-    COMPLETE_COVERAGE,
-    Evidence,
-    Finding,
-    LogCoverage,
-    Status,
-    Verdict,
-)
+from simscen.core.records.verdict import COMPLETE_COVERAGE, Evidence, Finding, LogCoverage, Status, Verdict
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import MissingEvidence, undecided
 from simscen.criteria.registry import AnyCriterion, verdict_names

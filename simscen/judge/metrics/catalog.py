@@ -30,12 +30,7 @@ _BELIEF = POSITION | {Evidence.BELIEF}
 _PEOPLE = POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT}
 """Sets of evidence that several metrics need."""
 
-_ERROR_STATISTICS = {
-    "rmse": "root mean square",
-    "mean": "mean",
-    "median": "median",
-    "max": "largest",
-}
+_ERROR_STATISTICS = {"rmse": "root mean square", "mean": "mean", "median": "median", "max": "largest"}
 """Statistics of pose errors: text by suffix of the metric's name."""
 
 METRICS: dict[str, Metric] = {

@@ -11,14 +11,7 @@ from simscen.core.geometry import Array
 from simscen.core.records.events import EventKind
 from simscen.core.records.run_result import Outcome
 from simscen.report.picture import event_layer, palette, path_layer, world_layer
-from simscen.report.picture.canvas import (
-    LABEL_CELL_PX,
-    Canvas,
-    TextItem,
-    draw_text,
-    font,
-    printable,
-)
+from simscen.report.picture.canvas import LABEL_CELL_PX, Canvas, TextItem, draw_text, font, printable
 from simscen.report.picture.labels import Label, place_labels
 from simscen.report.picture.map_layer import (
     BOTTOM_MARGIN_PX,

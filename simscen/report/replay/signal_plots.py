@@ -1,6 +1,5 @@
 """Signal plots on the replay page: signals (quantities over time), and the limits that criteria set on signals."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,14 +57,9 @@ def signal_plots(trace: Trace, case: Case, spec: ScenarioSpec | None, columns: P
 
     Signals that the trace (recorded run) does not contain are omitted. `spec` is None if the scenario is invalid.
     """
-    in_criteria = dict.fromkeys(_signals_in_criteria(spec)) if spec is not None else {}
-    without_arguments = [
-        SignalPlot(name, {})
-        for name, signal in SIGNALS.items()
-        if not signal.alternative_arguments and name not in _EXCLUDED_SIGNALS
-    ]
-    with_arguments = [SignalPlot(name, dict(arguments)) for name, arguments in in_criteria]
-    plots = {plot.name: plot for plot in (*without_arguments, *with_arguments)}
+    without_arguments = [SignalPlot(name, {}) for name, signal in SIGNALS.items() if not signal.alternative_arguments]
+    in_criteria = [] if spec is None else _signals_in_criteria(spec)
+    plots = {plot.name: plot for plot in (*without_arguments, *in_criteria) if plot.signal not in _EXCLUDED_SIGNALS}
     return [data for plot in plots.values() if (data := _plot_data(plot, trace, case, columns)) is not None]
 
 
@@ -107,13 +101,12 @@ def _step(unit: str, values: Array) -> float:
     return _STEP_OF_UNIT.get(unit, 1e-2)
 
 
-def _signals_in_criteria(spec: ScenarioSpec) -> Iterator[tuple[SignalName, tuple[tuple[str, Any], ...]]]:
-    """Yield each signal in a temporal criterion, and its arguments as pairs of name and value."""
-    for entry in spec.pass_:
-        chosen = entry.chosen
-        for one in chosen.condition.comparisons() if isinstance(chosen, TemporalCriterion) else ():
-            if one.signal is not None and one.signal not in _EXCLUDED_SIGNALS:
-                yield one.signal, tuple(one.arguments.items())
+def _signals_in_criteria(spec: ScenarioSpec) -> list[SignalPlot]:
+    """Return the signals that temporal criteria compare, with their arguments."""
+    criteria = [entry.chosen for entry in spec.pass_]
+    conditions = [criterion.condition for criterion in criteria if isinstance(criterion, TemporalCriterion)]
+    compared = [one for condition in conditions for one in condition.comparisons()]
+    return [SignalPlot(one.signal, one.arguments) for one in compared if one.signal is not None]
 
 
 def _limit(verdict: Verdict, finding: Finding) -> dict[str, Any] | None:

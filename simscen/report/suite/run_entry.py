@@ -166,12 +166,7 @@ def _disturbance_table(run: RunFinished) -> str:
 def _links(run: RunFinished, folder: str) -> str:
     """Return links to the files of a run in the output folder of the session; "" without any."""
     files = run.artifacts
-    named = [
-        (files.replay, "replay"),
-        (files.mcap, "log"),
-        (files.picture, "picture"),
-        (files.result, "result"),
-    ]
+    named = [(files.replay, "replay"), (files.mcap, "log"), (files.picture, "picture"), (files.result, "result")]
     if files.folder:
         others = [(str(Path(files.folder, name)), label) for name, label in _OTHER_FILES]
         named += [(path, label) for path, label in others if _has_content(path)]

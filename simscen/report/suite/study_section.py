@@ -9,13 +9,7 @@ from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
 from simscen.core.records.study import Study
 from simscen.report.display_text import html_text, relative_path
-from simscen.report.study import (
-    claim_text,
-    effect_text,
-    pass_rate_notes,
-    pass_rate_text,
-    significant_effects,
-)
+from simscen.report.study import claim_text, effect_text, pass_rate_notes, pass_rate_text, significant_effects
 from simscen.spec.quantities import si_number
 
 MAX_PLOTS = 8
