@@ -23,7 +23,6 @@ def to_json(result: RunResult) -> str:
 
 def result_data(result: RunResult) -> dict[str, Any]:
     """Return a result as JSON data."""
-    lines = result.lines or (0,) * len(result.verdicts)
     error = result.error
     return {
         "format": FORMAT,
@@ -43,7 +42,7 @@ def result_data(result: RunResult) -> dict[str, Any]:
         "disturbances": [_disturbance_data(one, result.tick_rate) for one in result.disturbances],
         "metrics": {name: _finite_or_none(value) for name, value in result.metrics.items()},
         "undefined": dict(result.undefined),
-        "verdicts": [verdict_data(v, line, result.tick_rate) for v, line in zip(result.verdicts, lines, strict=True)],
+        "verdicts": [verdict_data(verdict, line, result.tick_rate) for verdict, line in result.verdicts_with_lines],
         "error": None if error is None else _error_data(error),
     }
 

@@ -32,9 +32,9 @@ def combine_robots(
     """
     first = next(iter(results.values()))
     shared = {one.disturbance.name for one in first.disturbances if one.disturbance.kind == "event"}
-    judged = [(verdict, line) for verdict, line in _verdicts_with_lines(first) if _is_about_world(verdict, shared)]
+    judged = [(verdict, line) for verdict, line in first.verdicts_with_lines if _is_about_world(verdict, shared)]
     for name, result in results.items():
-        own = [pair for pair in _verdicts_with_lines(result) if not _is_about_world(pair[0], shared)]
+        own = [pair for pair in result.verdicts_with_lines if not _is_about_world(pair[0], shared)]
         judged += [(_with_robot_name(verdict, name), line) for verdict, line in own]
     verdicts = tuple(verdict for verdict, _ in judged)
     outcomes = [result.outcome for result in results.values()]
@@ -64,10 +64,6 @@ def combine_robots(
         error=errors[0] if errors else None,
         reason="" if expected is None else expected.reason,
     )
-
-
-def _verdicts_with_lines(result: RunResult) -> list[tuple[Verdict, int]]:
-    return list(zip(result.verdicts, result.lines or (0,) * len(result.verdicts), strict=True))
 
 
 def _with_robot_name(verdict: Verdict, robot: str) -> Verdict:

@@ -36,9 +36,8 @@ def reported_violations(run: RunFinished) -> list[Violation]:
 
     The texts are safe for terminals.
     """
-    lines = run.result.lines or (0,) * len(run.result.verdicts)
     found = []
-    for verdict, line in zip(run.result.verdicts, lines, strict=True):
+    for verdict, line in run.result.verdicts_with_lines:
         unchecked = Finding(Status.ERROR, verdict.criterion, "it checked nothing", "")
         for finding in violations(verdict) if verdict.findings else [unchecked]:
             message = one_line(sentence(verdict, finding, run.result.tick_rate))

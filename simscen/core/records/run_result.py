@@ -144,6 +144,11 @@ class RunResult:
             raise ValueError(f"outcome {self.outcome.value} with error {self.error}")
 
     @property
+    def verdicts_with_lines(self) -> list[tuple[Verdict, int]]:
+        """The verdicts, each with its line in the scenario file; 0 if unknown."""
+        return list(zip(self.verdicts, self.lines or (0,) * len(self.verdicts), strict=True))
+
+    @property
     def again(self) -> str:
         """Command that repeats the run if it is executed in the root."""
         varied = ["--variation", self.key.variation] if self.key.variation else []

@@ -125,8 +125,7 @@ def _error_section(run: RunFinished) -> str:
 
 def _criteria_table(run: RunFinished) -> str:
     """Return a table with a row per finding, violations first; "" without findings."""
-    lines = run.result.lines or (0,) * len(run.result.verdicts)
-    rows = [(v, f, n) for v, n in zip(run.result.verdicts, lines, strict=True) for f in v.findings]
+    rows = [(verdict, each, line) for verdict, line in run.result.verdicts_with_lines for each in verdict.findings]
     rows.sort(key=lambda row: row[1].status is Status.PASS)
     body = "".join(_criterion_row(run, *row) for row in rows)
     head = "".join(f'<th scope="col">{name}</th>' for name in ("", "criterion", "measured", "margin", "source"))
