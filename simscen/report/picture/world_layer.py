@@ -16,8 +16,9 @@ from simscen.core.records.trace import Samples
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Canvas, printable
 from simscen.report.picture.labels import Label
+from simscen.report.picture.object_outlines import Outlines, object_outlines, spawn_pose
 from simscen.report.picture.path_layer import split_at_jumps
-from simscen.report.picture.scene import Outlines, Scene, object_outlines, spawn_pose
+from simscen.report.picture.scene import Scene
 
 LABEL_RANK = 6
 """Rank of the labels of ramps and floors, which are placed after the labels of robots, goals, and objects."""

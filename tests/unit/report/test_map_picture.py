@@ -20,8 +20,9 @@ from simscen.report.picture.map_picture import (
     draw_map_picture,
     write_picture,
 )
+from simscen.report.picture.object_outlines import object_outlines, outlines_of_event
 from simscen.report.picture.path_layer import round_time_step
-from simscen.report.picture.scene import Scene, object_outlines, outlines_of_event
+from simscen.report.picture.scene import Scene
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 WIDE, TALL, RESOLUTION = 200, 120, 0.05
