@@ -16,7 +16,7 @@ from simscen.bench.localization.consistency import (
     grouped_anees_bounds,
 )
 from simscen.bench.localization.generated_logs import CIRCUMSTANCES, KIDNAPPED_AT_S, Log, generate_log
-from simscen.bench.localization.recorded_drive import (
+from simscen.bench.localization.log_evaluation import (
     LocalizationResult,
     PoseErrors,
     compare_with_reference,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from simscen.bench.localization.recorded_drive import LocalizationResult, PoseErrors, compare_with_reference, localize
+from simscen.bench.localization.log_evaluation import LocalizationResult, PoseErrors, compare_with_reference, localize
 from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
 from simscen.cli.session.user_files import save
 from simscen.core.environment.occupancy_grid import OccupancyGrid

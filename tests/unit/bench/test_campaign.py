@@ -10,7 +10,7 @@ from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.bench.localization.buildings import box_distances, generate_building, wall_boxes
 from simscen.bench.localization.campaign import CHECK_TIMES_S, PARAMETER_SETS, ROBOT, SuccessRate, Trial, summarize
 from simscen.bench.localization.generated_logs import Log, generate_log
-from simscen.bench.localization.recorded_drive import compare_with_reference, localize
+from simscen.bench.localization.log_evaluation import compare_with_reference, localize
 from simscen.core.environment.occupancy_grid import FREE, UNKNOWN
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.model.stack import StackSpec

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.bench.localization.recorded_drive import LocalizationResult, compare_with_reference
+from simscen.bench.localization.log_evaluation import LocalizationResult, compare_with_reference
 from simscen.record.localization_logs.read import LocalizationLog
 from simscen.record.localization_logs.rows import TICK_RATE_HZ
 
