@@ -6,12 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from scipy import ndimage, spatial
 
 from simscen.bench.navigation.barn import GOAL, START, scenario_text
 from simscen.bench.navigation.experiments import Drive, Experiment, write_text
 from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.shapes import Cylinder, Solid
 from simscen.core.random_streams import Streams
+from simscen.worlds.geometry.triangulation import merge_solids
+from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 CELL_SIZE_M = 0.15
 """Side of a grid cell. A filled cell contains a cylinder with this diameter."""
@@ -65,12 +68,10 @@ def generate_obstacle_field(
 
 def _smoothed_field(rng: np.random.Generator) -> Cells:
     """Return a field of random density with walls on both sides, smoothed two to four times as in BARN."""
-    from scipy.ndimage import convolve
-
     cells: Cells = rng.random((FIELD_ROWS, COLUMNS)) < rng.uniform(*FILL_RANGE)
     for _ in range(int(rng.integers(2, 5))):
         cells[:, [0, -1]] = True
-        neighbors = convolve(cells.astype(np.int64), np.ones((3, 3), np.int64), mode="constant") - cells
+        neighbors = ndimage.convolve(cells.astype(np.int64), np.ones((3, 3), np.int64), mode="constant") - cells
         cells = (cells | (neighbors >= FILL_NEIGHBORS)) & (neighbors > CLEAR_NEIGHBORS)
     cells[:, [0, -1]] = True
     return cells
@@ -87,8 +88,6 @@ def _cylinder_centers(field: Cells) -> Array:
 
 def _is_crossable(centers: Array, crossing_radius: float, blocked_radius: float | None) -> bool:
     """Return whether a disc of `crossing_radius` can move from START to GOAL, but a disc of `blocked_radius` cannot."""
-    from scipy import ndimage, spatial
-
     step = CELL_SIZE_M / 3
     x, y = np.meshgrid(np.arange(-COLUMNS * CELL_SIZE_M, 0.0, step), np.arange(0.0, GOAL.y + 1.0, step))
     distance, _ = spatial.cKDTree(centers).query(np.stack((x, y), axis=-1))
@@ -105,9 +104,6 @@ def _is_crossable(centers: Array, crossing_radius: float, blocked_radius: float 
 
 def _shortest_path_length(centers: Array, radius: float) -> float:
     """Return the length in m of the shortest path of a disc from START to GOAL; inf without a path."""
-    from simscen.worlds.geometry.triangulation import merge_solids
-    from simscen.worlds.routes.shortest_paths import ShortestPaths
-
     pillar = Cylinder(CELL_SIZE_M / 2, HEIGHT_M)
     mesh = merge_solids(tuple(Solid(pillar, Pose3(x, y, HEIGHT_M / 2), "") for x, y in centers.tolist()))
     # The bounds are as wide as the lane, because a path could lead around the walls, which end with the field.
