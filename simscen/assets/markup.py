@@ -13,11 +13,9 @@ from xml.parsers import expat
 from typing_extensions import Self
 
 MAX_DEPTH = 100
-"""Maximum depth of nested elements."""
 MAX_ELEMENTS = 200_000
 """Maximum number of elements, to limit memory."""
 MAX_SHOWN_LINE_BYTES = 300
-"""Maximum length of a line that messages show."""
 _COMMENT = re.compile(rb"<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?(?:\?>|\Z)|<!--(?P<text>.*?)(?:-->|\Z)", re.DOTALL)
 """Comment with the group `text`. CDATA sections and processing instructions match without this group."""
 

@@ -17,8 +17,6 @@ _FUEL = re.compile(
     r"(?P<owner>[^/]+)/(?P<kind>models|worlds)/(?P<name>[^/]+)(?:/(?P<version>\d+|tip))?(?:/(?:files/)?(?P<rest>.*))?"
 )
 """URI of a model or world on Gazebo Fuel (website or API), or of a file in it."""
-_BUILTIN_MODELS = {"sun", "ground_plane"}
-"""Models that Gazebo installs."""
 
 
 @dataclass(frozen=True)
@@ -67,17 +65,6 @@ def parse_fuel_uri(uri: str) -> FuelUri | None:
         return None
     parts = {key: unquote(value or "") for key, value in match.groupdict().items()}
     return None if any(unsafe in parts.values() for unsafe in (".", "..")) else FuelUri(**parts)
-
-
-def builtin_model_name(uri: str) -> str | None:
-    """Return the name of a built-in model of Gazebo (`sun` or `ground_plane`) that a URI refers to, or None."""
-    address = parse_fuel_uri(uri)
-    if address is None:
-        name = uri.removeprefix("model://").strip("/") if uri.startswith("model://") else ""
-    else:
-        name = address.name if address.owner.lower().replace(" ", "") == "openrobotics" and not address.rest else ""
-    name = name.lower().replace(" ", "_")
-    return name if name in _BUILTIN_MODELS else None
 
 
 def candidate_paths(

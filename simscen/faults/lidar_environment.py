@@ -17,7 +17,6 @@ from simscen.spec.places import ObjectName
 from simscen.spec.quantities import PositiveLength, Probability, Quantity
 
 MM_PER_HOUR = 0.001 / 3600
-"""1 mm/h in m/s."""
 REFERENCE_REFLECTIVITY = 0.9
 """Lowest reflectivity of a surface that a lidar detects at its maximum range in clear air."""
 

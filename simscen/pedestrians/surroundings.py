@@ -17,7 +17,6 @@ OBSTACLE_RANGE_M = 1.2
 SIGHT_CELL_M = 0.1
 """Minimum cell size of the visibility grid. Cells are larger if the grid would have more than MAX_SIGHT_CELLS."""
 MAX_SIGHT_CELLS = 4_000_000
-"""Maximum number of cells of the visibility grid."""
 SIGHT_MARGIN_M = 0.3
 """Distance from both ends of a line of sight within which walls do not block it."""
 

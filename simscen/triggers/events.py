@@ -14,7 +14,6 @@ from simscen.triggers.base import Condition
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
 COMPLETION_KINDS = frozenset({EventKind.GOAL_REACHED, EventKind.GOAL_PASSED})
-"""Kinds of events that complete a waypoint."""
 
 
 def _count_events(now: Situation, kind: EventKind, name: str | None) -> int:

@@ -11,7 +11,7 @@ from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.motion_paths import pose_at
 from simscen.core.geometry.shapes import Body, Box, Extrusion, Mesh, Solid
-from simscen.model.world import Door, Movable, Obstacle, WorldSpec
+from simscen.model.world import Door, Movable, WorldSpec
 from simscen.worlds.extent import union
 from simscen.worlds.geometry.prisms import bounding_rectangle
 
@@ -49,7 +49,10 @@ def world_from_spec(
     for number, wall in enumerate(spec.walls, start=1):
         points = [(x, y) for x, y in wall.points]
         solids += wall_solids(points, wall.thickness, wall.height, wall.label(number))
-    solids += [_obstacle_solid(obstacle) for obstacle in spec.obstacles]
+    for obstacle in spec.obstacles:
+        solid = obstacle.solid(obstacle.name)
+        pose = Pose3.planar(obstacle.pose.pose, solid.pose.z)
+        solids.append(replace(solid, pose=pose, friction=obstacle.friction))
     for ramp in spec.ramps:
         (start_x, start_y), (end_x, end_y) = ramp.start, ramp.end
         solids.append(ramp_solid((start_x, start_y), (end_x, end_y), ramp.width, ramp.height, ramp.name, ramp.friction))
@@ -87,11 +90,6 @@ def _panel_poses(door: Door) -> tuple[Pose2, Pose2]:
     if door.motion == "swing":
         return closed, closed.compose(Pose2(0.0, 0.0, math.pi / 2))
     return closed, closed.compose(Pose2(-(door.travel or math.hypot(px - hx, py - hy)), 0.0))
-
-
-def _obstacle_solid(obstacle: Obstacle) -> Solid:
-    solid = obstacle.solid(obstacle.name)
-    return replace(solid, pose=Pose3.planar(obstacle.pose.pose, solid.pose.z), friction=obstacle.friction)
 
 
 def _object_body(thing: Movable) -> Body:

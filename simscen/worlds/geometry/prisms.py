@@ -56,27 +56,20 @@ def upright_prism(solid: Solid, frame: Pose3 | None = None) -> UprightPrism | No
             base: Polygon = ((-x / 2, -y / 2), (x / 2, -y / 2), (x / 2, y / 2), (-x / 2, y / 2))
             bottom, top = -height / 2, height / 2
         case Cylinder(radius, height):
-            base, bottom, top = _circle_polygon(radius), -height / 2, height / 2
+            count = facet_count(radius)
+            angles = [2 * math.pi * k / count for k in range(count)]
+            base = tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
+            bottom, top = -height / 2, height / 2
         case Extrusion(polygon, height):
             base, bottom, top = polygon, 0.0, height
         case _:
             return None
     for pose in poses:
-        base, bottom, top = _place(base, pose), bottom + pose.z, top + pose.z
+        c, s = 1 - 2 * pose.qz * pose.qz, 2 * pose.qz * pose.qw  # cosine and sine of the yaw
+        base = tuple((c * x - s * y + pose.x, s * x + c * y + pose.y) for x, y in base)
+        bottom, top = bottom + pose.z, top + pose.z
     base = next((ring for ring in (base, base[::-1]) if _is_convex_and_counterclockwise(ring)), ())
     return UprightPrism(base, bottom, top) if base else None
-
-
-def _circle_polygon(radius: float) -> Polygon:
-    count = facet_count(radius)
-    angles = [2 * math.pi * k / count for k in range(count)]
-    return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
-
-
-def _place(base: Polygon, pose: Pose3) -> Polygon:
-    """Return a polygon rotated by the yaw of a level pose and moved to its position."""
-    c, s = 1 - 2 * pose.qz * pose.qz, 2 * pose.qz * pose.qw
-    return tuple((c * x - s * y + pose.x, s * x + c * y + pose.y) for x, y in base)
 
 
 def _is_convex_and_counterclockwise(base: Polygon) -> bool:

@@ -25,8 +25,6 @@ from simscen.core.geometry.shapes import (
     facet_count,
 )
 
-Faces = npt.NDArray[np.int32]
-"""Triangles (n, 3) as indices of vertices."""
 Profile = list[tuple[float, float]]
 """Points (distance from the z axis, height) in m, from the bottom up."""
 
@@ -161,7 +159,10 @@ def _extrude(polygon: Array, height: float) -> Mesh:
         polygon = polygon[::-1]
     n = len(polygon)
     cap = mapbox_earcut.triangulate_float64(np.ascontiguousarray(polygon), np.array([n], dtype=np.uint32))
-    cap_faces = _counterclockwise(cap.reshape(-1, 3).astype(np.int32), polygon)
+    cap_faces = cap.reshape(-1, 3).astype(np.int32)
+    a, b, c = polygon[cap_faces].swapaxes(0, 1)
+    is_clockwise = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    cap_faces[is_clockwise] = cap_faces[is_clockwise, ::-1]
     this, following = np.arange(n), (np.arange(n) + 1) % n
     lower_sides = np.column_stack((this, following, following + n))
     upper_sides = np.column_stack((this, following + n, this + n))
@@ -170,11 +171,3 @@ def _extrude(polygon: Array, height: float) -> Mesh:
     vertices[n:, 2] = height
     faces = np.concatenate((cap_faces[:, ::-1], cap_faces + n, lower_sides, upper_sides))
     return Mesh(vertices, faces.astype(np.int32))
-
-
-def _counterclockwise(triangles: Faces, points: Array) -> Faces:
-    """Return the triangles, with clockwise ones reversed; `points` (n, 2) are the vertices."""
-    a, b, c = points[triangles].swapaxes(0, 1)
-    is_clockwise = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
-    result: Faces = np.where(is_clockwise[:, None], triangles[:, ::-1], triangles)
-    return result

@@ -24,9 +24,7 @@ Grays16 = npt.NDArray[np.uint16]
 """Gray values of pixels (rows, columns), 0 (black) to 65535."""
 
 MAX_PIXELS, MAX_BYTES = 16 * 2**20, 64 * 2**20
-"""Maximum number of pixels of an image, and maximum size of the image file."""
 PROBLEM_CODE = "SC320"
-"""Error code of all problems with the image of a map."""
 
 # Header of a PGM: P2 or P5, width, height, and maxval, separated by white space or comments.
 _PNM_SEPARATOR = rb"(?:\s|#[^\r\n]*[\r\n])+"

@@ -25,7 +25,7 @@ class MapSize(NamedTuple):
     """Number of rows."""
 
 
-def map_size(bounds: Bounds, resolution: float = MAP_RESOLUTION_M) -> MapSize:
+def map_size(bounds: Bounds, resolution: float) -> MapSize:
     """Return the size of a map that covers `bounds` and MAP_MARGIN_M around it, with cells of `resolution` m."""
     left, bottom = (math.floor(round((edge - MAP_MARGIN_M) / resolution, 6)) for edge in bounds[:2])
     right, top = (math.ceil(round((edge + MAP_MARGIN_M) / resolution, 6)) for edge in bounds[2:])

@@ -135,8 +135,11 @@ class RestingGroup:
     def _scene_between(self, heights: HeightRange) -> MeshScene:
         """Return the scene of the triangles between two heights. It is kept until the heights change."""
         if self._scene is None or heights != self._heights:
-            merged = _merge(list(self._meshes.values()))
-            self._scene = MeshScene(submesh_between_heights(merged.vertices, merged.faces, heights), self._world_center)
+            meshes = list(self._meshes.values())
+            firsts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])]).tolist()
+            vertices = np.concatenate([mesh.vertices for mesh in meshes])
+            faces = np.concatenate([mesh.faces + np.int32(first) for mesh, first in zip(meshes, firsts, strict=True)])
+            self._scene = MeshScene(submesh_between_heights(vertices, faces, heights), self._world_center)
             self._heights = heights
         return self._scene
 
@@ -154,13 +157,6 @@ class RestingGroup:
         rays = rays_hitting_sphere(self._center, self._radius, origins, directions, ends)
         if len(rays):
             ends[rays] = self._scene_between(heights).distances(origins[rays], directions[rays], ends[rays])
-
-
-def _merge(meshes: list[Mesh]) -> Mesh:
-    """Return one mesh with the triangles of all meshes."""
-    firsts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])]).tolist()
-    faces = [mesh.faces + np.int32(first) for mesh, first in zip(meshes, firsts, strict=True)]
-    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
 class RayScene(RayCaster):

@@ -25,7 +25,6 @@ MAX_CELLS = 1_000_000
 OUTLINE_SPACING_M = 0.02
 """Distance between the points of an outline. The error of a clearance of 0.2 m is then at most 0.25 mm."""
 CLEARANCE_WITHOUT_SOLIDS_M = 1e6
-"""Clearance in a world without solids."""
 HALF_DIAGONAL_CELLS = 0.7072
 """Half of a cell's diagonal, in cells: the maximum distance of a point from the center of its cell."""
 

@@ -41,21 +41,15 @@ def narrowest_gap(field: ClearanceField, ends: tuple[Pose2, Pose2], radius: floa
     The width of the gap is exact to about 2 cm.
     """
     grid = field.grid
-    clearance = _clearances(field, 2 * radius)
+    clearance: Array = np.minimum(field.cell_clearance, 2 * radius)
+    near = field.cell_clearance < 2 * radius
+    clearance[near] = np.minimum(field.clearance_at(grid.center_of(np.argwhere(near))), 2 * radius)
     cell = _bottleneck(clearance, grid.cell_of(np.array([ends[0][:2], ends[1][:2]])))
     position: Array = grid.center_of(cell[None])[0]
     min_clearance = clearance[tuple(cell)]
     if min_clearance < MIN_CLEARANCE_CELLS * grid.resolution:
         return Gap(*_thinnest_wall(clearance, grid, ends), 0.0)
     return _measure_gap(field, position, 4 * radius)
-
-
-def _clearances(field: ClearanceField, max_clearance: float) -> Array:
-    """Return the clearance of each cell's center in m, negative in solids and at most `max_clearance`."""
-    clearance: Array = np.minimum(field.cell_clearance, max_clearance)
-    near = field.cell_clearance < max_clearance
-    clearance[near] = np.minimum(field.clearance_at(field.grid.center_of(np.argwhere(near))), max_clearance)
-    return clearance
 
 
 def _bottleneck(clearance: Array, ends: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:

@@ -15,7 +15,6 @@ from simscen.core.records.case import Passage, Point
 from simscen.worlds.routes.clearance import ClearanceField
 
 MAX_WIDTH_M = 4.0
-"""Maximum width of a passage."""
 PROBE_SPACING_M, MAX_PROBES = 0.25, 80
 """Minimum distance between the points of the path at which passages are searched, and maximum number of points."""
 NARROW_WIDTH_M = 2.0

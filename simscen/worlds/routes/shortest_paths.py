@@ -172,16 +172,17 @@ def shortest_paths_in(
     min_resolution: float = MIN_RESOLUTION_M,
 ) -> ShortestPaths:
     """Prepare the search for paths in a built world, in an area that contains all `stops` (starts and goals)."""
-    return ShortestPaths(built.mesh, _bounds_containing(built, stops), radius, z_range, min_resolution)
+    x0, y0, x1, y1 = built.world.bounds
+    corners = [(x0, y0), (x1, y1)] if any(built.world.bounds) else built.map.corners
+    xs, ys = zip(*corners, *(stop[:2] for stop in stops), strict=True)
+    return ShortestPaths(built.mesh, (min(xs), min(ys), max(xs), max(ys)), radius, z_range, min_resolution)
 
 
-def legs_between(
-    built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float, z_range: tuple[float, float] = Z_RANGE_M
-) -> list[Leg]:
+def legs_between(built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float) -> list[Leg]:
     """Return the shortest path of a disc for each pair (start, goal) of `ends`."""
     if not ends:
         return []
-    paths = shortest_paths_in(built, [pose for start, goal in ends for pose in (start, goal.pose)], radius, z_range)
+    paths = shortest_paths_in(built, [pose for start, goal in ends for pose in (start, goal.pose)], radius)
     found: dict[tuple[Pose2, Pose2], Leg] = {}
     legs = []
     for start, goal in ends:
@@ -190,14 +191,6 @@ def legs_between(
         leg = found[start, goal.pose]
         legs.append(replace(leg, passages=tuple(replace(each, goal=goal.name) for each in leg.passages)))
     return legs
-
-
-def _bounds_containing(built: BuiltWorld, stops: Sequence[Pose2]) -> Bounds:
-    """Return the bounds of the world, or of its map if the world has none, extended to contain the stops."""
-    x0, y0, x1, y1 = built.world.bounds
-    corners = [(x0, y0), (x1, y1)] if any(built.world.bounds) else built.map.corners
-    xs, ys = zip(*corners, *(stop[:2] for stop in stops), strict=True)
-    return min(xs), min(ys), max(xs), max(ys)
 
 
 def tighten_path(path: Array, field: ClearanceField, radius: float) -> Array:

@@ -87,15 +87,13 @@ class SimplePaths:
             for move in MOVES:
                 neighbor = cell[0] + move[0], cell[1] + move[1]
                 there, length = _point(start, neighbor), lengths[cell] + STEP_M * math.hypot(*move)
-                if length < lengths.get(neighbor, math.inf) and self._can_move(here, there, cell == (0, 0)):
+                if length >= lengths.get(neighbor, math.inf) or not self._has_clearance(there, HALF_DIAGONAL_STEP_M):
+                    continue
+                # Every grid point except the start has so much clearance that the lines to its neighbors are clear.
+                if cell != (0, 0) or self._is_clear(here, there):
                     lengths[neighbor] = length
                     heapq.heappush(queue, (length + math.dist(there, goal), neighbor))
         return math.inf
-
-    def _can_move(self, here: Point, there: Point, is_from_start: bool) -> bool:
-        """Return whether the disc can move from a grid point to a neighbor."""
-        # Every grid point except the start has so much clearance that the lines to its neighbors are clear.
-        return self._has_clearance(there, HALF_DIAGONAL_STEP_M) and (not is_from_start or self._is_clear(here, there))
 
     def _is_clear(self, a: Point, b: Point) -> bool:
         """Return whether the disc can move from `a` to `b` in a straight line."""

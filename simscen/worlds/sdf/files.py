@@ -6,18 +6,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from simscen.assets.folders import AllowedFolders, NoSuchFile, UnusableFile
-from simscen.assets.uris import builtin_model_name
+from simscen.assets.uris import parse_fuel_uri
 from simscen.worlds.sdf.elements import Element, parse
 from simscen.worlds.sdf.report import ImportReport, MissingAsset, SourceLocation, UnusableElement
 
 MAX_WORLD_BYTES = 20 * 2**20
-"""Maximum size of a world or model file."""
 MAX_MESH_BYTES = 64 * 2**20
-"""Maximum size of a mesh or image file."""
 MAX_SHOWN_URI_LENGTH = 1000
-"""Maximum length of a URI that messages contain."""
 OLDEST_VERSION, NEWEST_VERSION = (1, 3), (1, 12)
-"""Oldest and newest version of SDF that is read."""
 _NEWEST_PATCH = (*NEWEST_VERSION, 99)
 """Upper bound of patch versions such as 1.12.1."""
 BUILT_IN_MODELS = {
@@ -114,8 +110,8 @@ class IncludedFiles:
         try:
             found = self._files.locate(uri)
         except UnusableElement:
-            builtin = builtin_model_name(uri.text)
-            if builtin is None:
+            builtin = _model_name(uri.text)
+            if builtin not in BUILT_IN_MODELS:
                 raise
             return builtin
         return str(self._model_in_folder(found, uri) if found.is_dir() else found)
@@ -135,6 +131,16 @@ class IncludedFiles:
                 raise
             self._report.note(error.location, f"{error.message}; model.sdf in the same folder is used")
             return model
+
+
+def _model_name(uri: str) -> str:
+    """Return the normalized name of the model that a model:// or Fuel URI of Open Robotics refers to, otherwise ""."""
+    address = parse_fuel_uri(uri)
+    if address is None:
+        name = uri.removeprefix("model://").strip("/") if uri.startswith("model://") else ""
+    else:
+        name = address.name if address.owner.lower().replace(" ", "") == "openrobotics" and not address.rest else ""
+    return name.lower().replace(" ", "_")
 
 
 def _newest_sdf(config: Element) -> Element:

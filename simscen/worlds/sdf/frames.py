@@ -11,7 +11,6 @@ from simscen.core.geometry import Pose3
 from simscen.worlds.sdf.elements import Element, read_pose, reference_frame
 
 MODEL_FRAME, WORLD_FRAME = "__model__", "world"
-"""Names of the own frame of a model, and of the world."""
 
 
 @dataclass(eq=False)

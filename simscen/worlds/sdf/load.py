@@ -28,7 +28,6 @@ MAX_OUTLIER_FRACTION = 0.05
 """Maximum fraction of the models that `outliers` may leave out, in addition to one model."""
 
 Placed = TypeVar("Placed", Solid, Body)
-"""A solid or a body: both have a pose."""
 
 
 def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bool = False) -> World:

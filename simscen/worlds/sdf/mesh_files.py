@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     import collada
 
 MAX_FACES = 1_000_000
-"""Maximum number of triangles of a file."""
 MAX_NODES = 10_000
 """Maximum number of nodes of a COLLADA scene, including repeated instances of a node."""
 STL_HEADER_BYTES, STL_TRIANGLE_BYTES = 84, 50

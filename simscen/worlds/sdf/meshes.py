@@ -57,7 +57,6 @@ def _size_in_bytes(parts: tuple[MeshPart, ...]) -> int:
 
 
 MESH_CACHE = MeshCache()
-"""The cache of this process."""
 
 
 @dataclass(frozen=True)

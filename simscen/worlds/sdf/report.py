@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from simscen.core.errors import InvalidInput, Problem
 
 PROBLEM_CODE = "SC310"
-"""Error code of all problems of the importer."""
 
 
 @dataclass(frozen=True)
