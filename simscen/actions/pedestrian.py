@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -158,30 +158,20 @@ class Crowd(_WalkSettings, WorldAction):
 
     def perform(self, stage: Stage) -> Effect:
         """Add the people. If the free space is not enough for all, add fewer; the effect then counts as failed."""
-        added, group_start = 0, None
+        added = 0
+        group_start: Point | None = None  # of the first member of the current group
         for index in range(self.count):
-            is_follower = index % self.group_size > 0
-            start = self._draw_start(stage, index, group_start if is_follower else None)
+            if index % self.group_size == 0:
+                group_start = None
+            rng = stage.rng(f"person {self.names[index]}, start")
+            start = _draw_point(stage, rng, stage.region(self.start), self.radius, near=group_start)
             if start is None or not self._add(stage, index, start):
                 break
             added += 1
-            group_start = group_start if is_follower else start
+            group_start = group_start or start
         if added < self.count:
             return Effect(False, f"there was free space in {self.start} for only {added} of {self.count}")
         return Effect(True, f"added {added} people in {self.start}")
-
-    def _draw_start(self, stage: Stage, index: int, group_start: Point | None) -> Point | None:
-        """Return a random free point of the start region for the person with this index; None if none was found.
-
-        `group_start` is the start of the first member of the group, near which the point must be. It is None for the
-        first member itself.
-        """
-        rng, corners = stage.rng(f"person {self.names[index]}, start"), stage.region(self.start)
-        if group_start is None:
-            area = _bounding_rectangle(corners)
-        else:
-            area = _Rectangle(*group_start, GROUP_HALF_WIDTH_M, GROUP_HALF_WIDTH_M)
-        return _draw_point(stage, rng, area, corners, self.radius)
 
     def _add(self, stage: Stage, index: int, start: Point) -> bool:
         """Add the person with this index at `start`; return False if a goal region has no free space."""
@@ -191,8 +181,7 @@ class Crowd(_WalkSettings, WorldAction):
         rng = stage.rng(f"{_stream_prefix(name, group)}, goals")
         goals: list[Point] = []
         for region in self.goals:
-            corners = stage.region(region)
-            goal = _draw_point(stage, rng, _bounding_rectangle(corners), corners, self.radius, walls_only=True)
+            goal = _draw_point(stage, rng, stage.region(region), self.radius, walls_only=True)
             if goal is None:
                 return False
             goals.append(goal)
@@ -203,33 +192,29 @@ class Crowd(_WalkSettings, WorldAction):
         return True
 
 
-class _Rectangle(NamedTuple):
-    """Axis-aligned rectangle: center and half of its side lengths in m."""
-
-    x: float
-    y: float
-    half_width: float
-    half_height: float
-
-
-def _bounding_rectangle(corners: Polygon) -> _Rectangle:
-    """Return the smallest axis-aligned rectangle that contains a polygon."""
-    xs, ys = zip(*corners, strict=True)
-    return _Rectangle(
-        (min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2, (max(xs) - min(xs)) / 2, (max(ys) - min(ys)) / 2
-    )
-
-
 def _draw_point(
-    stage: Stage, rng: np.random.Generator, area: _Rectangle, corners: Polygon, radius: float, walls_only: bool = False
+    stage: Stage,
+    rng: np.random.Generator,
+    corners: Polygon,
+    radius: float,
+    near: Point | None = None,
+    walls_only: bool = False,
 ) -> Point | None:
-    """Return a random point of `area` inside the polygon `corners`; None if there is no room for a pedestrian.
+    """Return a random point inside the polygon `corners` with room for a pedestrian; None if none was found.
 
-    `radius` is the radius of the pedestrian in m. If `walls_only`, only walls count as obstacles.
+    radius:      radius of the pedestrian in m
+    near:        point from which it is at most GROUP_HALF_WIDTH_M away along x and along y; default: anywhere
+    walls_only:  whether only walls count as obstacles
     """
+    if near is None:
+        xs, ys = zip(*corners, strict=True)
+        center = (min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2
+        half_size = (max(xs) - min(xs)) / 2, (max(ys) - min(ys)) / 2
+    else:
+        center, half_size = near, (GROUP_HALF_WIDTH_M, GROUP_HALF_WIDTH_M)
     for _ in range(MAX_DRAWS):
         x, y = rng.uniform(-1.0, 1.0, 2).tolist()
-        point = area.x + x * area.half_width, area.y + y * area.half_height
+        point = center[0] + x * half_size[0], center[1] + y * half_size[1]
         if polygon_contains(corners, point) and stage.has_room(point, radius + INITIAL_CLEARANCE_M, walls_only):
             return point
     return None
