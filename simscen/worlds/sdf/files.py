@@ -37,7 +37,7 @@ class WorldFiles(AllowedFolders):
         try:
             return self.find(uri, Path(element.source.folder), allow_absolute=True)
         except NoSuchFile as error:
-            raise MissingAsset(element.location, f"{uri}: {error}", error.hint, uri) from error
+            raise MissingAsset(element.location, f"{uri}: {error}", error.hint) from error
         except UnusableFile as error:
             can_show_uri = uri.isprintable() and uri and len(uri) <= MAX_SHOWN_URI_LENGTH
             raise element.unusable(f"{uri}: {error}" if can_show_uri else str(error), error.hint) from error

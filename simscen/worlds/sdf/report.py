@@ -43,11 +43,7 @@ class OutOfReach(UnusableElement):
 
 
 class MissingAsset(UnusableElement):
-    """The file or model at `uri` does not exist in the allowed folders."""
-
-    def __init__(self, location: SourceLocation, message: str, hint: str, uri: str) -> None:
-        super().__init__(location, message, hint)
-        self.uri = uri
+    """A file or model does not exist in the allowed folders. The message begins with its URI."""
 
 
 class ImportReport:
@@ -79,7 +75,7 @@ class ImportReport:
             self.skipped_count += 1
             self.note(error.location, f"skipped: {error.message}")
         elif isinstance(error, MissingAsset):
-            self._missing.setdefault(error.uri, []).append(error)
+            self._missing.setdefault(error.message, []).append(error)
         else:
             self._problems[_problem(error)] = None
 
@@ -108,20 +104,15 @@ class ImportReport:
         return InvalidInput(self._all_problems())
 
     def _all_problems(self) -> list[Problem]:
-        return [*self._problems, *(_missing_asset_problem(errors) for errors in self._missing.values())]
+        return [*self._problems, *(_problem(*errors) for errors in self._missing.values())]
 
 
-def _problem(error: UnusableElement, suffix: str = "") -> Problem:
-    """Return the problem with an unusable element; `suffix` is appended to its message."""
-    location = error.location
-    message = f"{location.element}: {error.message}{suffix}" if location.element else f"{error.message}{suffix}"
+def _problem(*errors: UnusableElement) -> Problem:
+    """Return the problem of an unusable element, or of several elements that refer to the same missing file."""
+    first, location = errors[0], errors[0].location
+    message = f"{location.element}: {first.message}" if location.element else first.message
+    if more_count := len({error.location for error in errors}) - 1:
+        message += f" (and at {more_count} more place{'s' if more_count > 1 else ''})"
     return Problem(
-        location.file, location.line, location.col, PROBLEM_CODE, message, hint=error.hint, source=location.source
+        location.file, location.line, location.col, PROBLEM_CODE, message, hint=first.hint, source=location.source
     )
-
-
-def _missing_asset_problem(errors: list[MissingAsset]) -> Problem:
-    """Return one problem for a missing file, from the errors of all elements that refer to it."""
-    count = len({error.location for error in errors}) - 1
-    suffix = f" (and at {count} more place{'s' if count > 1 else ''})" if count else ""
-    return _problem(errors[0], suffix)
