@@ -1,4 +1,4 @@
-"""Command-line options that several commands share: options of runs, and options for reading logs."""
+"""Command-line options that several commands share: options of runs, reports, and of reading logs."""
 
 from collections.abc import Collection
 from enum import Enum
@@ -13,11 +13,45 @@ from simscen.cli.session.stacks import STACK_HELP
 from simscen.core.errors import UsageError
 from simscen.record.foreign.options import TOPICS, Clock, ForeignLogOptions
 
+
+class Format(str, Enum):
+    """Output format."""
+
+    TEXT = "text"
+    JSON = "json"
+    GITHUB = "github"
+
+
+class TextOrJson(str, Enum):
+    """Output format of a command without workflow commands for GitHub."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+class JunitFamily(str, Enum):
+    """Dialect of JUnit XML."""
+
+    SIMSCEN = "simscen"
+    XUNIT2 = "xunit2"
+
+
+FormatOption = Annotated[Format, typer.Option("--format", help="Output format.")]
 OutOption = Annotated[Path | None, typer.Option(help="New or empty output folder; default: simscen-out/<session id>.")]
 JobsOption = Annotated[
     int | None, typer.Option("-j", "--jobs", min=1, max=256, help="Number of parallel runs; default: one per core.")
 ]
 JunitOption = Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")]
+JunitFamilyOption = Annotated[
+    JunitFamily, typer.Option(help="Dialect of JUnit XML; xunit2 omits what the schema of Jenkins forbids.")
+]
+ResumeOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Continue in this output folder: execute runs without a result, with an error, or with changed files."
+    ),
+]
+OpenOption = Annotated[bool, typer.Option("--open", help="Open the report in a browser and update it as runs finish.")]
 WallLimitOption = Annotated[float, typer.Option(min=1, help="Wall-clock limit of one run in seconds.")]
 StackOption = Annotated[
     str | None, typer.Option(metavar="NAME=VALUE", autocompletion=completions.stacks, help=STACK_HELP)

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simscen.cli.benchmarks.results import Format, print_progress
+from simscen.cli.benchmarks.results import print_progress
 from simscen.cli.benchmarks.tables import align_columns, fits, label_cells, wrap_lines
 from simscen.cli.diagnostics import print_text
+from simscen.cli.shared_options import TextOrJson
 from simscen.core.errors import NothingSelected, UsageError
 from simscen.loading.schema.messages import quoted
 from simscen.report.display_text import detect_style
@@ -36,7 +37,7 @@ def command(
     sparse: Annotated[
         bool, typer.Option("--sparse", help="Use logs with scans 1 m or 0.5 rad apart, with five seeds each.")
     ] = False,
-    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
+    format_: Annotated[TextOrJson, typer.Option("--format", help="Output format.")] = TextOrJson.TEXT,
 ) -> None:
     """Measure the accuracy of AMCL on generated logs.
 
@@ -70,14 +71,14 @@ def command(
             _print_failures(name, new)
         print_progress(f"{done} of {buildings} buildings" if done < buildings else "")
     rows = [summarize(name, own) for name, own in trials.items()]
-    if format_ is Format.JSON:
+    if format_ is TextOrJson.JSON:
         logs = {name: [asdict(trial) for trial in own] for name, own in trials.items()}
         print(json.dumps({"rows": [asdict(row) for row in rows], "logs": logs}, indent=2))
     else:
         print_text(as_text(rows, detect_style(sys.stdout, os.environ).columns))
 
 
-def _measure_sparse_logs(numbers: range, workers: int, only: list[str] | None, format_: Format) -> None:
+def _measure_sparse_logs(numbers: range, workers: int, only: list[str] | None, format_: TextOrJson) -> None:
     """Run the benchmark with --sparse on the buildings with these numbers, and print the table."""
     from simscen.bench.localization.sparse_logs import run_sparse_logs, sparse_table
 
@@ -88,7 +89,7 @@ def _measure_sparse_logs(numbers: range, workers: int, only: list[str] | None, f
         trials += new
         print_progress(f"{new[0].kind}, building {new[0].building}")
     print_progress("")
-    if format_ is Format.JSON:
+    if format_ is TextOrJson.JSON:
         print(json.dumps({"logs": [asdict(trial) for trial in trials]}, indent=2))
     else:
         head, *rows = sparse_table(trials)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simscen.cli.benchmarks.results import Format
 from simscen.cli.diagnostics import as_text as problems_as_text
 from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
+from simscen.cli.shared_options import ResumeOption, TextOrJson
 from simscen.core.errors import Exit, NothingSelected
 from simscen.report.display_text import detect_style
 
@@ -62,13 +62,8 @@ def command(
         typer.Option("--workers", "-j", min=1, max=256, help="Number of parallel runs; default: one per core."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="New or empty output folder.")] = None,
-    resume: Annotated[
-        Path | None,
-        typer.Option(
-            help="Continue in this output folder: execute runs without a result, with an error, or with changed files."
-        ),
-    ] = None,
-    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
+    resume: ResumeOption = None,
+    format_: Annotated[TextOrJson, typer.Option("--format", help="Output format.")] = TextOrJson.TEXT,
 ) -> None:
     """Measure the navigation of the reference stack, and print one line per experiment.
 
@@ -119,7 +114,7 @@ def command(
         if finished_trials(before) and finished_trials(after)
     ]
     columns = detect_style(sys.stdout, os.environ).columns
-    print_text(as_json(rows, pairs) if format_ is Format.JSON else as_text(rows, pairs, columns))
+    print_text(as_json(rows, pairs) if format_ is TextOrJson.JSON else as_text(rows, pairs, columns))
     if stopped:
         count = f"{sum(len(finished_trials(runs)) for runs in trials)} of {sum(map(len, trials))} runs"
         print_text(f"simscen: interrupted: {count}; continue with --resume {escaped(str(folder))}", sys.stderr)

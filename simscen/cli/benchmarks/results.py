@@ -6,7 +6,6 @@ A figure is a measured value with a name. A round is one of several repeated mea
 import json
 import sys
 from dataclasses import asdict, dataclass
-from enum import Enum
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,6 +16,7 @@ from simscen.bench.speed.measurement import Measurement, Measurements
 from simscen.cli.benchmarks.tables import align_columns
 from simscen.cli.diagnostics import print_text
 from simscen.cli.installation import describe_processor
+from simscen.cli.shared_options import TextOrJson
 from simscen.core.errors import UsageError
 
 FORMAT_VERSION = 1
@@ -136,13 +136,6 @@ def _spread(figure: Measurement) -> str:
     return f"{min(figure.rounds):.4g} … {max(figure.rounds):.4g}" if len(figure.rounds) > 1 else "-"
 
 
-class Format(str, Enum):
-    """Output format."""
-
-    TEXT = "text"
-    JSON = "json"
-
-
 COMPARE_HELP = "Compare with this result of --format json, and tell changes from noise."
 """Help text of the option --compare."""
 
@@ -153,13 +146,15 @@ def print_progress(text: str) -> None:
         print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
 
 
-def print_result(result: Result, text: str, sections: dict[str, Any], format_: Format, before: Result | None) -> None:
+def print_result(
+    result: Result, text: str, sections: dict[str, Any], format_: TextOrJson, before: Result | None
+) -> None:
     """Print a result: in the format JSON with the further keys `sections`, in the format TEXT as `text`.
 
     The text is followed by the comparison with the earlier result `before`, if there is one.
     """
     print_progress("")
-    if format_ is Format.JSON:
+    if format_ is TextOrJson.JSON:
         print(as_json(result, sections))
         return
     print_text(text)

@@ -13,8 +13,9 @@ import typer
 
 from simscen.bench.speed.measurement import Measurement, Measurements
 from simscen.cli.benchmarks import localization, navigation, results
-from simscen.cli.benchmarks.results import COMPARE_HELP, Format, Result, load_baseline, print_progress, print_result
+from simscen.cli.benchmarks.results import COMPARE_HELP, Result, load_baseline, print_progress, print_result
 from simscen.cli.diagnostics import print_text
+from simscen.cli.shared_options import TextOrJson
 from simscen.core.errors import Exit
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def growth_command(
-    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
+    format_: Annotated[TextOrJson, typer.Option("--format", help="Output format.")] = TextOrJson.TEXT,
     rounds: Annotated[int, typer.Option(min=1, max=100, help="Number of runs of each; the median is used.")] = 3,
     compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
 ) -> None:
@@ -98,7 +99,7 @@ def suite_command(
     jobs: Annotated[
         int | None, typer.Option("--jobs", "-j", min=1, max=256, help="Number of parallel runs; default: one per core.")
     ] = None,
-    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
+    format_: Annotated[TextOrJson, typer.Option("--format", help="Output format.")] = TextOrJson.TEXT,
     compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
 ) -> None:
     """Measure the speed of a suite of scenarios on all cores.
@@ -155,7 +156,7 @@ app.command("localization")(localization.command)
 @app.callback(invoke_without_command=True)
 def command(
     ctx: typer.Context,
-    format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,
+    format_: Annotated[TextOrJson, typer.Option("--format", help="Output format.")] = TextOrJson.TEXT,
     rounds: Annotated[int, typer.Option(min=1, max=100, help="Number of runs of the patrol; the median is used.")] = 5,
     compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
 ) -> None:

@@ -10,10 +10,12 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
 from simscen.cli.session.falsification import FalsifyRequest, execute_search, summary_lines
-from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
-from simscen.cli.session.terminal import Format, FormatOption
 from simscen.cli.shared_options import (
+    Format,
+    FormatOption,
     JobsOption,
+    JunitFamily,
+    JunitFamilyOption,
     JunitOption,
     LenientOption,
     OutOption,

@@ -10,9 +10,9 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.session.exit_codes import exit_code
 from simscen.cli.session.judging import LogJudge, runs_without_log
 from simscen.cli.session.logs import find_logs
-from simscen.cli.session.output_files import exit_code
 from simscen.cli.shared_options import (
     RootOption,
     SameFrameOption,

@@ -6,9 +6,8 @@ from typing import Annotated
 import typer
 
 from simscen.cli.commands.report import write_reports
-from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption, Reports
-from simscen.cli.session.terminal import Format, FormatOption
-from simscen.cli.shared_options import JunitOption
+from simscen.cli.session.output_files import Reports
+from simscen.cli.shared_options import Format, FormatOption, JunitFamily, JunitFamilyOption, JunitOption
 from simscen.core.errors import UsageError
 from simscen.report.journal import require_unlocked
 from simscen.report.journal_reader import read_journal

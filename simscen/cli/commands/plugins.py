@@ -5,13 +5,13 @@ import json
 import shutil
 import sys
 import textwrap
-from enum import Enum
 from itertools import groupby
 from typing import Annotated, Any
 
 import typer
 
 from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.shared_options import TextOrJson
 from simscen.core.errors import Exit
 from simscen.spec.registry import (
     ENTRY_POINT_PREFIX,
@@ -26,21 +26,14 @@ INDENT = 6
 """Number of spaces before the description of a type."""
 
 
-class Format(str, Enum):
-    """Output formats."""
-
-    TEXT = "text"
-    JSON = "json"
-
-
-def command(format_: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT) -> None:
+def command(format_: Annotated[TextOrJson, typer.Option("--format", help="Output format.")] = TextOrJson.TEXT) -> None:
     """List the types that installed packages add.
 
     Lists for each package the kind, the name used in files, the class, and the first paragraph of its documentation, or
     why the type cannot be used. The command imports each type. Exit code 0: all types are usable; 3: one is not.
     """
     listed = [_row(entry) for entry in _entries_by_package()]
-    if format_ is Format.JSON:
+    if format_ is TextOrJson.JSON:
         print(json.dumps({"plugins": listed}, indent=2, ensure_ascii=False))
     else:
         print_text(_text(listed))

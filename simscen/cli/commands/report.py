@@ -7,8 +7,10 @@ from typing import Annotated, NoReturn
 import typer
 
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption, Reports, exit_code, require_writable_junit
-from simscen.cli.session.terminal import Format, FormatOption, open_screen
+from simscen.cli.session.exit_codes import exit_code
+from simscen.cli.session.output_files import Reports, require_writable_junit
+from simscen.cli.session.terminal import open_screen
+from simscen.cli.shared_options import Format, FormatOption, JunitFamily, JunitFamilyOption
 from simscen.core.errors import Exit, UsageError
 from simscen.judge.metrics.comparison import compare_stacks
 from simscen.judge.metrics.session_summary import session_summary_line

@@ -9,17 +9,21 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
-from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
 from simscen.cli.session.run_session import SessionRequest, execute_session
 from simscen.cli.session.selection import Selection, scenario_times, shard_of
 from simscen.cli.session.stacks import STACK_HELP
-from simscen.cli.session.terminal import Format, FormatOption
 from simscen.cli.session.watch import watch_session
 from simscen.cli.shared_options import (
+    Format,
+    FormatOption,
     JobsOption,
+    JunitFamily,
+    JunitFamilyOption,
     JunitOption,
     LenientOption,
+    OpenOption,
     OutOption,
+    ResumeOption,
     RootOption,
     WallLimitOption,
     WorldPathOption,
@@ -67,12 +71,7 @@ def command(
     junit_family: JunitFamilyOption = JunitFamily.SIMSCEN,
     format_: FormatOption = Format.TEXT,
     wall_limit: WallLimitOption = 300.0,
-    resume: Annotated[
-        Path | None,
-        typer.Option(
-            help="Continue in this output folder: execute runs without a result, with an error, or with changed files."
-        ),
-    ] = None,
+    resume: ResumeOption = None,
     shard: Annotated[
         str,
         typer.Option(
@@ -106,9 +105,7 @@ def command(
         int | None, typer.Option(min=0, metavar="N", help="List the N slowest runs at the end; 0 = all.")
     ] = None,
     watch: Annotated[bool, typer.Option("--watch", help="Watch for changes and rerun affected scenarios.")] = False,
-    open_: Annotated[
-        bool, typer.Option("--open", help="Open the report in a browser and update it as runs finish.")
-    ] = False,
+    open_: OpenOption = False,
     variation: Annotated[
         list[str] | None, typer.Option(help="Select the variation with exactly this name; repeatable.")
     ] = None,

@@ -8,14 +8,18 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
-from simscen.cli.session.output_files import JunitFamily, JunitFamilyOption
 from simscen.cli.session.study_session import StudyRequest, execute_study
-from simscen.cli.session.terminal import Format, FormatOption
 from simscen.cli.shared_options import (
+    Format,
+    FormatOption,
     JobsOption,
+    JunitFamily,
+    JunitFamilyOption,
     JunitOption,
     LenientOption,
+    OpenOption,
     OutOption,
+    ResumeOption,
     RootOption,
     StackOption,
     WallLimitOption,
@@ -45,12 +49,7 @@ def command(
         int | None, typer.Option(min=1, max=2**32 - 1, help="First seed, instead of the scenario's own.")
     ] = None,
     out: OutOption = None,
-    resume: Annotated[
-        Path | None,
-        typer.Option(
-            help="Continue in this output folder: execute runs without a result, with an error, or with changed files."
-        ),
-    ] = None,
+    resume: ResumeOption = None,
     workers: JobsOption = None,
     backend: BackendOption = BackendName.LOCAL,
     address: AddressOption = None,
@@ -59,9 +58,7 @@ def command(
     format_: FormatOption = Format.TEXT,
     wall_limit: WallLimitOption = 300.0,
     stack: StackOption = None,
-    open_: Annotated[
-        bool, typer.Option("--open", help="Open the report in a browser and update it as runs finish.")
-    ] = False,
+    open_: OpenOption = False,
     root: RootOption = None,
     world_path: WorldPathOption = None,
     replay: Annotated[

@@ -3,7 +3,6 @@
 import sys
 from collections import Counter
 from dataclasses import dataclass, field
-from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
@@ -13,18 +12,10 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import as_github, as_json, as_text, print_text, relative_to_working_folder
 from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.stacks import parse_stacks
-from simscen.cli.shared_options import RootOption, WorldPathOption
+from simscen.cli.shared_options import Format, RootOption, WorldPathOption
 from simscen.core.errors import Exit, Problem
 from simscen.loading.checks.files import CHECKED_DRAWS, STACK_KINDS, check_file, file_kind
 from simscen.loading.files.discovery import SUFFIXES, default_root, discover
-
-
-class Format(str, Enum):
-    """Output formats of problems."""
-
-    TEXT = "text"
-    JSON = "json"
-    GITHUB = "github"
 
 
 def command(

@@ -1,30 +1,23 @@
-"""Output files of a session (results.json, junit.xml, report.html, run.json), and its exit code."""
+"""Output files of a session: results.json, junit.xml, report.html, and run.json."""
 
 import errno
 import json
 import os
 import platform
 import sys
-import time
-import webbrowser
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime, timezone
-from enum import Enum
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from simscen.cli.diagnostics import print_text
-from simscen.core.errors import Exit, UsageError
+from simscen.core.errors import UsageError
 from simscen.core.files import require_not_input
 from simscen.core.records.comparison import Comparison
-from simscen.core.records.run_result import Outcome, RunKey
-from simscen.core.records.run_store import RunStore
-from simscen.core.records.session_events import RunFinished, RunStarted, SessionEvent, SessionFinished, SessionStarted
-from simscen.core.records.study import ClaimStatus, Study
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.session_events import RunFinished, SessionFinished
+from simscen.core.records.study import Study
 from simscen.report.journal_reader import JOURNAL_FILE
 from simscen.report.junit import Family, xml_parts
 from simscen.report.results_json import json_parts
@@ -37,18 +30,6 @@ PAGE = "report.html"
 """Name of the HTML report in the output folder."""
 RESERVED_NAMES = ("results.json", PAGE, "run.json", JOURNAL_FILE, RUNS_FOLDER)
 """Names in the output folder that `--junit` must not use."""
-
-
-class JunitFamily(str, Enum):
-    """Dialect of JUnit XML."""
-
-    SIMSCEN = "simscen"
-    XUNIT2 = "xunit2"
-
-
-JunitFamilyOption = Annotated[
-    JunitFamily, typer.Option(help="Dialect of JUnit XML; xunit2 omits what the schema of Jenkins forbids.")
-]
 
 
 class Reports:
@@ -69,15 +50,16 @@ class Reports:
         junit_only: bool = False,
         used: Mapping[str, object] | None = None,
     ) -> None:
-        self.folder, self.junit, self._junit_only = folder, junit or folder / "junit.xml", junit_only
+        self.folder, self.page = folder, folder / PAGE
+        self._junit, self._junit_only = junit or folder / "junit.xml", junit_only
+        self._family: Family = family
         self._used = used or {}
         self._missing: frozenset[Path] = frozenset()
-        self._family: Family = family
 
     def begin(self) -> None:
         """Write run.json before the first run. Raises UsageError if the folder is not writable."""
         try:
-            write_atomically(self.folder / "run.json", session_info_json(self._used))
+            write_atomically(self.folder / "run.json", _session_info_json(self._used))
         except OSError as error:
             raise UsageError(f"cannot use the output folder {self.folder}: {error.strerror}") from error
 
@@ -85,26 +67,22 @@ class Reports:
         self, finished_runs: Sequence[RunFinished], comparison: Comparison | None = None, study: Study | None = None
     ) -> bool:
         """Write the reports, and return whether all were written. A report that cannot be written is left unchanged."""
-        results = map(str.encode, json_parts(finished_runs, str(self.folder), comparison, study))
-        documents: dict[Path, bytes | Iterable[bytes]] = {}
+        folder, documents = str(self.folder), dict[Path, bytes | Iterable[bytes]]()
         if not self._junit_only:
-            documents[self.folder / "results.json"] = results
-            documents[self.folder / PAGE] = self._page(finished_runs, comparison, study)
-        for path in {self.junit: None} if self._junit_only else {self.folder / "junit.xml": None, self.junit: None}:
-            documents[path] = xml_parts(finished_runs, self._family, study=study)
+            names = ("results.json", "junit.xml", "run.json")
+            page = SessionReport(finished_runs, self._past, comparison, folder, names, study=study)
+            results = json_parts(finished_runs, folder, comparison, study)
+            documents[self.folder / "results.json"] = map(str.encode, results)
+            documents[self.page] = to_html(page).encode()
+            documents[self.folder / "junit.xml"] = xml_parts(finished_runs, self._family, study=study)
+        documents[self._junit] = xml_parts(finished_runs, self._family, study=study)
         self._missing = frozenset(path for path, data in documents.items() if not _write(path, data))
         return not self._missing
 
     def write_live(self, finished_runs: Sequence[RunFinished], live: RunningSession) -> bool:
         """Write the HTML report of a session that is still running, and return whether it was written."""
         page = to_html(SessionReport(finished_runs, self._past, folder=str(self.folder), live=live))
-        return _write(self.folder / PAGE, page.encode())
-
-    def _page(self, finished_runs: Sequence[RunFinished], comparison: Comparison | None, study: Study | None) -> bytes:
-        files = ("results.json", "junit.xml", "run.json")
-        return to_html(
-            SessionReport(finished_runs, self._past, comparison, str(self.folder), files, study=study)
-        ).encode()
+        return _write(self.page, page.encode())
 
     @cached_property
     def _past(self) -> Sequence[PastSession]:
@@ -112,7 +90,7 @@ class Reports:
 
     def write_duration(self, wall: float) -> bool:
         """Write run.json again with the duration of the session in seconds, and return whether it was written."""
-        return _write(self.folder / "run.json", session_info_json(self._used, wall))
+        return _write(self.folder / "run.json", _session_info_json(self._used, wall))
 
     def finished_event(
         self,
@@ -127,7 +105,7 @@ class Reports:
         The path of a report is empty if the report could not be written.
         """
         count, simulated = Counter[Outcome](), 0.0
-        for finished in finished_runs:
+        for finished in finished_runs:  # once, because a RunStore decompresses each run
             count[finished.outcome] += 1
             simulated += finished.result.simulated
         return SessionFinished(
@@ -137,39 +115,14 @@ class Reports:
             simulated=simulated,
             wall=wall,
             interrupted=interrupted,
-            junit="" if self.junit in self._missing else str(self.junit),
+            junit="" if self._junit in self._missing else str(self._junit),
             folder=str(self.folder),
             comparison=comparison,
             expected=count[Outcome.FAILED_AS_EXPECTED],
             skipped=count[Outcome.SKIPPED],
-            page="" if self._junit_only or self.folder / PAGE in self._missing else str(self.folder / PAGE),
+            page="" if self._junit_only or self.page in self._missing else str(self.page),
             study=study,
         )
-
-
-CLAIM_EXIT_CODES = {
-    ClaimStatus.HELD: Exit.PASSED,
-    ClaimStatus.REFUTED: Exit.FAILED,
-    ClaimStatus.UNDECIDED: Exit.UNDECIDED,
-    ClaimStatus.BLOCKED: Exit.INCOMPLETE,
-}
-"""Exit code of a study by the status of its claim, the pass rate that the study tests."""
-
-
-def exit_code(finished_runs: Sequence[RunFinished], study: Study | None = None) -> Exit:
-    """Return the exit code of a session that was not interrupted.
-
-    If a study has a claim, the exit code depends on its status, otherwise on the outcomes of the runs.
-    """
-    if study is not None and study.claim is not None:
-        return CLAIM_EXIT_CODES[study.claim.status]
-    outcomes = {finished.outcome for finished in finished_runs}
-    if outcomes == {Outcome.SKIPPED}:
-        return Exit.NOTHING_SELECTED
-    if Outcome.ERROR in outcomes:
-        only_not_run = all(a.result.error is None or a.result.error.kind == "not-run" for a in finished_runs)
-        return Exit.FAILED if only_not_run and Outcome.FAILED in outcomes else Exit.INCOMPLETE
-    return Exit.FAILED if Outcome.FAILED in outcomes else Exit.PASSED
 
 
 def require_writable_junit(junit: Path | None, folder: Path | None, inputs: Iterable[Path] = ()) -> None:
@@ -206,7 +159,7 @@ def _write(path: Path, data: bytes | Iterable[bytes]) -> bool:
     return True
 
 
-def session_info_json(used: Mapping[str, object], wall: float | None = None) -> bytes:
+def _session_info_json(used: Mapping[str, object], wall: float | None = None) -> bytes:
     """Return the content of run.json with the further entries `used`.
 
     `wall` is the wall-clock duration of the session in s; None while the session runs.
@@ -226,48 +179,3 @@ def session_info_json(used: Mapping[str, object], wall: float | None = None) -> 
         },
         indent=2,
     ).encode()
-
-
-MIN_UPDATE_INTERVAL_S = 1.0
-"""Minimum time between two updates of the page."""
-UPDATE_INTERVAL_FACTOR = 10
-"""Minimum time between two updates of the page, as a multiple of the duration of an update."""
-
-
-class LivePage:
-    """Listener that opens the HTML report of a running session in a browser, and updates it."""
-
-    def __init__(self, reports: Reports) -> None:
-        self._reports = reports
-        self._total, self._due = 0, 0.0
-        self._finished_runs = RunStore()
-        self._running: dict[RunKey, None] = {}
-
-    def __call__(self, event: SessionEvent) -> None:
-        """Write and open the page at the start of the session, and update it after runs."""
-        match event:
-            case SessionStarted():
-                self._total = event.total
-                self._write()
-                open_page(self._reports.folder / PAGE)
-            case RunStarted():
-                self._running[event.key] = None
-            case RunFinished():
-                self._running.pop(event.key, None)
-                self._finished_runs.append(event)
-                if time.monotonic() >= self._due:
-                    self._write()
-            case _:
-                pass
-
-    def _write(self) -> None:
-        start = time.monotonic()
-        self._reports.write_live(self._finished_runs, RunningSession(self._total, tuple(self._running)))
-        now = time.monotonic()
-        self._due = now + max(MIN_UPDATE_INTERVAL_S, UPDATE_INTERVAL_FACTOR * (now - start))
-
-
-def open_page(page: Path) -> None:
-    """Open a page in the browser of $BROWSER or of the system. Without a browser, print the path of the page."""
-    if not webbrowser.open(page.absolute().as_uri()):
-        print_text(f"simscen: no browser found; open {page} in a browser", sys.stderr)

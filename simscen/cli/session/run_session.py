@@ -9,11 +9,14 @@ from typing import Protocol
 
 from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
-from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable_junit
+from simscen.cli.session.exit_codes import exit_code
+from simscen.cli.session.live_page import LivePage
+from simscen.cli.session.output_files import Reports, require_writable_junit
 from simscen.cli.session.pending_runs import PendingRuns, failed_runs, plan_session
 from simscen.cli.session.selection import Selection, load_selection
 from simscen.cli.session.stacks import external_commands
-from simscen.cli.session.terminal import Format, Screen, open_screen
+from simscen.cli.session.terminal import Screen, open_screen
+from simscen.cli.shared_options import Format, JunitFamily
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.run_result import RunKey
 from simscen.core.records.run_store import RunStore

@@ -13,12 +13,15 @@ from typing import NamedTuple
 
 from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
-from simscen.cli.session.output_files import JunitFamily, LivePage, Reports, exit_code, require_writable_junit
+from simscen.cli.session.exit_codes import exit_code
+from simscen.cli.session.live_page import LivePage
+from simscen.cli.session.output_files import Reports, require_writable_junit
 from simscen.cli.session.pending_runs import divide_runs, plan_runs, previous_results, write_reused
 from simscen.cli.session.run_session import open_output_folder
 from simscen.cli.session.selection import Selection, load_selection, require_not_skipped
 from simscen.cli.session.stacks import external_commands
-from simscen.cli.session.terminal import Format, Screen, open_screen
+from simscen.cli.session.terminal import Screen, open_screen
+from simscen.cli.shared_options import Format, JunitFamily
 from simscen.core.errors import Exit, InvalidInput, Problem, UsageError
 from simscen.core.random_streams import MAX_SEED
 from simscen.core.records.run_store import RunStore

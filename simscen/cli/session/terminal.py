@@ -4,15 +4,13 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from enum import Enum
 from io import StringIO
 from pathlib import Path
-from typing import Annotated, TextIO
-
-import typer
+from typing import TextIO
 
 from simscen.cli.diagnostics import print_text
 from simscen.cli.process import discard_output
+from simscen.cli.shared_options import Format
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.session_events import SessionEvent
 from simscen.report.console_reporter import text_reporter
@@ -24,17 +22,6 @@ STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 """Environment variable with the path of the file for the job summary of GitHub Actions."""
 PICTURES_URL = "SIMSCEN_PICTURES_URL"
 """Environment variable with the URL of the uploaded output folder, for the pictures in the job summary."""
-
-
-class Format(str, Enum):
-    """Output format."""
-
-    TEXT = "text"
-    JSON = "json"
-    GITHUB = "github"
-
-
-FormatOption = Annotated[Format, typer.Option("--format", help="Output format.")]
 
 
 class Screen:

@@ -6,7 +6,7 @@ from urllib.parse import unquote, urlparse
 
 import pytest
 
-from simscen.cli.session import output_files
+from simscen.cli.session import live_page
 from simscen.core.records.session_events import SessionEvent
 
 SCENARIO = """\
@@ -40,13 +40,13 @@ def test_live_page_opens_first_and_becomes_the_report(
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     seen: list[str] = []
 
-    class Watched(output_files.LivePage):
+    class Watched(live_page.LivePage):
         def __call__(self, event: SessionEvent) -> None:
             super().__call__(event)
             seen.append((tmp_path / "out/report.html").read_text(encoding="utf-8"))
 
-    monkeypatch.setattr(output_files, "MIN_UPDATE_INTERVAL_S", 0.0)
-    monkeypatch.setattr(output_files, "UPDATE_INTERVAL_FACTOR", 0)
+    monkeypatch.setattr(live_page, "MIN_UPDATE_INTERVAL_S", 0.0)
+    monkeypatch.setattr(live_page, "UPDATE_INTERVAL_FACTOR", 0)
     monkeypatch.setattr("simscen.cli.session.run_session.LivePage", Watched)
     ended = simscen("run", "a.scenario.yaml", "--repeat", "2", "--out", "out", "--open", "-j", "1")
     assert (ended.code, ended.err) == (0, "")
