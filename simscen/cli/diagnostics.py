@@ -5,13 +5,14 @@ import os
 import re
 import sys
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any, TextIO
 
-from simscen.core.errors import Problem
+from simscen.core.errors import InvalidInput, Problem
 from simscen.report.display_text import (
     ascii_only,
     display_width,
@@ -41,6 +42,15 @@ def relative_to_working_folder(problems: Iterable[Problem], root: Path) -> list[
     return [replace(problem, path=_relative_path(problem.path, root)) for problem in problems]
 
 
+@contextmanager
+def paths_from_working_folder(root: Path) -> Iterator[None]:
+    """Within the context, apply `relative_to_working_folder` to the problems in InvalidInput."""
+    try:
+        yield
+    except InvalidInput as error:
+        raise InvalidInput(relative_to_working_folder(error.problems, root)) from error
+
+
 def as_text(problems: Sequence[Problem]) -> str:
     """Return the problems as text. Each has lines with place and message, source line, carets, and hint.
 
@@ -64,7 +74,16 @@ def as_json(problems: Iterable[Problem], **further_keys: Any) -> str:
 
 def as_github(problems: Iterable[Problem]) -> str:
     """Return GitHub workflow commands that annotate the lines of the problems."""
-    return "\n".join(_annotation(problem) for problem in problems)
+    lines = []
+    for problem in problems:
+        level = "error" if problem.severity == "error" else "warning"
+        where = f"file={_escape_property(relative_to_checkout(problem.path))}"
+        if problem.line:
+            where += f",line={problem.line},col={problem.col}"
+        title = _escape_property(f"simscen {problem.code}")
+        message = problem.message + (f"\n{problem.hint}" if problem.hint else "")
+        lines.append(f"::{level} {where},title={title}::{_escape_message(message)}")
+    return "\n".join(lines)
 
 
 def escaped(text: str) -> str:
@@ -88,15 +107,8 @@ def _problem_text(problem: Problem) -> str:
     lines = [head, *(_excerpt(problem) if problem.source.strip() and problem.line else [])]
     if problem.hint:
         margin = " " * (len(str(problem.line)) + 5)
-        lines.append(
-            textwrap.fill(
-                escaped(problem.hint),
-                MAX_COLUMNS,
-                initial_indent=f"{margin}= ",
-                subsequent_indent=f"{margin}  ",
-                break_long_words=False,
-            )
-        )
+        wrapper = textwrap.TextWrapper(MAX_COLUMNS, f"{margin}= ", f"{margin}  ", break_long_words=False)
+        lines.append(wrapper.fill(escaped(problem.hint)))
     return "\n".join(lines)
 
 
@@ -112,16 +124,6 @@ def _excerpt(problem: Problem) -> list[str]:
     gutter = " " * (len(str(problem.line)) + 4)
     carets = " " * display_width(before) + "^" * max(1, display_width(marked))
     return [f"    {problem.line} | {escape_ci_markers(shown)}", f"{gutter} | {carets}"]
-
-
-def _annotation(problem: Problem) -> str:
-    """Return the GitHub workflow command for one problem."""
-    level = "error" if problem.severity == "error" else "warning"
-    where = f"file={_escape_property(relative_to_checkout(problem.path))}"
-    if problem.line:
-        where += f",line={problem.line},col={problem.col}"
-    message = problem.message + (f"\n{problem.hint}" if problem.hint else "")
-    return f"::{level} {where},title={_escape_property(f'simscen {problem.code}')}::{_escape_message(message)}"
 
 
 def _escape_message(text: str) -> str:

@@ -11,7 +11,7 @@ from simscen.cli.catalog.commands_page import command_section, exit_code_section
 from simscen.cli.catalog.fields import OPTIONAL, Field
 from simscen.cli.catalog.json_schema import MODELS, as_text, schema_of
 from simscen.cli.catalog.reference_topics import metrics_page, signals_page
-from simscen.cli.catalog.topics import Topic, added_topics, topics
+from simscen.cli.catalog.topics import HEADINGS, Topic, added_topics, topics
 from simscen.cli.main import COMMANDS
 from simscen.criteria.base import AnyMeasure
 from simscen.criteria.trace_signals.catalog import SIGNALS
@@ -132,8 +132,6 @@ _PROBLEM_GROUPS = {
 }
 """Headings of docs/reference/problems.md, by the first code below each."""
 _SIGNAL_NAMES = " | ".join(f"`{name}`" for name in SIGNALS)
-_HEADINGS = ("What is measured:", "When it fails:", "Why this:", "Source:")
-"""Headings in the docstring of a criterion."""
 
 
 def language_page(installed: bool = False) -> str:
@@ -200,10 +198,10 @@ def _section(topic: Topic) -> str:
 
 
 def _markdown(text: str) -> str:
-    """Return a docstring as Markdown. Its _HEADINGS become list items."""
+    """Return a docstring as Markdown. Its HEADINGS become list items."""
     lines: list[str] = []
     for line in text.splitlines():
-        heading = next((h for h in _HEADINGS if line.startswith(h)), None)
+        heading = next((h for h in HEADINGS if line.startswith(h)), None)
         lines.append(f"- **{heading}**{line[len(heading) :]}" if heading else line.replace("    ", "  ", 1))
     return "\n".join(lines)
 

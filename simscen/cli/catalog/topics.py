@@ -46,6 +46,8 @@ from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.places import PoseSpec, SpeedMask
 from simscen.triggers.base import AnyCondition, Trigger
 
+HEADINGS = ("What is measured:", "When it fails:", "Why this:", "Source:")
+"""Headings in the docstring of a criterion."""
 _EXAMPLE = re.compile(r"^Example: `(.+)`$", re.MULTILINE)
 
 

@@ -10,8 +10,6 @@ import typer
 
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, InvalidInput, Problem
-from simscen.core.records.comparison import Comparison
-from simscen.core.records.session_events import RunFinished
 from simscen.judge.metrics.comparison import compare_sessions, comparison_data, labeled_key
 from simscen.judge.significance import Significance
 from simscen.report.comparison import Links, session_comparison_lines
@@ -85,7 +83,13 @@ def command(
         hint = "run the same scenarios with the same seeds in both"
         raise InvalidInput([Problem(str(candidate), 0, 0, "SC811", f"no run has a counterpart in {baseline}", hint)])
     is_worse = any(change.is_worse for change in against.changes)
-    _print(comparison, _links(sessions), format_, is_worse)
+    links = _links(sessions)
+    if format_ is ComparisonFormat.JSON:
+        print_text(json.dumps({"worse": is_worse, **comparison_data(comparison)}, indent=2, ensure_ascii=False))
+    elif format_ is ComparisonFormat.MARKDOWN:
+        print_text("\n".join(session_comparison_markdown(comparison, links, is_worse)))
+    else:
+        print_lines(session_comparison_lines(comparison, links, is_worse), sys.stdout)
     incomplete = any(row[CANDIDATE].errors for row in comparison.outcomes.values())
     has_flipped = any(flip.failed == CANDIDATE for flip in against.flips)
     has_failed = {Gate.WORSE: is_worse, Gate.FLIP: has_flipped, Gate.NEVER: False}[fail_on]
@@ -107,28 +111,15 @@ def _check_scenarios(sessions: dict[str, JournaledSession], candidate: Path, cha
 
 
 def _links(sessions: dict[str, JournaledSession]) -> Links:
-    """Return the replay, log, or repeat command of each run that did not pass.
+    """Return the replay or log of each run that did not pass; without these files, the command that repeats the run.
 
     A key consists of BASELINE or CANDIDATE, the name of the run without its seed, and the seed.
     """
     return {
-        (name, labeled_key(run.key, name).test, run.key.seed): _link(run)
+        (name, labeled_key(run.key, name).test, run.key.seed): next(
+            (file for file in (run.artifacts.replay, run.artifacts.mcap) if file and Path(file).is_file()), run.again
+        )
         for name, session in sessions.items()
         for run in session.runs
         if not run.outcome.is_good
     }
-
-
-def _link(run: RunFinished) -> str:
-    """Return the replay or log of a run if it exists, otherwise the command that repeats the run."""
-    files = run.artifacts.replay, run.artifacts.mcap
-    return next((file for file in files if file and Path(file).is_file()), run.again)
-
-
-def _print(comparison: Comparison, links: Links, format_: ComparisonFormat, is_worse: bool) -> None:
-    if format_ is ComparisonFormat.JSON:
-        print_text(json.dumps({"worse": is_worse, **comparison_data(comparison)}, indent=2, ensure_ascii=False))
-    elif format_ is ComparisonFormat.MARKDOWN:
-        print_text("\n".join(session_comparison_markdown(comparison, links, is_worse)))
-    else:
-        print_lines(session_comparison_lines(comparison, links, is_worse), sys.stdout)

@@ -9,11 +9,14 @@ import typer
 from simscen.cli import completions
 from simscen.cli.catalog.fields import OPTIONAL, Field
 from simscen.cli.catalog.topic_lookup import all_topics, key_topics, known_names
-from simscen.cli.catalog.topics import Topic
+from simscen.cli.catalog.topics import HEADINGS, Topic
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import UsageError
 from simscen.loading.codes import CODES
 from simscen.loading.schema.messages import quoted, suggestion
+
+_ITEM_STARTS = ("- ", *HEADINGS)
+"""Beginnings of lines with which a list item or a paragraph with a heading begins."""
 
 
 def command(
@@ -36,10 +39,7 @@ def command(
         print_text(language_page(installed=True).rstrip())
         return
     width = max(40, min(100, shutil.get_terminal_size().columns))
-    if not name:
-        print_text(_overview(width))
-    else:
-        print_text(explanation(name, width))
+    print_text(explanation(name, width) if name else _overview(width))
 
 
 def explanation(name: str, width: int = 100) -> str:
@@ -56,23 +56,18 @@ def _topics_named(name: str) -> list[Topic]:
     """Return the topics with this name, ignoring case, or else of the keys with this path. Raises UsageError."""
     known = all_topics()
     lowered = name.lower()
-    found = [topic for topic in known if lowered in (name.lower() for name in _names(topic))]
+    found = [
+        topic
+        for topic in known
+        if lowered in (topic.name.lower(), f"{topic.group}.{topic.name}".lower(), topic.alias.lower())
+    ]
     found = found or key_topics(name, known)
     if not found:
-        hint = suggestion(name, [*known_names(), *(known_names(keys=True) if "." in name else _key_names(known))])
-        raise UsageError(
-            f"unknown name {quoted(name)}; " + (hint if hint.startswith("did") else "run `simscen explain` for a list")
-        )
+        keys = known_names(keys=True) if "." in name else [field.key for topic in known for field in topic.fields]
+        hint = suggestion(name, [*known_names(), *keys])
+        advice = hint if hint.startswith("did") else "run `simscen explain` for a list"
+        raise UsageError(f"unknown name {quoted(name)}; {advice}")
     return found
-
-
-def _names(topic: Topic) -> tuple[str, ...]:
-    """Return all names of a topic: name, `group.name`, and alias."""
-    return (topic.name, f"{topic.group}.{topic.name}", *((topic.alias,) if topic.alias else ()))
-
-
-def _key_names(topics: list[Topic]) -> list[str]:
-    return [field.key for topic in topics for field in topic.fields]
 
 
 def _overview(width: int) -> str:
@@ -89,7 +84,8 @@ def _overview(width: int) -> str:
 def _topic_text(topic: Topic, width: int) -> str:
     """Return the text about one topic."""
     kind = f"{topic.group} of {topic.origin}" if topic.origin else topic.group
-    parts = [f"{topic.name} ({kind})", _paragraphs(topic.text, width)]
+    paragraphs = [_wrapped_paragraph(paragraph, width) for paragraph in topic.text.split("\n\n")]
+    parts = [f"{topic.name} ({kind})", "\n\n".join(paragraphs)]
     if topic.value:
         parts.append(f"  Value: {topic.value}")
     if topic.fields:
@@ -106,26 +102,17 @@ def _field(field: Field, width: int) -> str:
     return "\n".join([head, _wrapped(field.text, width, "      ")]) if field.text else head
 
 
-def _paragraphs(text: str, width: int) -> str:
-    return "\n\n".join(_lines(paragraph, width) for paragraph in text.split("\n\n"))
-
-
-def _lines(paragraph: str, width: int) -> str:
+def _wrapped_paragraph(paragraph: str, width: int) -> str:
     """Return a wrapped paragraph, with list items and headings such as "When it fails:" on new lines."""
     items: list[str] = []
     for line in paragraph.splitlines():
         if line.startswith(" ") and items:
             items[-1] += " " + line.strip()
-        elif items and not _begins_item(line):
+        elif items and not line.startswith(_ITEM_STARTS):
             items[-1] += " " + line
         else:
             items.append(line)
     return "\n".join(_wrapped(item, width, "  ") for item in items)
-
-
-def _begins_item(line: str) -> bool:
-    """Return whether a line begins a list item or a headed paragraph."""
-    return line.startswith(("- ", "What is measured:", "When it fails:", "Why this:", "Source:"))
 
 
 def _wrapped(text: str, width: int, indent: str) -> str:

@@ -28,7 +28,7 @@ from simscen.cli.shared_options import (
 from simscen.core.records.session_events import RunFinished
 from simscen.judge.result_json import result_data
 from simscen.record.foreign.options import ForeignLogOptions
-from simscen.report.display_text import escape_ci_commands, plain_text
+from simscen.report.display_text import StyledLine, escape_ci_commands, plain_text
 from simscen.report.judged_logs import full_log_lines, margin_table, short_log_line, summary_line
 from simscen.report.results_json import as_document, in_order
 
@@ -64,39 +64,31 @@ def command(
     files = find_logs(logs)
     judging = LogJudge(foreign, scenario, root, world_path or [])
     without_log = runs_without_log(logs)
-    runs = [
-        *((str(file), judging.judge(file, is_only_log=len(files) + len(without_log) == 1)) for file in files),
-        *without_log,
-    ]
+    is_only_log = len(files) + len(without_log) == 1
+    runs = [*((str(file), judging.judge(file, is_only_log)) for file in files), *without_log]
     if foreign != ForeignLogOptions() and not judging.foreign_count:
         judging.notes.append("logs of simscen contain truth and times; options for logs of real robots have no effect")
     for note in judging.notes:
         print_text(f"note: {escaped(note)}", sys.stderr)
+    results = [run for _, run in runs]
     if json_:
-        options = _options(foreign, scenario, root, world_path or [])
-        print(_document([run for _, run in runs], options), end="")
+        print(_document(results, _options(foreign, scenario, root, world_path or [])), end="")
     else:
-        _print(runs, scenario is not None)
-    sys.exit(exit_code([run for _, run in runs]))
+        for line in _lines(runs, scenario is not None):
+            print_text(escape_ci_commands(plain_text(line)))
+    sys.exit(exit_code(results))
 
 
-def _print(runs: list[tuple[str, RunFinished]], has_same_criteria: bool) -> None:
-    """Print one result in full, or one line for each of several results; a table if all have the same criteria.
+def _lines(runs: list[tuple[str, RunFinished]], has_same_criteria: bool) -> list[StyledLine]:
+    """Return the lines about one result, or a line for each of several results; a table if all have the same criteria.
 
     `runs` are pairs of the path of a log and its result.
     """
     if len(runs) == 1:
-        lines = list(full_log_lines(runs[0][1], runs[0][0]))
-    elif has_same_criteria:
-        lines = [*margin_table(runs), summary_line([run for _, run in runs])]
-    else:
-        width = max(len(name) for name, _ in runs)
-        lines = [
-            *(short_log_line(run, f"{name:{width}}") for name, run in runs),
-            summary_line([run for _, run in runs]),
-        ]
-    for line in lines:
-        print_text(escape_ci_commands(plain_text(line)))
+        return list(full_log_lines(runs[0][1], runs[0][0]))
+    width = max(len(name) for name, _ in runs)
+    rows = margin_table(runs) if has_same_criteria else (short_log_line(run, f"{name:{width}}") for name, run in runs)
+    return [*rows, summary_line([run for _, run in runs])]
 
 
 def _document(runs: list[RunFinished], options: list[str]) -> str:

@@ -32,14 +32,15 @@ def command(
     Prints one line for each scenario and variation: id, name, tags, external stack, and why it is skipped or expected
     to fail. Exit code 0: listed; 2: a scenario is invalid; 5: nothing is selected.
     """
-    root_folder = root if root is not None else default_root(paths)
+    root_folder = root or default_root(paths)
     tried = [try_variations(file, root_folder, world_path or ()) for file in discover(paths, root_folder)]
     if problems := [problem for found in tried if isinstance(found, list) for problem in found]:
         raise InvalidInput(problems)
     chosen = select([one for found in tried if isinstance(found, tuple) for one in found], keyword, tag or ())
     width = max(len(scenario.title) for scenario in chosen)
     for scenario in chosen:
-        details = f"{scenario.spec.name or ''} {_tags(scenario)} {_stack(scenario)} {_expectation(scenario)}"
+        tags = f"[{', '.join(scenario.spec.tags)}]" if scenario.spec.tags else ""
+        details = f"{scenario.spec.name or ''} {tags} {_stack(scenario)} {_expectation(scenario)}"
         print_text(f"{escaped(scenario.title):{width}}  {escaped(details)}".rstrip())
 
 
@@ -56,7 +57,3 @@ def _stack(scenario: LoadedScenario) -> str:
     stacks = [view.spec.stack for view in scenario.robot_views.values()]
     names = dict.fromkeys(stack.external for stack in stacks if isinstance(stack, ExternalStackSpec))
     return f"({'stack' if len(names) == 1 else 'stacks'} {', '.join(names)})" if names else ""
-
-
-def _tags(scenario: LoadedScenario) -> str:
-    return f"[{', '.join(scenario.spec.tags)}]" if scenario.spec.tags else ""

@@ -8,14 +8,14 @@ from typing import Annotated
 import typer
 
 from simscen.bench.localization.log_evaluation import LocalizationResult, PoseErrors, compare_with_reference, localize
-from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
+from simscen.cli.diagnostics import escaped, paths_from_working_folder, print_text
 from simscen.cli.session.user_files import save
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.core.random_streams import MAX_SEED
-from simscen.loading.files.criteria_file import LoadedCriteria, load_criteria
+from simscen.loading.files.criteria_file import load_criteria
 from simscen.loading.files.discovery import default_root
 from simscen.loading.files.single_files import load_robot_file, load_world_file
 from simscen.loading.yaml.tree import value_position
@@ -74,7 +74,10 @@ def command(
     for note in log_data.notes:
         print_text(f"note: {escaped(note)}", sys.stderr)
     if picture is not None:
-        _draw(grid, localized, log_data, picture, [log, map_])
+        from simscen.report.picture.drive_plots import write_localization_picture
+
+        positions, truth = localized.poses[:, :2], log_data.truth[:, :2]
+        save(picture, lambda path: write_localization_picture(grid, positions, truth, path), [log, map_])
     cpu_ms = localized.cpu_s * 1e3 / max(1, localized.scan_count)
     print_text(f"{cpu_ms:.2f} ms of CPU time per scan", sys.stderr)
     if json_:
@@ -93,37 +96,26 @@ def _load_inputs(
 
     spec = StackSpec()
     if scenario is not None:
-        root_folder = root if root is not None else default_root([scenario])
-        try:
+        root_folder = root or default_root([scenario])
+        with paths_from_working_folder(root_folder):
             criteria = load_criteria(scenario, root_folder)
-        except InvalidInput as error:
-            raise InvalidInput(relative_to_working_folder(error.problems, root_folder)) from error
-        if not isinstance(criteria.spec.stack, StackSpec):
-            raise InvalidInput(relative_to_working_folder([_missing_localizer_problem(criteria)], root_folder))
+            if not isinstance(criteria.spec.stack, StackSpec):
+                position = value_position(criteria.tree, ("stack",))
+                hint = "name a file whose `stack` is simscen's own"
+                problem = Problem(*position, "SC016", "this stack has no simscen localizer", hint)
+                raise InvalidInput(criteria.library.with_source([problem]))
         spec = criteria.spec.stack
-    root_folder = root if root is not None else default_root([map_])
-    try:
+    root_folder = root or default_root([map_])
+    with paths_from_working_folder(root_folder):
         world = load_world_file(map_, root_folder)
-    except InvalidInput as error:
-        raise InvalidInput(relative_to_working_folder(error.problems, root_folder)) from error
     if world.map is None:
-        raise InvalidInput(
-            [Problem(str(map_), 0, 0, "SC320", "not a ROS map", "see `simscen world --help` for how to make one")]
-        )
-    root_folder = root if root is not None else (default_root([Path(robot)]) if Path(robot).exists() else Path.cwd())
-    try:
+        hint = "see `simscen world --help` for how to make one"
+        raise InvalidInput([Problem(str(map_), 0, 0, "SC320", "not a ROS map", hint)])
+    root_folder = root or (default_root([Path(robot)]) if Path(robot).exists() else Path.cwd())
+    with paths_from_working_folder(root_folder):
         file = load_robot_file(robot, root_folder)
         body = robot_from_file(file.robot, file.roots)[1]
-    except InvalidInput as error:
-        raise InvalidInput(relative_to_working_folder(error.problems, root_folder)) from error
     return spec, load_map(world.map), robot_model(body)
-
-
-def _missing_localizer_problem(criteria: LoadedCriteria) -> Problem:
-    """Return the problem that the stack of a criteria file is external, and so has no localizer of simscen."""
-    position = value_position(criteria.tree, ("stack",))
-    hint = "name a file whose `stack` is simscen's own"
-    return criteria.library.with_source([Problem(*position, "SC016", "this stack has no simscen localizer", hint)])[0]
 
 
 def _estimate(start: str | None, log_data: LocalizationLog) -> Estimate:
@@ -143,18 +135,6 @@ def _estimate(start: str | None, log_data: LocalizationLog) -> Estimate:
     if not all(abs(value) < 1e6 for value in (x, y, yaw)):
         raise UsageError(f"cannot read --start {escaped(start)}: the values are out of range")
     return Estimate(Pose2(x, y, yaw))
-
-
-def _draw(
-    grid: OccupancyGrid, localized: LocalizationResult, log_data: LocalizationLog, picture: Path, inputs: list[Path]
-) -> None:
-    from simscen.report.picture.drive_plots import write_localization_picture
-
-    save(
-        picture,
-        lambda path: write_localization_picture(grid, localized.poses[:, :2], log_data.truth[:, :2], path),
-        inputs,
-    )
 
 
 def _lines(localized: LocalizationResult, errors: PoseErrors | None, lost: float) -> list[str]:
@@ -181,13 +161,10 @@ def _document(localized: LocalizationResult, errors: PoseErrors | None, seed: in
     document: dict[str, object] = {"scans": localized.scan_count, "seed": seed, "end": localized.poses[-1].tolist()}
     if errors is None:
         return document | {"error": None}
-    over_time = [
-        list(row) for row in zip(errors.times.tolist(), errors.distance.tolist(), errors.yaw.tolist(), strict=True)
-    ]
-    lost = [{"since": interval.since, "until": interval.until} for interval in errors.lost]
+    columns = (errors.times.tolist(), errors.distance.tolist(), errors.yaw.tolist())
     return document | {
         "error": errors.figures(),
         "compared": errors.compared,
-        "error_over_time": over_time,
-        "lost": lost,
+        "error_over_time": list(zip(*columns, strict=True)),
+        "lost": [{"since": interval.since, "until": interval.until} for interval in errors.lost],
     }

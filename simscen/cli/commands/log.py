@@ -1,7 +1,6 @@
 """Command `simscen log`, which recovers damaged logs, and writes layouts for viewers."""
 
 import shlex
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -62,11 +61,7 @@ def layout(
         raise UsageError("--rviz takes no log: the RViz configuration is the same for all logs")
     text = rviz_config() if rviz else foxglove_layout(read_log(log, with_sensors=True) if log else None)
     if out is None:
-        print(text, end="", file=sys.stdout)
+        print(text, end="")
     else:
-        save(out, lambda path: _write(path, text), [log] if log else [])
+        save(out, lambda path: path.write_text(text, "utf-8"), [log] if log else [])
         print_text(escaped(str(out)))
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, "utf-8")

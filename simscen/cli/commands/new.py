@@ -9,7 +9,6 @@ import typer
 from simscen.cli import completions
 from simscen.cli.completions import shipped_scenarios
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.session.from_log import FromLogOptions, write_scenario_from_log
 from simscen.cli.session.user_files import create_file
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.version import PACKAGE
@@ -92,29 +91,33 @@ def command(
     if from_log is not None:
         if like:
             raise UsageError("--like and --from-log exclude each other")
+        from simscen.cli.session.from_log import FromLogOptions, write_scenario_from_log
+
         options = FromLogOptions(from_log, _target(name, out, from_log), map_, world, robot, truth, topic or [], root)
         write_scenario_from_log(options, verify)
         return
-    if given := [
-        option for option, value in (("--out", out), ("--map", map_), ("--world", world)) if value is not None
-    ]:
-        raise UsageError(f"{given[0]} needs --from-log")
+    for option, value in (("--out", out), ("--map", map_), ("--world", world)):
+        if value is not None:
+            raise UsageError(f"{option} needs --from-log")
     if verify or robot or truth or topic or root:
         raise UsageError("--robot, --truth, --topic, --root, and --verify need --from-log")
     if not name:
         raise UsageError("missing argument NAME")
     last = name.rpartition("/")[2]
-    if is_unusable_name(
-        next((last.removesuffix(suffix) for suffix in SCENARIO_SUFFIXES if last.endswith(suffix)), last)
-    ):
+    suffix = next((suffix for suffix in SCENARIO_SUFFIXES if last.endswith(suffix)), "")
+    if is_unusable_name(last.removesuffix(suffix)):
         raise UsageError(f"{name!r} is not a valid scenario name")
     is_base = last == DEFAULTS_FILE or last.endswith(BASE_SUFFIXES)
     if is_base and like:
         raise UsageError(f"{name!r} is a base file; --like copies only scenarios")
     file = Path(name if is_base or name.endswith(SCENARIO_SUFFIXES) else f"{name}{SCENARIO_SUFFIXES[0]}")
+    others: list[Path] = []
     with create_file(file, name):
-        written = _copy(like, file) if like else _write_starter(file, "base" if is_base else "scenario")
-    for other in written[1:]:
+        if like:
+            others = _copy(like, file)
+        else:
+            _write_starter(file, "base" if is_base else "scenario")
+    for other in others:
         print_text(f"wrote {escaped(str(other))}")
     verb = "validate" if is_base else "run"
     print_text(f"wrote {escaped(str(file))}; try: simscen {verb} {escaped(str(file))}")
@@ -130,31 +133,29 @@ def _target(name: str, out: Path | None, log: Path) -> Path:
     return Path(written if written.endswith((".yaml", ".yml")) else f"{written}{SCENARIO_SUFFIXES[0]}")
 
 
-def _write_starter(file: Path, kind: str) -> list[Path]:
-    """Write the commented scenario or base file that simscen ships, and return the written files."""
+def _write_starter(file: Path, kind: str) -> None:
+    """Write the commented scenario or base file that simscen ships. Its first line refers to a schema of the project.
+
+    The schema is searched in the folders `schemas` above the file, up to its root.
+    """
     text = (PACKAGE / "data" / f"starter.{kind}.yaml").read_text(encoding="utf-8")
-    file.write_text(_schema_comment(file, kind) + text, encoding="utf-8")
-    return [file]
-
-
-def _schema_comment(file: Path, kind: str) -> str:
-    """Return the comment with the path of the schema for editors; "" without a schema above the file in its root."""
-    root_folder = file.absolute().parent
-    root = default_root([file])
-    ancestors = [folder for folder in (root_folder, *root_folder.parents) if folder.is_relative_to(root)]
-    schema = next((one for folder in ancestors if (one := folder / "schemas" / f"{kind}.schema.json").is_file()), None)
-    return "" if schema is None else f"# yaml-language-server: $schema={os.path.relpath(schema, root_folder)}\n"
+    folder, root = file.absolute().parent, default_root([file])
+    ancestors = [one for one in (folder, *folder.parents) if one.is_relative_to(root)]
+    schemas = [one / "schemas" / f"{kind}.schema.json" for one in ancestors]
+    if schema := next((one for one in schemas if one.is_file()), None):
+        text = f"# yaml-language-server: $schema={os.path.relpath(schema, folder)}\n{text}"
+    file.write_text(text, encoding="utf-8")
 
 
 def _copy(like: str, file: Path) -> list[Path]:
-    """Copy a scenario and the files that it needs, and return the written files. Raises InvalidInput, UsageError."""
+    """Copy a scenario to `file`, and the files that it needs. Return these. Raises InvalidInput and UsageError."""
     from simscen.loading.files.copying import copy_scenario
 
     source = _source(like)
     loaded = try_variations(source, default_root([source]))
     if isinstance(loaded, list):
         raise InvalidInput(loaded)
-    return copy_scenario(loaded[-1], file, default_root([file]))  # the last variation lists the files of all
+    return copy_scenario(loaded[-1], file, default_root([file]))[1:]  # the last variation lists the files of all
 
 
 def _source(like: str) -> Path:

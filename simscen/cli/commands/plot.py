@@ -12,7 +12,7 @@ from simscen.cli.session.user_files import save
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.record.log_header import scenery_from_header
-from simscen.record.log_reader import Log, invalid_log, read_run
+from simscen.record.log_reader import invalid_log, read_run
 
 
 def command(
@@ -25,28 +25,20 @@ def command(
     at which criteria were violated. A truncated log (run.partial.mcap) is drawn up to its end. Exit code 0: drawn; 2:
     the log is unusable, or the picture cannot be written.
     """
-    file = log_file(run)
-    log = read_run(file)
-    picture = out or file.with_name("map.png")
-    _draw(log, file, picture)
-    print_text(escaped(str(picture)))
-
-
-def _draw(log: Log, file: Path, picture: Path) -> None:
     from simscen.report.picture.map_picture import write_picture
     from simscen.report.picture.scene import Scene, scene_with_robots
 
+    file = log_file(run)
+    log = read_run(file)
+    start = log.header.case.start
+    unknown_map = OccupancyGrid(np.full((1, 1), UNKNOWN, dtype=np.int8), 0.05, Pose2(start.x, start.y))
     try:
         scenery = scenery_from_header(log.header)
-        map_ = scenery.map.grid if scenery.map else log.header.map or _unknown_map(log)
+        map_ = scenery.map.grid if scenery.map else log.header.map or unknown_map
     except ValueError as error:
         raise invalid_log(file, "SC802", f"the log is damaged: {error}") from error
     scene = Scene(log.trace, log.header.case, map_, recorded_result(log, file), scenery)
     robots = {name: (one.trace, one.header.case) for name, one in log.robots.items()}
+    picture = out or file.with_name("map.png")
     save(picture, lambda path: write_picture(scene_with_robots(scene, robots), path), [file])
-
-
-def _unknown_map(log: Log) -> OccupancyGrid:
-    """Return a map with one unknown cell at the start of the robot."""
-    start = log.header.case.start
-    return OccupancyGrid(np.full((1, 1), UNKNOWN, dtype=np.int8), 0.05, Pose2(start.x, start.y))
+    print_text(escaped(str(picture)))

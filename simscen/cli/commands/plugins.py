@@ -32,7 +32,9 @@ def command(format_: Annotated[TextOrJson, typer.Option("--format", help="Output
     Lists for each package the kind, the name used in files, the class, and the first paragraph of its documentation, or
     why the type cannot be used. The command imports each type. Exit code 0: all types are usable; 3: one is not.
     """
-    listed = [_row(entry) for entry in _entries_by_package()]
+    found = [entry for kind in GROUPS for entry in plugin_types(kind)]
+    by_package = sorted([*found, *unknown_groups()], key=lambda one: (one.distribution.lower(), one.distribution))
+    listed = [_row(entry) for entry in by_package]
     if format_ is TextOrJson.JSON:
         print(json.dumps({"plugins": listed}, indent=2, ensure_ascii=False))
     else:
@@ -40,17 +42,12 @@ def command(format_: Annotated[TextOrJson, typer.Option("--format", help="Output
     sys.exit(Exit.INCOMPLETE if any(row["broken"] for row in listed) else Exit.PASSED)
 
 
-def _entries_by_package() -> list[RegisteredType]:
-    """Return the entry points of installed packages, sorted by package, then by GROUPS. Unknown groups come last."""
-    found = [entry for kind in GROUPS for entry in plugin_types(kind)]
-    return sorted([*found, *unknown_groups()], key=lambda entry: (entry.distribution.lower(), entry.distribution))
-
-
 def _row(entry: RegisteredType) -> dict[str, Any]:
     """Return the JSON data of one type. Its key `broken` is the reason why the type cannot be used; "" if it can."""
     text, broken, hint = "", "", ""
     try:
-        text = _first_paragraph(inspect.cleandoc(entry.load().__doc__ or ""))
+        first_paragraph = inspect.cleandoc(entry.load().__doc__ or "").partition("\n\n")[0]
+        text = " ".join(first_paragraph.split())
     except BrokenPlugin as error:
         broken, hint = error.why, error.hint
     return {
@@ -66,17 +63,12 @@ def _row(entry: RegisteredType) -> dict[str, Any]:
     }
 
 
-def _first_paragraph(text: str) -> str:
-    return " ".join(text.partition("\n\n")[0].split())
-
-
 def _text(listed: list[dict[str, Any]]) -> str:
     if not listed:
         return f"no plug-ins: no other package has entry points in a group `{ENTRY_POINT_PREFIX}…`"
     lines = []
-    for (package, version, folder), rows in groupby(
-        listed, lambda row: (row["package"], row["version"], row["folder"])
-    ):
+    packages = groupby(listed, lambda row: (row["package"], row["version"], row["folder"]))
+    for (package, version, folder), rows in packages:
         lines.append(escaped(f"{package} {version} ({folder})".replace("  ", " ")))
         lines += [line for row in rows for line in _lines(row)]
     return "\n".join(lines)

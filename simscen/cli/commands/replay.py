@@ -2,6 +2,7 @@
 
 import sys
 import webbrowser
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -25,8 +26,6 @@ from simscen.cli.shared_options import (
     foreign_log_options,
 )
 from simscen.core.errors import UsageError
-
-PAGE = "replay.html"
 
 
 def command(
@@ -60,6 +59,8 @@ def command(
 
     Exit code 0: written; 2: a log is unusable, or the page cannot be written; 5: no logs found.
     """
+    from simscen.report.replay import write_replay
+
     files = find_logs(runs)
     if len(files) > 1 and (against is not None or out is not None):
         option = "--against" if against is not None else "--out"
@@ -69,17 +70,12 @@ def command(
     if len(others) > 1:
         raise UsageError(f"--against takes one run, but {escaped(str(against))} contains {len(others)}")
     for file in files:
-        page = out or file.with_name(PAGE if file.name in (COMPLETE_LOG, PARTIAL_LOG) else f"{file.stem}.{PAGE}")
-        _write(judging, [file, *others], page)
+        prefix = "" if file.name in (COMPLETE_LOG, PARTIAL_LOG) else f"{file.stem}."
+        page = out or file.with_name(f"{prefix}replay.html")
+        shown = [judging.judge_for_replay(one) for one in (file, *others)]
+        save(page, partial(write_replay, runs=shown), [file, *others])
         print_text(escaped(str(page)))
         if open_:
             webbrowser.open(page.resolve().as_uri())
     for note in judging.notes:
         print_text(f"note: {escaped(note)}", sys.stderr)
-
-
-def _write(judging: LogJudge, files: list[Path], page: Path) -> None:
-    from simscen.report.replay import write_replay
-
-    runs_shown = [judging.judge_for_replay(file) for file in files]
-    save(page, lambda path: write_replay(path, runs_shown), files)

@@ -14,7 +14,7 @@ from simscen.cli.diagnostics import as_text, escaped, print_text, relative_to_wo
 from simscen.cli.session.user_files import save
 from simscen.core.errors import Exit, InvalidInput
 from simscen.loading.files.discovery import default_root
-from simscen.loading.files.single_files import RobotFile, load_robot_file
+from simscen.loading.files.single_files import load_robot_file
 
 if TYPE_CHECKING:
     from simscen.run.robot_check import DriveCheck, Motion, RobotCheckResult, Trial
@@ -46,36 +46,26 @@ def check(
 
     Exit code 0: all checks passed; 1: a check failed; 2: the robot is unusable.
     """
-    file = load_robot_file(robot, root or default_root([Path(robot)]), world_path or ())
-    root_folder = file.library.sandbox.root
-    try:
-        failed = _check_and_print(file, robot, picture, as_json)
-    except InvalidInput as error:
-        raise InvalidInput(relative_to_working_folder(file.library.with_source(error.problems), root_folder)) from error
-    if failed:
-        sys.exit(Exit.FAILED)
-
-
-def _check_and_print(file: RobotFile, argument: str, picture: Path | None, as_json: bool) -> int:
-    """Check a robot, print the result, and return the number of failed checks.
-
-    `argument` is the robot on the command line. `picture` is the file for a picture of the drives, or None.
-    """
     from simscen.cli.process import engine_output_on_stderr
     from simscen.loading.builders import robot_from_file
     from simscen.loading.checks.robot_geometry import geometry_warnings
     from simscen.run.robot_check import check_robot
 
-    spec, body = robot_from_file(file.robot, file.roots)
+    file = load_robot_file(robot, root or default_root([Path(robot)]), world_path or ())
     library = file.library
-    notes = library.with_source(geometry_warnings(file.robot, spec, body, file.roots))
+    try:
+        spec, body = robot_from_file(file.robot, file.roots)
+        notes = library.with_source(geometry_warnings(file.robot, spec, body, file.roots))
+        with engine_output_on_stderr():
+            checked = check_robot(body)
+    except InvalidInput as error:
+        problems = library.with_source(error.problems)
+        raise InvalidInput(relative_to_working_folder(problems, library.sandbox.root)) from error
     notes = relative_to_working_folder(notes, library.sandbox.root)
-    with engine_output_on_stderr():
-        checked = check_robot(body)
     if as_json:
         print(problems_as_json(notes, **as_data(body, checked)))
     else:
-        print_text("\n".join([escaped(f"{body.name} · {argument}"), *as_table(body, checked)]))
+        print_text("\n".join([escaped(f"{body.name} · {robot}"), *as_table(body, checked)]))
         if notes:
             print_text(as_text(notes))
     if picture is not None:
@@ -84,7 +74,8 @@ def _check_and_print(file: RobotFile, argument: str, picture: Path | None, as_js
         panels = [(t.name, t.command.path, t.odometry.path, t.truth.path) for t in checked.trials]
         image = draw_drives(body.name, panels, body.footprint)
         save(picture, lambda path: image.save(path, format="PNG"), [file.robot.path])
-    return checked.failed_count
+    if checked.failed_count:
+        sys.exit(Exit.FAILED)
 
 
 def as_table(body: "RobotBody", checked: "RobotCheckResult") -> Iterator[str]:
@@ -112,7 +103,8 @@ def _drive_line(trial: "Trial") -> str:
     """Return the line of one test drive."""
     motions = (trial.command, trial.odometry, trial.truth)
     driven = " ".join(f"{motion.driven:7.3f}" for motion in motions)
-    turned = " ".join(f"{_degrees(motion.turned):7.1f}" for motion in motions)
+    angles = (round(math.degrees(motion.turned), 1) + 0.0 for motion in motions)  # + 0.0 turns -0.0 into 0.0
+    turned = " ".join(f"{angle:7.1f}" for angle in angles)
     gap = trial.odometry.end.distance(trial.truth.end)
     return f"  {trial.name:9} {driven}  {turned}   {gap:7.3f} m  {math.degrees(trial.tilt):4.1f}"
 
@@ -132,19 +124,19 @@ def as_data(body: "RobotBody", checked: "RobotCheckResult") -> dict[str, Any]:
         "passed": not checked.failed_count,
         "climb": {"slope": checked.climb.slope, "step": checked.climb.step},
         "rest": asdict(checked.rest),
-        "trials": [_trial_data(trial) for trial in checked.trials],
+        "trials": [
+            {
+                "name": trial.name,
+                "command": _motion_data(trial.command),
+                "odometry": _motion_data(trial.odometry),
+                "truth": _motion_data(trial.truth),
+                "tilt": trial.tilt,
+            }
+            for trial in checked.trials
+        ],
         "checks": [{**asdict(check), "held": check.passed} for check in checked.checks],
     }
 
 
-def _trial_data(trial: "Trial") -> dict[str, Any]:
-    motions = {name: _motion_data(getattr(trial, name)) for name in ("command", "odometry", "truth")}
-    return {"name": trial.name, **motions, "tilt": trial.tilt}
-
-
 def _motion_data(motion: "Motion") -> dict[str, Any]:
     return {"driven": motion.driven, "turned": motion.turned, "end": motion.end._asdict()}
-
-
-def _degrees(angle: float) -> float:
-    return round(math.degrees(angle), 1) + 0.0  # turns -0.0 into 0.0

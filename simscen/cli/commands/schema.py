@@ -1,6 +1,7 @@
 """Command `simscen schema`, which prints or writes the JSON Schemas for editors."""
 
 from enum import Enum
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -38,7 +39,7 @@ def command(
     for each in SchemaKind:
         text = schema_text(each.value)
         file = write / f"{each.value}.schema.json"
-        save(file, lambda path, text=text: path.write_text(text, encoding="utf-8"))  # type: ignore[misc]
+        save(file, partial(Path.write_text, data=text, encoding="utf-8"))
         print_text(escaped(str(file)))
 
 

@@ -47,7 +47,7 @@ def command(
 
     Exit code 0: all files are valid; 2: a file is invalid; 5: no files found.
     """
-    root_folder = root if root is not None else default_root(paths)
+    root_folder = root or default_root(paths)
     stacks = parse_stacks(stack or [], root_folder, world_path or [])
     checker = FileChecker(
         root_folder, world_path or [], lenient, fast, picture, stacks=stacks, requires_commands=bool(stack)
@@ -56,7 +56,12 @@ def command(
     for file in discover(paths, root_folder, SUFFIXES):
         kind = file_kind(file, root_folder)
         checked.add(kind, relative_to_working_folder(_problems(kind, file, checker), root_folder))
-    _PRINTERS[format_](checked)
+    if format_ is Format.JSON:
+        print(as_json(checked.problems, valid=not checked.invalid_files, files=checked.kinds.total()))
+    else:
+        if checked.problems:
+            print_text(as_github(checked.problems) if format_ is Format.GITHUB else as_text(checked.problems))
+        print_text(checked.summary)
     if checked.invalid_files:
         sys.exit(Exit.USAGE)
 
@@ -104,23 +109,3 @@ def _count(number: int, kind: str) -> str:
     noun, of, rest = kind.partition(" of ")  # a parameter file of Nav2
     plural = "studies" if noun == "study" else f"{noun}s"
     return f"{number} {noun if number == 1 else plural}{of}{rest}"
-
-
-def _print_as_text(checked: _Checked) -> None:
-    if checked.problems:
-        print_text(as_text(checked.problems))
-    print_text(checked.summary)
-
-
-def _print_as_json(checked: _Checked) -> None:
-    print(as_json(checked.problems, valid=not checked.invalid_files, files=checked.kinds.total()))
-
-
-def _print_as_github(checked: _Checked) -> None:
-    if checked.problems:
-        print_text(as_github(checked.problems))
-    print_text(checked.summary)
-
-
-_PRINTERS = {Format.TEXT: _print_as_text, Format.JSON: _print_as_json, Format.GITHUB: _print_as_github}
-"""Function that prints the result, by output format."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from pydantic import ValidationError
 
-from simscen.cli.diagnostics import as_text, escaped, print_text, relative_to_working_folder
+from simscen.cli.diagnostics import as_text, escaped, paths_from_working_folder, print_text, relative_to_working_folder
 from simscen.cli.session.user_files import save
 from simscen.cli.shared_options import LenientOption, WorldPathOption
 from simscen.core.environment.world_model import World
@@ -123,7 +123,8 @@ def convert(
     source = load_world_file(path, root_folder, world_path or ())
     spec, changes = _convert(source, root_folder, world_path or [], lenient, height)
     if source.map is not None:
-        spec = spec.model_copy(update={"map": _relative(source.map.path, out)})
+        path_of_map = os.path.relpath(source.map.path.resolve(), out.resolve().parent)
+        spec = spec.model_copy(update={"map": Path(path_of_map).as_posix()})
     content = world_text(spec).encode()
     save(out, lambda file: write_atomically(file, content), [path])
     for change in changes:
@@ -155,15 +156,8 @@ def _convert(
 
 
 def _build(source: LoadedWorld, root_folder: Path, world_path: list[Path], lenient: bool) -> World:
-    try:
+    with paths_from_working_folder(root_folder):
         return world_from_file(source, root_folder, world_path, lenient)
-    except InvalidInput as error:
-        raise InvalidInput(relative_to_working_folder(error.problems, root_folder)) from error
-
-
-def _relative(file: Path, out: Path) -> str:
-    """Return the path of a file relative to the folder of `out`."""
-    return Path(os.path.relpath(file.resolve(), out.resolve().parent)).as_posix()
 
 
 MAX_SOLIDS = 20

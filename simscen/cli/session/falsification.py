@@ -11,7 +11,7 @@ from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.output_files import Reports, require_writable_junit
 from simscen.cli.session.pending_runs import plan_runs
-from simscen.cli.session.run_session import open_output_folder
+from simscen.cli.session.run_session import finish_session, open_output_folder
 from simscen.cli.session.selection import require_not_skipped
 from simscen.cli.session.stacks import parse_stacks
 from simscen.cli.session.terminal import Screen, open_screen
@@ -156,12 +156,11 @@ class Falsification:
                 if finished is not None and stopped is None:
                     self._save_failure(finished)
         if not self.finished_runs and stopped is None:
-            raise InvalidInput(self._problems or [self._no_valid_values()])
+            message = f"none of {self._proposed} proposed values meets the conditions in `require`"
+            raise InvalidInput(self._problems or [Problem(str(self._request.file), 0, 0, "SC016", message)])
         study = evaluate_study(self._study_plan(), (finished.result for finished in self.finished_runs))
-        written = reports.write(self.finished_runs, None, study) if self.finished_runs else True
-        wall = time.monotonic() - start
-        listen(reports.finished_event(self.finished_runs, wall, stopped is not None, None, study))
-        written = reports.write_duration(wall) and written and journal.error is None
+        is_interrupted = stopped is not None
+        written = finish_session(reports, journal, listen, self.finished_runs, start, is_interrupted, study=study)
         if stopped is not None or not written:
             return stopped or Exit.INCOMPLETE
         if study.errors:
@@ -183,11 +182,11 @@ class Falsification:
 
     def _is_done(self) -> bool:
         """Return whether one of the limits in the request is reached: failures, runs, or probability."""
-        request, bound = self._request, self._request.probability
+        request = self._request
         if len(self.found) >= request.failures or len(self.finished_runs) >= request.runs:
             return True
-        largest = self.max_failure_rate() if bound is not None else None
-        return bound is not None and largest is not None and largest <= bound
+        largest = self.max_failure_rate()
+        return request.probability is not None and largest is not None and largest <= request.probability
 
     def _make_jobs(self, points: Sequence[Point], folder: Path) -> list[Job | None]:
         """Return a job for each point (proposed values); None for values with which the scenario is invalid."""
@@ -245,38 +244,30 @@ class Falsification:
     def _save_failure(self, finished: RunFinished) -> None:
         """Write a scenario that reproduces the run, if it failed with a new signature and more failures are wanted."""
         result = finished.result
-        if result.outcome.is_good or not is_counted(result) or (new := signature(result)) in self._signatures:
+        if result.outcome.is_good or not is_counted(result) or len(self.found) >= self._request.failures:
             return
-        if len(self.found) >= self._request.failures:
+        if (new := signature(result)) in self._signatures:
             return
         self._signatures.add(new)
         variation = self._variations[result.key.variation]
         tree = with_seed(variation.tree, result.key.seed)
         comment = f"Found by simscen falsify: {self._request.file.name} fails with these values."
         text = changed_text(self._scenario.text, self._scenario.path, tree.plain, comment)
-        file = new_failure_file(self._request.file)
+        # The first free name: earlier searches may have written files beside the scenario.
+        file = next(one for k in count(1) if not (one := sibling(self._request.file, f"failure-{k}")).exists())
         write_atomically(file, text.encode())
         self.found.append(FoundFailure(file, finished, variation.values))
-
-    def _no_valid_values(self) -> Problem:
-        message = f"none of {self._proposed} proposed values meets the conditions in `require`"
-        return Problem(str(self._request.file), 0, 0, "SC016", message)
 
 
 def signature(result: RunResult) -> Signature:
     """Return the signature of a failed run."""
     failed = [verdict for verdict in result.verdicts if verdict.status is Status.FAIL]
     finding = failed[0].tightest if failed else None
-    place = None if finding is None or finding.place is None else finding.place
+    place = None if finding is None else finding.place
     square = None if place is None else (math.floor(place[0] / SQUARE_SIZE_M), math.floor(place[1] / SQUARE_SIZE_M))
     kinds = tuple(sorted({verdict.id for verdict in failed})) or ((result.error.kind,) if result.error else ())
     happened = frozenset(disturbance.disturbance.name for disturbance in result.disturbances if disturbance.fired)
     return kinds, happened, square
-
-
-def new_failure_file(scenario: Path) -> Path:
-    """Return the first free path NAME.failure-N.scenario.yaml in the folder of the scenario."""
-    return next(file for number in count(1) if not (file := sibling(scenario, f"failure-{number}")).exists())
 
 
 def summary_lines(falsification: Falsification) -> list[str]:

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from simscen.cli.diagnostics import relative_to_working_folder
+from simscen.cli.diagnostics import paths_from_working_folder, relative_to_working_folder
 from simscen.cli.session.logs import COMPLETE_LOG, PARTIAL_LOG, recorded_result
 from simscen.core.environment.costmap_filters import MaskBlocks
 from simscen.core.errors import InvalidInput, Problem
@@ -50,11 +50,9 @@ class LogJudge:
         self._file_masks: Mapping[str, MaskBlocks] | None = None
         self._criteria: LoadedCriteria | None = None
         if scenario is not None:
-            root_folder = root if root is not None else default_root([scenario])
-            try:
+            root_folder = root or default_root([scenario])
+            with paths_from_working_folder(root_folder):
                 self._criteria = load_criteria(scenario, root_folder, world_path)
-            except InvalidInput as error:
-                raise InvalidInput(relative_to_working_folder(error.problems, root_folder)) from error
 
     def judge(self, log: Path, is_only_log: bool) -> RunFinished:
         """Evaluate a log and return its result.

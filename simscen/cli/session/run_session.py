@@ -18,9 +18,10 @@ from simscen.cli.session.stacks import external_commands
 from simscen.cli.session.terminal import Screen, open_screen
 from simscen.cli.shared_options import Format, JunitFamily
 from simscen.core.errors import Exit, UsageError
-from simscen.core.records.run_result import RunKey
+from simscen.core.records.comparison import Comparison
 from simscen.core.records.run_store import RunStore
-from simscen.core.records.session_events import Listener, SessionEvent
+from simscen.core.records.session_events import Listener, RunFinished, SessionEvent
+from simscen.core.records.study import Study
 from simscen.judge.metrics.comparison import compare_stacks
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
@@ -82,27 +83,21 @@ def execute_session(request: SessionRequest, observer: Observer | None = None) -
     for scenario in scenarios:
         scenario_seeds(scenario, options)
     if request.last_failed:
-        options = replace(options, only=_last_failed(scenarios, request))
+        if request.resume is not None:
+            raise UsageError("--last-failed and --resume exclude each other")
+        only, message = failed_runs(scenarios, options, request.out)
+        print_text(f"simscen: {message}", sys.stderr)
+        options = replace(options, only=only)
     inputs = {file for each in scenarios for file in (*each.files.values(), *each.read_files)}
     require_writable_junit(request.junit, request.out or request.resume, inputs)
     folder, journal = open_output_folder(request.out, request.resume)
-    used = {"plugins": plugin_packages(plugins_of_all(scenarios)), "stacks": external_commands(scenarios)}
-    reports = Reports(folder, request.junit, request.junit_family.value, used=used)
+    reports = Reports(folder, request.junit, request.junit_family.value, used=plugins_and_stacks(scenarios))
     reports.begin()
     pending = plan_session(journal, plan_jobs(scenarios, options, folder), options.workers, request.selection.shard)
     with open_screen(request.format_, request.durations) as output:
         listeners: list[Listener] = [*([observer] if observer else []), *([LivePage(reports)] if request.open_ else [])]
         code = _run(pending, options, reports, output, listeners)
     return output.exit_code(code)
-
-
-def _last_failed(scenarios: Sequence[LoadedScenario], request: SessionRequest) -> frozenset[RunKey] | None:
-    """Print a message about --last-failed, and return the runs that the option selects; None for all runs."""
-    if request.resume is not None:
-        raise UsageError("--last-failed and --resume exclude each other")
-    only, message = failed_runs(scenarios, request.options, request.out)
-    print_text(f"simscen: {message}", sys.stderr)
-    return only
 
 
 def _run(
@@ -132,22 +127,40 @@ def _run(
     finished_runs.extend(done)
     pending.journal.complete(finished_runs)
     comparison = compare_stacks((finished.result for finished in finished_runs), pending.stacks)
-    written = reports.write(finished_runs, comparison)
-    wall = time.monotonic() - start
-    listen(reports.finished_event(finished_runs, wall, stopped is not None, comparison))
-    written = reports.write_duration(wall) and written and _check_journal(pending.journal)
+    written = finish_session(reports, pending.journal, listen, finished_runs, start, stopped is not None, comparison)
     code = exit_code(finished_runs)
     if code is Exit.NOTHING_SELECTED:
         print_text("simscen: nothing was run: all selected scenarios are skipped", sys.stderr)
     return stopped or (code if written else Exit.INCOMPLETE)
 
 
-def _check_journal(journal: Journal) -> bool:
-    """Return whether the journal is complete, and print a message if not."""
+def finish_session(
+    reports: Reports,
+    journal: Journal,
+    listen: Listener,
+    finished_runs: Sequence[RunFinished],
+    start: float,
+    is_interrupted: bool,
+    comparison: Comparison | None = None,
+    study: Study | None = None,
+) -> bool:
+    """Write the reports of a session, send its last event to `listen`, and return whether all files were written.
+
+    `start` is the value of time.monotonic() at the start of the session. Without runs, only run.json is written.
+    """
+    written = not finished_runs or reports.write(finished_runs, comparison, study)
+    wall = time.monotonic() - start
+    listen(reports.finished_event(finished_runs, wall, is_interrupted, comparison, study))
+    written = reports.write_duration(wall) and written
     if journal.error is not None:
         reason = journal.error.strerror
         print_text(f"simscen: the journal in {journal.folder} is incomplete: {reason}", sys.stderr)
-    return journal.error is None
+    return written and journal.error is None
+
+
+def plugins_and_stacks(scenarios: Sequence[LoadedScenario]) -> dict[str, object]:
+    """Return the entries of run.json about the plug-ins and external stacks that the scenarios use."""
+    return {"plugins": plugin_packages(plugins_of_all(scenarios)), "stacks": external_commands(scenarios)}
 
 
 def open_output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Journal]:

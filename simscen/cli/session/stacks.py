@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simscen.cli.diagnostics import escaped, relative_to_working_folder
+from simscen.cli.diagnostics import escaped, paths_from_working_folder
 from simscen.cli.process import caller_environment, config_file
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.external_command import ExternalCommand
@@ -148,10 +148,8 @@ def _parse_choice(text: str, root: Path, world_path: Sequence[Path], stacks: Sta
     if value.endswith(STACK_SUFFIXES) or (value.endswith(YAML_SUFFIXES) and Path(value).is_file()):
         from simscen.loading.stacks.stack_files import load_stack_file
 
-        try:
+        with paths_from_working_folder(root):
             return load_stack_file(name, value, Path(value), root, world_path)
-        except InvalidInput as error:
-            raise InvalidInput(relative_to_working_folder(error.problems, root)) from error
     return StackChoice(name, value, external_command=_command(text, value, bool(equals), stacks))
 
 

@@ -17,22 +17,20 @@ from simscen.cli.session.exit_codes import exit_code
 from simscen.cli.session.live_page import LivePage
 from simscen.cli.session.output_files import Reports, require_writable_junit
 from simscen.cli.session.pending_runs import divide_runs, plan_runs, previous_results, write_reused
-from simscen.cli.session.run_session import open_output_folder
+from simscen.cli.session.run_session import finish_session, open_output_folder, plugins_and_stacks
 from simscen.cli.session.selection import Selection, load_selection, require_not_skipped
-from simscen.cli.session.stacks import external_commands
 from simscen.cli.session.terminal import Screen, open_screen
 from simscen.cli.shared_options import Format, JunitFamily
 from simscen.core.errors import Exit, InvalidInput, Problem, UsageError
 from simscen.core.random_streams import MAX_SEED
 from simscen.core.records.run_store import RunStore
-from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
+from simscen.core.records.session_events import Listener, RunFinished, SessionEvent, SessionStarted
 from simscen.core.records.study import ClaimStatus
 from simscen.core.version import __version__
 from simscen.judge.pass_rate_claims import evaluate_claim
 from simscen.judge.study import StudyPlan, evaluate_study, in_seed_order
 from simscen.loading.files.discovery import default_root
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.plugins import plugins_of_all
 from simscen.loading.scenario import read_variation_space
 from simscen.loading.variations.conditions import ConditionError
 from simscen.loading.variations.expand import MAX_REJECTED_DRAWS, VariationSpace
@@ -41,7 +39,6 @@ from simscen.model.acceptance import PassRate
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
 from simscen.run.process.jobs import Backend, Job
-from simscen.run.reproducibility import plugin_packages
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
@@ -93,8 +90,7 @@ def execute_study(request: StudyRequest) -> Exit:
     first = study.load_first_batch()
     require_writable_junit(request.junit, request.out or request.resume, study.inputs)
     folder, journal = open_output_folder(request.out, request.resume)
-    used = {"plugins": plugin_packages(plugins_of_all(first)), "stacks": external_commands(first)}
-    reports = Reports(folder, request.junit, request.junit_family.value, used=used)
+    reports = Reports(folder, request.junit, request.junit_family.value, used=plugins_and_stacks(first))
     reports.begin()
     with open_screen(request.format_) as output, backend_of(request.options) as backend:
         return output.exit_code(study.execute(backend, journal, reports, output))
@@ -150,12 +146,11 @@ class _StudySession:
         invalid: InvalidInput | None = None
         earlier = previous_results(journal)
         title = next(iter(self._loaded.values())).id
-        live = LivePage(reports) if self._request.open_ else None
+        listeners: list[Listener] = [output, *([LivePage(reports)] if self._request.open_ else [])]
 
         def show(event: SessionEvent) -> None:
-            output(event)
-            if live is not None:
-                live(event)
+            for each in listeners:
+                each(event)
 
         def listen(event: SessionEvent) -> None:
             journal(event)
@@ -182,10 +177,7 @@ class _StudySession:
                 invalid = error
                 break
         study = evaluate_study(self._study_plan(), (finished.result for finished in finished_runs))
-        written = reports.write(finished_runs, None, study)
-        wall = time.monotonic() - start
-        listen(reports.finished_event(finished_runs, wall, stopped is not None, None, study))
-        written = reports.write_duration(wall) and written and journal.error is None
+        written = finish_session(reports, journal, listen, finished_runs, start, stopped is not None, study=study)
         if invalid is not None:
             raise invalid
         return stopped or (exit_code(finished_runs, study) if written else Exit.INCOMPLETE)

@@ -33,7 +33,7 @@ def create_file(file: Path, name: str) -> Iterator[None]:
         raise
 
 
-def save(path: Path, write: Callable[[Path], None], inputs: Iterable[Path] = ()) -> None:
+def save(path: Path, write: Callable[[Path], object], inputs: Iterable[Path] = ()) -> None:
     """Create or replace a file by calling `write` with its path.
 
     Raises UsageError if that fails, and if the file is one of the `inputs`.
