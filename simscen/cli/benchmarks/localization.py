@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from simscen.cli.benchmarks.results import print_progress
-from simscen.cli.benchmarks.tables import align_columns, fits, label_cells, wrap_lines
+from simscen.cli.benchmarks.tables import table_lines, wrap_lines
 from simscen.cli.diagnostics import print_text
 from simscen.cli.shared_options import TextOrJson
 from simscen.core.errors import NothingSelected, UsageError
@@ -93,10 +93,7 @@ def _measure_sparse_logs(numbers: range, workers: int, only: list[str] | None, f
         print(json.dumps({"logs": [asdict(trial) for trial in trials]}, indent=2))
     else:
         head, *rows = sparse_table(trials)
-        lines = align_columns([head, *rows], str.ljust)
-        columns = detect_style(sys.stdout, os.environ).columns
-        if columns is not None and not fits(lines, columns):
-            lines = [line for row in rows for line in label_cells(head, row, columns)]
+        lines = table_lines(head, rows, detect_style(sys.stdout, os.environ).columns)
         print_text("\n".join(["lost runs, median error, error at the end", *lines]))
 
 
@@ -123,10 +120,7 @@ def as_text(rows: "Sequence[ParameterSetResults]", columns: int | None = None) -
     Lines are wrapped at `columns` characters; None stands for unlimited width.
     """
     head = ("parameters", *COLUMN_NAMES.values(), "median error", "ms a scan", "slowest")
-    table = [_cells(row) for row in rows]
-    lines = align_columns([head, *table], str.ljust)
-    if columns is not None and not fits(lines, columns):
-        lines = [line for row in table for line in label_cells(head, row, columns)]
+    lines = table_lines(head, [_cells(row) for row in rows], columns)
     return "\n".join(wrap_lines([*lines, "", *(line for row in rows for line in _consistency_lines(row))], columns))
 
 
@@ -158,11 +152,7 @@ def _consistency_lines(row: "ParameterSetResults") -> list[str]:
 
     def lines(name: str, consistency: "Consistency") -> list[str]:
         low, high = consistency.bounds or (0.0, 0.0)
-        right = (
-            ""
-            if consistency.bounds is None
-            else f"; if the covariance is right on average: {low:.2f} … {high:.2f} (95 %)"
-        )
+        right = f"; if the covariance is right on average: {low:.2f} … {high:.2f} (95 %)" if consistency.bounds else ""
         pairs = zip(CHECK_TIMES_S, consistency.moments, strict=True)
         moments = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in pairs)
         low, high = consistency.moment_bounds

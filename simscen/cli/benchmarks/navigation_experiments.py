@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -66,15 +66,15 @@ class ExperimentGroup:
     name:               name of the group
     data_folder:        folder with the data; None if the option for the folder was not given
     write_experiments:  function that writes the scenario files, and returns the experiments
-    missing_hint:       message if `data_folder` is None
     other_names:        names of the experiments that do not have the name of the group
+    missing_hint:       message if `data_folder` is None
     """
 
     name: str
     data_folder: Path | None
-    write_experiments: Callable[[], Sequence[Experiment]]
-    missing_hint: str = ""
+    write_experiments: Callable[[], Iterable[Experiment]]
     other_names: Sequence[str] = ()
+    missing_hint: str = ""
 
     @property
     def missing(self) -> str:
@@ -93,43 +93,15 @@ def experiment_groups(
     with simscen's scenarios and worlds. `generated` is the folder for generated files.
     """
     worlds, scenarios = project / "worlds", project / "scenarios"
+    seeds, goals = sizes.scenario_seeds(20), sizes.numbers(sizes.goals)
     return [
-        replace(group, other_names=_other_names(group.name, scenarios))
-        for group in _groups_without_names(barn_data, nav2, worlds, scenarios, generated, sizes)
-    ]
-
-
-def _other_names(group: str, scenarios: Path) -> list[str]:
-    """Return the names of the experiments in a group that do not have the name of the group."""
-    match group:
-        case "BARN":
-            return [f"BARN, {variant}" for variant in ("default parameters", *barn.CONTROLLERS)]
-        case "narrow fields":
-            return [obstacle_fields.narrow_fields_name(margin) for margin in obstacle_fields.NARROW_MARGINS_M]
-        case "dynamic fields":
-            return [moving_cylinders.dynamic_fields_name(speed) for speed in moving_cylinders.SPEEDS_M_S]
-        case "random goals":
-            return ["random goals, ROS maps"]
-        case "degraded sensing":
-            return [f"degraded sensing, {strength}" for strength in random_goals.STRENGTHS]
-        case "two robots":
-            return ["two robots in a corridor"]
-        case "tb3_sandbox":
-            return ["tb3_sandbox, unmapped box"]
-        case "corner cases":
-            return [case.name for case in experiments.corner_cases(scenarios, ())]
-        case "localization":
-            return [f"localization, {name}" for name in localization_drives.LOCALIZATION_EXPERIMENTS]
-        case _:
-            return []
-
-
-def _groups_without_names(
-    barn_data: Path | None, nav2: Path | None, worlds: Path, scenarios: Path, generated: Path, sizes: Sizes
-) -> list[ExperimentGroup]:
-    """Return all groups, with `other_names` still empty."""
-    return [
-        ExperimentGroup("BARN", barn_data, lambda: list(_barn(generated, barn_data or Path(), sizes)), BARN_HINT),
+        ExperimentGroup(
+            "BARN",
+            barn_data,
+            lambda: _barn(generated, barn_data or Path(), sizes),
+            [f"BARN, {variant}" for variant in ("default parameters", *barn.CONTROLLERS)],
+            BARN_HINT,
+        ),
         ExperimentGroup(
             "generated fields",
             generated,
@@ -139,39 +111,50 @@ def _groups_without_names(
             "narrow fields",
             generated,
             lambda: obstacle_fields.write_narrow_fields(generated, sizes.numbers(sizes.fields // 2)),
+            [obstacle_fields.narrow_fields_name(margin) for margin in obstacle_fields.NARROW_MARGINS_M],
         ),
         ExperimentGroup(
             "dynamic fields",
             generated,
             lambda: moving_cylinders.write_dynamic_fields(generated, sizes.numbers(sizes.dynamic)),
+            [moving_cylinders.dynamic_fields_name(speed) for speed in moving_cylinders.SPEEDS_M_S],
         ),
-        ExperimentGroup("random goals", worlds, lambda: list(_random_goals(generated, worlds, sizes))),
-        ExperimentGroup("degraded sensing", worlds, lambda: _degraded(generated, worlds, sizes)),
         ExperimentGroup(
-            "ramps", generated, lambda: [generated_worlds.write_ramps(generated / "ramps", sizes.numbers(sizes.goals))]
+            "random goals", worlds, lambda: _random_goals(generated, worlds, sizes), ["random goals, ROS maps"]
         ),
+        ExperimentGroup(
+            "degraded sensing",
+            worlds,
+            lambda: _degraded(generated, worlds, sizes),
+            [f"degraded sensing, {strength}" for strength in random_goals.STRENGTHS],
+        ),
+        ExperimentGroup("ramps", generated, lambda: [generated_worlds.write_ramps(generated / "ramps", goals)]),
         ExperimentGroup(
             "two robots",
             generated,
-            lambda: [generated_worlds.write_two_robots(generated / "corridors", sizes.numbers(sizes.goals))],
+            lambda: [generated_worlds.write_two_robots(generated / "corridors", goals)],
+            ["two robots in a corridor"],
         ),
         ExperimentGroup(
             "tb3_sandbox",
             nav2,
-            lambda: experiments.write_sandbox(generated, nav2 or Path(), sizes.scenario_seeds(20)),
+            lambda: experiments.write_sandbox(generated, nav2 or Path(), seeds),
+            ["tb3_sandbox, unmapped box"],
             NAV2_HINT,
         ),
         ExperimentGroup(
             "corner cases",
             scenarios,
-            lambda: experiments.corner_cases(scenarios, sizes.scenario_seeds(20)),
+            lambda: experiments.corner_cases(scenarios, seeds),
+            [case.name for case in experiments.corner_cases(scenarios, ())],
         ),
         ExperimentGroup(
             "localization",
             worlds,
             lambda: localization_drives.write_localization_experiments(
-                generated, worlds, sizes.scenario_seeds(20), sizes.numbers(sizes.lost)
+                generated, worlds, seeds, sizes.numbers(sizes.lost)
             ),
+            [f"localization, {name}" for name in localization_drives.LOCALIZATION_EXPERIMENTS],
         ),
     ]
 
@@ -188,10 +171,9 @@ def _barn(generated: Path, barn_data: Path, sizes: Sizes) -> Iterator[Experiment
 def _random_goals(generated: Path, worlds: Path, sizes: Sizes) -> Iterator[Experiment]:
     """Write the experiments with random goals in shipped worlds, and with three goals on each generated ROS map."""
     folder, maps = generated / "random_goals", generated / "buildings"
-    yield random_goals.write_random_goals(
-        "random goals", folder, _shipped_worlds(folder, worlds), sizes.numbers(sizes.goals), (worlds.absolute(),)
-    )
-    buildings = _generated_buildings(maps, sizes.numbers(sizes.goals))
+    numbers, shipped = sizes.numbers(sizes.goals), _shipped_worlds(folder, worlds)
+    yield random_goals.write_random_goals("random goals", folder, shipped, numbers, (worlds.absolute(),))
+    buildings = _generated_buildings(maps, numbers)
     yield random_goals.write_random_goals("random goals, ROS maps", maps, buildings, range(1, 4))
 
 

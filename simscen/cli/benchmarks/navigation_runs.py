@@ -99,18 +99,14 @@ def _is_unfinished(run: RunFinished) -> bool:
     return run.result.error is not None and run.result.error.kind in UNFINISHED_KINDS
 
 
-ExperimentDrive = tuple[int, Drive]
-"""Index of an experiment in the list of experiments, and one of its drives."""
-
-
-def _plan_jobs(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], dict[RunKey, ExperimentDrive]]:
-    """Return a job for each run, and the experiment and drive of each run.
+def _plan_jobs(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], dict[RunKey, tuple[int, Drive]]]:
+    """Return a job for each run, and the index of the experiment and the drive of each run.
 
     Only the first scenario of each experiment is checked in its world. Raises InvalidInput, and ValueError for two runs
     with the same key.
     """
     jobs: list[Job] = []
-    drives: dict[RunKey, ExperimentDrive] = {}
+    drives: dict[RunKey, tuple[int, Drive]] = {}
     for number, experiment in enumerate(experiments):
         for index, drive in enumerate(experiment.drives):
             scenario = load_scenario(drive.file, experiment.root, experiment.world_path)
@@ -132,7 +128,7 @@ def _top_speed(scenario: LoadedScenario) -> float | None:
     return max(robot.top_speed for robot in robots if robot) if all(robots) else None
 
 
-def repeat_command(job: Job) -> str:
+def _repeat_command(job: Job) -> str:
     """Return the shell command that repeats a run."""
     scenario = job.scenario
     folders = [part for folder in scenario.world_path for part in ("--world-path", str(folder))]
@@ -153,10 +149,9 @@ class _Progress:
         self._done += 1
         if event.outcome is not Outcome.PASSED:
             print_progress("")
-            repeatable = replace(event, again=repeat_command(self._jobs[event.key]))
-            print_text(
-                "\n".join(plain_text(line) for line in run_lines(repeatable, RunNaming(has_seeds=True))), sys.stderr
-            )
+            repeatable = replace(event, again=_repeat_command(self._jobs[event.key]))
+            lines = run_lines(repeatable, RunNaming(has_seeds=True))
+            print_text("\n".join(map(plain_text, lines)), sys.stderr)
         print_progress(f"{self._done} of {self._total} runs" if self._done < self._total else "")
 
 

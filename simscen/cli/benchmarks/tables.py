@@ -17,16 +17,21 @@ def fits(lines: Sequence[str], columns: int | None) -> bool:
 
 def align_columns(table: Sequence[TableRow], pad: PadFunction = str.rjust) -> list[str]:
     """Return one line per row with aligned columns: the first one left-aligned, the others padded by `pad`."""
-    widths = column_widths(table)
-    return [
-        "  ".join((row[0].ljust(widths[0]), *map(pad, row[1:], widths[1:]))).rstrip()
-        for row in table
-    ]  # fmt: skip
+    widths = _column_widths(table)
+    return ["  ".join((row[0].ljust(widths[0]), *map(pad, row[1:], widths[1:]))).rstrip() for row in table]
+
+
+def table_lines(head: TableRow, rows: Sequence[TableRow], columns: int | None) -> list[str]:
+    """Return a table with left-aligned columns; if it is too wide, the lines of `label_cells` for each row."""
+    lines = align_columns([head, *rows], str.ljust)
+    if fits(lines, columns) or columns is None:
+        return lines
+    return [line for row in rows for line in label_cells(head, row, columns)]
 
 
 def two_line_rows(table: Sequence[TableRow], columns: int) -> list[str]:
     """Return two lines per row, the name of the row and the other cells, for a terminal with `columns` characters."""
-    widths = column_widths(table)[1:]
+    widths = _column_widths(table)[1:]
     gap = "  " if 2 + sum(widths) + 2 * (len(widths) - 1) <= columns else " "
     return [line for name, *rest in table for line in (name, "  " + gap.join(map(str.rjust, rest, widths)))]
 
@@ -45,6 +50,6 @@ def wrap_lines(lines: Sequence[str], columns: int | None) -> list[str]:
     return [plain_text(piece) for line in lines for piece in wrap_line((StyledText(line),), columns)]
 
 
-def column_widths(table: Sequence[TableRow]) -> list[int]:
+def _column_widths(table: Sequence[TableRow]) -> list[int]:
     """Return the width of each column of a table in characters."""
     return [max(map(len, cells)) for cells in zip(*table, strict=True)]

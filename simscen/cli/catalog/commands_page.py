@@ -1,4 +1,4 @@
-"""Sections of docs/reference/commands.md, generated from the functions of the commands."""
+"""Text of docs/reference/commands.md, generated from the functions of the commands."""
 
 import importlib
 import inspect
@@ -12,6 +12,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from typer.models import ArgumentInfo, OptionInfo
 
+from simscen.cli.main import COMMANDS
 from simscen.core.errors import Exit
 
 EXIT_CODES = {
@@ -60,6 +61,10 @@ _EXAMPLES = {
     "bench localization": "simscen bench localization --only scan_matching --buildings 3",
 }
 """Example of a command line by the name of the command, such as "world export"."""
+_COMMANDS_INTRO = """\
+This page lists every command with its options and exit codes; `simscen COMMAND --help` prints the same. To learn the
+command line by task, see [The command line](../guides/command-line.md). [Exit codes](#exit-codes) are at the end.
+"""
 _TYPE_NAMES = {int: "integer", float: "number", str: "text", Path: "path"}
 _MARKUP = re.compile(r"[*<]")
 """Characters that Markdown would interpret."""
@@ -81,6 +86,18 @@ class Parameter:
     help: str
 
 
+def commands_page() -> str:
+    """Return the text of docs/reference/commands.md."""
+    functions = {name: list(functions_of_command(name)) for name in COMMANDS}
+    rows = "\n".join(
+        f"| [`simscen {name}`](#simscen-{functions[name][0][0].replace(' ', '-')}) | {text} |"
+        for name, text in COMMANDS.items()
+    )
+    sections = [command_section(*one) for name in COMMANDS for one in functions[name]]
+    table = f"| command | what it does |\n|---|---|\n{rows}\n"
+    return "\n".join([f"# Commands\n\n{_COMMANDS_INTRO}\n{table}", *sections, exit_code_section()])
+
+
 def functions_of_command(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
     """Yield name and function of a command and of each of its subcommands. A name is, for example, "world export"."""
     module = importlib.import_module(f"simscen.cli.commands.{name}")
@@ -98,7 +115,14 @@ def functions_of_command(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
 
 def parameters_of(function: Callable[..., Any]) -> list[Parameter]:
     """Return the arguments and options of a command from its function."""
-    return [_parameter(*annotated) for annotated in _annotated_parameters(function)]
+    found = []
+    # get_type_hints cannot be used: in Python 3.10 it hides Annotated in an Optional if the default is None.
+    for parameter in inspect.signature(function, eval_str=True).parameters.values():
+        if get_origin(parameter.annotation) is Annotated:
+            kind, info = get_args(parameter.annotation)[:2]
+            if isinstance(info, ArgumentInfo | OptionInfo):
+                found.append(_parameter(parameter, kind, info))
+    return found
 
 
 def command_section(command: str, function: Callable[..., Any]) -> str:
@@ -121,26 +145,10 @@ def exit_code_section() -> str:
     return f"## Exit codes\n\n{text}\n\n| code | meaning |\n|---|---|\n{rows}\n"
 
 
-def _annotated_parameters(
-    function: Callable[..., Any],
-) -> list[tuple[inspect.Parameter, Any, ArgumentInfo | OptionInfo]]:
-    """Return each argument and option of a command with its type and its description for typer."""
-    found = []
-    # get_type_hints cannot be used: in Python 3.10 it hides Annotated in an Optional if the default is None.
-    for parameter in inspect.signature(function, eval_str=True).parameters.values():
-        annotation = parameter.annotation
-        if get_origin(annotation) is Annotated:
-            kind, info = get_args(annotation)[:2]
-            if isinstance(info, ArgumentInfo | OptionInfo):
-                found.append((parameter, kind, info))
-    return found
-
-
 def _parameter(parameter: inspect.Parameter, kind: Any, info: ArgumentInfo | OptionInfo) -> Parameter:
     repeated, kind = _item_type(kind)
     required = parameter.default is inspect.Parameter.empty
-    has_no_default = required or parameter.default is None or parameter.default is False or parameter.default == ""
-    default = "" if has_no_default else _default_text(parameter.default)
+    default = "" if required or parameter.default is None or parameter.default is False else parameter.default
     if isinstance(info, ArgumentInfo):
         name = (info.metavar or parameter.name).upper()
         spelling = f"{name}…" if repeated else name if required else f"[{name}]"
@@ -148,6 +156,7 @@ def _parameter(parameter: inspect.Parameter, kind: Any, info: ArgumentInfo | Opt
         # Within Annotated, typer stores the first name as the default.
         names = [name for name in (info.default, *(info.param_decls or ())) if isinstance(name, str)]
         spelling = ", ".join(names or [f"--{parameter.name.replace('_', '-')}"])
+    default = str(default.value if isinstance(default, Enum) else default)
     return Parameter(spelling, "" if kind is bool else _value_text(kind, info), default, info.help or "")
 
 
@@ -173,7 +182,3 @@ def _escape_markdown(text: str) -> str:
     """Escape text for a cell of a Markdown table. In code between backticks, escape only `|`."""
     parts = text.replace("|", "\\|").split("`")
     return "`".join(part if index % 2 else _MARKUP.sub(r"\\\g<0>", part) for index, part in enumerate(parts))
-
-
-def _default_text(default: Any) -> str:
-    return str(default.value if isinstance(default, Enum) else default)

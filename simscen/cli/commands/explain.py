@@ -34,7 +34,7 @@ def command(
     several meanings, all are explained; `simscen explain trigger.localization_error` selects one.
     """
     if page:
-        from simscen.cli.catalog.generate import language_page
+        from simscen.cli.catalog.language_page import language_page
 
         print_text(language_page(installed=True).rstrip())
         return
