@@ -6,6 +6,7 @@ Each completion function takes the text typed so far, and returns the values tha
 from collections.abc import Iterator
 from pathlib import Path
 
+from simscen.cli.process import config_file
 from simscen.core.version import PACKAGE
 
 
@@ -41,7 +42,6 @@ def scenarios_to_copy(incomplete: str) -> list[str]:
 
 def stacks(incomplete: str) -> list[str]:
     """Return the names of stacks that simscen, installed packages, and the user's configuration define."""
-    from simscen.cli.process import config_file
     from simscen.core.errors import SimscenError
     from simscen.loading.stacks.userconfig import load_config
     from simscen.spec.registry import all_types
@@ -70,15 +70,11 @@ def _files(incomplete: str, suffixes: tuple[str, ...]) -> Iterator[str]:
                 yield f"{parent}{slash}{path.name}"
 
 
-_SHIPPED_ROOTS = (PACKAGE / "data" / "library", PACKAGE.parent)
-"""Possible parents of the folder `scenarios`: in an installed package, and in a clone of the repository."""
-_SCENARIO_SUFFIX = ".scenario.yaml"
-
-
 def shipped_scenarios() -> dict[str, Path]:
     """Return the files of the shipped scenarios by ID, such as "navigation/goal"; {} if none are shipped."""
-    folder = next((root / "scenarios" for root in _SHIPPED_ROOTS if (root / "scenarios").is_dir()), None)
-    if folder is None:
-        return {}
-    files = sorted(folder.rglob(f"*{_SCENARIO_SUFFIX}"))
-    return {file.relative_to(folder).as_posix().removesuffix(_SCENARIO_SUFFIX): file for file in files}
+    suffix = ".scenario.yaml"
+    for root in (PACKAGE / "data" / "library", PACKAGE.parent):  # in an installed package, and in a clone
+        if (folder := root / "scenarios").is_dir():
+            files = sorted(folder.rglob(f"*{suffix}"))
+            return {file.relative_to(folder).as_posix().removesuffix(suffix): file for file in files}
+    return {}

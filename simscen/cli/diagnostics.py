@@ -102,7 +102,6 @@ def print_text(text: str, stream: TextIO | None = None) -> None:
 
 
 def _problem_text(problem: Problem) -> str:
-    """Return the lines of one problem."""
     head = f"{escaped(problem.place)}: {problem.severity}[{problem.code}] {escaped(problem.message)}"
     lines = [head, *(_excerpt(problem) if problem.source.strip() and problem.line else [])]
     if problem.hint:

@@ -45,7 +45,6 @@ def _check_requirements(all_packages: bool) -> None:
 
 
 def _exit_unusable(problems: list[str]) -> NoReturn:
-    """Print the problems of the installation, and exit with INCOMPLETE."""
     print(f"simscen: this installation does not work: {'; '.join(problems)}", file=sys.stderr)
     sys.exit(INCOMPLETE)
 

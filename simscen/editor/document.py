@@ -104,7 +104,6 @@ class Document:
         return _version(data)
 
     def _require_version(self, version: str) -> None:
-        """Raise ChangedMeanwhile if the file has another version."""
         try:
             now = _version(self.path.read_bytes())
         except OSError:

@@ -126,7 +126,6 @@ class TrialRuns:
             trial.state, trial.message = "error", one_line(str(error))
 
     def _finish(self, trial: TrialRun, result: RunResult) -> None:
-        """Write the result to `trial`."""
         lines = result.lines or (0,) * len(result.verdicts)
         for verdict, line in zip(result.verdicts, lines, strict=False):
             finding = verdict.tightest

@@ -125,7 +125,6 @@ def as_text(rows: "Sequence[ParameterSetResults]", columns: int | None = None) -
 
 
 def _cells(row: "ParameterSetResults") -> tuple[str, ...]:
-    """Return the table row of one parameter set."""
     return (
         row.parameters,
         *(_success_text(row.shares[name]) for name in COLUMN_NAMES),

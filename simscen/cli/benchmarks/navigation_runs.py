@@ -129,7 +129,6 @@ def _top_speed(scenario: LoadedScenario) -> float | None:
 
 
 def _repeat_command(job: Job) -> str:
-    """Return the shell command that repeats a run."""
     scenario = job.scenario
     folders = [part for folder in scenario.world_path for part in ("--world-path", str(folder))]
     root = ["--root", str(scenario.root)]

@@ -70,7 +70,6 @@ def read_result(file: Path) -> Result:
 
 
 def _figure(entry: dict[str, Any]) -> Measurement:
-    """Return a figure from its JSON data."""
     rounds = tuple(float(value) for value in entry["rounds"])
     return Measurement(float(entry["value"]), str(entry["unit"]), rounds, bool(entry["more_is_better"]))
 

@@ -51,5 +51,4 @@ def wrap_lines(lines: Sequence[str], columns: int | None) -> list[str]:
 
 
 def _column_widths(table: Sequence[TableRow]) -> list[int]:
-    """Return the width of each column of a table in characters."""
     return [max(map(len, cells)) for cells in zip(*table, strict=True)]

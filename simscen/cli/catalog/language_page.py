@@ -91,7 +91,6 @@ def _units_section() -> str:
 
 
 def _section(topic: Topic) -> str:
-    """Return the Markdown section of a topic."""
     parts = [f"### `{topic.name}`\n", *([f"Added by {topic.origin}.\n"] if topic.origin else []), _markdown(topic.text)]
     if topic.value:
         parts.append(f"\nValue: {topic.value}.")
@@ -113,7 +112,6 @@ def _markdown(text: str) -> str:
 
 
 def _row(field: Field) -> str:
-    """Return the row of a key in the table of a topic."""
     code = field.default if field.default == OPTIONAL else f"`{field.default}`"
     default = code if field.default else "**required**"
     kind = field.kind.replace(_SIGNAL_NAMES, "name of a [signal](signals.md)")

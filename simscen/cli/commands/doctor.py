@@ -14,6 +14,7 @@ from pathlib import Path
 from simscen.cli import installation
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.installation import CheckFailed
+from simscen.cli.process import caller_environment, config_file, engine_output_on_stderr
 from simscen.core.errors import Exit, InvalidInput, SimscenError
 
 _SCENARIO = """\
@@ -103,7 +104,6 @@ def check_cache() -> str:
 
 def check_stacks() -> str:
     """Check that the user's configuration is valid, and return the commands of its external stacks."""
-    from simscen.cli.process import caller_environment, config_file
     from simscen.loading.stacks.userconfig import load_config
 
     try:
@@ -119,8 +119,6 @@ def check_stacks() -> str:
 
 def check_speed() -> str:
     """Check that a patrol runs faster than real time, and return its speed."""
-    from simscen.cli.process import engine_output_on_stderr
-
     with engine_output_on_stderr():
         from simscen.bench.speed import run_speed
 

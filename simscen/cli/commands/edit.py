@@ -17,7 +17,6 @@ from simscen.loading.files.discovery import SCENARIO_SUFFIXES, STUDY_SUFFIXES, d
 
 if TYPE_CHECKING:
     from simscen.editor.document import EditedFile
-    from simscen.run.process.jobs import Backend
 
 SUFFIX = SCENARIO_SUFFIXES[0]
 """Suffix of a new scenario file."""
@@ -59,13 +58,15 @@ def command(
     edited, text = _edited_file(file, new, map_, root, tuple(world_path or ()), lenient)
     if stack is not None and edited.kind != "scenario":
         raise UsageError("--stack has no effect on a world, which does not run; edit a scenario")
+    from simscen.cli.session.backends import backend_of
     from simscen.cli.session.stacks import parse_stacks
     from simscen.editor.server import EditorServer
     from simscen.editor.session import EditorSession
+    from simscen.run.sessions.run_session import SessionOptions
 
     stacks = parse_stacks([] if stack is None else [stack], edited.root, edited.world_path)
     chosen = next(iter(stacks.chosen), None)
-    session = EditorSession(edited, _backend, text, lenient, chosen, stacks.with_command)
+    session = EditorSession(edited, lambda: backend_of(SessionOptions()), text, lenient, chosen, stacks.with_command)
     try:
         server = EditorServer(session, port)
     except OSError as error:
@@ -83,14 +84,6 @@ def command(
             print_text("")
         finally:
             server.stop_runs()
-
-
-def _backend() -> "Backend":
-    """Create the backend for the button Run."""
-    from simscen.cli.session.backends import backend_of
-    from simscen.run.sessions.run_session import SessionOptions
-
-    return backend_of(SessionOptions())
 
 
 def _edited_file(
@@ -114,15 +107,13 @@ def _edited_file(
     if not file.is_file():
         what = "it is not a regular file" if file.exists() else "no such file"
         raise InvalidInput([Problem(str(file), 0, 0, "SC001", what, "start a new one with --new --map office.yaml")])
-    root_folder = root if root is not None else default_root([file])
-    return _existing_file(file, root_folder, world_path), ""
+    return _existing_file(file, root or default_root([file]), world_path), ""
 
 
 def _new_file(
     file: Path | None, map_: Path, root: Path | None, world_path: tuple[Path, ...], lenient: bool
 ) -> tuple["EditedFile", str]:
     """Return a new scenario file for a map, and its text. Raises UsageError and InvalidInput."""
-    from simscen.editor.document import EditedFile
     from simscen.editor.new_scenario import new_scenario_text
 
     target = file or Path(f"{map_.name.split('.')[0]}{SUFFIX}")
@@ -132,15 +123,13 @@ def _new_file(
         raise UsageError(f"{target} already exists; edit it without --new, or choose another name")
     if not target.absolute().parent.is_dir():
         raise UsageError(f"{target.parent} is not a folder; create it first")
-    root_folder = root if root is not None else default_root([target, map_])
+    root_folder = root or default_root([target, map_])
     text = new_scenario_text(target, map_, root_folder, world_path, lenient)
-    edited = EditedFile(_real_path(target), "scenario", _real_folder(root_folder), world_path)
-    return _require_inside(edited, target), text
+    return _edited(target, "scenario", root_folder, world_path), text
 
 
 def _existing_file(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
     """Return an existing scenario, study, or world file. Raises InvalidInput for other files."""
-    from simscen.editor.document import EditedFile
     from simscen.loading.checks.files import file_kind
     from simscen.loading.files.assets import SDF_SUFFIXES
 
@@ -149,25 +138,20 @@ def _existing_file(file: Path, root: Path, world_path: tuple[Path, ...]) -> "Edi
         hint = "edit takes a scenario or a *.world.yaml; for other maps use: simscen edit --new --map FILE"
         message = f"is a {'Gazebo world' if kind == 'world' else f'{kind} file'}"
         raise InvalidInput([Problem(str(file), 0, 0, "SC001", message, hint)])
-    return _require_inside(EditedFile(_real_path(file), kind, _real_folder(root), world_path), file)
+    return _edited(file, kind, root, world_path)
 
 
-def _require_inside(edited: "EditedFile", file: Path) -> "EditedFile":
-    """Return `edited`. Raises InvalidInput if `file`, the path as typed by the user, is outside of the root and world
-    path."""
+def _edited(file: Path, kind: str, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
+    """Return a file with absolute paths. Raises InvalidInput if it is outside of the root and world path.
+
+    Symbolic links of folders are resolved, but not of the file itself.
+    """
+    from simscen.editor.document import EditedFile
     from simscen.loading.files.paths import PathSandbox
 
+    path = Path(os.path.realpath(file.parent)) / file.name
+    edited = EditedFile(path, kind, Path(os.path.realpath(root)), world_path)
     entered = PathSandbox.around(edited.root, edited.world_path).resolve_argument(file)
     if isinstance(entered, Problem):
         raise InvalidInput([entered])
     return edited
-
-
-def _real_path(file: Path) -> Path:
-    """Return the absolute path of a file. Resolve symbolic links of its folder, but not of the file itself."""
-    return Path(os.path.realpath(file.parent)) / file.name
-
-
-def _real_folder(folder: Path) -> Path:
-    """Return the absolute path of a folder with all symbolic links resolved."""
-    return Path(os.path.realpath(folder))

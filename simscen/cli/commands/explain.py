@@ -82,7 +82,6 @@ def _overview(width: int) -> str:
 
 
 def _topic_text(topic: Topic, width: int) -> str:
-    """Return the text about one topic."""
     kind = f"{topic.group} of {topic.origin}" if topic.origin else topic.group
     paragraphs = [_wrapped_paragraph(paragraph, width) for paragraph in topic.text.split("\n\n")]
     parts = [f"{topic.name} ({kind})", "\n\n".join(paragraphs)]
@@ -96,7 +95,6 @@ def _topic_text(topic: Topic, width: int) -> str:
 
 
 def _field(field: Field, width: int) -> str:
-    """Return the lines about one key."""
     needed = "required" if not field.default else "" if field.default == OPTIONAL else f"default {field.default}"
     head = f"  {field.key}: {field.kind}" + (f" ({needed})" if needed else "")
     return "\n".join([head, _wrapped(field.text, width, "      ")]) if field.text else head

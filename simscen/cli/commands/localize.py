@@ -157,7 +157,6 @@ def _lines(localized: LocalizationResult, errors: PoseErrors | None, lost: float
 
 
 def _document(localized: LocalizationResult, errors: PoseErrors | None, seed: int) -> dict[str, object]:
-    """Return the JSON output of --json."""
     document: dict[str, object] = {"scans": localized.scan_count, "seed": seed, "end": localized.poses[-1].tolist()}
     if errors is None:
         return document | {"error": None}

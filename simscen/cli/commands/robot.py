@@ -11,6 +11,7 @@ import typer
 
 from simscen.cli.diagnostics import as_json as problems_as_json
 from simscen.cli.diagnostics import as_text, escaped, print_text, relative_to_working_folder
+from simscen.cli.process import engine_output_on_stderr
 from simscen.cli.session.user_files import save
 from simscen.core.errors import Exit, InvalidInput
 from simscen.loading.files.discovery import default_root
@@ -46,7 +47,6 @@ def check(
 
     Exit code 0: all checks passed; 1: a check failed; 2: the robot is unusable.
     """
-    from simscen.cli.process import engine_output_on_stderr
     from simscen.loading.builders import robot_from_file
     from simscen.loading.checks.robot_geometry import geometry_warnings
     from simscen.run.robot_check import check_robot
@@ -100,7 +100,6 @@ def as_table(body: "RobotBody", checked: "RobotCheckResult") -> Iterator[str]:
 
 
 def _drive_line(trial: "Trial") -> str:
-    """Return the line of one test drive."""
     motions = (trial.command, trial.odometry, trial.truth)
     driven = " ".join(f"{motion.driven:7.3f}" for motion in motions)
     angles = (round(math.degrees(motion.turned), 1) + 0.0 for motion in motions)  # + 0.0 turns -0.0 into 0.0

@@ -128,35 +128,36 @@ def command(
         topics = TopicNames(namespace, remap or [])
     except AdapterError as error:
         raise UsageError(str(error)) from error
-    parameters = _read_parameters(params) if params is not None else None
+    parameters = None if params is None else read_nav2_parameters(params)
+    if isinstance(parameters, list):
+        raise InvalidInput(relative_to_working_folder(parameters, Path.cwd()))
     if SOCKET_VARIABLE not in os.environ:
         names = PublishedNames([topics("/scan")], topics("/odom"), base_frames, topics.namespace)
         _check_parameters(what, parameters, names)
         return
     options = {
-        **{"launch": launch, "domain": domain, "namespace": namespace, "remap": remap or [], "without": without or []},
-        **{"frame": frame or [], "base_frame": base_frame},
-        **{"goals": goals.value, "sync": sync.value, "factor": factor, "rounds": rounds},
-        **{
-            "wait": wait,
-            "warm_up": warm_up,
-            "ready": ready,
-            "settle": settle,
-            "answer": answer,
-            "wall_time": wall_time,
-        },
+        "launch": launch,
+        "domain": domain,
+        "namespace": namespace,
+        "remap": remap or [],
+        "without": without or [],
+        "frame": frame or [],
+        "base_frame": base_frame,
+        "goals": goals.value,
+        "sync": sync.value,
+        "factor": factor,
+        "rounds": rounds,
+        "wait": wait,
+        "warm_up": warm_up,
+        "ready": ready,
+        "settle": settle,
+        "answer": answer,
+        "wall_time": wall_time,
         "nav2": what is GraphKind.NAV2,
         "parameters": parameters.nodes if parameters is not None else None,
         "parameter_file": str(params) if params is not None else "",
     }
     _execute_adapter(python or _find_python(), options)
-
-
-def _read_parameters(params: Path) -> Nav2Parameters:
-    parameters = read_nav2_parameters(params)
-    if isinstance(parameters, list):
-        raise InvalidInput(relative_to_working_folder(parameters, Path.cwd()))
-    return parameters
 
 
 def _check_parameters(kind: GraphKind, parameters: Nav2Parameters | None, names: PublishedNames) -> None:

@@ -31,12 +31,12 @@ from simscen.cli.shared_options import (
     WorldPathOption,
 )
 from simscen.core.errors import Exit, UsageError
-from simscen.core.records.run_result import RunKey, RunResult
+from simscen.core.records.run_result import RunResult
 from simscen.loading.files.discovery import default_root, sibling
 from simscen.loading.reduction import changed_values, removed_parts
 from simscen.loading.scenario import ChangedScenario
 from simscen.loading.yaml.rewriting import changed_text
-from simscen.loading.yaml.tree import Keys, MappingNode, Node, child
+from simscen.loading.yaml.tree import Keys, MappingNode, Node, SequenceNode, child
 from simscen.report.journal_reader import JOURNAL_FILE, PlannedRun, read_journal
 from simscen.run.sessions.output_folder import RUNS_FOLDER, write_atomically
 from simscen.run.sessions.results import display_path
@@ -91,7 +91,7 @@ def command(
     not fail; 3: the run could not be completed.
     """
     chosen = _chosen_run(run, seed, variation, stack)
-    root_folder = root if root is not None else default_root([chosen.file])
+    root_folder = root or default_root([chosen.file])
     stacks = parse_stacks([] if chosen.stack is None else [chosen.stack], root_folder, world_path or ())
     scenario = ChangedScenario(
         chosen.file, root_folder, world_path or (), next(iter(stacks.chosen), None), chosen.variation
@@ -113,7 +113,9 @@ def command(
     except BudgetSpent as error:
         count = "1 run is" if runs == 1 else f"{runs} runs are"
         raise UsageError(f"{count} not enough to reproduce the failure; increase --runs") from error
-    comment = _comment(chosen, shrinker, first_seed)
+    source = f"{chosen.file.name}, seed {first_seed}" + (f", {chosen.variation}" if chosen.variation else "")
+    failure = shrinker.failure.verdict_id or "an error of the stack"
+    comment = f"The smallest scenario that simscen shrink found to fail in {failure}, from {source}."
     text = changed_text(scenario.text, scenario.path, shrinker.tree.plain, comment)
     save(target, lambda file: write_atomically(file, text.encode()))
     _print_summary(shrinker, before, target, chosen.stack)
@@ -148,15 +150,10 @@ def _planned_run(folder: Path) -> PlannedRun:
     for session in folder.parents:
         if (session / JOURNAL_FILE).is_file():
             inside = folder.relative_to(session / RUNS_FOLDER).as_posix()
-            found = [one for one in read_journal(session).planned if _folder_name(one.key) == inside]
-            if found:
-                return found[0]
+            for planned in read_journal(session).planned:
+                if f"{planned.key.scenario}/{planned.key.folder}" == inside:
+                    return planned
     raise UsageError(f"{folder} is not the folder of a run, such as simscen-out/latest/runs/NAME/seed-1")
-
-
-def _folder_name(key: RunKey) -> str:
-    """Return the folder of a run relative to RUNS_FOLDER."""
-    return f"{key.scenario}/{key.folder}"
 
 
 def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: bool) -> tuple[Shrinker, MappingNode]:
@@ -177,7 +174,9 @@ def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: 
             tree = inline
     shrinker = Shrinker(candidates, failure, tree)
     if sys.stderr.isatty():
-        candidates.report = lambda: _show_progress(candidates.runs, _size(shrinker.tree))
+        candidates.report = lambda: print(
+            f"\r{candidates.runs} runs, {_size(shrinker.tree)} values left \x1b[K", end="", file=sys.stderr, flush=True
+        )
     if candidates.first_accepted([tree], failure.occurs_in) is None:
         raise UsageError("the run no longer fails if only this criterion is kept; this is a bug in simscen")
     nominal = {change.target.keys: _value_at(scenario.base_tree, change.target.keys) for change in scenario.changes}
@@ -185,12 +184,6 @@ def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: 
     if sys.stderr.isatty():
         print_text("", sys.stderr)
     return shrinker, tree
-
-
-def _show_progress(runs: int, size: int) -> None:
-    """Replace the progress line on stderr. `size` is the number of values in the scenario."""
-    sys.stderr.write(f"\r{runs} runs, {size} values left \x1b[K")
-    sys.stderr.flush()
 
 
 def _value_at(tree: MappingNode, keys: Keys) -> Node | None:
@@ -203,16 +196,9 @@ def _value_at(tree: MappingNode, keys: Keys) -> Node | None:
 
 def _size(node: Node) -> int:
     """Return the number of scalar values in a YAML tree."""
-    plain, count = [node.plain], 0
-    while plain:
-        value = plain.pop()
-        if isinstance(value, dict):
-            plain += value.values()
-        elif isinstance(value, list):
-            plain += value
-        else:
-            count += 1
-    return count
+    if isinstance(node, MappingNode):
+        return sum(_size(entry.value) for entry in node.entries.values())
+    return sum(map(_size, node.items)) if isinstance(node, SequenceNode) else 1
 
 
 def _failure_text(result: RunResult, failure: Failure) -> str:
@@ -222,13 +208,6 @@ def _failure_text(result: RunResult, failure: Failure) -> str:
     verdict = next(one for one in result.verdicts if one.id == failure.verdict_id)
     finding = verdict.tightest
     return verdict.id if finding is None else f"{verdict.id}: {finding.measured} (limit {finding.limit})"
-
-
-def _comment(chosen: ChosenRun, shrinker: Shrinker, seed: int) -> str:
-    """Return the comment at the top of the written scenario."""
-    source = f"{chosen.file.name}, seed {seed}" + (f", {chosen.variation}" if chosen.variation else "")
-    failure = shrinker.failure.verdict_id or "an error of the stack"
-    return f"The smallest scenario that simscen shrink found to fail in {failure}, from {source}."
 
 
 def _print_summary(shrinker: Shrinker, before: MappingNode, target: Path, stack: str | None) -> None:

@@ -112,7 +112,7 @@ class Falsification:
     def __init__(self, request: FalsifyRequest) -> None:
         """Read the scenario and its ranges. Raises InvalidInput and UsageError."""
         self._request = request
-        root_folder = request.root if request.root is not None else default_root([request.file])
+        root_folder = request.root or default_root([request.file])
         stacks = parse_stacks([] if request.stack is None else [request.stack], root_folder, request.world_path)
         choice = next(iter(stacks.chosen), None)
         self._scenario = ChangedScenario(request.file, root_folder, request.world_path, choice, None)

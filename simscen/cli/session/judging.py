@@ -61,11 +61,7 @@ class LogJudge:
         UnusableScenario if the criteria file is invalid.
         """
         try:
-            return (
-                self._judge_simscen_log(log)
-                if _may_be_simscen_log(log) and is_simscen_log(log)
-                else self._judge_foreign(log)
-            )
+            return self._judge_simscen_log(log) if _is_own_log(log) else self._judge_foreign(log)
         except InvalidInput as error:
             if is_only_log or isinstance(error, UnusableScenario):
                 raise
@@ -79,7 +75,7 @@ class LogJudge:
 
     def judge_for_replay(self, log: Path) -> tuple[Log, RunResult]:
         """Return a log with its sensor data, and its result. Raises InvalidInput if the log is unusable."""
-        if _may_be_simscen_log(log) and is_simscen_log(log):
+        if _is_own_log(log):
             read = read_run(log, with_sensors=True)
             return read, recorded_result(read, log) if self._criteria is None else self._judge_simscen_log(log).result
         self.foreign_count += 1
@@ -111,18 +107,19 @@ class LogJudge:
     def _judge_robot(self, log: Path, read: Log, robot: str) -> RunFinished:
         """Evaluate the part of a log about one robot. `robot` is its name; "" for the only robot."""
         header, case = read.header, read.header.case
-        key = header.key
         if self._criteria is None:
             spec = criteria_of_text(header.scenario, str(log), header.facts, robot)
             expected = expected_failure(spec)
-            result = judge_run(key, str(log), spec.pass_, read.trace, case, (), read.coverage, spec.metrics, expected)
+            result = judge_run(
+                header.key, str(log), spec.pass_, read.trace, case, (), read.coverage, spec.metrics, expected
+            )
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
         with _scenario_errors(self._criteria):
             criteria = self._criteria.for_robot(robot)
         # The disturbances are in the scenario of the log, at lines that the criteria file does not have.
         case = replace(case, disturbances=tuple(replace(disturbance, line=0) for disturbance in case.disturbances))
         case = replace(case, masks={**case.masks, **self._masks(criteria)})
-        return self._judge_by_file(log, key, read.trace, case, read.coverage, criteria)
+        return self._judge_by_file(log, header.key, read.trace, case, read.coverage, criteria)
 
     def _judge_foreign(self, log: Path) -> RunFinished:
         self.foreign_count += 1
@@ -185,9 +182,9 @@ def _not_judged(log: Path, failure: RunFailure) -> RunFinished:
     )
 
 
-def _may_be_simscen_log(log: Path) -> bool:
-    """Return whether a log has a file type that simscen writes."""
-    return not log.is_dir() and log.suffix not in (".db3", ".bag")
+def _is_own_log(log: Path) -> bool:
+    """Return whether simscen wrote a log. It writes no folders, and no files of the rosbag formats."""
+    return not log.is_dir() and log.suffix not in (".db3", ".bag") and is_simscen_log(log)
 
 
 class UnusableScenario(InvalidInput):

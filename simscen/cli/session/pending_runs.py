@@ -65,9 +65,19 @@ def plan_session(journal: Journal, jobs: Sequence[Job], workers: int, shard: tup
 
 def plan_runs(jobs: Sequence[Job]) -> list[PlannedRun]:
     """Return the runs of these jobs as entries of the journal."""
-    scenarios = {_job_identity(job): job.scenario for job in jobs}
-    digests = {identity: scenario_digests(scenario) for identity, scenario in scenarios.items()}
-    return [_planned_run(job, digests[_job_identity(job)]) for job in jobs]
+    planned = []
+    digests: dict[tuple[str, str, str], ScenarioDigests] = {}
+    for job in jobs:
+        scenario, seed = job.scenario, job.key.seed
+        identity = (scenario.id, scenario.variation, scenario.stack_name)
+        if identity not in digests:
+            digests[identity] = scenario_digests(scenario)
+        digest, file, again = digests[identity], display_path(scenario.file), repeat_command(scenario, seed)
+        run = PlannedRun(
+            job.key, scenario.path, digest.run, again, file, scenario.stack, digest.definition, scenario.varied_values
+        )
+        planned.append(run)
+    return planned
 
 
 def divide_runs(
@@ -95,15 +105,6 @@ def write_reused(journal: Journal, reused: Sequence[RunFinished]) -> None:
         journal(finished)
     if journal.error:
         raise UsageError(f"cannot write the journal in {journal.folder}: {journal.error.strerror}")
-
-
-def _planned_run(job: Job, digests: ScenarioDigests) -> PlannedRun:
-    scenario = job.scenario
-    again = repeat_command(scenario, job.key.seed)
-    file, stack = display_path(scenario.file), scenario.stack
-    return PlannedRun(
-        job.key, scenario.path, digests.run, again, file, stack, digests.definition, scenario.varied_values
-    )
 
 
 def previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:
@@ -143,11 +144,6 @@ def _compared_index(jobs: Sequence[Job], number: int) -> int:
     return number
 
 
-def _job_identity(job: Job) -> tuple[str, str, str]:
-    """Return scenario id, variation, and stack name of a job."""
-    return job.scenario.id, job.scenario.variation, job.scenario.stack_name
-
-
 RUN_ALL = "all selected scenarios run"
 """Last words of a message of --last-failed if all selected scenarios run."""
 
@@ -167,16 +163,15 @@ def failed_runs(
     if not failed:
         return None, f"no run in {sessions_folder} failed when it last ran: {RUN_ALL}"
     selected = {(scenario.title, scenario.stack_name): scenario for scenario in scenarios if scenario.spec.skip is None}
-    found = frozenset(key for key in failed if _is_selected(key, selected.get((key.test, key.stack_name)), options))
+    any_seed = options.seed is None and options.repeat == 1
+    found = frozenset(
+        key
+        for key in failed
+        if (scenario := selected.get((key.test, key.stack_name))) is not None
+        and (any_seed or key.seed in scenario_seeds(scenario, options))
+    )
     missing = len(failed) - len(found)
     text = f"{number_with_noun(len(failed), 'run')} failed when last run"
     if not found:
         return None, f"{text}, but none is selected: {RUN_ALL}"
     return found, text + (f": {len(found)} selected, {missing} not" if missing else "")
-
-
-def _is_selected(key: RunKey, scenario: LoadedScenario | None, options: SessionOptions) -> bool:
-    """Return whether the scenario of a run is selected (not None), and the options include the seed of the run."""
-    if scenario is None:
-        return False
-    return (options.seed is None and options.repeat == 1) or key.seed in scenario_seeds(scenario, options)

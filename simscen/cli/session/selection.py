@@ -154,7 +154,7 @@ def load_selection(
     is skipped, or invalid if `paths` contains its file. Raises InvalidInput if a file below `paths` is invalid, and
     NothingSelected if no scenario is selected.
     """
-    root_folder = root if root is not None else default_root(paths)
+    root_folder = root or default_root(paths)
     checker = FileChecker(root_folder, world_path, lenient, stacks=parse_stacks(stacks, root_folder, world_path))
     choices = checker.choices
     loaded: dict[str, list[LoadedScenario]] = {}

@@ -109,7 +109,7 @@ class CandidateRuns:
 
     def results(self, trees: Sequence[MappingNode]) -> list[RunResult | None]:
         """Run candidates, and return their results; None for an invalid candidate. Raises BudgetSpent and Stopped."""
-        keys = [_content_key(tree) for tree in trees]
+        keys = [hashlib.sha256(json.dumps(tree.plain, sort_keys=True).encode()).hexdigest() for tree in trees]
         new = {key: tree for key, tree in zip(keys, trees, strict=True) if key not in self._results}
         loaded = {key: self.load(tree) for key, tree in new.items()}
         valid = {key: scenario for key, scenario in loaded.items() if scenario is not None}
@@ -143,11 +143,6 @@ class CandidateRuns:
         return [results[job.key] for job in jobs]
 
 
-def _content_key(tree: MappingNode) -> str:
-    """Return a hash of the data in a YAML tree."""
-    return hashlib.sha256(json.dumps(tree.plain, sort_keys=True).encode()).hexdigest()
-
-
 MAX_ROUNDS = 3
 """Maximum number of rounds. Each round removes parts, and then rounds numbers."""
 
@@ -171,14 +166,10 @@ class Failure:
             return result.error is not None and result.error.by_stack
         if result.outcome is not Outcome.FAILED:
             return False
-        failed = [
-            verdict
-            for verdict in result.verdicts
-            if verdict.criterion == self.criterion and verdict.status is Status.FAIL
-        ]
-        margins = [smallest_margin(one) for one in failed]
+        failed = [one for one in result.verdicts if one.criterion == self.criterion and one.status is Status.FAIL]
         if self.max_margin is None:
             return bool(failed)
+        margins = map(_smallest_margin, failed)
         return any(margin is not None and margin <= self.max_margin for margin in margins)
 
 
@@ -232,7 +223,6 @@ class Shrinker:
             depth += 1
 
     def _round(self) -> None:
-        """Round numbers to as few digits as possible."""
         for digits in range(1, MAX_DIGITS + 1):
             before, changes = self.tree, find_roundings(self.tree, digits)
 
@@ -267,16 +257,14 @@ def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
         names = ", ".join(one.id for one in failed)
         reason = f"did not fail in {criterion}, but in {names}" if failed else f"did not fail: {result.outcome.value}"
         raise UsageError(f"the run {reason}")
-    margin = smallest_margin(chosen)
+    margin = _smallest_margin(chosen)
     return Failure(chosen.criterion, chosen.id, None if margin is None or margin >= 0.0 else share * margin)
 
 
-def smallest_margin(verdict: Verdict) -> float | None:
+def _smallest_margin(verdict: Verdict) -> float | None:
     """Return the smallest margin of a verdict's failed findings (checked bounds); None without margins."""
-    margins = [
-        finding.margin for finding in verdict.findings if finding.status is Status.FAIL and finding.margin is not None
-    ]
-    return min(margins, default=None)
+    failed = [finding for finding in verdict.findings if finding.status is Status.FAIL]
+    return min((finding.margin for finding in failed if finding.margin is not None), default=None)
 
 
 def with_only_failed_criterion(tree: MappingNode, failure: Failure, seed: int) -> MappingNode:

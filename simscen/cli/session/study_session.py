@@ -101,7 +101,7 @@ class _StudySession:
 
     def __init__(self, request: StudyRequest) -> None:
         self._request = request
-        self._root_folder = request.root if request.root is not None else default_root([request.file])
+        self._root_folder = request.root or default_root([request.file])
         space = read_variation_space(request.file, self._root_folder, request.world_path)
         self._space = space if space is not None and space.blocks else None
         self._is_random = self._space is None or self._space.is_random

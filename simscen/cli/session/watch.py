@@ -30,15 +30,14 @@ FileStamps = dict[Path, tuple[int, int, int] | None]
 
 def file_stamps(files: Iterable[Path]) -> FileStamps:
     """Return the stamps of the files."""
-    return {file: _stamp(file) for file in files}
-
-
-def _stamp(file: Path) -> tuple[int, int, int] | None:
-    try:
-        status = file.stat()
-    except OSError:
-        return None
-    return status.st_mtime_ns, status.st_size, status.st_ino
+    stamps: FileStamps = {}
+    for file in files:
+        try:
+            status = file.stat()
+            stamps[file] = status.st_mtime_ns, status.st_size, status.st_ino
+        except OSError:
+            stamps[file] = None
+    return stamps
 
 
 class WatchReporter:
@@ -165,7 +164,9 @@ def watch_session(request: SessionRequest) -> int:
     state = WatchState(lambda: discover(request.paths, root_folder), request.paths)
     code, seen = _run_in_child(replace(request, root=root_folder), state)
     while code not in INTERRUPTED_CODES:
-        _print_status(state)
+        keys = f"a = run all, f = run those that did not pass ({len(state.failed)}), q = quit"
+        print_text(f"watching {len(state.files)} files of {len(state.scenarios)} scenarios: {keys}")
+        sys.stdout.flush()
         files = _wait_for_changes(state, seen)
         if files is None:
             break
@@ -191,31 +192,18 @@ def _run_in_child(request: SessionRequest, state: WatchState) -> tuple[int, File
                 report.invalid_files(error.problems)
                 raise
     os.close(writing)
-    with _ignore_interrupts(), os.fdopen(reading, encoding="utf-8") as lines:
-        state.begin(request.paths)
-        for line in lines:
-            state.update(line)
-        code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)  # the child process handles Ctrl-C
+    try:
+        with os.fdopen(reading, encoding="utf-8") as lines:
+            state.begin(request.paths)
+            for line in lines:
+                state.update(line)
+            code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    finally:
+        signal.signal(signal.SIGINT, handler)
     state.end(code)
     now = file_stamps(state.files)
     return code, {**now, **{file: stamp for file, stamp in stamps_before.items() if file in now}}
-
-
-@contextmanager
-def _ignore_interrupts() -> Iterator[None]:
-    """Ignore Ctrl-C in this process within the context. The child process handles Ctrl-C."""
-    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)
-
-
-def _print_status(state: WatchState) -> None:
-    failed = len(state.failed)
-    keys = f"a = run all, f = run those that did not pass ({failed}), q = quit"
-    print_text(f"watching {len(state.files)} files of {len(state.scenarios)} scenarios: {keys}")
-    sys.stdout.flush()
 
 
 def _wait_for_changes(state: WatchState, seen: FileStamps) -> Sequence[Path] | None:
@@ -235,18 +223,15 @@ def _wait_for_changes(state: WatchState, seen: FileStamps) -> Sequence[Path] | N
             now = file_stamps(state.files)
             if now == seen:
                 continue
-            while (later := _stamps_after_pause(state)) != now:
-                now = later
+            settled: FileStamps = {}
+            while settled != now:  # wait until no more files are written
+                settled = now
+                select.select([], [], [], POLL_INTERVAL_S)
+                now = file_stamps(state.files)
             changed = {file for file in {*now, *seen} if now.get(file) != seen.get(file)}
             seen = now
             if affected := state.scenarios_to_run(changed):
                 return affected
-
-
-def _stamps_after_pause(state: WatchState) -> FileStamps:
-    """Wait for POLL_INTERVAL_S, and return the stamps of the files."""
-    select.select([], [], [], POLL_INTERVAL_S)
-    return file_stamps(state.files)
 
 
 @contextmanager

@@ -68,7 +68,6 @@ def insert_item(text: str, sequence: SourceNode, value: Any, index: int | None =
 
 
 def _dash_before(text: str, start: int) -> int:
-    """Return the position of the dash before the list item that starts at `start`."""
     return text.rfind("-", 0, start)
 
 
@@ -102,7 +101,6 @@ def _separator(text: str, items: Sequence[SourceNode]) -> str:
 
 
 def _has_blank_line(text: str, start: int, end: int) -> bool:
-    """Return whether there is a blank line between the positions `start` and `end`."""
     return any(not line.strip() for line in text[start:end].split("\n")[1:-1])
 
 

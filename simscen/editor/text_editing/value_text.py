@@ -102,7 +102,6 @@ def is_same_value(found: Any, wanted: Any) -> bool:
 
 
 def _quoted_text(text: str) -> str:
-    """Return a text in double quotes."""
     return _UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", json.dumps(text, ensure_ascii=False))
 
 
