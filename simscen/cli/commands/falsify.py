@@ -10,6 +10,7 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
 from simscen.cli.session.falsification import FalsifyRequest, execute_search, summary_lines
+from simscen.cli.session.output_files import OutputOptions
 from simscen.cli.shared_options import (
     Format,
     FormatOption,
@@ -98,10 +99,7 @@ def command(
         world_path or [],
         lenient,
         stack,
-        out,
-        junit,
-        junit_family,
-        format_,
+        OutputOptions(out, None, junit, junit_family, format_, False),
     )
     code, falsification = execute_search(request)
     if format_ is not Format.JSON:

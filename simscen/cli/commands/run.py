@@ -9,6 +9,7 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
+from simscen.cli.session.output_files import OutputOptions
 from simscen.cli.session.run_session import SessionRequest, execute_session
 from simscen.cli.session.selection import Selection, scenario_times, shard_of
 from simscen.cli.session.stacks import STACK_HELP
@@ -154,13 +155,8 @@ def command(
         world_path or [],
         lenient,
         stack or [],
-        out,
-        resume,
-        junit,
-        junit_family,
-        format_,
+        OutputOptions(out, resume, junit, junit_family, format_, open_),
         durations,
         last_failed,
-        open_,
     )
     sys.exit(watch_session(request) if watch else execute_session(request))

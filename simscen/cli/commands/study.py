@@ -8,6 +8,7 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
+from simscen.cli.session.output_files import OutputOptions
 from simscen.cli.session.study_session import StudyRequest, execute_study
 from simscen.cli.shared_options import (
     Format,
@@ -91,11 +92,6 @@ def command(
         world_path or [],
         lenient,
         stack,
-        out,
-        resume,
-        junit,
-        junit_family,
-        format_,
-        open_,
+        OutputOptions(out, resume, junit, junit_family, format_, open_),
     )
     sys.exit(execute_study(request))

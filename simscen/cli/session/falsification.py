@@ -3,19 +3,18 @@
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.file_checks import FileChecker
-from simscen.cli.session.output_files import Reports, require_writable_junit
+from simscen.cli.session.output_files import OutputOptions, Reports
 from simscen.cli.session.pending_runs import plan_runs
-from simscen.cli.session.run_session import finish_session, open_output_folder
+from simscen.cli.session.run_session import finish_session, start_session
 from simscen.cli.session.selection import require_not_skipped
 from simscen.cli.session.stacks import parse_stacks
 from simscen.cli.session.terminal import Screen, open_screen
-from simscen.cli.shared_options import Format, JunitFamily
 from simscen.core.errors import Exit, InvalidInput, Problem, UsageError
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
@@ -55,20 +54,17 @@ class FalsifyRequest:
     """Arguments of `simscen falsify` by name. `options` contains the options for the runs."""
 
     file: Path
-    method: SearchMethod = SearchMethod.AUTO
-    failures: int = 1
-    runs: int = 200
-    probability: float | None = None
-    search_seed: int = 1
-    options: SessionOptions = field(default_factory=SessionOptions)
-    root: Path | None = None
-    world_path: Sequence[Path] = ()
-    lenient: bool = False
-    stack: str | None = None
-    out: Path | None = None
-    junit: Path | None = None
-    junit_family: JunitFamily = JunitFamily.SIMSCEN
-    format_: Format = Format.TEXT
+    method: SearchMethod
+    failures: int
+    runs: int
+    probability: float | None
+    search_seed: int
+    options: SessionOptions
+    root: Path | None
+    world_path: Sequence[Path]
+    lenient: bool
+    stack: str | None
+    output: OutputOptions
 
 
 @dataclass(frozen=True)
@@ -98,12 +94,9 @@ def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
     Raises InvalidInput, UsageError, and NothingSelected.
     """
     falsification = Falsification(request)
-    require_writable_junit(request.junit, request.out, [request.file])
-    folder, journal = open_output_folder(request.out, None)
-    reports = Reports(folder, request.junit, request.junit_family.value)
-    reports.begin()
-    with open_screen(request.format_) as output, backend_of(request.options) as backend:
-        return output.exit_code(falsification.execute(backend, journal, reports, output)), falsification
+    reports, journal = start_session(request.output, [request.file])
+    with open_screen(request.output.format_) as screen, backend_of(request.options) as backend:
+        return screen.exit_code(falsification.execute(backend, journal, reports, screen)), falsification
 
 
 class Falsification:
@@ -130,16 +123,16 @@ class Falsification:
         self.finished_runs: list[RunFinished] = []
         self.found: list[FoundFailure] = []
 
-    def execute(self, backend: Backend, journal: Journal, reports: Reports, output: Screen) -> Exit:
+    def execute(self, backend: Backend, journal: Journal, reports: Reports, screen: Screen) -> Exit:
         """Search until a limit of the request is reached, or no valid values are found. Return the exit code."""
         start, stopped, empty_batches = time.monotonic(), None, 0
 
         def listen(event: SessionEvent) -> None:
             journal(event)
-            output(event)
+            screen(event)
 
         workers = self._request.options.workers
-        output(SessionStarted(__version__, self._request.runs, 1, workers, str(reports.folder)))
+        screen(SessionStarted(__version__, self._request.runs, 1, workers, str(reports.folder)))
         while stopped is None and not self._is_done() and empty_batches < MAX_EMPTY_BATCHES:
             points = self._search.ask(min(BATCH_SIZE, self._request.runs - len(self.finished_runs)))
             jobs = self._make_jobs(points, reports.folder)

@@ -2,21 +2,19 @@
 
 import sys
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
 
 from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.exit_codes import exit_code
 from simscen.cli.session.live_page import LivePage
-from simscen.cli.session.output_files import Reports, require_writable_junit
+from simscen.cli.session.output_files import OutputOptions, Reports, require_writable_junit
 from simscen.cli.session.pending_runs import PendingRuns, failed_runs, plan_session
 from simscen.cli.session.selection import Selection, load_selection
 from simscen.cli.session.stacks import external_commands
-from simscen.cli.session.terminal import Screen, open_screen
-from simscen.cli.shared_options import Format, JunitFamily
+from simscen.cli.session.terminal import open_screen
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.comparison import Comparison
 from simscen.core.records.run_store import RunStore
@@ -32,50 +30,37 @@ from simscen.run.sessions.output_folder import RUNS_FOLDER, create_output_folder
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session, scenario_seeds
 
 
-class Observer(Protocol):
-    """Object that receives the scenarios and the events of a session, such as the reporter of the watch mode."""
-
-    def loaded(self, scenarios: Sequence[LoadedScenario]) -> None:
-        """Receive the selected scenarios, before the first event."""
-        ...
-
-    def __call__(self, event: SessionEvent) -> None:
-        """Handle an event."""
-        ...
-
-
 @dataclass(frozen=True)
 class SessionRequest:
     """Arguments of `simscen run` by name. `selection` and `options` each contain several arguments."""
 
     paths: Sequence[Path]
-    selection: Selection = field(default_factory=Selection)
-    options: SessionOptions = field(default_factory=SessionOptions)
-    root: Path | None = None
-    world_path: Sequence[Path] = ()
-    lenient: bool = False
-    stacks: Sequence[str] = ()
-    out: Path | None = None
-    resume: Path | None = None
-    junit: Path | None = None
-    junit_family: JunitFamily = JunitFamily.SIMSCEN
-    format_: Format = Format.TEXT
-    durations: int | None = None
-    last_failed: bool = False
-    open_: bool = False
+    selection: Selection
+    options: SessionOptions
+    root: Path | None
+    world_path: Sequence[Path]
+    lenient: bool
+    stacks: Sequence[str]
+    output: OutputOptions
+    durations: int | None
+    last_failed: bool
 
 
-def execute_session(request: SessionRequest, observer: Observer | None = None) -> Exit:
+def execute_session(
+    request: SessionRequest,
+    on_loaded: Callable[[Sequence[LoadedScenario]], None] = lambda _: None,
+    listeners: Sequence[Listener] = (),
+) -> Exit:
     """Run a session, write its reports, and return the exit code.
 
+    `on_loaded` is called with the selected scenarios before the first run. `listeners` receive all events.
     Raises InvalidInput, UsageError, and NothingSelected before the first run.
     """
-    options = request.options
+    options, output = request.options, request.output
     scenarios, warnings = load_selection(
         request.paths, request.root, request.world_path, request.lenient, request.selection, request.stacks
     )
-    if observer is not None:
-        observer.loaded(scenarios)
+    on_loaded(scenarios)
     if warnings:
         print_text(as_text(warnings), sys.stderr)
     if options.against is not None and not (options.against / RUNS_FOLDER).is_dir():
@@ -83,34 +68,29 @@ def execute_session(request: SessionRequest, observer: Observer | None = None) -
     for scenario in scenarios:
         scenario_seeds(scenario, options)
     if request.last_failed:
-        if request.resume is not None:
+        if output.resume is not None:
             raise UsageError("--last-failed and --resume exclude each other")
-        only, message = failed_runs(scenarios, options, request.out)
+        only, message = failed_runs(scenarios, options, output.out)
         print_text(f"simscen: {message}", sys.stderr)
         options = replace(options, only=only)
     inputs = {file for each in scenarios for file in (*each.files.values(), *each.read_files)}
-    require_writable_junit(request.junit, request.out or request.resume, inputs)
-    folder, journal = open_output_folder(request.out, request.resume)
-    reports = Reports(folder, request.junit, request.junit_family.value, used=plugins_and_stacks(scenarios))
-    reports.begin()
-    pending = plan_session(journal, plan_jobs(scenarios, options, folder), options.workers, request.selection.shard)
-    with open_screen(request.format_, request.durations) as output:
-        listeners: list[Listener] = [*([observer] if observer else []), *([LivePage(reports)] if request.open_ else [])]
-        code = _run(pending, options, reports, output, listeners)
-    return output.exit_code(code)
+    reports, journal = start_session(output, inputs, plugins_and_stacks(scenarios))
+    jobs = plan_jobs(scenarios, options, reports.folder)
+    pending = plan_session(journal, jobs, options.workers, request.selection.shard)
+    with open_screen(output.format_, request.durations) as screen:
+        live = [LivePage(reports)] if output.open_ else []
+        code = _run(pending, options, reports, [screen, *listeners, *live])
+    return screen.exit_code(code)
 
 
-def _run(
-    pending: PendingRuns, options: SessionOptions, reports: Reports, output: Screen, listeners: Sequence[Listener]
-) -> Exit:
+def _run(pending: PendingRuns, options: SessionOptions, reports: Reports, listeners: Sequence[Listener]) -> Exit:
     """Execute the pending runs, write the reports, and return the exit code.
 
-    `output` and `listeners` receive all events, including the events of reused results.
+    `listeners` receive all events, including the events of reused results.
     """
     start = time.monotonic()
 
     def show(event: SessionEvent) -> None:
-        output(event)
         for each in listeners:
             each(event)
 
@@ -132,6 +112,20 @@ def _run(
     if code is Exit.NOTHING_SELECTED:
         print_text("simscen: nothing was run: all selected scenarios are skipped", sys.stderr)
     return stopped or (code if written else Exit.INCOMPLETE)
+
+
+def start_session(
+    output: OutputOptions, inputs: Iterable[Path], used: Mapping[str, object] | None = None
+) -> tuple[Reports, Journal]:
+    """Create the output folder with its journal and run.json, which has the further entries `used`.
+
+    The file of --junit must not be one of the `inputs`. Raises InvalidInput and UsageError.
+    """
+    require_writable_junit(output.junit, output.out or output.resume, inputs)
+    folder, journal = open_output_folder(output.out, output.resume)
+    reports = Reports(folder, output.junit, output.junit_family.value, used=used)
+    reports.begin()
+    return reports, journal
 
 
 def finish_session(

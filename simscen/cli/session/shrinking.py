@@ -17,7 +17,6 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.reduction import (
     MAX_DIGITS,
     UNNEEDED_KEYS,
-    Rounding,
     find_roundings,
     max_depth,
     removable_parts,
@@ -193,9 +192,12 @@ class Shrinker:
         try:
             self._restore_nominal(nominal)
             for _ in range(MAX_ROUNDS):
-                before = self.tree
-                self._remove_parts()
-                self._round()
+                before, depth = self.tree, 1
+                while depth <= max_depth(self.tree):
+                    self._remove_parts(depth)
+                    depth += 1
+                for digits in range(1, MAX_DIGITS + 1):
+                    self._round(digits)
                 if self.tree.plain == before.plain:
                     break
         except BudgetSpent:
@@ -203,44 +205,36 @@ class Shrinker:
 
     def _restore_nominal(self, nominal: Mapping[Keys, Node | None]) -> None:
         """Set the varied keys that the failure does not need to their values without variation."""
-        parts = list(nominal)
-
-        def build(varied: Sequence[Keys]) -> MappingNode:
-            return with_values(self.tree, {keys: nominal[keys] for keys in parts if keys not in varied})
-
-        self.tree = build(self._minimize(parts, build))
-
-    def _remove_parts(self) -> None:
-        """Remove parts of the YAML tree that the failure does not need, from the top down."""
-        depth = 1
-        while depth <= max_depth(self.tree):
-            before, parts = self.tree, removable_parts(self.tree, depth)
-
-            def build(needed: Sequence[Keys], parts: Sequence[Keys] = parts, tree: MappingNode = before) -> MappingNode:
-                return without_parts(tree, [keys for keys in parts if keys not in needed])
-
-            self.tree = build(self._minimize(parts, build))
-            depth += 1
-
-    def _round(self) -> None:
-        for digits in range(1, MAX_DIGITS + 1):
-            before, changes = self.tree, find_roundings(self.tree, digits)
-
-            def build(
-                exact: Sequence[Keys], changes: Sequence[Rounding] = tuple(changes), tree: MappingNode = before
-            ) -> MappingNode:
-                return with_roundings(tree, [change for change in changes if change.keys not in exact])
-
-            self.tree = build(self._minimize([change.keys for change in changes], build))
-
-    def _minimize(self, parts: Sequence[Part], build: Callable[[Sequence[Part]], MappingNode]) -> list[Part]:
-        """Return the parts that the failure needs. `build` returns the scenario with the other parts simplified."""
-        if not parts:
-            return []
-        return minimize(
-            parts,
-            lambda lists: self.candidates.first_accepted([build(needed) for needed in lists], self.failure.occurs_in),
+        tree = self.tree
+        self._simplify(
+            list(nominal),
+            lambda varied: with_values(tree, {keys: node for keys, node in nominal.items() if keys not in varied}),
         )
+
+    def _remove_parts(self, depth: int) -> None:
+        """Remove the parts at this depth of the YAML tree that the failure does not need."""
+        tree, parts = self.tree, removable_parts(self.tree, depth)
+        self._simplify(parts, lambda needed: without_parts(tree, [keys for keys in parts if keys not in needed]))
+
+    def _round(self, digits: int) -> None:
+        """Round the numbers that the failure does not need exactly."""
+        tree, roundings = self.tree, find_roundings(self.tree, digits)
+        self._simplify(
+            [one.keys for one in roundings],
+            lambda exact: with_roundings(tree, [one for one in roundings if one.keys not in exact]),
+        )
+
+    def _simplify(self, parts: Sequence[Keys], build: Callable[[Sequence[Keys]], MappingNode]) -> None:
+        """Simplify all parts that the failure does not need.
+
+        `build` takes the parts to keep, and returns the scenario in which all other parts are simplified.
+        """
+        if parts:
+            accepts = self.failure.occurs_in
+            needed = minimize(
+                parts, lambda lists: self.candidates.first_accepted([build(kept) for kept in lists], accepts)
+            )
+            self.tree = build(needed)
 
 
 def failure_of(result: RunResult, criterion: str, share: float) -> Failure:

@@ -6,7 +6,7 @@ A claim is a pass rate to be tested. A sequential claim is evaluated repeatedly 
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import count, islice
 from pathlib import Path
 from typing import NamedTuple
@@ -15,12 +15,11 @@ from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.exit_codes import exit_code
 from simscen.cli.session.live_page import LivePage
-from simscen.cli.session.output_files import Reports, require_writable_junit
+from simscen.cli.session.output_files import OutputOptions, Reports
 from simscen.cli.session.pending_runs import divide_runs, plan_runs, previous_results, write_reused
-from simscen.cli.session.run_session import finish_session, open_output_folder, plugins_and_stacks
+from simscen.cli.session.run_session import finish_session, plugins_and_stacks, start_session
 from simscen.cli.session.selection import Selection, load_selection, require_not_skipped
-from simscen.cli.session.terminal import Screen, open_screen
-from simscen.cli.shared_options import Format, JunitFamily
+from simscen.cli.session.terminal import open_screen
 from simscen.core.errors import Exit, InvalidInput, Problem, UsageError
 from simscen.core.random_streams import MAX_SEED
 from simscen.core.records.run_store import RunStore
@@ -53,19 +52,14 @@ class StudyRequest:
     """Arguments of `simscen study` by name. `options` contains the options for the runs."""
 
     file: Path
-    runs: int | None = None
-    repeat: int = 1
-    options: SessionOptions = field(default_factory=SessionOptions)
-    root: Path | None = None
-    world_path: Sequence[Path] = ()
-    lenient: bool = False
-    stack: str | None = None
-    out: Path | None = None
-    resume: Path | None = None
-    junit: Path | None = None
-    junit_family: JunitFamily = JunitFamily.SIMSCEN
-    format_: Format = Format.TEXT
-    open_: bool = False
+    runs: int | None
+    repeat: int
+    options: SessionOptions
+    root: Path | None
+    world_path: Sequence[Path]
+    lenient: bool
+    stack: str | None
+    output: OutputOptions
 
 
 class StudyRun(NamedTuple):
@@ -88,12 +82,10 @@ def execute_study(request: StudyRequest) -> Exit:
     """
     study = _StudySession(request)
     first = study.load_first_batch()
-    require_writable_junit(request.junit, request.out or request.resume, study.inputs)
-    folder, journal = open_output_folder(request.out, request.resume)
-    reports = Reports(folder, request.junit, request.junit_family.value, used=plugins_and_stacks(first))
-    reports.begin()
-    with open_screen(request.format_) as output, backend_of(request.options) as backend:
-        return output.exit_code(study.execute(backend, journal, reports, output))
+    reports, journal = start_session(request.output, study.inputs, plugins_and_stacks(first))
+    with open_screen(request.output.format_) as screen, backend_of(request.options) as backend:
+        listeners: list[Listener] = [screen, *([LivePage(reports)] if request.output.open_ else [])]
+        return screen.exit_code(study.execute(backend, journal, reports, listeners))
 
 
 class _StudySession:
@@ -137,16 +129,16 @@ class _StudySession:
         self._batch = list(islice(self._runs, self._batch_size))
         return self._load([run.number for run in self._batch])
 
-    def execute(self, backend: Backend, journal: Journal, reports: Reports, output: Screen) -> Exit:
+    def execute(self, backend: Backend, journal: Journal, reports: Reports, listeners: Sequence[Listener]) -> Exit:
         """Run batches until the claim is decided or all runs are done, write the reports, and return the exit code.
 
-        Raises InvalidInput, after the reports are written, if the values of a later run are invalid.
+        `listeners` receive all events. Raises InvalidInput, after the reports are written, if the values of a later run
+        are invalid.
         """
         start, finished_runs, stopped = time.monotonic(), RunStore(), None
         invalid: InvalidInput | None = None
         earlier = previous_results(journal)
         title = next(iter(self._loaded.values())).id
-        listeners: list[Listener] = [output, *([LivePage(reports)] if self._request.open_ else [])]
 
         def show(event: SessionEvent) -> None:
             for each in listeners:

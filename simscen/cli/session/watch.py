@@ -153,10 +153,10 @@ def watch_session(request: SessionRequest) -> int:
 
     Return the last exit code. Raises UsageError for options that exclude --watch.
     """
-    for name, value in (("--out", request.out), ("--resume", request.resume)):
+    for name, value in (("--out", request.output.out), ("--resume", request.output.resume)):
         if value is not None:
             raise UsageError(f"--watch and {name} exclude each other: each session has its own folder")
-    if request.open_:
+    if request.output.open_:
         raise UsageError("--watch and --open exclude each other: each session has its own page")
     if request.selection.shard != (1, 1):
         raise UsageError("--watch and --shard exclude each other")
@@ -187,7 +187,7 @@ def _run_in_child(request: SessionRequest, state: WatchState) -> tuple[int, File
         with os.fdopen(writing, "w", encoding="utf-8") as pipe:
             report = WatchReporter(pipe)
             try:
-                sys.exit(execute_session(request, report))
+                sys.exit(execute_session(request, report.loaded, [report]))
             except InvalidInput as error:
                 report.invalid_files(error.problems)
                 raise
