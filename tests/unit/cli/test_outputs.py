@@ -8,6 +8,8 @@ import pytest
 
 from simscen.cli.session.output_files import Reports
 from simscen.core.records.run_result import RunKey
+from simscen.core.records.session_events import SessionEvent
+from simscen.report.journal import Journal
 from simscen.run.sessions.output_folder import create_output_folder, run_folder, write_atomically
 
 NOT_REGULAR = ("device", "fifo", "link", "dangling", "folder")
@@ -155,3 +157,13 @@ def test_unwritten_report_is_not_named(tmp_path: Path, monkeypatch) -> None:
     assert not reports.write([])
     ended = reports.finished_event([], 1.0, False)
     assert (ended.junit, ended.page) == ("", "")
+
+
+def test_incomplete_journal_of_a_study_is_reported(simscen, monkeypatch) -> None:
+    def lose(journal: Journal, _: SessionEvent) -> None:
+        journal.error = OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Journal, "__call__", lose)
+    ended = simscen("study", "good.scenario.yaml", "--runs", "1", "--out", "out", "-j", "1")
+    assert ended.code == 3
+    assert "simscen: the journal in out is incomplete: No space left on device\n" in ended.err
