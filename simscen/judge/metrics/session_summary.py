@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from simscen.core.records.run_result import Outcome, RunResult
+from simscen.core.records.run_result import Outcome, RunKey, RunResult
 from simscen.core.statistics import wilson_interval
 
 
@@ -50,22 +50,33 @@ class SessionSummaryBuilder:
     """Computes a SessionSummary from runs that are added one by one."""
 
     def __init__(self) -> None:
-        self._runs: list[tuple[tuple[str, str, int, str], RunNumbers | None]] = []
+        self._runs = 0
+        self._measured: list[tuple[RunKey, _RunNumbers]] = []
 
     def add(self, result: RunResult) -> None:
         """Add a run. Skipped runs are ignored."""
-        if result.outcome is not Outcome.SKIPPED:
-            key = result.key
-            order = key.scenario, key.variation, key.seed, key.stack_name
-            self._runs.append((order, RunNumbers.from_result(result) if result.metrics else None))
+        if result.outcome is Outcome.SKIPPED:
+            return
+        self._runs += 1
+        if result.metrics:
+            robots = max(1, sum(_is_metric(metric, "path_length") for metric in result.metrics))
+            numbers = _RunNumbers(
+                result.metrics.get("success") == 1.0,
+                _known(result, "spl"),
+                _known(result, "soft_spl"),
+                _known(result, "collisions"),
+                _known(result, "path_length"),
+                result.simulated * robots,
+            )
+            self._measured.append((result.key, numbers))
 
     def summary(self) -> SessionSummary:
         """Return the statistics of the added runs."""
-        measured = [run for _, run in sorted(self._runs, key=lambda run: run[0]) if run is not None]
+        measured = [numbers for _, numbers in sorted(self._measured, key=lambda run: run[0])]
         successes = sum(run.success for run in measured)
         spl = [value for run in measured for value in run.spl]
         soft_spl = [value for run in measured for value in run.soft_spl]
-        runs = len(self._runs)
+        runs = self._runs
         return SessionSummary(
             runs=runs,
             success_rate=successes / runs if runs else None,
@@ -80,7 +91,7 @@ class SessionSummaryBuilder:
         )
 
 
-class RunNumbers(NamedTuple):
+class _RunNumbers(NamedTuple):
     """Numbers of one run that the statistics of a session need.
 
     Tuples have one value for each robot that has the metric. `robot_seconds` is the simulated time of all robots
@@ -93,19 +104,6 @@ class RunNumbers(NamedTuple):
     collisions: tuple[float, ...]
     path_lengths: tuple[float, ...]
     robot_seconds: float
-
-    @classmethod
-    def from_result(cls, run: RunResult) -> "RunNumbers":
-        """Return the numbers of a run from its metrics."""
-        robots = max(1, sum(_is_metric(metric, "path_length") for metric in run.metrics))
-        return cls(
-            run.metrics.get("success") == 1.0,
-            _known(run, "spl"),
-            _known(run, "soft_spl"),
-            _known(run, "collisions"),
-            _known(run, "path_length"),
-            run.simulated * robots,
-        )
 
 
 def session_summary_data(summary: SessionSummary) -> dict[str, float | list[float] | None]:
