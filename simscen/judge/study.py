@@ -112,24 +112,18 @@ def _rates(plan: StudyPlan, results: Sequence[RunResult]) -> Iterable[RateRow]:
     """
     has_limits = plan.is_random and plan.has_fixed_runs
     for path in _paths(plan):
+        values = [plan.values.get(result.key, {}).get(path) for result in results]
         groups: dict[str, list[bool]] = defaultdict(list)
-        labels = _labels([plan.values.get(result.key, {}).get(path) for result in results])
-        for label, result in zip(labels, results, strict=True):
+        ranks: dict[str, tuple[int, float, str]] = {}  # labels are sorted by their smallest number, texts after numbers
+        for label, value, result in zip(_labels(values), values, results, strict=True):
             groups[label].append(result.outcome is Outcome.PASSED)
-        for label in dict.fromkeys(sorted(labels, key=_label_order(labels, plan, path, results))):
+            number = si_number(value)
+            rank = (0, float(number), "") if _is_number(number) else (1, 0.0, label)
+            ranks[label] = min(ranks.get(label, rank), rank)
+        for label in sorted(groups, key=ranks.__getitem__):
             outcomes = groups[label]
             limits = wilson_interval(sum(outcomes), len(outcomes)) if has_limits else None
             yield RateRow(path, label, sum(outcomes), len(outcomes), limits)
-
-
-def _label_order(labels: Sequence[str], plan: StudyPlan, path: str, results: Sequence[RunResult]) -> Any:
-    """Return a sort key for labels: by their smallest number, and texts after numbers."""
-    least: dict[str, tuple[int, float, str]] = {}
-    for label, result in zip(labels, results, strict=True):
-        value = si_number(plan.values.get(result.key, {}).get(path))
-        rank = (0, float(value), "") if _is_number(value) else (1, 0.0, label)
-        least[label] = min(least.get(label, rank), rank)
-    return lambda label: least[label]
 
 
 def _labels(values: Sequence[Any]) -> list[str]:
