@@ -5,7 +5,9 @@ A promise is one rule of the component's protocol, such as "the same seed gives 
 
 from __future__ import annotations
 
+import math
 import traceback
+from argparse import ArgumentTypeError
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -21,6 +23,17 @@ pytest_plugins = ("simscen.pytesting.plugin",)
 _PROMISES: pytest.StashKey[list[Promise]] = pytest.StashKey()
 
 
+def _positive_seconds(text: str) -> float:
+    """Convert the value of an option to seconds. Raises ArgumentTypeError if it is not a positive finite number."""
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not 0.0 < seconds < math.inf:
+        raise ArgumentTypeError(f"{text!r} is not a positive number of seconds")
+    return seconds
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options --simscen-contract and --simscen-contract-limit."""
     group = parser.getgroup("simscen", "contracts of simscen's plug-ins")
@@ -34,7 +47,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
     group.addoption(
         "--simscen-contract-limit",
-        type=float,
+        type=_positive_seconds,
         default=60.0,
         metavar="SECONDS",
         help="wall time after which a promise counts as broken because the component does not return (default: 60)",

@@ -83,6 +83,13 @@ def test_mistake_is_readable_with_xdist_workers(run) -> None:
     assert output.strip().splitlines()[-1].startswith("ERROR: --simscen-contract headless: no installed package")
 
 
+@pytest.mark.parametrize("limit", ["0", "-1", "nan", "soon"])
+def test_limit_must_be_positive(run, limit: str) -> None:
+    code, output = run("-p", "no:xdist", "--simscen-contract-limit", limit)
+    assert code == pytest.ExitCode.USAGE_ERROR
+    assert f"argument --simscen-contract-limit: {limit!r} is not a positive number of seconds" in output
+
+
 INVALID_TARGETS = {
     "own:Checker": "part: Field required",
     "own:Checker={part: 1}": "is not valid JSON",
