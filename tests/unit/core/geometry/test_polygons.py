@@ -1,14 +1,17 @@
-import math
-
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simscen.core.geometry.polygon_separation import convex_pieces
-from simscen.core.geometry.polygons import polygon_defect
-from simscen.core.geometry.polylines import path_corners
+from simscen.core.geometry import Pose2
+from simscen.core.geometry.polygons import (
+    depth_inside_polygon,
+    distance_to_polygon,
+    points_in_polygon,
+    polygon_contains,
+    polygon_defect,
+)
 
 L = ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))
 
@@ -42,34 +45,16 @@ def test_validity_of_a_ring_equals_that_of_shapely(ring):
     assert (polygon_defect(ring) is None) == shapely.Polygon(ring).is_valid
 
 
-@given(RINGS)
-def test_the_pieces_are_convex_counterclockwise_and_cover_the_ring_exactly_once(ring):
+@given(RINGS, st.floats(-7, 7), st.floats(-7, 7))
+def test_containment_and_distances_equal_those_of_shapely(ring, x, y):
     if polygon_defect(ring) is not None:
         return
-    pieces = [shapely.Polygon(piece) for piece in convex_pieces(ring)]
-    assert all(piece.exterior.is_ccw for piece in pieces)
-    assert all(piece.convex_hull.area == pytest.approx(piece.area) for piece in pieces)
-    assert sum(piece.area for piece in pieces) == pytest.approx(shapely.Polygon(ring).area)
-    assert shapely.union_all(pieces).symmetric_difference(shapely.Polygon(ring)).area == pytest.approx(0, abs=1e-9)
-
-
-def test_pentagram_is_not_convex():
-    corners = [(math.cos(0.8 * math.pi * k), math.sin(0.8 * math.pi * k)) for k in range(5)]
-    with pytest.raises(ValueError, match="crosses itself"):
-        convex_pieces(corners)
-
-
-def test_convex_ring_is_a_single_piece():
-    angles = np.linspace(0, 2 * np.pi, 32, endpoint=False)
-    ring = tuple((float(np.cos(a)), float(np.sin(a))) for a in angles)
-    assert convex_pieces(ring) == [ring]
-    assert len(convex_pieces(L)) == 2
-
-
-def test_corners_of_a_path_are_where_it_leaves_straight_lines():
-    steps = np.linspace(0.0, 2.0, 21)
-    there = np.column_stack((steps, 0.01 * np.sin(20 * steps)))
-    up = np.column_stack((np.full(20, 2.0), steps[1:]))
-    assert path_corners(np.vstack((there, up)), 0.1) == [20]
-    assert path_corners(there, 0.1) == []
-    assert path_corners(np.vstack((there, there[-2::-1])), 0.1) == [20], "where it turns back"
+    polygon, point, pose = shapely.Polygon(ring), shapely.Point(x, y), Pose2(x, y)
+    to_border = polygon.exterior.distance(point)
+    if to_border < 1e-9:
+        return
+    is_inside = polygon.contains(point)
+    assert polygon_contains(ring, (x, y)) == is_inside
+    assert points_in_polygon(ring, np.array([[x, y]])).tolist() == [is_inside]
+    assert distance_to_polygon(pose, ring) == pytest.approx(0.0 if is_inside else to_border)
+    assert depth_inside_polygon(pose, ring) == pytest.approx(to_border if is_inside else -1.0)
