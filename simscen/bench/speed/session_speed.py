@@ -61,9 +61,8 @@ class SuiteResult:
 
 def evenly_spaced(scenarios: Sequence[LoadedScenario], max_count: int) -> list[LoadedScenario]:
     """Return at most `max_count` of the scenarios, evenly spaced in the sequence."""
-    if len(scenarios) <= max_count:
-        return list(scenarios)
-    return [scenarios[number * len(scenarios) // max_count] for number in range(max_count)]
+    count = min(max_count, len(scenarios))
+    return [scenarios[number * len(scenarios) // count] for number in range(count)]
 
 
 def measure_suite(
