@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -121,16 +121,9 @@ class Timebase:
     anchor: StampedMessages | None = None
 
     @classmethod
-    def from_logged(
-        cls, logged: Iterable[Ticks], rate: int, anchor: StampedMessages | None, begin: int | None = None
-    ) -> Timebase:
-        """Return the timebase from `begin` (None for the first time) to the last time of logging.
-
-        `logged` are the times of logging of each topic in ns, at least one in total.
-        """
-        times = np.concatenate(list(logged))
-        begin = int(times.min()) if begin is None else begin
-        start, stop = _header_times(np.array([begin, times.max()]), anchor).tolist()
+    def from_logged(cls, begin: int, end: int, rate: int, anchor: StampedMessages | None) -> Timebase:
+        """Return the timebase between two times of logging in ns."""
+        start, stop = _header_times(np.array([begin, end]), anchor).tolist()
         return cls(start, stop, rate, anchor)
 
     @property

@@ -132,7 +132,8 @@ class ForeignTraceReader:
         anchor = next((messages for messages in stamped if messages is not None), None)
         if anchor is None and self._options.clock == "header":
             self.notes.append("no relevant message has a stamp, so the times of logging are used")
-        return Timebase.from_logged(logged, self._options.tick_rate, anchor, self._recorded_since(logged, tracks[0]))
+        begin, end = self._recorded_since(logged, tracks[0]), max(int(times.max()) for times in logged)
+        return Timebase.from_logged(begin, end, self._options.tick_rate, anchor)
 
     def _recorded_since(self, logged: Sequence[Ticks], truth: Track | None) -> int:
         """Return the time of logging in ns from which the log is judged: see MAX_LATE_SUBSCRIPTION_S."""

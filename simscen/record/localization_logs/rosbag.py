@@ -33,16 +33,21 @@ LoggedMessage = tuple[int, int, Any]
 
 
 @dataclass
-class _TransformMessages:
-    """Transforms of a log, and the indices of their messages in the log by time of logging."""
+class _Messages:
+    """Decoded messages of a log, and message types of all topics.
 
+    `static_transforms` are by child frame. `tf_indices` are the indices of the messages with transforms by time of
+    logging.
+    """
+
+    odometry: list[LoggedMessage] = field(default_factory=list)
+    scans: list[LoggedMessage] = field(default_factory=list)
+    truth: list[LoggedMessage] = field(default_factory=list)
+    initial: list[LoggedMessage] = field(default_factory=list)
+    static_transforms: dict[str, StampedPose] = field(default_factory=dict)
     transforms: TransformTree = field(default_factory=TransformTree)
-    indices: dict[int, int] = field(default_factory=dict)
-
-    def add(self, logged: int, index: int, links: list[StampedPose], is_static: bool) -> None:
-        """Add the transforms of one message on /tf, or on /tf_static if `is_static`."""
-        self.transforms.add(logged, links, is_static)
-        self.indices[logged] = index
+    tf_indices: dict[int, int] = field(default_factory=dict)
+    topics: dict[str, str] = field(default_factory=dict)
 
     def between(self, outer: str, inner: str) -> list[LoggedMessage]:
         """Return the poses of the frame `inner` in `outer` as messages. Raises UnusableLog if the poses are unknown."""
@@ -51,22 +56,9 @@ class _TransformMessages:
             raise UnusableLog(result)
         times, poses = result
         return [
-            (logged, self.indices[logged], StampedPose(stamp, outer, tuple(pose), child=inner))
+            (logged, self.tf_indices[logged], StampedPose(stamp, outer, tuple(pose), child=inner))
             for logged, stamp, pose in zip(times.logged.tolist(), times.stamps.tolist(), poses.tolist(), strict=True)
         ]
-
-
-@dataclass
-class _Messages:
-    """Decoded messages of a log, static transforms by child frame, and message types of all topics."""
-
-    odometry: list[LoggedMessage] = field(default_factory=list)
-    scans: list[LoggedMessage] = field(default_factory=list)
-    truth: list[LoggedMessage] = field(default_factory=list)
-    initial: list[LoggedMessage] = field(default_factory=list)
-    static_transforms: dict[str, StampedPose] = field(default_factory=dict)
-    tf: _TransformMessages = field(default_factory=_TransformMessages)
-    topics: dict[str, str] = field(default_factory=dict)
 
 
 def read_rosbag_rows(path: Path, odometry: str, scan: str, reference: str | None) -> LocalizationRows:
@@ -81,9 +73,9 @@ def read_rosbag_rows(path: Path, odometry: str, scan: str, reference: str | None
     """
     messages = _collect_messages(path, odometry, scan, reference or topics.TRUTH.name)
     if frames := parse_frame_pair(odometry):
-        messages.odometry = messages.tf.between(*frames)
+        messages.odometry = messages.between(*frames)
     if reference is not None and (frames := parse_frame_pair(reference)):
-        messages.truth = messages.tf.between(*frames)
+        messages.truth = messages.between(*frames)
     names = ", ".join(sorted(messages.topics)[:12]) or "none"
     rows = LocalizationRows(hint=f"its topics: {names}; name others with --odom, --scan and --reference")
     if reference is not None and not messages.truth:
@@ -112,7 +104,8 @@ def _collect_messages(path: Path, odometry: str, scan: str, truth: str) -> _Mess
     for index, raw in enumerate(stream):
         if raw.topic in (topics.TF_STATIC.name, topics.TF.name):
             links, is_static = _decode(raw, {topics.TF.type: transforms}), raw.topic == topics.TF_STATIC.name
-            messages.tf.add(raw.time, index, links, is_static)
+            messages.transforms.add(raw.time, links, is_static)
+            messages.tf_indices[raw.time] = index
             messages.static_transforms.update({link.child: link for link in links if is_static})
         elif raw.topic == INITIAL_POSE_TOPIC:
             messages.initial.append((raw.time, index, _decode(raw, POSE_DECODERS)))
