@@ -11,9 +11,9 @@ from simscen.core.geometry.kinematics import STOP, MecanumWheels, Twist
 from simscen.model.robot import Mecanum
 from simscen.sim.body.inertia import MassProperties, combine
 from simscen.sim.body.robot_body import RobotBody
-from simscen.sim.bullet import engine, pybullet
+from simscen.sim.bullet import collision_shapes, engine, pybullet
 from simscen.sim.robots.robot_state import RobotState
-from simscen.sim.robots.wheel_drives import VelocityRamp
+from simscen.sim.robots.velocity_ramp import VelocityRamp
 
 MAX_FORCE_PER_WEIGHT = 0.7
 """Largest motor force divided by the weight of the robot."""
@@ -34,7 +34,7 @@ class PlanarBase:
         """Place the base at `pose`; the renderer shows `visual_shape`."""
         self._client = client
         moments, base_from_center = _total_mass_properties(body).principal()
-        hulls = engine.create_robot_shapes(client, body.collision_solids)
+        hulls = collision_shapes.create_robot_shapes(client, body.collision_solids)
         extra = len(hulls) - 1
         self.id: int = pybullet.createMultiBody(
             0,

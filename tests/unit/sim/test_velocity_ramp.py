@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.robot import Limits
-from simscen.sim.robots.wheel_drives import VelocityRamp
+from simscen.sim.robots.velocity_ramp import VelocityRamp
 
 LIMITS = Limits(
     linear=1.0, reverse=0.5, angular=2.0, linear_acceleration=1.0, linear_deceleration=2.0, angular_acceleration=4.0
