@@ -21,7 +21,7 @@ from simscen.sim.contact.collisions import BaseMotion, CollisionTracker, PreStep
 from simscen.sim.objects.actors import NEVER, Actors
 from simscen.sim.objects.proximity import REQUERY_DISTANCE_M, ProximityQuery
 from simscen.sim.robots.drive_factory import build_drive
-from simscen.sim.robots.robot_state import CachedState, RobotState, TruthSampler
+from simscen.sim.robots.robot_state import RobotState, TruthSampler
 from simscen.sim.scene.camera import RenderScene, render_image
 from simscen.sim.scene.terrain import FloorFriction, Terrain, is_ground_contact
 from simscen.sim.scene.walls import Walls
@@ -136,7 +136,7 @@ class Robot:
         self.advance = self._drive.advance
         """Function that runs one period of the firmware."""
         self._command: Twist | None = None
-        self._state = CachedState(self.base.state, scene)
+        self._state_tick, self._cached_state = scene.tick, self.base.state()
         self._label = f'robot "{name}"' if name else "the robot"
         self.others: tuple[Robot, ...] = ()
         """The other robots, sorted by name."""
@@ -147,7 +147,7 @@ class Robot:
         self._placements, self._placed_tick = 0, -1
         is_uneven = bool(scene.terrain and self.base.ground_links)
         self.clearance = Clearance(
-            scene.client, scene.tick_rate, static, obstacles, is_uneven, body, self.base, self._state, scene.actors,
+            scene.client, scene.tick_rate, static, obstacles, is_uneven, body, self.base, self.state, scene.actors,
             clearance_range,
         )  # fmt: skip
         self.sampler = TruthSampler(self.clearance.static_clearance)
@@ -183,7 +183,7 @@ class Robot:
 
     def _checked_state(self, tick: int) -> RobotState:
         """Return the state; raises RunError if the physics of the robot or of a movable object has diverged."""
-        (x, y, z, i, j, k, w), (vx, vy, vz), (wx, wy, wz) = state = self._state()
+        (x, y, z, i, j, k, w), (vx, vy, vz), (wx, wy, wz) = state = self.state()
         actors = self._scene.actors
         reason = divergence_reason(self._label, x, y, z, i + j + k + w + vx + vy + vz + wx + wy + wz)
         if reason is None and actors.has_pushable:
@@ -216,18 +216,25 @@ class Robot:
         """Return all movable objects and other robots with their poses by name."""
         return {name: (self.bodies[name], pose) for name, pose in self.objects().items()}
 
+    def state(self) -> RobotState:
+        """Return the current pose and velocity; queries the engine at most once per tick."""
+        tick = self._scene.tick
+        if tick != self._state_tick:
+            self._state_tick, self._cached_state = tick, self.base.state()
+        return self._cached_state
+
     def base_pose(self) -> Pose3:
         """Return the pose of the base frame in the world."""
-        return self._state().pose
+        return self.state().pose
 
     def base_velocity(self) -> tuple[Vector, Vector]:
         """Return the linear (m/s) and angular (rad/s) velocity of the base frame along the world axes."""
-        state = self._state()
+        state = self.state()
         return state.linear, state.angular
 
     def base_twist(self) -> Twist:
         """Return the velocity in the base frame."""
-        return self._state().twist
+        return self.state().twist
 
     def encoders(self) -> tuple[float, ...]:
         """Return the accumulated rotation of the wheels; see `SensorView.encoders`."""
@@ -273,7 +280,7 @@ class Robot:
     def set_pose(self, pose: Pose2) -> None:
         """Place the robot at rest at `pose`, without updating the scene."""
         self.base.place(pose)
-        self._state.invalidate()
+        self._state_tick = -1
         self._drive.rest()
 
     def on_push(self) -> None:
@@ -298,11 +305,11 @@ class Robot:
     @property
     def distance_since_query(self) -> float:
         """Distance in m that the robot has moved since the last call of `make_query`."""
-        return math.dist(self._query_point, self._state().pose[:3])
+        return math.dist(self._query_point, self.state().pose[:3])
 
     def make_query(self) -> ProximityQuery:
         """Return a query for the deferred actors near the robot."""
-        self._query_point = self._state().pose.position
+        self._query_point = self.state().pose.position
         return ProximityQuery(self._query_point, self.clearance.contact_radius, self.clearance.distance_radius)
 
     def add_bodies(self, names: Mapping[int, str | None]) -> None:
@@ -320,7 +327,7 @@ class Robot:
         is_outdated = tick >= clearance.no_contact_before and not self._collisions.is_colliding
         if clearance.may_be_enclosed or is_outdated:
             clearance.measure(tick)
-        state = self._state()
+        state = self.state()
         return BaseMotion(state.pose.position, state.linear, state.angular)
 
     def after_contact_step(self, before: PreStepMotion) -> None:

@@ -1,7 +1,7 @@
 """Pose and velocity of a robot, and samples of the true state whose clearances are computed later in one batch."""
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from simscen.core.geometry import Pose3, Vector
 from simscen.core.geometry.kinematics import Twist
@@ -26,34 +26,6 @@ class RobotState(NamedTuple):
         p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
         i, j, k = 2 * (y * h - z * g), 2 * (z * f - x * h), 2 * (x * g - y * f)
         return _new(Twist, (a + w * p + y * r - z * q, b + w * q + z * p - x * r, h + w * k + x * j - y * i))
-
-
-class TickClock(Protocol):
-    """Provides the current tick."""
-
-    @property
-    def tick(self) -> int:
-        """Ticks since the start."""
-        ...
-
-
-class CachedState:
-    """Callable that returns the state of a robot; queries the engine at most once per tick."""
-
-    def __init__(self, query: Callable[[], RobotState], clock: TickClock) -> None:
-        self._query, self._clock = query, clock
-        self._tick, self._state = -1, RobotState(Pose3(), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-
-    def __call__(self) -> RobotState:
-        """Return the state at the current tick."""
-        tick = self._clock.tick
-        if tick != self._tick:
-            self._tick, self._state = tick, self._query()
-        return self._state
-
-    def invalidate(self) -> None:
-        """Discard the cached state, because the robot was placed."""
-        self._tick = -1
 
 
 class PendingTruth:
