@@ -14,6 +14,7 @@ from simscen.core.records.case import CLEARANCE_RANGE_M
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.bullet import engine, pybullet
 from simscen.sim.bullet.client_pool import CLIENT_POOL
+from simscen.sim.bullet.collision_shapes import Triangulate
 from simscen.sim.contact.collisions import PreStepMotion
 from simscen.sim.objects.actors import Actors
 from simscen.sim.objects.proximity import ACTIVATION_PERIOD_S, EARLY_QUERY_DISTANCE_M
@@ -50,7 +51,7 @@ class Simulation:
         static: TriangleMesh,
         bodies: Iterable[Body],
         robots: Mapping[str, RobotPlacement],
-        triangulate: engine.Triangulate,
+        triangulate: Triangulate,
         tick_rate: int = 240,
         solver_iterations: int = 10,
         clearance_range: float = CLEARANCE_RANGE_M,

@@ -9,7 +9,7 @@ from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.core.records.case import ROBOT_NAME
 from simscen.core.records.trace import Truth
 from simscen.sim.body.robot_body import RobotBody
-from simscen.sim.bullet import engine
+from simscen.sim.bullet.collision_shapes import Triangulate
 from simscen.sim.simulation import RobotPlacement, Simulation
 
 
@@ -22,7 +22,7 @@ class SingleRobotSimulation(Simulation):
         bodies: Iterable[Body],
         robot: RobotBody,
         pose: Pose2,
-        triangulate: engine.Triangulate,
+        triangulate: Triangulate,
         obstacles: TriangleMesh | None = None,
         **physics: Any,
     ) -> None:

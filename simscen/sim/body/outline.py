@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -135,10 +134,8 @@ MAX_HULL_VERTICES = 256
 HULL_TOLERANCE_M = 0.001
 """Largest distance in m of an omitted vertex from the reduced hull."""
 
-_reduced_vertices: "WeakKeyDictionary[Mesh, Array]" = WeakKeyDictionary()
-"""Cached results of `reduce_hull_vertices`."""
 
-
+@cached_on_instance
 def reduce_hull_vertices(mesh: Mesh) -> Array:
     """Return vertices (n, 3) of a mesh that span its convex hull within HULL_TOLERANCE_M. The result is cached.
 
@@ -146,19 +143,12 @@ def reduce_hull_vertices(mesh: Mesh) -> Array:
     """
     if len(mesh.vertices) <= MAX_HULL_VERTICES:
         return mesh.vertices
-    if mesh not in _reduced_vertices:
-        _reduced_vertices[mesh] = _hull_corners(mesh.vertices)
-    return _reduced_vertices[mesh]
-
-
-def _hull_corners(points: Array) -> Array:
-    """Return the points that span the convex hull within HULL_TOLERANCE_M; all points if they lie in a plane."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
         # Qhull's option W: a point that is outside of a facet by less counts as inside.
-        hull = ConvexHull(points, qhull_options=f"Qt W{HULL_TOLERANCE_M}")
+        hull = ConvexHull(mesh.vertices, qhull_options=f"Qt W{HULL_TOLERANCE_M}")
     except QhullError:
-        return points
-    corners: Array = points[np.sort(hull.vertices)]
+        return mesh.vertices
+    corners: Array = mesh.vertices[np.sort(hull.vertices)]
     return corners

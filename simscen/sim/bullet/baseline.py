@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.geometry.meshes import submesh
 from simscen.core.geometry.shapes import Solid, TriangleMesh
 from simscen.sim.body.robot_body import RobotBody
-from simscen.sim.bullet import engine, pybullet
+from simscen.sim.bullet import collision_shapes, engine, pybullet
+from simscen.sim.bullet.collision_shapes import Triangulate
 from simscen.sim.robots.wheeled_base import WheeledBase
 
 
@@ -19,21 +19,23 @@ class PyBulletBaseline:
     """
 
     def __init__(
-        self, static: TriangleMesh | Sequence[Solid], robot: RobotBody, pose: Pose2, triangulate: engine.Triangulate
+        self,
+        static: TriangleMesh | Sequence[Solid],
+        robot: RobotBody,
+        pose: Pose2,
+        triangulate: Triangulate,
     ) -> None:
         self._client = client = pybullet.connect(pybullet.DIRECT)
         engine.set_physics_parameters(client, 240, 10)
         ground = self._create_body(pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client))
         engine.set_collision_filter(client, ground, -1, engine.GROUND, engine.EVERYTHING)
         if isinstance(static, TriangleMesh):
-            for tile in engine.split_into_tiles(
-                static.vertices, engine.faces_above_floor(static.vertices, static.faces)
-            ):
-                mesh = self._create_body(engine.create_concave_shape(client, submesh(static.vertices, tile)))
+            for shape in collision_shapes.create_concave_shapes(client, static.vertices, static.faces):
+                mesh = self._create_body(shape)
                 pybullet.changeDynamics(mesh, -1, collisionMargin=0.0, physicsClientId=client)
         else:
             for solid in static:
-                self._create_body(engine.create_body_shape(client, [solid], False, triangulate))
+                self._create_body(collision_shapes.create_body_shape(client, [solid], False, triangulate))
         WheeledBase(self._client, robot, pose)
         self._pose = pose
 

@@ -1,24 +1,13 @@
-"""Creates collision shapes and bodies in a PyBullet client, and sets its physics parameters.
+"""Creates bodies in a PyBullet client, and sets its physics parameters.
 
-`client` is the id of the PyBullet client. Functions that create shapes and bodies return their ids.
+`client` is the id of the PyBullet client. Functions that create bodies return their ids.
 """
-
-from collections.abc import Callable, Iterable, Sequence
-
-import numpy as np
-import numpy.typing as npt
 
 from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.geometry import Array, Pose3, Vector
-from simscen.core.geometry.meshes import FLOOR_HEIGHT_M, submesh
-from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
-from simscen.sim.body.outline import hull_points, reduce_hull_vertices
 from simscen.sim.bullet import pybullet
+from simscen.sim.bullet.collision_shapes import Faces, create_concave_shapes
 
-MAX_FACES_PER_SHAPE = 40_000
-"""Largest number of triangles in a collision shape; PyBullet refuses larger shapes."""
-STRIP_WIDTH_M = 20.0
-"""Width in m along x of the strips by which `split_into_tiles` sorts triangles."""
 CONTACT_BREAKING_RATIO = 0.02
 """Fraction of a shape's size by which a contact point may move in a step and still count as the same point."""
 REST_SPEED_SQUARED_M2_S2 = 1e-6
@@ -35,15 +24,8 @@ STATIC_MASK = ~(STATIC | GROUND | TERRAIN)
 DEFAULT_VISUAL = -1
 """Id of the visual shape that equals the collision shape."""
 ORIGIN = Pose3()
-PRIMITIVES = (Box, Cylinder, Sphere, Capsule)
-"""Types of shapes that PyBullet supports without triangles."""
-
-Triangulate = Callable[[Shape], Mesh]
-"""Returns the closed surface of a shape."""
 Inertia = tuple[Vector, Pose3]
 """Principal moments of inertia in kg m², and the pose of the principal axes in the body frame."""
-Faces = npt.NDArray[np.int32]
-"""Vertex indices (n, 3) of triangles."""
 
 
 def set_physics_parameters(
@@ -87,131 +69,6 @@ def set_collision_filter(client: int, body: int, link: int, group: int, mask: in
     pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=client)
 
 
-def create_static_faces(client: int, vertices: Array, faces: Faces) -> list[int]:
-    """Create triangles as a few static bodies, and return the ids of the bodies."""
-    return [_create_concave_body(client, vertices, tile) for tile in split_into_tiles(vertices, faces)]
-
-
-def split_into_tiles(vertices: Array, faces: Faces) -> list[Faces]:
-    """Split triangles into groups of at most MAX_FACES_PER_SHAPE that are close together."""
-    if len(faces) > MAX_FACES_PER_SHAPE:
-        middle = vertices[faces, :2].mean(axis=1)
-        faces = faces[np.lexsort((middle[:, 1], np.floor(middle[:, 0] / STRIP_WIDTH_M)))]
-    return [faces[k : k + MAX_FACES_PER_SHAPE] for k in range(0, len(faces), MAX_FACES_PER_SHAPE)]
-
-
-def faces_above_floor(vertices: Array, faces: Faces) -> Faces:
-    """Return the triangles that extend above the floor."""
-    above: Faces = faces[(vertices[faces, 2] > FLOOR_HEIGHT_M).any(axis=1)]
-    return above
-
-
-def _create_concave_body(client: int, vertices: Array, faces: Faces) -> int:
-    body = create_static_body(client, create_concave_shape(client, submesh(vertices, faces)))
-    # Bullet would thicken the triangles by 1 mm.
-    pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=client)
-    return body
-
-
-def create_concave_shape(client: int, mesh: Mesh) -> int:
-    """Create the shape of a triangle mesh, which can be concave. It is hollow: a body inside it does not touch it."""
-    vertices, indices = mesh.vertices.tolist(), mesh.faces.ravel().tolist()
-    shape: int = pybullet.createCollisionShape(
-        pybullet.GEOM_MESH,
-        vertices=vertices,
-        indices=indices,
-        flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
-        physicsClientId=client,
-    )
-    # PyBullet never releases these lists, which take 80 MB for a map of 220 000 triangles.
-    for values in (*vertices, vertices, indices):
-        values.clear()
-    return _checked_shape(shape)
-
-
-def create_convex_shape(client: int, corners: Array) -> int:
-    """Create the shape of the convex hull of points (n, 3)."""
-    shape: int = pybullet.createCollisionShape(pybullet.GEOM_MESH, vertices=corners.tolist(), physicsClientId=client)
-    return _checked_shape(shape)
-
-
-def create_compound_shape(client: int, solids: Iterable[Solid]) -> int:
-    """Create one shape from solids that are all PRIMITIVES."""
-    kinds, halves, radii, lengths, positions, orientations = [], [], [], [], [], []
-    for solid in solids:
-        kind, half, radius, length = _primitive_parameters(solid.shape)
-        kinds.append(kind)
-        halves.append(half)
-        radii.append(radius)
-        lengths.append(length)
-        positions.append(solid.pose.position)
-        orientations.append(solid.pose.quaternion)
-    shape: int = pybullet.createCollisionShapeArray(
-        shapeTypes=kinds,
-        halfExtents=halves,
-        radii=radii,
-        lengths=lengths,
-        collisionFramePositions=positions,
-        collisionFrameOrientations=orientations,
-        physicsClientId=client,
-    )
-    return _checked_shape(shape)
-
-
-def create_hull_of_solids(client: int, solids: Iterable[Solid]) -> int:
-    """Create the shape of the common convex hull of solids."""
-    return create_convex_shape(
-        client, np.concatenate([solid.pose.apply(_reduced_hull_points(solid.shape)) for solid in solids])
-    )
-
-
-def _reduced_hull_points(shape: Shape) -> Array:
-    """Return points (n, 3) that span the convex hull of a shape; for a large mesh, only some of its vertices."""
-    return reduce_hull_vertices(shape) if isinstance(shape, Mesh) else hull_points(shape)
-
-
-def create_robot_shapes(client: int, solids: Sequence[Solid]) -> list[int]:
-    """Create the shapes of a robot's solids: one shape for all PRIMITIVES, and one convex hull for each other solid."""
-    primitives = [solid for solid in solids if isinstance(solid.shape, PRIMITIVES)]
-    others = [solid for solid in solids if not isinstance(solid.shape, PRIMITIVES)]
-    first = [create_compound_shape(client, primitives)] if primitives else []
-    return first + [create_hull_of_solids(client, [solid]) for solid in others]
-
-
-def create_body_shape(client: int, solids: Sequence[Solid], is_pushable: bool, triangulate: Triangulate) -> int:
-    """Create the collision shape of a movable object.
-
-    If all solids are PRIMITIVES, the shape consists of these primitives. If not, the shape of a pushable object is its
-    convex hull, and the shape of any other object is its surface, which can be concave.
-    """
-    if are_primitives(solids):
-        return create_compound_shape(client, solids)
-    return (
-        create_hull_of_solids(client, solids)
-        if is_pushable
-        else create_concave_shape(client, fuse_surfaces(solids, triangulate))
-    )
-
-
-def is_hollow(solids: Sequence[Solid], is_pushable: bool) -> bool:
-    """Return whether `create_body_shape` creates a triangle mesh, which is hollow (see `create_concave_shape`)."""
-    return not are_primitives(solids) and not is_pushable
-
-
-def are_primitives(solids: Sequence[Solid]) -> bool:
-    """Return whether the shapes of all solids are PRIMITIVES."""
-    return all(isinstance(solid.shape, PRIMITIVES) for solid in solids)
-
-
-def fuse_surfaces(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
-    """Return the surfaces of solids as one mesh."""
-    meshes = [(triangulate(solid.shape), solid.pose) for solid in solids]
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh, _ in meshes)])
-    vertices = np.concatenate([pose.apply(mesh.vertices) for mesh, pose in meshes])
-    faces = [mesh.faces + np.int32(start) for (mesh, _), start in zip(meshes, starts, strict=False)]
-    return Mesh(vertices, np.concatenate(faces))
-
-
 def create_rigid_body(
     client: int, mass: float, shape: int, pose: Pose3, inertia: Inertia, friction: float, visual: int = DEFAULT_VISUAL
 ) -> int:
@@ -231,10 +88,10 @@ def create_rigid_body(
         physicsClientId=client,
     )  # fmt: skip
     if mass == 0:
-        set_collision_filter(client, body_id, -1, STATIC, STATIC_MASK)
+        enable_collisions(client, body_id)
         sleeps = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING
         pybullet.changeDynamics(body_id, -1, activationState=sleeps, physicsClientId=client)
-    if mass > 0:
+    else:
         pybullet.changeDynamics(body_id, -1, localInertiaDiagonal=moments, physicsClientId=client)
         pybullet.resetBasePositionAndOrientation(body_id, center.position, center.quaternion, physicsClientId=client)
     return body_id
@@ -262,7 +119,7 @@ def disable_collisions(client: int, body_id: int) -> None:
 
 
 def enable_collisions(client: int, body_id: int) -> None:
-    """Let a body without mass collide again."""
+    """Let a body without mass collide with robots and with bodies that have a mass."""
     set_collision_filter(client, body_id, -1, STATIC, STATIC_MASK)
 
 
@@ -276,12 +133,21 @@ def create_static_body(
     body_id: int = pybullet.createMultiBody(
         0.0, shape, visual, pose.position, pose.quaternion, useMaximalCoordinates=1, physicsClientId=client
     )
-    set_collision_filter(client, body_id, -1, STATIC, STATIC_MASK)
+    enable_collisions(client, body_id)
     pybullet.changeDynamics(
         body_id, -1, lateralFriction=friction, restitution=0.0, activationState=pybullet.ACTIVATION_STATE_SLEEP,
         physicsClientId=client,
     )  # fmt: skip
     return body_id
+
+
+def create_static_faces(client: int, vertices: Array, faces: Faces) -> list[int]:
+    """Create the triangles above the floor as a few static bodies, and return the ids of the bodies."""
+    bodies = [create_static_body(client, shape) for shape in create_concave_shapes(client, vertices, faces)]
+    for body in bodies:
+        # Bullet would thicken the triangles by 1 mm.
+        pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=client)
+    return bodies
 
 
 def create_ground_plane(client: int, visual: int = DEFAULT_VISUAL) -> int:
@@ -298,25 +164,3 @@ def create_invisible_shape(client: int) -> int:
         pybullet.GEOM_MESH, vertices=corners, indices=[0, 1, 2], physicsClientId=client
     )
     return visual
-
-
-def _primitive_parameters(shape: Shape) -> tuple[int, Sequence[float], float, float]:
-    """Return PyBullet's type of a shape from PRIMITIVES, its half extents, radius, and length in m; 0 if unused."""
-    match shape:
-        case Box((x, y, z)):
-            return pybullet.GEOM_BOX, (x / 2, y / 2, z / 2), 0.0, 0.0
-        case Cylinder(radius, length):
-            return pybullet.GEOM_CYLINDER, (0.0, 0.0, 0.0), radius, length
-        case Capsule(radius, length):
-            return pybullet.GEOM_CAPSULE, (0.0, 0.0, 0.0), radius, length
-        case Sphere(radius):
-            return pybullet.GEOM_SPHERE, (0.0, 0.0, 0.0), radius, 0.0
-        case _:
-            raise TypeError(f"{type(shape).__name__} is not a primitive of the engine")
-
-
-def _checked_shape(shape: int) -> int:
-    """Return the id `shape`; raises RuntimeError if it is invalid."""
-    if shape < 0:
-        raise RuntimeError("PyBullet could not create a collision shape")
-    return shape

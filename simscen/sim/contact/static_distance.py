@@ -17,7 +17,7 @@ from simscen.core.geometry.meshes import FLOOR_HEIGHT_M, is_convex, submesh
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.sim.body import outline
 from simscen.sim.body.robot_body import RobotBody
-from simscen.sim.bullet import engine, pybullet
+from simscen.sim.bullet import collision_shapes, pybullet
 from simscen.sim.bullet.client_pool import CLIENT_POOL
 from simscen.sim.contact.triangles import LINE_TILT, encloses, encloses_along_line, point_to_triangles
 from simscen.sim.scene.mesh_parts import parts_of
@@ -51,7 +51,7 @@ class StaticDistance:
         self._mesh, self._max_range = static, max_range
         radius, self._height = outline.radius_and_height(robot.collision_solids)
         self._radius, self._extent = radius + EXTENT_MARGIN_M, math.hypot(radius, self._height)
-        self._hull = engine.create_robot_shapes(self._client, robot.collision_solids)
+        self._hull = collision_shapes.create_robot_shapes(self._client, robot.collision_solids)
         self._parts = parts_of(static)
         self._shape_pairs: dict[int, list[tuple[int, int]]] = {}
         self._others: list[PartBound] = []
@@ -146,12 +146,11 @@ class StaticDistance:
         """Create the collision shapes of a part, and return their ids."""
         vertices, hulls = self._mesh.vertices, self._mesh.hulls
         if hulls and (own := hulls[self._parts.solids[part]]):
-            return [engine.create_convex_shape(self._client, vertices[own])]
+            return [collision_shapes.create_convex_shape(self._client, vertices[own])]
         faces = self._mesh.faces[self._parts.faces(part)]
         if self._parts.is_whole_solid(part) and is_convex(solid := submesh(vertices, faces)):
-            return [engine.create_convex_shape(self._client, solid.vertices)]
-        tiles = engine.split_into_tiles(vertices, engine.faces_above_floor(vertices, faces))
-        return [engine.create_concave_shape(self._client, submesh(vertices, tile)) for tile in tiles]
+            return [collision_shapes.create_convex_shape(self._client, solid.vertices)]
+        return collision_shapes.create_concave_shapes(self._client, vertices, faces)
 
     def enclosing_solids(self, point: Vector, exclude: Collection[int] = ()) -> list[int]:
         """Return the indices of the solids that enclose a point, except those in `exclude`."""

@@ -26,7 +26,8 @@ from simscen.core.geometry.scripted_poses import BatchPathSampler, PosesAtTick, 
 from simscen.core.geometry.shapes import Body, Mesh, MotionPath
 from simscen.sim.body.inertia import inertia_of_solids
 from simscen.sim.body.outline import radius_and_height
-from simscen.sim.bullet import engine, pybullet
+from simscen.sim.bullet import collision_shapes, engine, pybullet
+from simscen.sim.bullet.collision_shapes import Triangulate
 
 FRICTION = 0.6
 """Friction coefficient of movable objects on the ground, about as for wood on concrete."""
@@ -161,7 +162,7 @@ class Actor:
 class ActorBuilder:
     """Creates actors, and their bodies in the engine."""
 
-    def __init__(self, client: int, tick_rate: int, triangulate: engine.Triangulate, visual_shape: int) -> None:
+    def __init__(self, client: int, tick_rate: int, triangulate: Triangulate, visual_shape: int) -> None:
         """Take the id of the engine's client, and the id of the visual shape of all actors."""
         self._client, self._tick_rate = client, tick_rate
         self._triangulate, self._visual_shape = triangulate, visual_shape
@@ -174,8 +175,9 @@ class ActorBuilder:
         segments, speed = [SweptSegment(body.pose.x, body.pose.y, body.pose.x, body.pose.y)], 0.0
         if body.path is not None:
             segments, speed = swept_segments(body.path), top_speed(body.path, radius)
-        is_hollow = engine.is_hollow(body.solids, body.mass > 0 and body.path is None)
-        surface = engine.fuse_surfaces(body.solids, self._triangulate) if is_hollow else None
+        surface = None
+        if not (collision_shapes.are_primitives(body.solids) or (body.mass > 0 and body.path is None)):
+            surface = collision_shapes.fuse_surfaces(body.solids, self._triangulate)
         bounding_radius = math.hypot(radius, height)
         return Actor(body, body.path, tick, segments, speed, bounding_radius, radius, surface, is_steered)
 
@@ -200,7 +202,7 @@ class ActorBuilder:
     def _create(self, actor: Actor, tick: int) -> None:
         """Create the body of an actor in the engine."""
         client, body, visual = self._client, actor.body, self._visual_shape
-        shape = engine.create_body_shape(client, body.solids, actor.is_pushable, self._triangulate)
+        shape = collision_shapes.create_body_shape(client, body.solids, actor.is_pushable, self._triangulate)
         if actor.is_pushable:
             frame = inertia_of_solids(body.solids, body.mass).principal()
             actor.center_from_base = frame[1].inverse()

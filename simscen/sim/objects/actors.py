@@ -13,6 +13,7 @@ import numpy as np
 from simscen.core.geometry import Pose2, Pose3, Vector
 from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.sim.bullet import engine, pybullet
+from simscen.sim.bullet.collision_shapes import Triangulate
 from simscen.sim.bullet.divergence import divergence_reason
 from simscen.sim.contact.triangles import encloses
 from simscen.sim.objects.actor import FALL_SPEED_M_S, Actor, ActorBuilder, ScheduledPoses
@@ -35,7 +36,7 @@ class Actors:
         self,
         client: int,
         tick_rate: int,
-        triangulate: engine.Triangulate,
+        triangulate: Triangulate,
         visual_shape: int = engine.DEFAULT_VISUAL,
         is_rendered: bool = True,
     ) -> None:

@@ -10,7 +10,7 @@ from simscen.core.geometry import Pose2, Pose3, Vector, rotated
 from simscen.core.geometry.shapes import Solid, Sphere
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.body.undercarriage import Wheel, caster_gap, casters_for_uneven_ground
-from simscen.sim.bullet import engine, pybullet
+from simscen.sim.bullet import collision_shapes, engine, pybullet
 from simscen.sim.robots.robot_state import RobotState
 from simscen.sim.scene.terrain import MIN_NORMAL_Z_CASTER, MIN_NORMAL_Z_WHEEL, Terrain
 
@@ -145,8 +145,8 @@ def _create_multibody(
         joints.append(len(links))
         max_roll = tick_seconds * (body.limits.linear + body.limits.angular * abs(wheel.y))
         links += _wheel_links(client, wheel, len(links), max_roll)
-    hull_shapes = engine.create_robot_shapes(client, body.hull)
-    first, *others = [*hull_shapes, *engine.create_robot_shapes(client, casters)]
+    hull_shapes = collision_shapes.create_robot_shapes(client, body.hull)
+    first, *others = [*hull_shapes, *collision_shapes.create_robot_shapes(client, casters)]
     hull = (-1, *range(len(links), len(links) + len(others)))
     links += [_Link(HULL_LINK_MASS_KG, shape, (0.0, 0.0, 0.0), 0, pybullet.JOINT_FIXED, (0, 0, 1)) for shape in others]
     _, center = body.chassis.principal()
@@ -213,4 +213,4 @@ def _wheel_shape(client: int, wheel: Wheel, max_roll: float) -> int:
         shape: int = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=wheel.radius, physicsClientId=client)
         return shape
     pin = Solid(Sphere(PIN_RADIUS_M), Pose3(y=-math.copysign(pin_distance, wheel.y)))
-    return engine.create_compound_shape(client, [Solid(Sphere(wheel.radius)), pin])
+    return collision_shapes.create_compound_shape(client, [Solid(Sphere(wheel.radius)), pin])

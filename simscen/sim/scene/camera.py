@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.shapes import Body, Solid, TriangleMesh
-from simscen.sim.bullet import engine, pybullet
+from simscen.sim.bullet import collision_shapes, engine, pybullet
+from simscen.sim.bullet.collision_shapes import Triangulate
 
 NEAR_PLANE_M = 0.02
 """Distance from the camera below which nothing is rendered."""
@@ -60,7 +61,7 @@ class RenderScene:
     image.
     """
 
-    def __init__(self, client: int, static: TriangleMesh, triangulate: engine.Triangulate) -> None:
+    def __init__(self, client: int, static: TriangleMesh, triangulate: Triangulate) -> None:
         self._client, self._static, self._triangulate = client, static, triangulate
         self._is_built = False
         self._visuals: dict[str, _VisualBody] = {}
@@ -76,7 +77,7 @@ class RenderScene:
         for name in [name for name in self._visuals if name not in moving]:
             self._remove(name)
         for name, (body, pose) in moving.items():
-            if not engine.are_primitives(body.solids):
+            if not collision_shapes.are_primitives(body.solids):
                 self._place(name, body, pose)
 
     def _place(self, name: str, body: Body, pose: Pose3) -> None:
@@ -84,7 +85,7 @@ class RenderScene:
         known = self._visuals.get(name)
         if known is None or known.solids is not body.solids:
             self._remove(name)
-            mesh = engine.fuse_surfaces(body.solids, self._triangulate)
+            mesh = collision_shapes.fuse_surfaces(body.solids, self._triangulate)
             known = self._visuals[name] = _VisualBody(body.solids, self._create_bodies(mesh.vertices, mesh.faces))
         for body_id in known.body_ids:
             pybullet.resetBasePositionAndOrientation(
@@ -96,7 +97,7 @@ class RenderScene:
         for body_id in visual.body_ids if visual else ():
             pybullet.removeBody(body_id, physicsClientId=self._client)
 
-    def _create_bodies(self, vertices: Array, faces: engine.Faces) -> tuple[int, ...]:
+    def _create_bodies(self, vertices: Array, faces: collision_shapes.Faces) -> tuple[int, ...]:
         """Create visual bodies of triangles; return their ids."""
         return tuple(
             pybullet.createMultiBody(0, -1, self._create_shape(vertices[faces[k : k + MAX_FACES_PER_VISUAL_SHAPE]]),

@@ -11,7 +11,7 @@ from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.meshes import SolidIndices, drivable_solids, is_convex, submesh
 from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import Body, TriangleMesh
-from simscen.sim.bullet import engine, pybullet
+from simscen.sim.bullet import collision_shapes, engine, pybullet
 
 RAY_HEIGHT_M = 1000.0
 """Height above the floor from which vertical rays search the ground, and depth below the floor where they end."""
@@ -50,10 +50,9 @@ class Terrain:
         faces = static.faces[static.owners == solid]
         mesh = submesh(static.vertices, faces)
         if is_convex(mesh):
-            shapes = [engine.create_convex_shape(self._client, mesh.vertices)]
+            shapes = [collision_shapes.create_convex_shape(self._client, mesh.vertices)]
         else:
-            tiles = engine.split_into_tiles(static.vertices, engine.faces_above_floor(static.vertices, faces))
-            shapes = [engine.create_concave_shape(self._client, submesh(static.vertices, tile)) for tile in tiles]
+            shapes = collision_shapes.create_concave_shapes(self._client, static.vertices, faces)
         friction = static.frictions[solid] if static.frictions else 1.0
         for shape in shapes:
             body = engine.create_static_body(self._client, shape)

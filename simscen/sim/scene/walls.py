@@ -9,7 +9,7 @@ from simscen.core.decorators import cached_on_instance
 from simscen.core.geometry import Vector
 from simscen.core.geometry.meshes import FaceTiles, tile_faces
 from simscen.core.geometry.shapes import TriangleMesh
-from simscen.sim.bullet import engine
+from simscen.sim.bullet import collision_shapes, engine
 from simscen.sim.scene.mesh_parts import parts_of
 
 SMALL_WORLD_FACES = 10_000
@@ -44,8 +44,7 @@ class Walls:
             self._tiles = _tiles_of(mesh)
             self._is_missing = np.ones(len(self._tiles), dtype=np.bool_)
         else:
-            faces = engine.faces_above_floor(mesh.vertices, mesh.faces)
-            self.bodies += engine.create_static_faces(client, mesh.vertices, faces)
+            self.bodies += engine.create_static_faces(client, mesh.vertices, mesh.faces)
         self.is_complete = not self._is_missing.any()
 
     def build_near(self, body_id: int, point: Vector, radius: float) -> list[int]:
@@ -75,4 +74,4 @@ def prepare_walls(mesh: TriangleMesh) -> None:
 @cached_on_instance
 def _tiles_of(mesh: TriangleMesh) -> FaceTiles:
     """Return the tiles of a mesh without the faces on the floor. The result is cached."""
-    return tile_faces(mesh.vertices, engine.faces_above_floor(mesh.vertices, mesh.faces), TILE_SIZE_M)
+    return tile_faces(mesh.vertices, collision_shapes.faces_above_floor(mesh.vertices, mesh.faces), TILE_SIZE_M)

@@ -14,7 +14,7 @@ from simscen.core.geometry.motion_paths import pose_at
 from simscen.core.geometry.shapes import Body, Box, MotionPath, Solid
 from simscen.core.records.events import EventKind
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.bullet import engine, pybullet
+from simscen.sim.bullet import collision_shapes, engine, pybullet
 from simscen.sim.objects.actor import Actor
 from simscen.sim.objects.proximity import REQUERY_DISTANCE_M, DeferredActors, ProximityQuery
 from simscen.sim.simulation import RobotPlacement, Simulation
@@ -211,7 +211,7 @@ def test_distance_to_a_deferred_actor_is_an_error(simulate):
 def test_scripted_body_with_reenabled_collisions_has_no_ground_contact(simulate):
     """Such a contact would cost time at each step."""
     client = simulate()._scene.client
-    shape = engine.create_compound_shape(client, [Solid(Box((0.4, 0.4, 0.4)), Pose3())])
+    shape = collision_shapes.create_compound_shape(client, [Solid(Box((0.4, 0.4, 0.4)), Pose3())])
     inertia = ((0.0, 0.0, 0.0), Pose3())
     body = engine.create_rigid_body(client, 0.0, shape, Pose3(5.0, 0.0, 0.2), inertia, friction=0.6)
     engine.disable_collisions(client, body)

@@ -11,7 +11,8 @@ from simulation_helpers import box, robot_spec
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Cylinder, Extrusion, Mesh, Solid
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.bullet.engine import create_hull_of_solids, create_static_body, split_into_tiles
+from simscen.sim.bullet.collision_shapes import create_hull_of_solids, split_into_tiles
+from simscen.sim.bullet.engine import create_static_body
 from simscen.sim.contact.static_distance import StaticDistance, max_displacement
 from simscen.sim.contact.triangles import encloses, encloses_along_line, point_to_triangles
 from simscen.worlds.geometry.triangulation import merge_solids
