@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.core.records.case import ROBOT_NAME
 from simscen.model.robot import Ackermann, Drive, Mecanum, SkidSteer
 from simscen.run.robot_interface import robot_model
 from simscen.sensors.odometry import integrate_arc, kinematics_of
 from simscen.sim.body.robot_body import ClimbLimits, RobotBody, compute_climb_limits
-from simscen.sim.simulation import FIRMWARE_RATE_HZ
-from simscen.sim.single_robot import SingleRobotSimulation
+from simscen.sim.simulation import FIRMWARE_RATE_HZ, RobotPlacement, Simulation
 from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 
 TICK_RATE_HZ = 240
@@ -83,7 +83,7 @@ def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
 
     Raises RunError if the simulation becomes unstable.
     """
-    simulation = SingleRobotSimulation(merge_solids([]), [], body, Pose2(0.0, 0.0, 0.0), triangulate)
+    simulation = Simulation(merge_solids([]), [], {ROBOT_NAME: RobotPlacement(body, Pose2(0.0, 0.0, 0.0))}, triangulate)
     try:
         rest = _measure_rest(simulation)
         return rest, tuple(_run_trial(simulation, body, name, legs) for name, legs in _legs_by_trial(body).items())
@@ -105,31 +105,33 @@ def _legs_by_trial(body: RobotBody) -> dict[str, list[_TrialLeg]]:
     return trials | ({"sideways": [_TrialLeg(0.0, LINE_LENGTH_M)]} if robot_model(body).holonomic else {})
 
 
-def _measure_rest(simulation: SingleRobotSimulation) -> RestingState:
-    begin = simulation.base_pose()
+def _measure_rest(simulation: Simulation) -> RestingState:
+    robot = simulation.robots[ROBOT_NAME]
+    begin = robot.base_pose()
     simulation.step(REST_TICKS)
-    end = simulation.base_pose()
+    end = robot.base_pose()
     return RestingState(_tilt(end, Pose3()), end.z, math.hypot(end.x - begin.x, end.y - begin.y))
 
 
-def _run_trial(simulation: SingleRobotSimulation, body: RobotBody, name: str, legs: list[_TrialLeg]) -> Trial:
-    simulation.place_robot(Pose2(0.0, 0.0, 0.0))
+def _run_trial(simulation: Simulation, body: RobotBody, name: str, legs: list[_TrialLeg]) -> Trial:
+    robot = simulation.robots[ROBOT_NAME]
+    simulation.place_robot(ROBOT_NAME, Pose2(0.0, 0.0, 0.0))
     simulation.step(SETTLING_TICKS)
-    motion, level = kinematics_of(body.drive), simulation.base_pose()
-    encoders, start, max_tilt = simulation.encoders(), level.plane, 0.0
+    motion, level = kinematics_of(body.drive), robot.base_pose()
+    encoders, start, max_tilt = robot.encoders(), level.plane, 0.0
     commanded, odometry, truth = _MotionRecorder(), _MotionRecorder(), _MotionRecorder()
     for twist in (twist for leg in legs for twist in _commands(leg, body)):
-        simulation.drive(twist)
+        robot.drive(twist)
         simulation.step(COMMAND_PERIOD_TICKS)
         commanded.append(commanded.last.compose(integrate_arc(Twist(*(part / FIRMWARE_RATE_HZ for part in twist)))))
-        new_encoders = simulation.encoders()
+        new_encoders = robot.encoders()
         step = motion(tuple(b - a for a, b in zip(encoders, new_encoders, strict=True)))
         encoders = new_encoders
         odometry.append(odometry.last.compose(integrate_arc(step)))
-        pose = simulation.base_pose()
+        pose = robot.base_pose()
         truth.append(start.between(pose.plane))
         max_tilt = max(max_tilt, _tilt(pose, level))
-    simulation.truth()  # raises RunError if the simulation became unstable
+    robot.truth()  # raises RunError if the simulation became unstable
     return Trial(name, commanded.motion, odometry.motion, truth.motion, max_tilt)
 
 

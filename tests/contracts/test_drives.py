@@ -10,8 +10,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.robot import Holonomic, RobotSpec
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.single_robot import SingleRobotSimulation
-from simscen.worlds.geometry.triangulation import merge_solids, triangulate
+from tests.single_robot import SingleRobotSimulation
 
 ROBOTS = Path(__file__).parents[2] / "simscen/data/robots"
 NAMES = sorted(path.name.removesuffix(".robot.yaml") for path in ROBOTS.glob("*.robot.yaml"))
@@ -21,7 +20,7 @@ FIRMWARE = 4  # ticks between two steps of a ramp
 @pytest.fixture(params=NAMES)
 def robot(request):
     spec = RobotSpec.model_validate(yaml.safe_load((ROBOTS / f"{request.param}.robot.yaml").read_text()))
-    simulation = SingleRobotSimulation(merge_solids([]), [], build_robot_body(spec), Pose2(0.0, 0.0, 0.0), triangulate)
+    simulation = SingleRobotSimulation(build_robot_body(spec))
     yield spec, simulation
     simulation.close()
 
@@ -74,7 +73,7 @@ def test_encoders_do_not_detect_a_kidnapping(robot):
 
 def test_equal_commands_give_equal_motion(robot):
     spec, first = robot
-    second = SingleRobotSimulation(merge_solids([]), [], build_robot_body(spec), Pose2(0.0, 0.0, 0.0), triangulate)
+    second = SingleRobotSimulation(build_robot_body(spec))
     for simulation in (first, second):
         for k in range(20):
             simulation.drive(Twist(0.4, 0.1, 0.1 * k - 1.0))

@@ -17,9 +17,9 @@ from simscen.core.random_streams import Streams
 from simscen.model.robot import RobotSpec
 from simscen.sensors.factory import build_sensors
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.single_robot import SingleRobotSimulation
-from simscen.worlds.geometry.triangulation import merge_solids, triangulate
+from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.raycasting.ray_scene import RayScene
+from tests.single_robot import SingleRobotSimulation
 
 ROBOTS = Path(__file__).parents[2] / "simscen/data/robots"
 CAMERA = {"camera": {"rate": 5.0, "width": 32, "height": 24, "mount": {"z": 0.4}}}
@@ -52,7 +52,7 @@ class Rig:
     """A robot in a room with its sensors."""
 
     def __init__(self, spec, seed=1, pose=Pose2(0.5, -0.3, 0.4)):
-        self.simulation = SingleRobotSimulation(ROOM, [], build_robot_body(spec), pose, triangulate)
+        self.simulation = SingleRobotSimulation(build_robot_body(spec), pose, WALLS)
         self.sensors = build_sensors(spec, Clock(240), Streams(seed), self.simulation.robot, RayScene(ROOM))
 
     def drive(self, twist, ticks):

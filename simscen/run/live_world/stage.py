@@ -231,7 +231,7 @@ class LiveStage:
 
     def place_robot(self, pose: Pose2) -> None:
         """Teleport the robot to a pose."""
-        self._robot.place(pose)
+        self._simulation.place_robot(self._robot.name, pose)
         self._update_pose()
         self.record_event(Event(0, EventKind.ROBOT_PLACED, "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
 
@@ -239,10 +239,8 @@ class LiveStage:
         """Push an object (None: the robot) with an impulse in N s (x, y in the world frame), spread over `seconds`."""
         if name is not None:
             self._simulation.push_object(name, impulse, seconds)
-        elif seconds:
-            self._robot.push_for(impulse, seconds)
         else:
-            self._robot.push(impulse)
+            self._simulation.push_robot(self._robot.name, impulse, seconds)
         data: dict[str, Value] = {"impulse": list(impulse), **({"seconds": seconds} if seconds else {})}
         kind = EventKind.ROBOT_PUSHED if name is None else EventKind.OBJECT_PUSHED
         (self.record_event if name is None else self.record_world_event)(Event(0, kind, name or "", data))

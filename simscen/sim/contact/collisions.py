@@ -1,7 +1,7 @@
 """Detects the collisions of a robot, and creates an event at the start and the end of each collision."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,9 +18,6 @@ This is its speed in any direction if the object is static, otherwise its speed 
 """
 NO_BODY = -1
 """Invalid body id."""
-
-IsGroundContact = Callable[[int, int, float], bool]
-"""Function (id of the other body, link of the robot, z of the unit normal): whether a contact is with the ground."""
 
 
 @dataclass(frozen=True)
@@ -41,25 +38,12 @@ class ContactPoint:
     is_static: bool
 
 
-class BaseMotion(NamedTuple):
-    """Position and velocity (m/s and rad/s along the world axes) of the base frame of a robot."""
+class BodyMotion(NamedTuple):
+    """Position of a body's frame, and its linear (m/s) and angular (rad/s) velocity along the world axes."""
 
     origin: Vector
     linear: Vector
     angular: Vector
-
-
-class PreStepMotion(NamedTuple):
-    """Motions before a step, to compute the speed of a collision that starts during the step.
-
-    robot:   motion of the robot that collides
-    actors:  velocities in m/s of all movable objects that can collide, by body id
-    robots:  motions of all robots, by body id
-    """
-
-    robot: BaseMotion
-    actors: Mapping[int, Vector]
-    robots: Mapping[int, BaseMotion]
 
 
 @dataclass
@@ -88,13 +72,19 @@ class CollisionTracker:
         """Whether any collision has started and not ended."""
         return bool(self._ongoing)
 
-    def update(self, tick: int, contact_points: list[ContactPoint], before: PreStepMotion) -> None:
-        """Process the contacts at `tick`; `before` are the motions before the step that ended at `tick`."""
-        for contact in contact_points:
+    def update(
+        self, tick: int, contacts: list[ContactPoint], robot: BodyMotion, others: Mapping[int, BodyMotion]
+    ) -> None:
+        """Process the contacts at `tick`.
+
+        `robot` and `others` are the motions of the robot and of all other bodies that can move (by body id), before the
+        step that ended at `tick`.
+        """
+        for contact in contacts:
             collision = self._ongoing.get(contact.name)
             if collision is None:
                 self._ongoing[contact.name] = _OngoingCollision(tick, tick, contact.impulse)
-                self._events.append(_started_event(tick, contact, before))
+                self._events.append(_started_event(tick, contact, robot, others.get(contact.other_id)))
             else:
                 collision.last_tick, collision.impulse = tick, collision.impulse + contact.impulse
         self._end_collisions(
@@ -125,18 +115,23 @@ def contact_points(
     names: Mapping[int, str | None],
     static_solid_at: Callable[[Vector], str],
     tick_seconds: float,
-    is_ground_contact: IsGroundContact,
+    ground: Collection[int],
+    ground_links: Mapping[int, float],
 ) -> list[ContactPoint]:
     """Return the current contacts of a robot, one for each touched object, sorted by name; without the ground.
 
     `names` has the names of the other bodies by id. Contacts with bodies that it does not contain are ignored. The name
     of a static body is None; `static_solid_at` then returns the name of the solid at a point. `tick_seconds` is the
     duration of a tick.
+
+    A contact of a wheel or caster with a `ground` body is not returned if its normal is steep enough: `ground_links`
+    has the smallest z of the normal for each link of a wheel or caster.
     """
     found: dict[str, ContactPoint] = {}
     for contact in pybullet.getContactPoints(robot_id, physicsClientId=client):
         other, point, normal, distance, force = contact[2], contact[6], contact[7], contact[8], contact[9]
-        if other not in names or (force <= 0 and distance > 0) or is_ground_contact(other, contact[3], normal[2]):
+        is_on_ground = other in ground and normal[2] >= ground_links.get(contact[3], math.inf)
+        if other not in names or (force <= 0 and distance > 0) or is_on_ground:
             continue
         name = names[other] or static_solid_at(point)
         known = found.get(name)
@@ -150,13 +145,10 @@ def enclosed_contact(name: str, point: Vector) -> ContactPoint:
     return ContactPoint(name, NO_BODY, point, (0.0, 0.0, 1.0), 0.0, is_static=True)
 
 
-def _started_event(tick: int, contact: ContactPoint, before: PreStepMotion) -> Event:
-    """Return the event for the start of a collision."""
-    robot_velocity = _velocity_at(before.robot, contact.point)
-    if contact.other_id in before.robots:
-        other_velocity = _velocity_at(before.robots[contact.other_id], contact.point)
-    else:
-        other_velocity = before.actors.get(contact.other_id, (0.0, 0.0, 0.0))
+def _started_event(tick: int, contact: ContactPoint, robot: BodyMotion, other: BodyMotion | None) -> Event:
+    """Return the event for the start of a collision. `other` is None for an object that does not move."""
+    robot_velocity = _velocity_at(robot, contact.point)
+    other_velocity = _velocity_at(other, contact.point) if other else (0.0, 0.0, 0.0)
     approach = -_dot(robot_velocity, contact.normal)
     is_grazing = contact.is_static and math.hypot(*robot_velocity) >= MIN_CAUSING_SPEED_M_S
     return Event(
@@ -175,8 +167,8 @@ def _started_event(tick: int, contact: ContactPoint, before: PreStepMotion) -> E
     )
 
 
-def _velocity_at(motion: BaseMotion, point: Vector) -> Vector:
-    """Return the velocity in m/s of the part of a robot that is at `point`."""
+def _velocity_at(motion: BodyMotion, point: Vector) -> Vector:
+    """Return the velocity in m/s of the part of a body that is at `point`."""
     (vx, vy, vz), (wx, wy, wz) = motion.linear, motion.angular
     x, y, z = (point[i] - motion.origin[i] for i in range(3))
     return vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x

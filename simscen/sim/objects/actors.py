@@ -15,6 +15,7 @@ from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.sim.bullet import engine, pybullet
 from simscen.sim.bullet.collision_shapes import Triangulate
 from simscen.sim.bullet.divergence import divergence_reason
+from simscen.sim.contact.collisions import BodyMotion
 from simscen.sim.contact.triangles import encloses
 from simscen.sim.objects.actor import FALL_SPEED_M_S, Actor, ActorBuilder, ScheduledPoses
 from simscen.sim.objects.broad_phase import BroadPhase
@@ -263,11 +264,12 @@ class Actors:
         for actor in self._scripted:
             actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
 
-    def velocities(self, tick: int) -> dict[int, Vector]:
-        """Return the velocities in m/s of all actors that collide and can move, by body id."""
+    def motions(self, tick: int) -> dict[int, BodyMotion]:
+        """Return the motions of all actors that collide and can move, by body id. Their rotation is ignored."""
         scripted = {actor.id: actor.path_velocity(tick, self._tick_rate)[0] for actor in self._scripted_colliding}
         pushed = {actor.id: pybullet.getBaseVelocity(actor.id, self._client)[0] for actor in self._pushable}
-        return {**scripted, **pushed}
+        none = (0.0, 0.0, 0.0)
+        return {body_id: BodyMotion(none, linear, none) for body_id, linear in {**scripted, **pushed}.items()}
 
     # Poses
 

@@ -1,9 +1,7 @@
-"""One robot of a simulation: its motion, collisions, and clearance; and the scene that all robots share."""
+"""One robot of a simulation: its motion, collisions, and clearance."""
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import partial
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -17,95 +15,13 @@ from simscen.core.records.trace import DeferredTruth, Truth
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.bullet.divergence import divergence_reason
 from simscen.sim.contact.clearance import Clearance
-from simscen.sim.contact.collisions import BaseMotion, CollisionTracker, PreStepMotion, contact_points, enclosed_contact
-from simscen.sim.objects.actors import NEVER, Actors
-from simscen.sim.objects.proximity import REQUERY_DISTANCE_M, ProximityQuery
+from simscen.sim.contact.collisions import BodyMotion, CollisionTracker, ContactPoint, contact_points, enclosed_contact
+from simscen.sim.objects.actors import NEVER
+from simscen.sim.objects.proximity import ProximityQuery
 from simscen.sim.robots.drive_factory import build_drive
 from simscen.sim.robots.robot_state import RobotState, TruthSampler
-from simscen.sim.scene.camera import RenderScene, render_image
-from simscen.sim.scene.terrain import FloorFriction, Terrain, is_ground_contact
-from simscen.sim.scene.walls import Walls
-
-
-@dataclass(frozen=True)
-class TimedPush:
-    """Push that lasts several ticks: calls `push(impulse)` at each tick from `start_tick` to `end_tick - 1`.
-
-    `impulse` is in N s per tick, in the world frame.
-    """
-
-    push: Callable[[tuple[float, float]], None]
-    impulse: tuple[float, float]
-    start_tick: int
-    end_tick: int
-
-
-@dataclass(eq=False)
-class Scene:
-    """State that all robots of a simulation share: the engine client, the objects in it, and the current tick."""
-
-    client: int
-    tick_rate: int
-    walls: Walls
-    terrain: Terrain
-    actors: Actors
-    render_scene: RenderScene | None
-    robots: dict[str, "Robot"] = field(default_factory=dict)
-    tick: int = 0
-    pushes: list[TimedPush] = field(default_factory=list)
-    floor: FloorFriction = field(default_factory=FloorFriction)
-
-    def update_wheel_friction(self) -> None:
-        """Set the friction of each wheel to the friction of the floor below it."""
-        self.floor.remove_expired(self.tick)
-        for robot in self.robots.values():
-            robot.base.set_friction(self.floor.friction)
-
-    def apply_pushes(self) -> bool:
-        """Apply the pushes of the next step; return whether any push is active or scheduled."""
-        self.pushes = [push for push in self.pushes if push.end_tick > self.tick]
-        for push in self.pushes:
-            if push.start_tick <= self.tick:
-                push.push(push.impulse)
-        if self.pushes:
-            self.on_push()
-        return bool(self.pushes)
-
-    def add_push(
-        self, push: Callable[[tuple[float, float]], None], impulse: tuple[float, float], seconds: float, tick: int
-    ) -> None:
-        """Schedule calls of `push` that spread an impulse (N s, world frame) evenly over `seconds` from `tick` on."""
-        ticks = max(1, round(seconds * self.tick_rate))
-        self.pushes.append(TimedPush(push, (impulse[0] / ticks, impulse[1] / ticks), tick, tick + ticks))
-
-    def on_push(self) -> None:
-        """Discard all predictions of robots and actors, because something is pushed during the next step."""
-        self.actors.on_push(self.tick)
-        for robot in self.robots.values():
-            robot.on_push()
-
-    def before_change(self) -> None:
-        """Compute the deferred samples of all robots before an object is added, removed, or moved."""
-        for robot in self.robots.values():
-            robot.sampler.compute_deferred()
-
-    def activate_actors(self, moved: float = REQUERY_DISTANCE_M) -> None:
-        """Let deferred actors near robots collide. These are movable objects that cannot collide yet, to save time.
-
-        Skips robots that have moved less than `moved` m since their last query.
-        """
-        if self.actors.is_engine_complete:
-            return
-        queries = [robot.make_query() for robot in self.robots.values() if robot.distance_since_query >= moved]
-        if queries and (activated := self.actors.activate_near(queries, self.tick)):
-            for robot in self.robots.values():
-                robot.add_bodies(activated)
-
-    def after_change(self) -> None:
-        """Update all robots after an object or robot was added, removed, or placed."""
-        self.activate_actors(moved=0.0)
-        for robot in self.robots.values():
-            robot.on_change()
+from simscen.sim.scene.camera import render_image
+from simscen.sim.scene.scene import Scene
 
 
 class Robot:
@@ -151,7 +67,6 @@ class Robot:
             clearance_range,
         )  # fmt: skip
         self.sampler = TruthSampler(self.clearance.static_clearance)
-        self._is_ground_contact = partial(is_ground_contact, scene.terrain.names, self.base.ground_links)
         self._names: dict[int, str | None] = {}
         self._query_point: Vector = (math.inf, math.inf, math.inf)
 
@@ -259,38 +174,28 @@ class Robot:
         render_scene.update(self.bodies_and_poses())
         return render_image(self._scene.client, self.base_pose().compose(mount), width, height, field_of_view, far)
 
+    # Called by the simulation
+
     def place(self, pose: Pose2) -> None:
         """Place the robot at rest at `pose`, and end its collisions."""
         self._collisions.end_all(self._scene.tick)
         self._placements, self._placed_tick = self._placements + 1, self._scene.tick
         self.set_pose(pose)
-        self._scene.after_change()
-
-    def push_for(self, impulse: tuple[float, float], seconds: float) -> None:
-        """Apply an impulse (N s, world frame) at the center of mass, spread over `seconds` from now on."""
-        self._scene.add_push(self.push, impulse, seconds, self._scene.tick)
-
-    def push(self, impulse: tuple[float, float]) -> None:
-        """Apply an impulse (N s, world frame) at the center of mass during the next tick."""
-        self.base.push(impulse, 1 / self._scene.tick_rate)
-        self._scene.on_push()
-
-    # Called by the simulation
 
     def set_pose(self, pose: Pose2) -> None:
-        """Place the robot at rest at `pose`, without updating the scene."""
+        """Place the robot at rest at `pose`, as if it had always been there."""
         self.base.place(pose)
         self._state_tick = -1
         self._drive.rest()
 
-    def on_push(self) -> None:
-        """Discard all predictions, because something is pushed during the next step."""
-        self.clearance.on_push(self._scene.tick)
+    def push(self, impulse: tuple[float, float]) -> None:
+        """Apply an impulse (N s, world frame) at the center of mass during the next tick."""
+        self.base.push(impulse, 1 / self._scene.tick_rate)
 
-    def on_change(self) -> None:
-        """Update the lists of other robots and objects after an object or robot was added, removed, or placed."""
+    def on_change(self, robots: Iterable["Robot"]) -> None:
+        """Update the lists of other robots and objects after an object or one of the `robots` has changed."""
         scene = self._scene
-        self.others = tuple(robot for robot in scene.robots.values() if robot is not self)
+        self.others = tuple(robot for robot in robots if robot is not self)
         self.clearance.others = [robot.clearance for robot in self.others]
         self.bodies = {**scene.actors.bodies(), **{robot.name: robot.body for robot in self.others}}
         others = {robot.base.id: robot.name for robot in self.others}
@@ -321,32 +226,33 @@ class Robot:
         """Tick before which the robot cannot touch anything; -1 during a collision."""
         return -1 if self._collisions.is_colliding else self.clearance.no_contact_before
 
-    def before_contact_step(self) -> BaseMotion:
+    def before_contact_step(self) -> BodyMotion:
         """Return the current motion before a step with possible contact, and update the clearance if needed."""
         tick, clearance = self._scene.tick, self.clearance
         is_outdated = tick >= clearance.no_contact_before and not self._collisions.is_colliding
         if clearance.may_be_enclosed or is_outdated:
             clearance.measure(tick)
         state = self.state()
-        return BaseMotion(state.pose.position, state.linear, state.angular)
+        return BodyMotion(state.pose.position, state.linear, state.angular)
 
-    def after_contact_step(self, before: PreStepMotion) -> None:
-        """Record the robot's contacts after a step; `before` has the motions before the step."""
-        tick, clearance = self._scene.tick, self.clearance
+    def after_contact_step(self, motions: Mapping[int, BodyMotion]) -> None:
+        """Record the robot's contacts after a step. `motions` has the motions of all bodies before it, by body id."""
+        tick, clearance, motion = self._scene.tick, self.clearance, motions[self.base.id]
         if not self._collisions.is_colliding and tick <= clearance.no_contact_before:
             return
-        contacts = contact_points(
-            self._scene.client,
-            self.base.id,
-            self._names,
-            clearance.static_solid_at,
-            1 / self._scene.tick_rate,
-            self._is_ground_contact,
-        )
+        contacts = self.contacts()
         enclosing = clearance.enclosed_by
         if enclosing is not None and enclosing not in {contact.name for contact in contacts}:
-            contacts.append(enclosed_contact(enclosing, before.robot.origin))
-        self._collisions.update(tick, contacts, before)
+            contacts.append(enclosed_contact(enclosing, motion.origin))
+        self._collisions.update(tick, contacts, motion, motions)
+
+    def contacts(self) -> list[ContactPoint]:
+        """Return the current contacts, one for each touched object, sorted by name; without the ground."""
+        scene = self._scene
+        return contact_points(
+            scene.client, self.base.id, self._names, self.clearance.static_solid_at, 1 / scene.tick_rate,
+            scene.terrain.names, self.base.ground_links,
+        )  # fmt: skip
 
     def close(self) -> None:
         """Compute the deferred samples, and release the engine clients."""

@@ -1,7 +1,6 @@
 """Ground on which robots drive: ramps and other uneven ground above the plane z = 0, and the friction of the floor."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -90,18 +89,6 @@ class Terrain:
         roll, pitch = math.atan2(slope_y, math.hypot(1.0, slope_x)), -math.atan(slope_x)
         tilt = Pose3.from_rpy(0.0, 0.0, 0.0, roll, pitch, 0.0)
         return Pose3.planar(pose, base + lift).compose(tilt)
-
-
-def is_ground_contact(
-    ground: Mapping[int, str | None], min_normal_z: Mapping[int, float], other: int, link: int, normal_z: float
-) -> bool:
-    """Return whether a contact is between a wheel or caster and the ground, and not a collision.
-
-    The contact is between the robot's `link` and the body with the id `other`; `normal_z` is the z of the unit normal
-    towards the robot. `ground` has the bodies of the terrain by id. `min_normal_z` has the smallest `normal_z` of a
-    ground contact by link.
-    """
-    return other in ground and link in min_normal_z and normal_z >= min_normal_z[link]
 
 
 class FloorFriction:

@@ -8,8 +8,7 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.single_robot import SingleRobotSimulation
-from simscen.worlds.geometry.triangulation import merge_solids, triangulate
+from tests.single_robot import SingleRobotSimulation
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -23,7 +22,7 @@ def simulate():
 
     def make(robot="turtlebot", solids=(), bodies=(), pose=Pose2(0.0, 0.0, 0.0), drive=None, **physics):
         body = build_robot_body(robot_spec(robot)) if isinstance(robot, str) else robot
-        simulations.append(SingleRobotSimulation(merge_solids(solids), bodies, body, pose, triangulate, **physics))
+        simulations.append(SingleRobotSimulation(body, pose, solids, bodies, **physics))
         if drive:
             simulations[-1].drive(Twist(*drive))
         return simulations[-1]

@@ -118,7 +118,7 @@ def test_collisions_equal_those_of_a_query_after_every_tick(simulate, monkeypatc
         for k, command in enumerate(commands):
             simulation.drive(command)
             if k == 15:
-                simulation.robot.push((3.0, 1.0))
+                simulation.push_robot((3.0, 1.0))
             events += collisions(simulation, 96)
         return events, simulation.truth().pose
 

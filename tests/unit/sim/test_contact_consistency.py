@@ -9,7 +9,6 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, Extrusion, MotionPath, Solid
 from simscen.core.records.events import EventKind
-from simscen.sim.contact.collisions import contact_points
 
 SAMPLE_TICKS = 6
 SQUARE = ((-0.6, -0.6), (0.6, -0.6), (0.6, 0.6), (-0.6, 0.6))
@@ -18,12 +17,7 @@ L_SHAPE = ((0.0, 0.0), (4.0, 0.0), (4.0, 1.2), (1.2, 1.2), (1.2, 4.0), (0.0, 4.0
 
 def has_contact(simulation) -> bool:
     """Return whether the engine reports a contact of the robot, except with the ground."""
-    robot = simulation.robot
-    return bool(
-        contact_points(
-            simulation._scene.client, robot.base.id, robot._names, lambda _: "", 1.0, robot._is_ground_contact
-        )
-    )
+    return bool(simulation.robot.contacts())
 
 
 def step_and_sample(simulation, ticks, every=SAMPLE_TICKS):
@@ -89,7 +83,7 @@ def test_events_and_clearance_equal_those_of_a_query_at_every_tick(simulate, mon
         for k in range(24):
             simulation.drive(Twist(rng.uniform(-0.5, 0.5), 0.0, rng.uniform(-2, 2)))
             if k % 8 == 5:
-                simulation.robot.push((rng.uniform(-4, 4), rng.uniform(-4, 4)))
+                simulation.push_robot((rng.uniform(-4, 4), rng.uniform(-4, 4)))
             if k == 17:  # away from the cart: how Bullet separates overlapping bodies depends on their earlier poses
                 simulation.place_robot(Pose2(0.0, 0.0, rng.uniform(-3, 3)))
             more = step_and_sample(simulation, 96)
@@ -153,7 +147,7 @@ def test_push_into_a_wall_is_detected_as_a_collision(simulate, monkeypatch, gap)
     def run():
         simulation = simulate(solids=[box("wall", 0.22 + gap + 0.05, 0, 0.1, 4)])
         step_and_sample(simulation, 24)
-        simulation.robot.push((8.0, 0.0))
+        simulation.push_robot((8.0, 0.0))
         return step_and_sample(simulation, 48, 24)
 
     skipping = run()

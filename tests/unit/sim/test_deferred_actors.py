@@ -103,7 +103,7 @@ def drive_among_carts(seed, has_images):
             beside = (here.x + rng.uniform(0.3, 1.0), here.y + rng.uniform(-1.0, 1.0))
             action = beat // 8
             if action in (0, 3):  # beside a cart or overlapping it
-                robot.place(Pose2(there.x + rng.uniform(-0.9, 0.9), there.y + 0.5))
+                simulation.place_robot(robot.name, Pose2(there.x + rng.uniform(-0.9, 0.9), there.y + 0.5))
             elif action == 1:
                 simulation.spawn(random_body(rng, "new", beside))
             elif action == 2:

@@ -6,16 +6,17 @@ from pathlib import Path
 
 import pytest
 
+FOLDERS = [str(Path(__file__).parents[k]) for k in (0, 3)]
+"""Folders of the modules that the simulated code imports."""
 RUN = """
 import sys
-sys.path.insert(0, {folder!r})
+sys.path[:0] = {folders}
 from simulation_helpers import box, robot_spec
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.single_robot import SingleRobotSimulation
-from simscen.worlds.geometry.triangulation import merge_solids, triangulate
+from tests.single_robot import SingleRobotSimulation
 
 solids = [box(f"box{{k}}", (k * 7 % 11) - 5, (k * 5 % 9) - 4, 0.3, 0.4) for k in range(60)]
 solids = [solid for solid in solids if abs(solid.pose.x) + abs(solid.pose.y) > 1.0]
@@ -26,7 +27,7 @@ bodies = [
 if {reverse}:
     bodies.reverse()
 body = build_robot_body(robot_spec({robot!r}))
-simulation = SingleRobotSimulation(merge_solids(solids), bodies, body, Pose2(0.1, 0.2, 0.3), triangulate)
+simulation = SingleRobotSimulation(body, Pose2(0.1, 0.2, 0.3), solids, bodies)
 for k in range(60):
     simulation.drive(Twist(0.5, 0.0, 0.4 - 0.02 * k))
     simulation.step(24)
@@ -37,12 +38,12 @@ print(simulation.robot.collisions())
 
 
 def run_in_new_process(robot, reverse=False):
-    code = RUN.format(folder=str(Path(__file__).parent), robot=robot, reverse=reverse)
+    code = RUN.format(folders=FOLDERS, robot=robot, reverse=reverse)
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
 
 
 def test_runs_in_the_same_and_in_a_new_process_are_equal(capsys):
-    code = RUN.format(folder=str(Path(__file__).parent), robot="turtlebot", reverse=False)
+    code = RUN.format(folders=FOLDERS, robot="turtlebot", reverse=False)
     outputs = []
     for _ in range(2):
         exec(code, {})

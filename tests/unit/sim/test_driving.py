@@ -164,7 +164,7 @@ def test_placed_robot_is_at_rest_and_its_encoders_do_not_change(simulate):
 def test_push_moves_the_robot_in_its_direction(simulate):
     for robot in ("turtlebot", "jackal", "omni"):
         simulation = simulate(robot)
-        simulation.robot.push((0.0, 30.0))
+        simulation.push_robot((0.0, 30.0))
         simulation.step(30)
         pose = simulation.truth().pose
         assert pose.y > 0.01
@@ -181,7 +181,7 @@ def test_a_push_in_free_flight_gives_the_robot_its_impulse(simulate):
     pybullet.resetBasePositionAndOrientation(
         simulation.robot.base.id, up, turn, physicsClientId=simulation._scene.client
     )
-    simulation.robot.push((0.9, 0.0))
+    simulation.push_robot((0.9, 0.0))
     simulation.step(1)
     assert simulation.robot.base_velocity()[0][0] == pytest.approx(0.9 / 1.8, rel=0.02)
 

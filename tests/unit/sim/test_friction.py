@@ -93,7 +93,7 @@ def test_hull_slides_along_wall_by_coulombs_law(simulate, share):
 
     def press(ticks):
         for _ in range(ticks):
-            simulation.robot.push((pressing / TICKS, along / TICKS))
+            simulation.push_robot((pressing / TICKS, along / TICKS))
             simulation.step(1)
 
     press(TICKS // 4)

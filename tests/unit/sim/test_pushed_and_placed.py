@@ -101,7 +101,7 @@ def test_force_on_the_robot_adds_its_impulse_evenly_over_its_duration(simulate):
     pybullet.resetBasePositionAndOrientation(
         number, (*position[:2], position[2] + 0.5), orientation, physicsClientId=client
     )
-    simulation.robot.push_for((0.9, 0.0), 0.1)
+    simulation.push_robot((0.9, 0.0), 0.1)
     speeds = []
     for _ in range(3):
         simulation.step(12)

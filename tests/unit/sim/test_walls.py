@@ -30,7 +30,7 @@ def push_crate_into_a_distant_wall(simulation):
 
 
 def place_beside_a_post(simulation):
-    simulation.robot.place(Pose2(30.0, 29.5, 1.5))
+    simulation.place_robot(Pose2(30.0, 29.5, 1.5))
     simulation.drive(Twist(0.4, 0.0, 0.0))
 
 

@@ -5,12 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from simscen.core.geometry import Pose2, wrap
+from simscen.core.geometry import wrap
 from simscen.core.geometry.kinematics import Twist
 from simscen.model.robot import RobotSpec
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.single_robot import SingleRobotSimulation
-from simscen.worlds.geometry.triangulation import merge_solids, triangulate
+from tests.single_robot import SingleRobotSimulation
 
 JACKAL = Path(__file__).parents[5] / "shared/data/jackal_urdf"
 
@@ -26,7 +25,7 @@ def jackal():
         {"simscen": 1, "name": "jackal", "urdf": "jackal.urdf", "drive": drive, "limits": limits, "sensors": {}}
     )
     body = build_robot_body(spec, JACKAL / "jackal.robot.yaml", [JACKAL])
-    simulation = SingleRobotSimulation(merge_solids([]), [], body, Pose2(0, 0, 0), triangulate)
+    simulation = SingleRobotSimulation(body)
     yield simulation
     simulation.close()
 

@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 from simscen.core.errors import InvalidInput
-from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Box, Mesh
 from simscen.model.robot import RobotSpec
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.single_robot import SingleRobotSimulation
-from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 from simscen.worlds.sdf.mesh_files import UnusableMesh, read_parts
+from tests.single_robot import SingleRobotSimulation
 
 DIFFERENTIAL = {"type": "differential", "wheel_radius": 0.05, "wheel_separation": 0.4}
 LIMITS = {"linear": 0.5, "angular": 2.0, "linear_acceleration": 1.0, "angular_acceleration": 3.0}
@@ -139,7 +137,7 @@ def test_casters_of_the_urdf_on_the_ground_are_replaced_by_generated_ones(load):
 
 
 def test_urdf_robot_drives(load):
-    simulation = SingleRobotSimulation(merge_solids([]), [], load(robot()), Pose2(0, 0, 0), triangulate)
+    simulation = SingleRobotSimulation(load(robot()))
     simulation.drive(Twist(0.5, 0.0, 0.0))
     simulation.step(240)
     start = simulation.truth().pose.x
@@ -153,7 +151,7 @@ def test_meshes_are_part_of_the_hull_as_their_convex_hull(load, tmp_path):
     body = load(robot(extra="", geometry='<mesh filename="tetra.stl" scale="0.001 0.001 0.001"/>'))
     (solid,) = (solid for solid in body.hull if solid.name == "base")
     assert solid.shape.vertices.max() == pytest.approx(0.3)
-    simulation = SingleRobotSimulation(merge_solids([]), [], body, Pose2(0, 0, 0), triangulate)
+    simulation = SingleRobotSimulation(body)
     simulation.step(10)
     simulation.close()
 
@@ -312,7 +310,7 @@ def test_car_is_steered_by_the_wheels_below_vertical_joints(load):
     body = load(robot(extra=steering), drive=drive)
     assert [(w.is_steered, w.is_driven, round(w.x, 3)) for w in body.wheels] == [
         (False, True, 0.0), (False, True, 0.0), (True, False, 0.4), (True, False, 0.4)]  # fmt: skip
-    simulation = SingleRobotSimulation(merge_solids([]), [], body, Pose2(0, 0, 0), triangulate)
+    simulation = SingleRobotSimulation(body)
     simulation.drive(Twist(0.4, 0.0, 0.4))
     simulation.step(720)
     assert simulation.truth().twist == pytest.approx((0.4, 0.0, 0.4), abs=0.02)
