@@ -1,11 +1,10 @@
 """Definitions in xacro files: parses macros, binds the arguments of macro calls, and defines properties."""
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass, field
 
 from simscen.sim.urdf.xacro.limits import ExpansionError, parse_bool, parse_literal
-from simscen.sim.urdf.xacro.text import Block, LazyText, Scope, ScopeValue, TextEvaluator, required_attribute
+from simscen.sim.urdf.xacro.scopes import Block, LazyText, Macro, Parameter, Scope, ScopeValue
+from simscen.sim.urdf.xacro.text import TextEvaluator, required_attribute
 from simscen.sim.urdf.xml_source import Element
 
 PARAMETER = re.compile(
@@ -15,60 +14,6 @@ PARAMETER = re.compile(
     re.VERBOSE,
 )
 """One parameter in `params`, such as `name`, `*block`, `name:=default`, or `name:=^|default`."""
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A parameter of a macro.
-
-    If a call has no argument for it, its value is `default` (None: the argument is required). If the parameter
-    `is_forwarded` (`^`), a property of the same name in the scope of the caller takes precedence over `default`.
-    """
-
-    name: str
-    is_forwarded: bool = False
-    default: str | None = None
-
-    @property
-    def is_block(self) -> bool:
-        """Whether the argument is a block: a child element of the call. The name then begins with `*` or `**`."""
-        return self.name.startswith("*")
-
-
-@dataclass(frozen=True, eq=False)
-class Macro:
-    """A macro. `body` is the `<xacro:macro>` element."""
-
-    name: str
-    parameters: tuple[Parameter, ...]
-    body: Element
-
-
-@dataclass(eq=False)
-class MacroScope:
-    """Macros that are defined in a scope, by name. The macros of the `parent` scope are visible as well.
-
-    `namespaces` are the scopes of files that are included with a namespace, by name.
-    """
-
-    parent: "MacroScope | None" = None
-    macros: dict[str, Macro] = field(default_factory=dict)
-    namespaces: "dict[str, MacroScope]" = field(default_factory=dict)
-
-    def find(self, name: str) -> Macro | None:
-        """Return the innermost visible macro with this name, or None."""
-        return next((scope.macros[name] for scope in self._outwards() if name in scope.macros), None)
-
-    def find_namespace(self, name: str) -> "MacroScope | None":
-        """Return the innermost visible namespace with this name, or None."""
-        return next((scope.namespaces[name] for scope in self._outwards() if name in scope.namespaces), None)
-
-    def _outwards(self) -> "Iterator[MacroScope]":
-        """Yield this scope, its parent, the parent's parent, and so on."""
-        scope: MacroScope | None = self
-        while scope is not None:
-            yield scope
-            scope = scope.parent
 
 
 def parse_macro(element: Element) -> Macro:
@@ -91,22 +36,21 @@ def _parse_parameters(text: str) -> list[Parameter]:
     return found
 
 
-def resolve_macro(qualified_name: str, scope: Scope, macros: MacroScope) -> tuple[Macro, Scope, MacroScope]:
-    """Return the macro `name` or `namespace.name`, and the scopes that its body sees. Raises ExpansionError.
+def resolve_macro(qualified_name: str, scope: Scope) -> tuple[Macro, Scope]:
+    """Return the macro `name` or `namespace.name`, and the scope that its body sees. Raises ExpansionError.
 
-    These are the scopes of the namespace, or without a namespace those of the call.
+    This is the scope of the namespace, or without a namespace that of the call.
     """
     *spaces, name = qualified_name.split(".")
     for space in spaces:
-        owner, inner = scope.find_scope(space), macros.find_namespace(space)
-        found = owner.values[space] if owner is not None else None
-        if inner is None or not isinstance(found, Scope):
+        inner = scope.find_namespace(space)
+        if inner is None:
             raise ExpansionError(f"there is no namespace {space[:60]!r}")
-        scope, macros = found, inner
-    macro = macros.find(name)
+        scope = inner
+    macro = scope.find_macro(name)
     if macro is None:
         raise ExpansionError(f"there is no macro {qualified_name[:60]!r}")
-    return macro, scope, macros
+    return macro, scope
 
 
 def bind_parameters(

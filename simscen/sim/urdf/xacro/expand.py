@@ -6,16 +6,10 @@ from pathlib import Path
 
 from simscen.assets.folders import AllowedFolders, NoSuchFile, UnusableFile
 from simscen.core.errors import InvalidInput, Problem
-from simscen.sim.urdf.xacro.definitions import (
-    Macro,
-    MacroScope,
-    bind_parameters,
-    define_property,
-    parse_macro,
-    resolve_macro,
-)
+from simscen.sim.urdf.xacro.definitions import bind_parameters, define_property, parse_macro, resolve_macro
 from simscen.sim.urdf.xacro.limits import Budget, ExpansionError, MissingFile, parse_bool
-from simscen.sim.urdf.xacro.text import Block, Scope, TextEvaluator, required_attribute
+from simscen.sim.urdf.xacro.scopes import Block, Macro, Scope
+from simscen.sim.urdf.xacro.text import TextEvaluator, required_attribute
 from simscen.sim.urdf.xml_source import MAX_URDF_BYTES, Element
 
 MAX_FILES = 200
@@ -47,7 +41,7 @@ def expand(
     container = replace(robot, tag="", attributes={}, children=[])
     expansion = _Expansion(file, folders, read, arguments or {})
     try:
-        expansion.element(robot, container, Scope(), MacroScope())
+        expansion.element(robot, container, Scope())
     except InvalidInput:
         if not expansion.missing:
             raise
@@ -70,7 +64,7 @@ class _Expansion:
     """Expansion of one file. Most private methods are handlers of one xacro element, such as `_if` of `<xacro:if>`.
 
     A handler appends the expansion of the element `source` to the children of `into`. `scope` has the visible
-    properties, and `macros` has the visible macros.
+    definitions.
     """
 
     def __init__(self, file: Path, folders: AllowedFolders, read: FileReader, arguments: Mapping[str, str]) -> None:
@@ -83,7 +77,7 @@ class _Expansion:
         self._calls: list[tuple[Macro, Element]] = []
         self._elements, self._bytes = 0, 0
         self._handlers = {
-            "xacro:property": lambda source, _, scope, __: define_property(source, scope, self._texts),
+            "xacro:property": lambda source, _, scope: define_property(source, scope, self._texts),
             "xacro:macro": self._macro,
             "xacro:arg": self._argument,
             "xacro:include": self._include,
@@ -95,23 +89,23 @@ class _Expansion:
             "xacro:call": self._call_by_name,
         }
 
-    def element(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+    def element(self, source: Element, into: Element, scope: Scope) -> None:
         """Append the expansion of an element to the children of `into`."""
         try:
             with self._budget:
                 self._budget.spend()
                 other = self._call if source.tag.startswith("xacro:") else self._copy
-                self._handlers.get(source.tag, other)(source, into, scope, macros)
+                self._handlers.get(source.tag, other)(source, into, scope)
         except ExpansionError as error:
             calls = [f"in macro {m.name!r}, called at {e.source.name}:{e.line}" for m, e in self._calls[-1:]]
             hint = "; ".join(filter(None, [error.hint, *calls]))
             raise InvalidInput([source.problem(error.message, hint)]) from error
 
-    def _expand_children(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+    def _expand_children(self, source: Element, into: Element, scope: Scope) -> None:
         for child in source.children:
-            self.element(child, into, scope, macros)
+            self.element(child, into, scope)
 
-    def _copy(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+    def _copy(self, source: Element, into: Element, scope: Scope) -> None:
         """Append a copy of an element that is not a xacro element."""
         own = [(n, text) for n, text in source.attributes.items() if not n.startswith("xacro:") and n != "xmlns:xacro"]
         attributes = {name: self._texts.text(text, scope) for name, text in own}
@@ -121,13 +115,13 @@ class _Expansion:
             raise ExpansionError(f"more than {MAX_ELEMENTS} elements or {MAX_URDF_BYTES // 2**20} MiB when expanded")
         copy = replace(source, attributes=attributes, children=[])
         into.children.append(copy)
-        self._expand_children(source, copy, scope, macros)
+        self._expand_children(source, copy, scope)
 
-    def _macro(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+    def _macro(self, source: Element, into: Element, scope: Scope) -> None:
         macro = parse_macro(source)
-        macros.macros[macro.name] = macro
+        scope.macros[macro.name] = macro
 
-    def _argument(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+    def _argument(self, source: Element, into: Element, scope: Scope) -> None:
         name = required_attribute(source, "name")
         self.declared.add(name)
         if name not in self._texts.arguments:
@@ -135,56 +129,54 @@ class _Expansion:
                 required_attribute(source, "default", may_be_empty=True), scope
             )
 
-    def _if(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+    def _if(self, source: Element, into: Element, scope: Scope) -> None:
         if parse_bool(self._texts.value(required_attribute(source, "value"), scope)) is (source.tag == "xacro:if"):
-            self._expand_children(source, into, scope, macros)
+            self._expand_children(source, into, scope)
 
-    def _attribute(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+    def _attribute(self, source: Element, into: Element, scope: Scope) -> None:
         name = self._texts.text(required_attribute(source, "name"), scope)
         into.attributes[name] = self._texts.text(required_attribute(source, "value", may_be_empty=True), scope)
 
-    def _element(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
-        self.element(
-            replace(source, tag=self._texts.text(required_attribute(source, "xacro:name"), scope)), into, scope, macros
-        )
+    def _element(self, source: Element, into: Element, scope: Scope) -> None:
+        tag = self._texts.text(required_attribute(source, "xacro:name"), scope)
+        self.element(replace(source, tag=tag), into, scope)
 
-    def _insert(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+    def _insert(self, source: Element, into: Element, scope: Scope) -> None:
         name = required_attribute(source, "name")
         for key in (f"**{name}", f"*{name}"):
             owner = scope.find_scope(key)
             if owner is not None and isinstance(block := owner.values[key], Block):
                 insert = self._copy if block.includes_element else self._expand_children
-                insert(block.element, into, scope, macros)
+                insert(block.element, into, scope)
                 return
         raise ExpansionError(f"there is no block {name[:60]!r}")
 
-    def _call_by_name(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+    def _call_by_name(self, source: Element, into: Element, scope: Scope) -> None:
         name = self._texts.text(required_attribute(source, "macro"), scope)
         rest = {key: value for key, value in source.attributes.items() if key != "macro"}
-        self._call(replace(source, tag=f"xacro:{name}", attributes=rest), into, scope, macros)
+        self._call(replace(source, tag=f"xacro:{name}", attributes=rest), into, scope)
 
-    def _call(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+    def _call(self, source: Element, into: Element, scope: Scope) -> None:
         self._budget.spend(10)
-        macro, enclosing, enclosing_macros = resolve_macro(source.tag.removeprefix("xacro:"), scope, macros)
+        macro, enclosing = resolve_macro(source.tag.removeprefix("xacro:"), scope)
         arguments = replace(source, attributes={}, children=[])
-        self._expand_children(source, arguments, scope, macros)
+        self._expand_children(source, arguments, scope)
         inside = bind_parameters(macro, source, arguments.children, scope, Scope(enclosing), self._texts)
         self._calls.append((macro, source))
-        self._expand_children(macro.body, into, inside, MacroScope(enclosing_macros))
+        self._expand_children(macro.body, into, inside)
         self._calls.pop()
 
-    def _include(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+    def _include(self, source: Element, into: Element, scope: Scope) -> None:
         try:
-            self._include_file(source, into, scope, macros)
+            self._include_file(source, into, scope)
         except MissingFile as missing:
             self.missing.setdefault(missing.message, source.problem(missing.message, missing.hint))
 
-    def _include_file(self, source: Element, into: Element, scope: Scope, macros: MacroScope) -> None:
+    def _include_file(self, source: Element, into: Element, scope: Scope) -> None:
         filename = self._texts.text(required_attribute(source, "filename"), scope)
         if space := self._texts.text(source.attributes.get("ns", ""), scope):
             enclosing, scope = scope, Scope(scope, is_namespace=True)
             enclosing.values[space] = scope
-            macros.namespaces[space] = macros = MacroScope()
         try:
             found = self._folders.find(filename, self._texts.file.parent, allow_absolute=True)
             path = self._folders.check_file(found, MAX_URDF_BYTES)
@@ -193,7 +185,7 @@ class _Expansion:
                 return
             raise MissingFile(f"include {filename[:200]!r}: {trouble}", trouble.hint) from trouble
         before, self._texts.file = self._texts.file, path
-        self._expand_children(self._parse(path), into, scope, macros)
+        self._expand_children(self._parse(path), into, scope)
         self._texts.file = before
 
     def _parse(self, path: Path) -> Element:

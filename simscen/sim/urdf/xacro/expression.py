@@ -4,7 +4,7 @@ import ast
 import math
 import operator
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import Any
 
 from simscen.sim.urdf.xacro.limits import MAX_BITS, MAX_LENGTH, Budget, ExpansionError, Value, check_bounds, size
 
@@ -110,11 +110,8 @@ COMPARISON_OPERATORS: dict[type[ast.cmpop], Callable[[Any, Any], object]] = {
 EXPRESSION_HINT = "supported are numbers, texts, lists, comparisons, `a if b else c`, math functions, and properties"
 
 
-class PropertyLookup(Protocol):
-    """Source of the values of xacro properties."""
-
-    def value(self, path: tuple[str, ...]) -> Value:
-        """Return the value of the property `a.b`, given as ("a", "b"); raises KeyError if it does not exist."""
+PropertyLookup = Callable[[tuple[str, ...]], Value]
+"""Returns the value of the property `a.b`, given as ("a", "b"); raises KeyError if it does not exist."""
 
 
 def evaluate(text: str, properties: PropertyLookup, budget: Budget) -> Value:
@@ -174,7 +171,7 @@ class _Evaluation:
     def _name(self, node: ast.expr) -> object:
         path = _path(node)
         try:
-            return self._properties.value(path)
+            return self._properties(path)
         except KeyError:
             known = _find_builtin(path)
         if isinstance(known, int | float):

@@ -2,83 +2,13 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Union
 
 from simscen.assets.folders import AllowedFolders, UnusableFile
 from simscen.sim.urdf.xacro.expression import evaluate
 from simscen.sim.urdf.xacro.limits import MAX_LENGTH, Budget, ExpansionError, MissingFile, Value, parse_literal
+from simscen.sim.urdf.xacro.scopes import Block, EvaluationMarker, LazyText, Scope
 from simscen.sim.urdf.xml_source import Element
-
-
-@dataclass(frozen=True, eq=False)
-class LazyText:
-    """Text of a property that is evaluated when the property is first used."""
-
-    text: str
-
-
-@dataclass(frozen=True, eq=False)
-class Block:
-    """Block that `<xacro:insert_block>` inserts: `element` if `includes_element`, else only its children."""
-
-    element: Element
-    includes_element: bool
-
-
-@dataclass(eq=False)
-class EvaluationMarker:
-    """Marker for a property that is being evaluated, to detect circular definitions."""
-
-
-ScopeValue = Union[Value, LazyText, Block, EvaluationMarker, "Scope"]
-"""Content of a name in a scope: a property, a block, or the scope of an included namespace."""
-
-
-@dataclass(eq=False)
-class Scope:
-    """Properties and blocks of a file, of an included namespace, or of one macro call, by name.
-
-    The properties and blocks of the `parent` scope are visible as well. The names of blocks begin with `*` or `**`.
-    """
-
-    parent: "Scope | None" = None
-    is_namespace: bool = False
-    values: dict[str, ScopeValue] = field(default_factory=dict)
-
-    def find_scope(self, name: str) -> "Scope | None":
-        """Return the innermost visible scope with a property of this name, or None."""
-        scope: Scope | None = self
-        while scope is not None and name not in scope.values:
-            scope = scope.parent
-        return scope
-
-    def top(self) -> "Scope":
-        """Return the outermost scope."""
-        scope = self
-        while scope.parent is not None:
-            scope = scope.parent
-        return scope
-
-    def caller(self) -> "Scope":
-        """Return the scope in which `<xacro:property scope="parent">` sets a property.
-
-        In a namespace, this is its parent scope. In a macro call, it is the innermost enclosing scope that is not a
-        namespace.
-        """
-        scope = self.parent
-        while scope is not None and scope.is_namespace and not self.is_namespace:
-            scope = scope.parent
-        return scope or self.top()
-
-    def remove(self, name: str) -> None:
-        """Remove a property from this scope and all enclosing scopes."""
-        scope: Scope | None = self
-        while scope is not None:
-            scope.values.pop(name, None)
-            scope = scope.parent
-
 
 TOKEN = re.compile(r"\$\$+[{(]|\$\{[^}]*\}|\$\([^)]*\)|[^$]+|\$[^{($]+|\$\Z")
 """Pattern of a part of a text: an escaped `$${` or `$$(`, an expression, a substitution, or plain text."""
@@ -147,6 +77,17 @@ class TextEvaluator:
             case found:
                 return found
 
+    def _property_at(self, path: tuple[str, ...], scope: Scope) -> Value:
+        """Return the property `a.b`, given as ("a", "b"); raises KeyError if it does not exist."""
+        current: Value | Scope = scope
+        for name in path:
+            if not isinstance(current, Scope):
+                raise KeyError(name)
+            current = self.property(current, name)
+        if isinstance(current, Scope):
+            raise KeyError(path[-1])
+        return current
+
     def _part(self, token: str, scope: Scope) -> Value:
         """Return the value of a part of a text (see TOKEN)."""
         if token.startswith("$$"):
@@ -154,7 +95,7 @@ class TextEvaluator:
         if token.startswith("${"):
             expression = str(self.value(token[2:-1], scope))
             try:
-                return evaluate(expression, _ScopeLookup(self, scope), self.budget)
+                return evaluate(expression, lambda path: self._property_at(path, scope), self.budget)
             except ExpansionError as error:
                 if error.message.startswith("${"):
                     raise
@@ -188,23 +129,6 @@ class TextEvaluator:
             return str(self._folders.package_folder(name, self.file.parent))
         except UnusableFile as trouble:
             raise MissingFile(f"$(find {name[:60]}): {trouble}", trouble.hint) from None
-
-
-class _ScopeLookup:
-    """Implementation of PropertyLookup for the properties that are visible in a scope."""
-
-    def __init__(self, texts: TextEvaluator, scope: Scope) -> None:
-        self._texts, self._scope = texts, scope
-
-    def value(self, path: tuple[str, ...]) -> Value:
-        current: Value | Scope = self._scope
-        for name in path:
-            if not isinstance(current, Scope):
-                raise KeyError(name)
-            current = self._texts.property(current, name)
-        if isinstance(current, Scope):
-            raise KeyError(path[-1])
-        return current
 
 
 def required_attribute(element: Element, attribute: str, may_be_empty: bool = False) -> str:
