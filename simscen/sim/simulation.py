@@ -171,7 +171,7 @@ class Simulation:
         """Return the current pose of an object or robot, or None if it does not exist."""
         if name in self.robots:
             return self.robots[name].base_pose()
-        return self._scene.actors.poses(self.tick).get(name)
+        return self._scene.actors.poses.at(self.tick).get(name)
 
     def close(self) -> None:
         """Release the engine."""

@@ -1,14 +1,12 @@
-"""State of one movable object (actor), its creation in the engine, and precomputed poses of scripted actors.
+"""State of one movable object (actor), and its creation in the engine.
 
 A scripted actor follows a path and has no mass in the engine. A pushable actor has a mass and no path. All other actors
 stand still.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-
-import numpy as np
 
 from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.errors import RunError
@@ -22,7 +20,6 @@ from simscen.core.geometry.motion_paths import (
     too_fast_message,
     top_speed,
 )
-from simscen.core.geometry.scripted_poses import BatchPathSampler, PosesAtTick, PredictedPoses
 from simscen.core.geometry.shapes import Body, Mesh, MotionPath
 from simscen.sim.body.inertia import inertia_of_solids
 from simscen.sim.body.outline import radius_and_height
@@ -37,8 +34,6 @@ FALL_SPEED_M_S = SPEED_HORIZON_S * GRAVITY_M_S2
 """Speed that a resting object can gain by falling for SPEED_HORIZON_S."""
 SHAPE_MARGIN_M = 0.05
 """Distance that collision shapes may extend beyond their vertices."""
-PRECOMPUTED_S = 4
-"""Simulated time for which the poses of scripted actors are computed in one batch."""
 
 CenterPose = tuple[Vector, tuple[float, float, float, float]]
 """Position and quaternion of a center of mass, as returned by PyBullet."""
@@ -218,37 +213,3 @@ class ActorBuilder:
         else:
             # Setting the pose again makes it bit-identical to that of an actor that has been there before.
             actor.set_engine_pose(client, actor.path_pose(tick, self._tick_rate))
-
-
-class ScheduledPoses:
-    """Precomputed poses of scripted actors; create a new instance when a path changes."""
-
-    def __init__(self, scripted: Sequence[Actor], tick_rate: int) -> None:
-        self._scripted, self._tick_rate = scripted, tick_rate
-        self._predicted: PredictedPoses | None = None
-        self._sampler: BatchPathSampler | None = None
-
-    def at(self, tick: int) -> PosesAtTick | None:
-        """Return the poses of all actors at a tick, or None if these poses have not been computed."""
-        return None if self._predicted is None else self._predicted.at(tick)
-
-    def invalidate(self) -> None:
-        """Discard the poses, because an actor that is not scripted has moved."""
-        self._predicted = None
-
-    def compute(self, tick: int, period: int, poses: Mapping[str, Pose3]) -> None:
-        """Compute the poses of the next PRECOMPUTED_S at every `period` ticks from `tick` on.
-
-        Does nothing if they are known or an actor is steered. `poses` are the current poses of all actors.
-        """
-        is_known = self._predicted is not None and tick in self._predicted.ticks
-        if is_known or any(actor.is_steered for actor in self._scripted):
-            return
-        if self._sampler is None:
-            paths = [(actor.path, actor.body.pose.z) for actor in self._scripted]
-            self._sampler = BatchPathSampler([(path, z) for path, z in paths if path is not None])
-        ticks = range(tick, tick + max(1, PRECOMPUTED_S * self._tick_rate // period) * period, period)
-        starts = np.array([actor.path_start_tick for actor in self._scripted])
-        table = self._sampler.at((np.array(ticks)[:, np.newaxis] - starts) / self._tick_rate)
-        names = tuple(actor.body.name for actor in self._scripted)
-        self._predicted = PredictedPoses(ticks, names, table, {**poses})

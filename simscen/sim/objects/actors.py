@@ -4,7 +4,6 @@ A scripted actor follows a path. A pushable actor has a mass and no path. A defe
 no robot has come near. A steered actor is a scripted actor whose path can change at any time, such as a pedestrian.
 """
 
-import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 
@@ -14,11 +13,11 @@ from simscen.core.geometry import Pose2, Pose3, Vector
 from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.sim.bullet import engine, pybullet
 from simscen.sim.bullet.collision_shapes import Triangulate
-from simscen.sim.bullet.divergence import divergence_reason
 from simscen.sim.contact.collisions import BodyMotion
 from simscen.sim.contact.triangles import encloses
-from simscen.sim.objects.actor import FALL_SPEED_M_S, Actor, ActorBuilder, ScheduledPoses
+from simscen.sim.objects.actor import FALL_SPEED_M_S, Actor, ActorBuilder
 from simscen.sim.objects.broad_phase import BroadPhase
+from simscen.sim.objects.poses import ActorPoses
 from simscen.sim.objects.proximity import DeferredActors, NearbyActors, ProximityQuery, find_nearby
 from simscen.sim.objects.rest import RestDetector, RestPoses
 
@@ -34,39 +33,35 @@ class Actors:
     """
 
     def __init__(
-        self,
-        client: int,
-        tick_rate: int,
-        triangulate: Triangulate,
-        visual_shape: int = engine.DEFAULT_VISUAL,
-        is_rendered: bool = True,
+        self, client: int, tick_rate: int, triangulate: Triangulate, visual_shape: int, is_rendered: bool
     ) -> None:
         """Begin without actors. If `is_rendered`, actors are in the engine with `visual_shape` even while deferred."""
         self._client, self._tick_rate = client, tick_rate
         self._builder = ActorBuilder(client, tick_rate, triangulate, visual_shape)
         self._is_rendered = is_rendered
         self._actors: dict[str, Actor] = {}
-        self._deferred: DeferredActors | None = None
-        self._deferred_count = 0
-        self._scripted: list[Actor] = []
-        self._scripted_colliding: list[Actor] = []
-        self._scripted_speed = 0.0
-        """Upper bound of the speed of all scripted actors in m/s."""
-        self._pushable: list[Actor] = []
-        self._poses: Mapping[str, Pose3] = {}
-        self._poses_tick: int | None = None
-        self._resting_since: int | None = None
-        """Tick of the last motion of any pushable actor."""
-        self._ticks_until_asleep = math.ceil(2 * engine.SLEEP_DELAY_S * tick_rate)
         self._no_contact_before: dict[int, int] = {}
-        """For each robot's body id, the tick until which it cannot touch any actor."""
-        self._broad_phase = BroadPhase(client, tick_rate, (), ())
-        self._moved: list[Actor] = []
-        """Pushable actors that have moved since the last check for divergence."""
+        """For each robot's body id, the tick before which it cannot touch any actor."""
         self._nearby: dict[int, NearbyActors] = {}
         """Actors near each robot, by the robot's body id."""
-        self._scheduled_poses = ScheduledPoses((), tick_rate)
         self._rest_poses = RestPoses()
+        self._update_lists()
+
+    def _update_lists(self) -> None:
+        """Update the lists of actors, discard cached results, and wake all pushable actors."""
+        actors = self._actors.values()
+        self._scripted = [actor for actor in actors if actor.path is not None]
+        self._scripted_colliding = [actor for actor in self._scripted if actor.collides]
+        self._scripted_speed = max((actor.max_speed for actor in self._scripted), default=0.0)
+        """Upper bound of the speed of all scripted actors in m/s."""
+        self._pushable = [actor for actor in actors if actor.is_pushable]
+        self._deferred: DeferredActors | None = None
+        self._deferred_count = sum(not actor.collides for actor in actors)
+        self.poses = ActorPoses(self._client, self._tick_rate, self._actors, self._no_contact_before)
+        self._broad_phase = BroadPhase(self._client, self._tick_rate, self._scripted, self._pushable)
+        self._nearby.clear()
+        for actor in self._pushable:
+            engine.wake(self._client, actor.id)  # it may have stood on a removed object
 
     # Adding, removing, and changing actors
 
@@ -126,7 +121,7 @@ class Actors:
     def move(self, name: str, path: MotionPath, tick: int) -> None:
         """Let a body follow a path from `tick` on; it cannot be pushed any more."""
         actor = self._actors[name]
-        self.add(replace(actor.body, pose=self.poses(tick)[name], mass=0.0, path=path), tick)
+        self.add(replace(actor.body, pose=self.poses.at(tick)[name], mass=0.0, path=path), tick)
 
     def place(self, name: str, pose: Pose2, tick: int) -> None:
         """Place a body upright and at rest at `pose`, and end its path."""
@@ -138,26 +133,8 @@ class Actors:
 
         The path must begin at the current pose of the actor and must not exceed `max_speed` m/s.
         """
-        actor = self._actors[name]
-        actor.follow(path, max_speed, tick)
-        self._scheduled_poses = ScheduledPoses(self._scripted, self._tick_rate)
+        self._actors[name].follow(path, max_speed, tick)
         self._scripted_speed = max(self._scripted_speed, max_speed)
-
-    def _update_lists(self) -> None:
-        """Update the lists of actors, discard cached results, and wake all pushable actors."""
-        self._poses_tick = self._resting_since = None
-        actors = self._actors.values()
-        self._deferred, self._deferred_count = None, sum(not actor.collides for actor in actors)
-        self._scripted = [actor for actor in actors if actor.path is not None]
-        self._scripted_colliding = [actor for actor in self._scripted if actor.collides]
-        self._scripted_speed = max((actor.max_speed for actor in self._scripted), default=0.0)
-        self._pushable = [actor for actor in actors if actor.is_pushable]
-        self._broad_phase = BroadPhase(self._client, self._tick_rate, self._scripted, self._pushable)
-        self._nearby.clear()
-        self._scheduled_poses = ScheduledPoses(self._scripted, self._tick_rate)
-        self._moved = list(self._pushable)
-        for actor in self._pushable:
-            engine.wake(self._client, actor.id)  # it may have stood on a removed object
 
     def motion(self, name: str, tick: int) -> tuple[MotionPath, float] | None:
         """Return the path that a body follows and the seconds since its start, or None if it follows no path."""
@@ -192,7 +169,7 @@ class Actors:
         center = pybullet.getBasePositionAndOrientation(body_id, physicsClientId=self._client)[0]
         force = (impulse[0] * self._tick_rate, impulse[1] * self._tick_rate, 0.0)
         pybullet.applyExternalForce(body_id, -1, force, center, pybullet.WORLD_FRAME, physicsClientId=self._client)
-        self._resting_since = None
+        self.poses.resting_since = None
 
     def make_rest_detector(self) -> RestDetector:
         """Return a detector of the pushable actors that are at rest."""
@@ -202,11 +179,11 @@ class Actors:
         """Put bodies to sleep after the next step."""
         for body_id in body_ids:
             engine.put_to_sleep(self._client, body_id)
-        self._poses_tick = None
+        self.poses.query_again()
 
     def update_rest_poses(self, tick: int) -> None:
         """Record the poses of pushable actors that have not moved since the last call."""
-        poses = self.poses(tick)
+        poses = self.poses.at(tick)
         self._rest_poses.update({actor.body.name: poses[actor.body.name] for actor in self._pushable})
 
     @property
@@ -227,15 +204,10 @@ class Actors:
             return NEVER
         broad_phase = self._broad_phase
         if tick >= broad_phase.valid_until and broad_phase.update(
-            tick, robot_speed(), self.poses(tick), self._are_pushable_asleep(tick)
+            tick, robot_speed(), self.poses.at(tick), self.poses.are_pushable_asleep(tick)
         ):
-            self._resting_since = None
+            self.poses.resting_since = None
         return -1 if broad_phase.near_contact else broad_phase.valid_until
-
-    def _are_pushable_asleep(self, tick: int) -> bool:
-        """Return whether all pushable actors sleep in the engine, and no robot can have touched any of them."""
-        is_resting = self._resting_since is not None and tick - self._resting_since > self._ticks_until_asleep
-        return is_resting and tick <= min(self._no_contact_before.values())
 
     def set_no_contact_before(self, robot_id: int, tick: int) -> None:
         """Store the tick before which the robot with the body id `robot_id` cannot touch any actor."""
@@ -271,45 +243,11 @@ class Actors:
         none = (0.0, 0.0, 0.0)
         return {body_id: BodyMotion(none, linear, none) for body_id, linear in {**scripted, **pushed}.items()}
 
-    # Poses
-
-    def poses(self, tick: int) -> Mapping[str, Pose3]:
-        """Return the poses of all actors, sorted by name; queries the engine at most once per tick."""
-        if self._poses_tick == tick:
-            return self._poses
-        if self._poses_tick is None or (self._pushable and not self._are_pushable_asleep(tick)):
-            self._poses = {name: self._pose(actor, tick) for name, actor in self._actors.items()}
-            self._scheduled_poses.invalidate()
-            if self._resting_since is None or not all(actor.is_resting for actor in self._pushable):
-                self._resting_since = tick
-        elif self._scripted:
-            scheduled = self._scheduled_poses.at(tick)
-            if scheduled is not None:
-                self._poses = scheduled
-            else:
-                self._poses = {**self._poses, **{a.body.name: self._pose(a, tick) for a in self._scripted}}
-        self._poses_tick = tick
-        return self._poses
-
-    def _pose(self, actor: Actor, tick: int) -> Pose3:
-        if actor.path is not None:
-            return actor.path_pose(tick, self._tick_rate)
-        if not actor.is_pushable:
-            actor.is_resting = True
-            return actor.body.pose
-        if actor.update_pose(self._client):
-            self._moved.append(actor)
-        assert actor.center_and_pose is not None
-        return actor.center_and_pose[1]
-
-    def prefetch_poses(self, tick: int, period: int) -> None:
-        """Precompute poses of scripted actors for calls of `poses` every `period` ticks from the current `tick` on."""
-        if self._scripted and self._poses_tick is not None and (not self._pushable or self._are_pushable_asleep(tick)):
-            self._scheduled_poses.compute(tick, period, self._poses)
+    # Bodies
 
     def bodies_and_poses(self, tick: int) -> dict[str, tuple[Body, Pose3]]:
         """Return all bodies and their poses, sorted by name."""
-        return {name: (self._actors[name].body, pose) for name, pose in self.poses(tick).items()}
+        return {name: (self._actors[name].body, pose) for name, pose in self.poses.at(tick).items()}
 
     def bodies(self) -> dict[str, Body]:
         """Return all bodies, sorted by name."""
@@ -321,23 +259,12 @@ class Actors:
 
     def find_enclosing(self, point: Vector, tick: int) -> str | None:
         """Return the name of the first actor with a `surface` that encloses a point, or None."""
-        for name, pose in self.poses(tick).items():
+        for name, pose in self.poses.at(tick).items():
             surface = self._actors[name].surface
             if surface is not None:
                 x, y, z = pose.inverse().apply(np.array(point)).tolist()
                 if encloses(surface.vertices[surface.faces], (x, y, z)):
                     return name
-        return None
-
-    def find_divergence(self, tick: int) -> str | None:
-        """Return the reason why the state of an actor that has moved is invalid, or None if all states are valid."""
-        self.poses(tick)
-        moved, self._moved = self._moved, []
-        for actor in moved:
-            if actor.center_and_pose is not None:
-                position, quaternion = actor.center_and_pose[0]
-                if reason := divergence_reason(f'object "{actor.body.name}"', *position, sum(quaternion)):
-                    return reason
         return None
 
     # Distances and speeds
@@ -350,8 +277,8 @@ class Actors:
         Sets the poses of these actors in the engine. If none of them moves, returns only the actors that may be within
         `ground_distance` m, measured in the ground plane.
         """
-        poses = self.poses(tick)
-        asleep_since = self._resting_since if not self._pushable or self._are_pushable_asleep(tick) else None
+        poses = self.poses.at(tick)
+        asleep_since = self.poses.resting_since if not self._pushable or self.poses.are_pushable_asleep(tick) else None
         max_step = self._scripted_speed / self._tick_rate
         nearby = self._nearby.get(robot_id)
         if nearby is None or nearby.asleep_since != asleep_since or not nearby.covers(point, distance, tick, max_step):
@@ -368,7 +295,7 @@ class Actors:
         if self._pushable or any(actor.is_steered for actor in self._scripted):
             return None
         travel = self.max_scripted_travel(tick - nearby.tick)
-        return nearby.free_distance(point, self.poses(tick), travel) - distance
+        return nearby.free_distance(point, self.poses.at(tick), travel) - distance
 
     def max_scripted_travel(self, ticks: int) -> float:
         """Return an upper bound in m of the distance that a scripted actor moves within `ticks`."""
@@ -377,7 +304,7 @@ class Actors:
     def reachable_spheres(self, tick: int, ticks: int) -> Iterator[tuple[int, Vector, float]]:
         """Yield a sphere (body id, center, radius in m) that each pushable actor cannot leave within `ticks`."""
         if self._pushable:
-            poses, travel = self.poses(tick), self.speed_bound(tick) * ticks / self._tick_rate
+            poses, travel = self.poses.at(tick), self.speed_bound(tick) * ticks / self._tick_rate
             for actor in self._pushable:
                 yield actor.id, poses[actor.body.name].position, actor.bounding_radius + travel
 
@@ -385,9 +312,9 @@ class Actors:
         """Return an upper bound in m/s of the speed of any actor for the next SPEED_HORIZON_S."""
         if not self._pushable:
             return self._scripted_speed
-        self.poses(tick)
+        self.poses.at(tick)
         # A body that is hit by a heavier one leaves with up to twice its speed.
         factor = 2 if len(self._pushable) > 1 else 1
-        if self._are_pushable_asleep(tick):
+        if self.poses.are_pushable_asleep(tick):
             return max(self._scripted_speed, FALL_SPEED_M_S) * factor
         return max(self._scripted_speed, *(actor.speed_bound(self._client) for actor in self._pushable)) * factor

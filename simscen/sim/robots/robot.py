@@ -90,7 +90,7 @@ class Robot:
         """
         tick = self._scene.tick
         state = self._checked_state(tick)
-        self._scene.actors.prefetch_poses(tick, period)
+        self._scene.actors.poses.prefetch(tick, period)
         if not self._collisions.is_colliding and self.clearance.can_defer(tick, period, state.pose):
             return self.sampler.defer(state, self.objects())
         self.sampler.compute_deferred()
@@ -102,7 +102,7 @@ class Robot:
         actors = self._scene.actors
         reason = divergence_reason(self._label, x, y, z, i + j + k + w + vx + vy + vz + wx + wy + wz)
         if reason is None and actors.has_pushable:
-            reason = actors.find_divergence(tick)
+            reason = actors.poses.find_divergence(tick)
         if reason is not None:
             raise RunError("diverged", f"simulation diverged at t={tick / self._scene.tick_rate:.3f} s: {reason}")
         return state
@@ -119,7 +119,7 @@ class Robot:
 
     def objects(self) -> Mapping[str, Pose3]:
         """Return the poses of all movable objects and of the other robots by name."""
-        poses = self._scene.actors.poses(self._scene.tick)
+        poses = self._scene.actors.poses.at(self._scene.tick)
         return {**poses, **{robot.name: robot.base_pose() for robot in self.others}} if self.others else poses
 
     @property
