@@ -30,24 +30,17 @@ def build_sensors(
     Each sensor has its own random stream `sensor.<name>`. `view` gives the true state, and `rays` measures distances.
     Raises ValueError if a period is not a whole number of ticks, and RunError if a plug-in's sensor is invalid.
     """
-    return tuple(
-        _build_sensor(name, spec, clock, streams, view, rays)
-        for name in sorted(spec.sensors, key=lambda name: (spec.sensors[name].original_class is not None, name))
-    )
-
-
-def _build_sensor(
-    name: str, robot: RobotSpec, clock: Clock, streams: Streams, view: SensorView, rays: RayCaster
-) -> Sensor:
-    entry = robot.sensors[name]
-    spec = entry.chosen
-    assert isinstance(spec, SensorSpec)
-    period, rng = clock.period(spec.rate), streams.generator(f"sensor.{name}")
-    setting = SensorSetting(name, period, clock.seconds(period), rng, view, rays, robot.drive)
-    if entry.original_class is not None:
-        return PluginSensor(entry.kind, spec, setting)
-    sensor: Sensor = spec.implementation()(spec, setting)
-    return sensor
+    sensors: list[Sensor] = []
+    for name, entry in sorted(spec.sensors.items(), key=lambda item: (item[1].original_class is not None, item[0])):
+        sensor_spec = entry.chosen
+        assert isinstance(sensor_spec, SensorSpec)
+        period, rng = clock.period(sensor_spec.rate), streams.generator(f"sensor.{name}")
+        setting = SensorSetting(name, period, clock.seconds(period), rng, view, rays, spec.drive)
+        if entry.original_class is None:
+            sensors.append(sensor_spec.implementation()(sensor_spec, setting))
+        else:
+            sensors.append(PluginSensor(entry.kind, sensor_spec, setting))
+    return tuple(sensors)
 
 
 class PluginSensor:
@@ -91,7 +84,6 @@ class PluginSensor:
             raise RunError("crashed", f"{self._label}: {type(error).__name__}: {error} ({place})") from error
 
     def _fail(self, problem: str) -> NoReturn:
-        """Raise RunError with the name of the sensor and the problem."""
         raise RunError(BROKEN_COMPONENT, f"{self._label} {problem}")
 
     @property

@@ -102,30 +102,20 @@ def kinematics_of(drive: Drive) -> Kinematics:
     Source: Siegwart, Nourbakhsh and Scaramuzza, Introduction to Autonomous Mobile Robots, section 3.2.
     """
     if isinstance(drive, Omnidirectional):
-        return _omnidirectional_motion
+        return lambda increment: Twist(*increment)
     if isinstance(drive, Mecanum):
-        return _mecanum_kinematics(drive)
+        wheels = drive.wheels
+
+        def mecanum_motion(increment: EncoderIncrement) -> Displacement:
+            front_left, front_right, rear_left, rear_right = increment
+            return wheels.motion((front_left, front_right, rear_left, rear_right))
+
+        return mecanum_motion
+    radius = drive.wheel_radius
     separation = drive.wheel_separation * (drive.turning_scale if isinstance(drive, SkidSteer) else 1.0)
-    return _two_sided_kinematics(drive.wheel_radius, separation)
 
-
-def _two_sided_kinematics(radius: float, separation: float) -> Kinematics:
-    """Return the kinematics of left and right wheels of `radius` m that are `separation` m apart."""
-
-    def motion(increment: EncoderIncrement) -> Displacement:
+    def two_sided_motion(increment: EncoderIncrement) -> Displacement:
         left, right = increment[0] * radius, increment[1] * radius
         return _new(Twist, ((left + right) / 2, 0.0, (right - left) / separation))
 
-    return motion
-
-
-def _mecanum_kinematics(drive: Mecanum) -> Kinematics:
-    def motion(increment: EncoderIncrement) -> Displacement:
-        front_left, front_right, rear_left, rear_right = increment
-        return drive.wheels.motion((front_left, front_right, rear_left, rear_right))
-
-    return motion
-
-
-def _omnidirectional_motion(increment: EncoderIncrement) -> Displacement:
-    return Twist(*increment)
+    return two_sided_motion

@@ -145,14 +145,15 @@ def add_casters(
 
 
 def casters_for_uneven_ground(casters: Sequence[Solid]) -> tuple[Solid, ...]:
-    """Return the casters for uneven ground: the unloaded caster is higher."""
-    return tuple(_raise_caster(caster) if caster_gap(caster) > 0 else caster for caster in casters)
-
-
-def _raise_caster(caster: Solid) -> Solid:
-    """Return a caster at the height that UNEVEN_CASTER_GAP_RATIO gives."""
-    gap = UNEVEN_CASTER_GAP_RATIO * math.hypot(caster.pose.x, caster.pose.y)
-    return replace(caster, pose=caster.pose._replace(z=caster.pose.z - caster_gap(caster) + gap))
+    """Return the casters for uneven ground: the unloaded caster is higher, as UNEVEN_CASTER_GAP_RATIO states."""
+    adapted = []
+    for caster in casters:
+        if (gap := caster_gap(caster)) > 0:
+            uneven_gap = UNEVEN_CASTER_GAP_RATIO * math.hypot(caster.pose.x, caster.pose.y)
+            adapted.append(replace(caster, pose=caster.pose._replace(z=caster.pose.z - gap + uneven_gap)))
+        else:
+            adapted.append(caster)
+    return tuple(adapted)
 
 
 def caster_gap(caster: Solid) -> float:

@@ -28,7 +28,7 @@ class PyBulletBaseline:
         self._client = client = pybullet.connect(pybullet.DIRECT)
         engine.set_physics_parameters(client, 240, 10)
         ground = self._create_body(pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client))
-        engine.set_collision_filter(client, ground, -1, engine.GROUND, engine.EVERYTHING)
+        pybullet.setCollisionFilterGroupMask(ground, -1, engine.GROUND, engine.EVERYTHING, physicsClientId=client)
         if isinstance(static, TriangleMesh):
             for shape in collision_shapes.create_concave_shapes(client, static.vertices, static.faces):
                 mesh = self._create_body(shape)

@@ -17,11 +17,11 @@ class ClientPool:
         """Fill the pool in a process that forks for each run. From then on, released clients are disconnected."""
         self._is_single_use = True
         while len(self._free) < MAX_FREE_CLIENTS:
-            self._free.append(_add_ground(_connect()))
+            self._free.append(_new_client())
 
     def take(self) -> int:
         """Return a client that contains only the plane z = 0, without physics parameters."""
-        return self._free.pop() if self._free else _add_ground(_connect())
+        return self._free.pop() if self._free else _new_client()
 
     def release(self, client: int) -> None:
         """Reset a client and put it back into the pool, or disconnect it."""
@@ -36,14 +36,14 @@ CLIENT_POOL = ClientPool()
 """Client pool of this process."""
 
 
-def _connect() -> int:
+def _new_client() -> int:
     client: int = pybullet.connect(pybullet.DIRECT)
     if client < 0:
         raise RuntimeError("PyBullet has no free client left")
-    return client
+    return _add_ground(client)
 
 
 def _add_ground(client: int) -> int:
     ground = engine.create_ground_plane(client, engine.create_invisible_shape(client))
-    engine.set_collision_filter(client, ground, -1, engine.GROUND, engine.EVERYTHING)
+    pybullet.setCollisionFilterGroupMask(ground, -1, engine.GROUND, engine.EVERYTHING, physicsClientId=client)
     return client

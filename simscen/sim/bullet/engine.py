@@ -64,11 +64,6 @@ def set_physics_parameters(
     pybullet.setGravity(0, 0, -GRAVITY_M_S2, physicsClientId=client)
 
 
-def set_collision_filter(client: int, body: int, link: int, group: int, mask: int) -> None:
-    """Set the collision group of a link (-1: the base), and the mask of the groups that it collides with."""
-    pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=client)
-
-
 def create_rigid_body(
     client: int, mass: float, shape: int, pose: Pose3, inertia: Inertia, friction: float, visual: int = DEFAULT_VISUAL
 ) -> int:
@@ -115,12 +110,12 @@ def put_to_sleep(client: int, body_id: int) -> None:
 
 def disable_collisions(client: int, body_id: int) -> None:
     """Keep a body without mass from colliding. Distances to it can still be measured."""
-    set_collision_filter(client, body_id, -1, NOTHING, NOTHING)
+    pybullet.setCollisionFilterGroupMask(body_id, -1, NOTHING, NOTHING, physicsClientId=client)
 
 
 def enable_collisions(client: int, body_id: int) -> None:
     """Let a body without mass collide with robots and with bodies that have a mass."""
-    set_collision_filter(client, body_id, -1, STATIC, STATIC_MASK)
+    pybullet.setCollisionFilterGroupMask(body_id, -1, STATIC, STATIC_MASK, physicsClientId=client)
 
 
 def create_static_body(

@@ -14,9 +14,10 @@ from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.bullet import pybullet
 from simscen.sim.contact.static_distance import StaticDistance, max_displacement
 from simscen.sim.objects.actor import SHAPE_MARGIN_M, SPEED_HORIZON_S
-from simscen.sim.objects.actors import NEVER, Actors
+from simscen.sim.objects.actors import NEVER
 from simscen.sim.robots.drive_factory import Base
 from simscen.sim.robots.robot_state import RobotState
+from simscen.sim.scene.scene import Scene
 
 CONTACT_TOLERANCE_M = 0.002
 """Clearance up to which contact is possible, because corners of shapes are rounded by up to 0.4 mm."""
@@ -44,24 +45,21 @@ class Clearance:
 
     def __init__(
         self,
-        client: int,
-        tick_rate: int,
+        scene: Scene,
         static: TriangleMesh,
         obstacles: TriangleMesh,
-        is_uneven: bool,
         robot: RobotBody,
         base: Base,
         state: Callable[[], RobotState],
-        actors: Actors,
         max_range: float,
     ) -> None:
         """Prepare measurements up to `max_range` m; `state` returns the current state of the robot.
 
         `obstacles` is the part of the `static` world that counts for the clearance: ramps that the robot can climb do
-        not count. `is_uneven` states whether the robot can stand on ground above the plane z = 0.
+        not count.
         """
-        self._client, self._tick_rate, self._base, self._actors = client, tick_rate, base, actors
-        self._state = state
+        self._client, self._tick_rate, self._actors = scene.client, scene.tick_rate, scene.actors
+        self._base, self._state = base, state
         self.others: Sequence[Clearance] = ()
         """Clearances of the other robots."""
         limits, (self._radius, self._height) = robot.limits, radius_and_height(robot.collision_solids)
@@ -73,6 +71,7 @@ class Clearance:
         """Radius in m around its base frame within which actors must be able to collide."""
         self.distance_radius = max(self.contact_radius, self.bounding_radius + max_range)
         """Radius in m around its base frame within which actors must be in the engine, to measure their distances."""
+        is_uneven = bool(scene.terrain and base.ground_links)
         # Wheels can also hit the solids that they roll on.
         touching = replace(robot, casters=(*robot.casters, *robot.tires)) if is_uneven else robot
         self._static_distance = StaticDistance(static, touching, max_range)

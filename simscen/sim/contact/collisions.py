@@ -1,13 +1,12 @@
 """Detects the collisions of a robot, and creates an event at the start and the end of each collision."""
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from simscen.core.geometry import Vector
 from simscen.core.records.events import Event, EventKind
-from simscen.sim.bullet import pybullet
 
 END_DELAY_S = 0.1
 """Time without contact after which a collision has ended."""
@@ -16,8 +15,6 @@ MIN_CAUSING_SPEED_M_S = 0.02
 
 This is its speed in any direction if the object is static, otherwise its speed along the contact normal.
 """
-NO_BODY = -1
-"""Invalid body id."""
 
 
 @dataclass(frozen=True)
@@ -107,42 +104,6 @@ class CollisionTracker:
             return ()
         events, self._events = tuple(self._events), []
         return events
-
-
-def contact_points(
-    client: int,
-    robot_id: int,
-    names: Mapping[int, str | None],
-    static_solid_at: Callable[[Vector], str],
-    tick_seconds: float,
-    ground: Collection[int],
-    ground_links: Mapping[int, float],
-) -> list[ContactPoint]:
-    """Return the current contacts of a robot, one for each touched object, sorted by name; without the ground.
-
-    `names` has the names of the other bodies by id. Contacts with bodies that it does not contain are ignored. The name
-    of a static body is None; `static_solid_at` then returns the name of the solid at a point. `tick_seconds` is the
-    duration of a tick.
-
-    A contact of a wheel or caster with a `ground` body is not returned if its normal is steep enough: `ground_links`
-    has the smallest z of the normal for each link of a wheel or caster.
-    """
-    found: dict[str, ContactPoint] = {}
-    for contact in pybullet.getContactPoints(robot_id, physicsClientId=client):
-        other, point, normal, distance, force = contact[2], contact[6], contact[7], contact[8], contact[9]
-        is_on_ground = other in ground and normal[2] >= ground_links.get(contact[3], math.inf)
-        if other not in names or (force <= 0 and distance > 0) or is_on_ground:
-            continue
-        name = names[other] or static_solid_at(point)
-        known = found.get(name)
-        impulse = force * tick_seconds + (known.impulse if known else 0.0)
-        found[name] = ContactPoint(name, other, point, normal, impulse, names[other] is None)
-    return [found[name] for name in sorted(found)]
-
-
-def enclosed_contact(name: str, point: Vector) -> ContactPoint:
-    """Return the contact of a robot that is completely inside an object. The normal points up."""
-    return ContactPoint(name, NO_BODY, point, (0.0, 0.0, 1.0), 0.0, is_static=True)
 
 
 def _started_event(tick: int, contact: ContactPoint, robot: BodyMotion, other: BodyMotion | None) -> Event:

@@ -143,7 +143,6 @@ class StaticDistance:
         )
 
     def _build_shapes(self, part: int) -> list[int]:
-        """Create the collision shapes of a part, and return their ids."""
         vertices, hulls = self._mesh.vertices, self._mesh.hulls
         if hulls and (own := hulls[self._parts.solids[part]]):
             return [collision_shapes.create_convex_shape(self._client, vertices[own])]
@@ -157,7 +156,6 @@ class StaticDistance:
         return [k for k in self._parts.solids_around(point) if k not in exclude and self._encloses(k, point)]
 
     def _encloses(self, solid: int, point: Vector) -> bool:
-        """Return whether a solid encloses a point."""
         parts, vertices = self._parts, self._mesh.vertices
         own_parts = parts.parts_of_solid(solid)
         if len(own_parts) > 1:

@@ -195,7 +195,6 @@ class ActorBuilder:
             engine.disable_collisions(self._client, actor.id)
 
     def _create(self, actor: Actor, tick: int) -> None:
-        """Create the body of an actor in the engine."""
         client, body, visual = self._client, actor.body, self._visual_shape
         shape = collision_shapes.create_body_shape(client, body.solids, actor.is_pushable, self._triangulate)
         if actor.is_pushable:

@@ -31,12 +31,12 @@ class RestDetector:
 
     def resting_ids(self) -> set[int]:
         """Return the ids of the bodies at rest."""
-        return {body_id for body_id, speeds in self._speeds.items() if _is_at_rest(speeds)}
-
-
-def _is_at_rest(speeds: list[float]) -> bool:
-    is_slow = max(speeds) ** 2 < engine.REST_SPEED_SQUARED_M2_S2
-    return is_slow and any(now <= before for before, now in itertools.pairwise(speeds))
+        return {
+            body_id
+            for body_id, speeds in self._speeds.items()
+            if max(speeds) ** 2 < engine.REST_SPEED_SQUARED_M2_S2
+            and any(now <= before for before, now in itertools.pairwise(speeds))
+        }
 
 
 class RestPoses:

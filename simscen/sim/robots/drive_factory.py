@@ -1,12 +1,12 @@
 """Builds the base and the drive of a robot for any type of drive."""
 
 from simscen.core.geometry import Pose2
-from simscen.model.robot import Ackermann, Differential, Mecanum, Omnidirectional, SkidSteer
+from simscen.model.robot import Ackermann, Mecanum, Omnidirectional
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.robots.planar_base import MecanumDrive, OmnidirectionalDrive, PlanarBase
 from simscen.sim.robots.wheel_drives import AckermannDrive, DifferentialDrive
 from simscen.sim.robots.wheeled_base import WheeledBase
-from simscen.sim.scene.terrain import Terrain
+from simscen.sim.scene.scene import Scene
 
 Base = PlanarBase | WheeledBase
 """Hull and wheels of a robot in the engine."""
@@ -20,22 +20,17 @@ SimulatedDrive = OmnidirectionalDrive | AckermannDrive | DifferentialDrive
 
 
 def build_drive(
-    client: int, body: RobotBody, pose: Pose2, period: float, tick_seconds: float, terrain: Terrain, visual_shape: int
+    scene: Scene, body: RobotBody, pose: Pose2, period: float, visual_shape: int
 ) -> tuple[Base, SimulatedDrive]:
     """Return the base and drive of a robot at `pose`. The firmware of the drive runs every `period` seconds.
 
-    `visual_shape` is the id of the shape that the renderer shows, `tick_seconds` the duration of a physics step.
+    `visual_shape` is the id of the shape that the renderer shows.
     """
-    match body.drive:
-        case Omnidirectional():
-            base = PlanarBase(client, body, pose, visual_shape)
-            return base, OmnidirectionalDrive(base, body, period)
-        case Mecanum():
-            base = PlanarBase(client, body, pose, visual_shape)
-            return base, MecanumDrive(base, body, period)
-        case Ackermann():
-            vehicle = WheeledBase(client, body, pose, terrain, tick_seconds, visual_shape)
-            return vehicle, AckermannDrive(client, vehicle, body, period)
-        case Differential() | SkidSteer():
-            vehicle = WheeledBase(client, body, pose, terrain, tick_seconds, visual_shape)
-            return vehicle, DifferentialDrive(client, vehicle, body, period)
+    client, drive = scene.client, body.drive
+    if isinstance(drive, Omnidirectional | Mecanum):
+        base = PlanarBase(client, body, pose, visual_shape)
+        planar_drive = MecanumDrive if isinstance(drive, Mecanum) else OmnidirectionalDrive
+        return base, planar_drive(base, body, period)
+    vehicle = WheeledBase(client, body, pose, scene.terrain, 1 / scene.tick_rate, visual_shape)
+    wheel_drive = AckermannDrive if isinstance(drive, Ackermann) else DifferentialDrive
+    return vehicle, wheel_drive(client, vehicle, body, period)

@@ -9,7 +9,7 @@ from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.geometry.kinematics import STOP, MecanumWheels, Twist
 from simscen.model.robot import Mecanum
-from simscen.sim.body.inertia import MassProperties, combine
+from simscen.sim.body.inertia import combine
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.bullet import collision_shapes, engine, pybullet
 from simscen.sim.robots.robot_state import RobotState
@@ -27,13 +27,12 @@ CARRIER_MASS_KG = 0.001
 class PlanarBase:
     """Hull on three joints from the world: along x, along y, and about z. It stays at z = 0 and cannot tip."""
 
-    ground_links: Mapping[int, float]
-    """Always empty, because the base does not touch the ground."""
-
     def __init__(self, client: int, body: RobotBody, pose: Pose2, visual_shape: int = engine.DEFAULT_VISUAL) -> None:
         """Place the base at `pose`; the renderer shows `visual_shape`."""
         self._client = client
-        moments, base_from_center = _total_mass_properties(body).principal()
+        wheels = [wheel.inertia.transformed(Pose3(wheel.x, wheel.y, wheel.radius)) for wheel in body.wheels]
+        total = combine([body.chassis, *wheels]) if wheels else body.chassis
+        moments, base_from_center = total.principal()
         hulls = collision_shapes.create_robot_shapes(client, body.collision_solids)
         extra = len(hulls) - 1
         self.id: int = pybullet.createMultiBody(
@@ -56,7 +55,8 @@ class PlanarBase:
         )
         self.joints = (0, 1, 2)
         self.hull_links = tuple(range(2, 2 + len(hulls)))
-        self.ground_links = {}
+        self.ground_links: Mapping[int, float] = {}
+        """Always empty, because the base does not touch the ground."""
         pybullet.changeDynamics(self.id, 2, localInertiaDiagonal=moments, physicsClientId=client)
         for link in range(2 + len(hulls)):
             pybullet.changeDynamics(
@@ -64,7 +64,7 @@ class PlanarBase:
                 jointDamping=0, physicsClientId=client,
             )  # fmt: skip
         for link in self.hull_links:
-            engine.set_collision_filter(client, self.id, link, engine.HULL, ~engine.GROUND)
+            pybullet.setCollisionFilterGroupMask(self.id, link, engine.HULL, ~engine.GROUND, physicsClientId=client)
         self._mass, self._floor_friction, self._motor_ratio = body.mass, 1.0, body.motor_ratio
         self._radius = body.circumscribed_radius
         self.place(pose)
@@ -107,12 +107,6 @@ class PlanarBase:
             forces=(max_force, max_force, max_force * self._radius),
             physicsClientId=self._client,
         )
-
-
-def _total_mass_properties(body: RobotBody) -> MassProperties:
-    """Return the mass properties of the whole robot as one rigid body."""
-    wheels = [wheel.inertia.transformed(Pose3(wheel.x, wheel.y, wheel.radius)) for wheel in body.wheels]
-    return combine([body.chassis, *wheels]) if wheels else body.chassis
 
 
 class OmnidirectionalDrive:

@@ -13,15 +13,19 @@ from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.core.records.events import Event
 from simscen.core.records.trace import DeferredTruth, Truth
 from simscen.sim.body.robot_body import RobotBody
+from simscen.sim.bullet import pybullet
 from simscen.sim.bullet.divergence import divergence_reason
 from simscen.sim.contact.clearance import Clearance
-from simscen.sim.contact.collisions import BodyMotion, CollisionTracker, ContactPoint, contact_points, enclosed_contact
+from simscen.sim.contact.collisions import BodyMotion, CollisionTracker, ContactPoint
 from simscen.sim.objects.actors import NEVER
 from simscen.sim.objects.proximity import ProximityQuery
 from simscen.sim.robots.drive_factory import build_drive
 from simscen.sim.robots.robot_state import RobotState, TruthSampler
 from simscen.sim.scene.camera import render_image
 from simscen.sim.scene.scene import Scene
+
+NO_BODY = -1
+"""Invalid body id."""
 
 
 class Robot:
@@ -45,10 +49,7 @@ class Robot:
         `clearance_range` m. `visual_shape` is the id of the shape that the renderer shows.
         """
         self.name, self._scene = name, scene
-        tick_seconds = 1 / scene.tick_rate
-        self.base, self._drive = build_drive(
-            scene.client, body, pose, period, tick_seconds, scene.terrain, visual_shape
-        )
+        self.base, self._drive = build_drive(scene, body, pose, period, visual_shape)
         self.advance = self._drive.advance
         """Function that runs one period of the firmware."""
         self._command: Twist | None = None
@@ -61,13 +62,10 @@ class Robot:
         self.body = Body(name, body.collision_solids, Pose3.planar(pose), body.mass)
         self._collisions = CollisionTracker(scene.tick_rate)
         self._placements, self._placed_tick = 0, -1
-        is_uneven = bool(scene.terrain and self.base.ground_links)
-        self.clearance = Clearance(
-            scene.client, scene.tick_rate, static, obstacles, is_uneven, body, self.base, self.state, scene.actors,
-            clearance_range,
-        )  # fmt: skip
+        self.clearance = Clearance(scene, static, obstacles, body, self.base, self.state, clearance_range)
         self.sampler = TruthSampler(self.clearance.static_clearance)
         self._names: dict[int, str | None] = {}
+        """Names of all bodies that the robot can touch, by body id (None: a wall)."""
         self._query_point: Vector = (math.inf, math.inf, math.inf)
 
     # Driving and observing
@@ -218,7 +216,7 @@ class Robot:
         return ProximityQuery(self._query_point, self.clearance.contact_radius, self.clearance.distance_radius)
 
     def add_bodies(self, names: Mapping[int, str | None]) -> None:
-        """Add bodies that the robot can touch; `names` has their names by body id (None: a wall)."""
+        """Add bodies that the robot can touch, by body id (None: a wall)."""
         self._names.update(names)
 
     @property
@@ -243,16 +241,26 @@ class Robot:
         contacts = self.contacts()
         enclosing = clearance.enclosed_by
         if enclosing is not None and enclosing not in {contact.name for contact in contacts}:
-            contacts.append(enclosed_contact(enclosing, motion.origin))
+            up = (0.0, 0.0, 1.0)
+            contacts.append(ContactPoint(enclosing, NO_BODY, motion.origin, up, 0.0, is_static=True))
         self._collisions.update(tick, contacts, motion, motions)
 
     def contacts(self) -> list[ContactPoint]:
         """Return the current contacts, one for each touched object, sorted by name; without the ground."""
-        scene = self._scene
-        return contact_points(
-            scene.client, self.base.id, self._names, self.clearance.static_solid_at, 1 / scene.tick_rate,
-            scene.terrain.names, self.base.ground_links,
-        )  # fmt: skip
+        scene, names, ground_links = self._scene, self._names, self.base.ground_links
+        tick_seconds = 1 / scene.tick_rate
+        found: dict[str, ContactPoint] = {}
+        for contact in pybullet.getContactPoints(self.base.id, physicsClientId=scene.client):
+            other, link, (point, normal, distance, force) = contact[2], contact[3], contact[6:10]
+            if other not in names or (force <= 0 and distance > 0):
+                continue
+            if other in scene.terrain.names and normal[2] >= ground_links.get(link, math.inf):
+                continue  # a wheel or caster on the ground
+            name = names[other] or self.clearance.static_solid_at(point)
+            known = found.get(name)
+            impulse = force * tick_seconds + (known.impulse if known else 0.0)
+            found[name] = ContactPoint(name, other, point, normal, impulse, names[other] is None)
+        return [found[name] for name in sorted(found)]
 
     def close(self) -> None:
         """Compute the deferred samples, and release the engine clients."""

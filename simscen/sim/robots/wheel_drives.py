@@ -143,7 +143,6 @@ class AckermannDrive(WheelDrive):
             super().advance()
 
     def _set_steering(self) -> None:
-        """Set the target angles of both front wheels."""
         tangent, ratio = math.tan(self._steering), self._drive.wheel_separation / (2 * self._drive.wheel_base)
         angles = (math.atan(tangent / (1 - tangent * ratio)), math.atan(tangent / (1 + tangent * ratio)))
         pybullet.setJointMotorControlArray(

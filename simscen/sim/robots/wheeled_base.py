@@ -1,7 +1,7 @@
 """Wheeled base of a robot: a PyBullet multibody with the hull as its base and the wheels as links."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -54,25 +54,29 @@ class WheeledBase:
         self._is_aligned = self._center_from_base.quaternion == IDENTITY
         casters = casters_for_uneven_ground(body.casters) if terrain else body.casters
         self.id, self.joints, self.hull_links = _create_multibody(client, body, casters, tick_seconds, visual_shape)
-        self.ground_links: Mapping[int, float] = _ground_links(body, self.joints, self.hull_links, casters)
         on_ground = [(caster.pose.x, caster.pose.y) for caster in body.casters if not caster_gap(caster)]
         self._supports = np.array([*((wheel.x, wheel.y) for wheel in body.wheels), *on_ground])
         pybullet.changeDynamics(self.id, -1, localInertiaDiagonal=moments, physicsClientId=client)
+        self._wheels: dict[int, Vector] = {}
+        """Positions of the wheels in the base frame on the ground, by link."""
         for wheel, joint in zip(body.wheels, self.joints, strict=True):
-            self._set_up_wheel(wheel, joint)
-        self._wheels: dict[int, Vector] = {
-            joint + 1 if wheel.is_steered else joint: (wheel.x, wheel.y, 0.0)
-            for wheel, joint in zip(body.wheels, self.joints, strict=True)
-        }
+            link = joint + 1 if wheel.is_steered else joint
+            self._wheels[link] = (wheel.x, wheel.y, 0.0)
+            self._set_up_wheel(wheel, link)
+        self.ground_links = dict.fromkeys(self._wheels, MIN_NORMAL_Z_WHEEL)
+        """Smallest z of the contact normal with uneven ground, for each link of a wheel or caster."""
+        if casters:
+            self.ground_links[self.hull_links[-1]] = MIN_NORMAL_Z_CASTER
         self._frictions = dict.fromkeys(self._wheels, 1.0)
         self.place(pose)
 
-    def _set_up_wheel(self, wheel: Wheel, joint: int) -> None:
+    def _set_up_wheel(self, wheel: Wheel, link: int) -> None:
         """Set the collision filter, the friction, and the inertia of a wheel."""
         xx, yy, zz = wheel.inertia.tensor.diagonal().tolist()  # the axle is the y axis
-        link = joint + 1 if wheel.is_steered else joint
         # The sphere extends beyond the sides of a narrow wheel; against obstacles, the wheel guard in the hull is used.
-        engine.set_collision_filter(self._client, self.id, link, engine.WHEEL, engine.GROUND | engine.TERRAIN)
+        pybullet.setCollisionFilterGroupMask(
+            self.id, link, engine.WHEEL, engine.GROUND | engine.TERRAIN, physicsClientId=self._client
+        )
         pybullet.changeDynamics(
             self.id, link, lateralFriction=1.0, restitution=0.0, linearDamping=0, angularDamping=0, jointDamping=0,
             localInertiaDiagonal=(xx, yy + wheel.rotor_inertia, zz), physicsClientId=self._client,
@@ -121,17 +125,6 @@ class WheeledBase:
         pybullet.applyExternalForce(self.id, -1, force, center, pybullet.WORLD_FRAME, physicsClientId=self._client)
 
 
-def _ground_links(
-    body: RobotBody, joints: Sequence[int], hull: Sequence[int], casters: Sequence[Solid]
-) -> dict[int, float]:
-    """Return the smallest z of the contact normal with uneven ground for each link of a wheel or caster.
-
-    `joints` are the first joints of the wheels, and `hull` are the links of the hull and casters.
-    """
-    wheels = [joint + 1 if wheel.is_steered else joint for wheel, joint in zip(body.wheels, joints, strict=True)]
-    return dict.fromkeys(wheels, MIN_NORMAL_Z_WHEEL) | ({hull[-1]: MIN_NORMAL_Z_CASTER} if casters else {})
-
-
 def _create_multibody(
     client: int, body: RobotBody, casters: Sequence[Solid], tick_seconds: float, visual_shape: int
 ) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
@@ -170,7 +163,7 @@ def _create_multibody(
     )
     for index, link in enumerate(hull):
         friction = body.hull_friction if index < len(hull_shapes) else 0.0  # the last link may be that of the casters
-        engine.set_collision_filter(client, robot, link, engine.HULL, ~engine.WHEEL)
+        pybullet.setCollisionFilterGroupMask(robot, link, engine.HULL, ~engine.WHEEL, physicsClientId=client)
         pybullet.changeDynamics(
             robot, link, lateralFriction=friction, restitution=0.0, linearDamping=0, angularDamping=0,
             physicsClientId=client,

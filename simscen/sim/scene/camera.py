@@ -70,9 +70,7 @@ class RenderScene:
         """Show the movable objects, given by name with their current poses; remove all other movable objects."""
         if not self._is_built:
             self._is_built = True
-            engine.set_collision_filter(
-                self._client, engine.create_ground_plane(self._client), -1, engine.NOTHING, engine.NOTHING
-            )
+            engine.disable_collisions(self._client, engine.create_ground_plane(self._client))
             self._create_bodies(self._static.vertices, self._static.faces)
         for name in [name for name in self._visuals if name not in moving]:
             self._remove(name)

@@ -44,7 +44,6 @@ class Terrain:
         return bool(self.names)
 
     def _add(self, static: TriangleMesh, solid: int) -> None:
-        """Create the bodies of a static solid, given by its index."""
         # A convex solid becomes one shape, so that a wheel on a ramp does not bump into edges between triangles.
         faces = static.faces[static.owners == solid]
         mesh = submesh(static.vertices, faces)
@@ -58,7 +57,9 @@ class Terrain:
             pybullet.changeDynamics(
                 body, -1, collisionMargin=0.0, lateralFriction=friction, physicsClientId=self._client
             )
-            engine.set_collision_filter(self._client, body, -1, engine.TERRAIN, engine.EVERYTHING)
+            pybullet.setCollisionFilterGroupMask(
+                body, -1, engine.TERRAIN, engine.EVERYTHING, physicsClientId=self._client
+            )
             self.names[body] = static.names[solid]
 
     def heights(self, points: Array) -> Array:

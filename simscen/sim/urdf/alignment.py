@@ -1,6 +1,7 @@
 """Warns about wheels and casters of a URDF at wrong heights."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -29,7 +30,7 @@ def alignment_warnings(tree: LinkTree, drive: Drive) -> list[Problem]:
         return []
     ground = min(wheel.bottom for wheel in wheels)
     found = [*_wheel_warnings(wheels, ground), *_caster_warnings(tree, wheels, ground, drive.type == "differential")]
-    return [Problem(p.path, p.line, p.col, ALIGNMENT_CODE, p.message, p.hint, "warning", p.source) for p in found]
+    return [replace(problem, code=ALIGNMENT_CODE, severity="warning") for problem in found]
 
 
 def _wheel_warnings(wheels: list[WheelJoint], ground: float) -> Iterator[Problem]:
@@ -42,9 +43,12 @@ def _wheel_warnings(wheels: list[WheelJoint], ground: float) -> Iterator[Problem
 
 def _caster_warnings(tree: LinkTree, wheels: list[WheelJoint], ground: float, needs_caster: bool) -> Iterator[Problem]:
     rolling = {link for wheel in wheels for link in tree.subtree(wheel.joint.child)}
-    gaps = {
-        name: _lowest_z(tree, name) - ground for name in tree.links if name not in rolling and tree.links[name].solids
+    points = {
+        name: np.concatenate([tree.poses[name].compose(s.pose).apply(hull_points(s.shape)) for s in link.solids])
+        for name, link in tree.links.items()
+        if name not in rolling and link.solids
     }
+    gaps = {name: float(corners[:, 2].min()) - ground for name, corners in points.items()}
     for name, gap in gaps.items():
         if gap < -HEIGHT_TOLERANCE_M:
             message = (
@@ -53,22 +57,12 @@ def _caster_warnings(tree: LinkTree, wheels: list[WheelJoint], ground: float, ne
             hint = f"raise it by {-gap:.4g} m; simscen uses frictionless spheres as casters instead"
             yield tree.links[name].element.problem(message, hint)
     nearest = min(gaps, key=lambda name: gaps[name], default=None)
-    if needs_caster and nearest and MAX_CASTER_GAP_M < gaps[nearest] < MAX_CASTER_HEIGHT_M and _is_small(tree, nearest):
+    if not needs_caster or nearest is None:
+        return
+    size = np.ptp(points[nearest][:, :2], axis=0).max()
+    if MAX_CASTER_GAP_M < gaps[nearest] < MAX_CASTER_HEIGHT_M and size <= MAX_CASTER_SIZE_M:
         message = (
             f"link {nearest!r} is {1e3 * gaps[nearest]:.1f} mm above the ground, so that the robot would tip onto it"
         )
         hint = f"lower it by {gaps[nearest]:.4g} m; simscen uses spheres that touch the ground as casters instead"
         yield tree.links[nearest].element.problem(message, hint)
-
-
-def _collision_points(tree: LinkTree, name: str) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
-    pose = tree.poses[name]
-    return np.concatenate([pose.compose(s.pose).apply(hull_points(s.shape)) for s in tree.links[name].solids])
-
-
-def _lowest_z(tree: LinkTree, name: str) -> float:
-    return float(_collision_points(tree, name)[:, 2].min())
-
-
-def _is_small(tree: LinkTree, name: str) -> bool:
-    return bool((np.ptp(_collision_points(tree, name)[:, :2], axis=0) <= MAX_CASTER_SIZE_M).all())

@@ -10,23 +10,13 @@ from simscen.assets.folders import AllowedFolders, UnusableFile
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Solid
-from simscen.model.robot import (
-    Mecanum,
-    Omnidirectional,
-    RobotSpec,
-)
+from simscen.model.robot import Mecanum, Omnidirectional, RobotSpec
 from simscen.sim.body.inertia import MassProperties, combine
 from simscen.sim.body.outline import hull_points
 from simscen.sim.body.robot_body import MIN_GROUND_CLEARANCE_M, RobotBody, assemble_body
 from simscen.sim.body.undercarriage import Wheel, wheel_inertia
 from simscen.sim.urdf.elements import LinkTree, MeshReader, MeshSource, build_tree
-from simscen.sim.urdf.wheels import (
-    WheelJoint,
-    check_front_steering,
-    describe_wheels,
-    examine_joints,
-    select_wheels,
-)
+from simscen.sim.urdf.wheels import WheelJoint, check_front_steering, describe_wheels, examine_joints, select_wheels
 from simscen.sim.urdf.xacro.expand import UnknownArgument, expand
 from simscen.sim.urdf.xml_source import URDF_ERROR_CODE, RobotFiles, read_xml
 
@@ -55,7 +45,10 @@ def read_spec_tree(
     except UnusableFile as trouble:
         shown = folders.display_path(file.resolve()) if file else ""
         raise InvalidInput([Problem(shown, 0, 0, URDF_ERROR_CODE, f"urdf {spec.urdf[:200]!r}: {trouble}")]) from trouble
-    return read_tree(path, folders, read_mesh, {name: _xml_text(value) for name, value in spec.arguments.items()})
+    arguments = {
+        name: str(value).lower() if isinstance(value, bool) else str(value) for name, value in spec.arguments.items()
+    }
+    return read_tree(path, folders, read_mesh, arguments)
 
 
 def read_tree(
@@ -74,11 +67,6 @@ def read_tree(
     elif arguments:
         raise UnknownArgument(robot, next(iter(arguments)), ())
     return build_tree(robot, MeshSource(path.parent, folders, read_mesh, is_xacro))
-
-
-def _xml_text(argument: str | float | bool) -> str:
-    """Return the text of a xacro argument."""
-    return str(argument).lower() if isinstance(argument, bool) else str(argument)
 
 
 def body_from_tree(spec: RobotSpec, tree: LinkTree) -> RobotBody:
@@ -134,13 +122,10 @@ def _check_corners(tree: LinkTree, wheels: list[WheelJoint]) -> None:
 def _base_from_root(wheels: list[WheelJoint], solids: Sequence[Solid]) -> Pose3:
     """Return the pose of the root frame in the base frame, which is on the ground, centered below the driven axles."""
     if not wheels:
-        return Pose3(0.0, 0.0, -min(_lowest_z(solid) for solid in solids))
+        lowest = [solid.pose.apply(hull_points(solid.shape))[:, 2].min() for solid in solids]
+        return Pose3(0.0, 0.0, -float(min(lowest)))
     x, y, _ = np.mean([wheel.center for wheel in wheels if not wheel.is_steered], axis=0).tolist()
     return Pose3(-x, -y, -min(wheel.bottom for wheel in wheels))
-
-
-def _lowest_z(solid: Solid) -> float:
-    return float(solid.pose.apply(hull_points(solid.shape))[:, 2].min())
 
 
 def _mass_scale(spec: RobotSpec, tree: LinkTree) -> float:
@@ -168,10 +153,9 @@ def _build_wheel(tree: LinkTree, wheel: WheelJoint, base_from_root: Pose3, scale
     links = [(tree.poses[name], tree.links[name].mass) for name in tree.subtree(wheel.joint.child)]
     parts = [mass.transformed(pose) for pose, mass in links if mass is not None and mass.mass > 0]
     mass = scale * sum(part.mass for part in parts)
-    inertia = wheel_inertia(mass, wheel.radius, wheel.width) if mass > 0 else None
-    if inertia is None:
-        problem = wheel.joint.element.problem(f"the wheel on joint {wheel.joint.name!r} has no mass")
-        raise InvalidInput([problem])
+    if mass <= 0:
+        raise InvalidInput([wheel.joint.element.problem(f"the wheel on joint {wheel.joint.name!r} has no mass")])
+    inertia = wheel_inertia(mass, wheel.radius, wheel.width)
     is_car = spec.drive.type == "ackermann"
     return Wheel(
         wheel.joint.name, x, y, wheel.radius, wheel.width, inertia, is_driven=not (is_car and wheel.is_steered),

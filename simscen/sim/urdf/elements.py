@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -188,6 +188,7 @@ def _parse_mass(inertial: Element) -> MassProperties:
     return own.transformed(_parse_origin(inertial))
 
 
+Item = TypeVar("Item", Link, Joint)
 MAX_LINKS = 200
 """Maximum number of links."""
 
@@ -228,9 +229,9 @@ def build_tree(robot: Element, meshes: MeshSource) -> LinkTree:
     for element in robot.children:
         try:
             if element.tag == "link":
-                _add_unique(links, parse_link(element, meshes), element)
+                _add_unique(links, parse_link(element, meshes))
             elif element.tag == "joint":
-                _add_unique(joints, parse_joint(element), element)
+                _add_unique(joints, parse_joint(element))
         except InvalidElement as error:
             problems.append(error.problem)
     if problems:
@@ -238,11 +239,11 @@ def build_tree(robot: Element, meshes: MeshSource) -> LinkTree:
     return _connect_links(robot, links, joints)
 
 
-def _add_unique(known: "dict[str, Link] | dict[str, Joint]", item: "Link | Joint", element: Element) -> None:
+def _add_unique(known: dict[str, Item], item: Item) -> None:
     """Add a link or joint by name; raises InvalidElement if the name is not unique."""
     if item.name in known:
-        raise InvalidElement(element, f"two <{element.tag}>s are called {item.name!r}")
-    known[item.name] = item  # type: ignore[assignment]  # callers pass a dictionary of the same type
+        raise InvalidElement(item.element, f"two <{item.element.tag}>s are called {item.name!r}")
+    known[item.name] = item
 
 
 def _connect_links(robot: Element, links: dict[str, Link], joints: dict[str, Joint]) -> LinkTree:

@@ -22,7 +22,7 @@ from simscen.model.robot import (
     SkidSteer,
     WheelOdometry,
 )
-from simscen.sim.body.outline import hull_points
+from simscen.sim.body.robot_body import hull_height
 from simscen.sim.urdf.body import body_from_tree, read_tree
 from simscen.sim.urdf.elements import LinkTree, MeshReader
 from simscen.sim.urdf.wheels import WheelJoint, check_front_steering, describe_wheels, examine_joints
@@ -131,5 +131,4 @@ def _infer_lidar_mount(tree: LinkTree, draft: RobotSpec, wheels: list[WheelJoint
             x, y, z = float(pose.x - axle[0]), float(pose.y - axle[1]), float(pose.z - ground)
             roll = math.pi if pose.rotation()[2, 2] < MAX_UPSIDE_DOWN_Z else 0.0
             return Mount(x=x, y=y, z=max(0.0, z), roll=roll, yaw=pose.yaw)
-    top = max(float(solid.pose.apply(hull_points(solid.shape))[:, 2].max()) for solid in body.hull)
-    return Mount(z=top + 0.02)
+    return Mount(z=hull_height(body) + 0.02)

@@ -104,19 +104,16 @@ def _stands_on_ground(wheel: WheelJoint, ground: float) -> bool:
 
 def _reason_for_no_wheel(tree: LinkTree, joint: Joint, wheel: WheelJoint | None) -> str:
     """Return the reason why a joint has no wheel, or "" if it has one. `wheel` is the result of `_measure_wheel`."""
-    if not _turns_freely(joint):
-        return f"{joint.type} joint with limits" if joint.type == "revolute" else f"{joint.type} joint"
+    if joint.type not in ROTARY_JOINT_TYPES:
+        return f"{joint.type} joint"
+    if joint.limits.upper - joint.limits.lower < MIN_WHEEL_RANGE_RAD:
+        return f"{joint.type} joint with limits"
     axis = _parallel_axis(tree, joint)
     if axis != "y":
         return f"axis along {axis}, not y" if axis else "axis not along y"
     if wheel is not None:
         return ""
     return "no round collision shape" if tree.links[joint.child].solids else "no collision shape"
-
-
-def _turns_freely(joint: Joint) -> bool:
-    """Return whether a joint is continuous, or revolute with a range of at least MIN_WHEEL_RANGE_RAD."""
-    return joint.type in ROTARY_JOINT_TYPES and joint.limits.upper - joint.limits.lower >= MIN_WHEEL_RANGE_RAD
 
 
 def _with_steering(tree: LinkTree, wheel: WheelJoint, steering_joints: Sequence[Joint]) -> WheelJoint:
@@ -135,7 +132,8 @@ def select_wheels(tree: LinkTree, drive: Drive) -> list[WheelJoint]:
     if isinstance(drive, Omnidirectional):
         return []
     steering = drive.steering if isinstance(drive, Ackermann) else None
-    named = [*(drive.left or []), *(drive.right or []), *(steering or [])]
+    rolling = [*(drive.left or []), *(drive.right or [])]
+    named = [*rolling, *(steering or [])]
     unknown = [name for name in named if name not in tree.joints]
     if unknown:
         problem = tree.element.problem(
@@ -147,20 +145,15 @@ def select_wheels(tree: LinkTree, drive: Drive) -> list[WheelJoint]:
         # A wheel that swivels is a caster of a differential drive, not a steered wheel: it becomes part of the hull.
         return [w for w in wheels if not w.is_steered] if isinstance(drive, Differential) else wheels
     turned = _steered_links(tree, [tree.joints[name] for name in steering or []])
-    given = [
-        WheelJoint(
-            joint, tree.poses[joint.child].position, drive.wheel_radius, drive.wheel_width, joint.child in turned
-        )
-        if (inferred := _measure_wheel(tree, joint, joint.child in turned)) is None
-        else inferred
-        for joint in (tree.joints[name] for name in (*(drive.left or []), *(drive.right or [])))
-    ]
-    rolling = {wheel.joint.name for wheel in given}
+    given = []
+    for joint in (tree.joints[name] for name in rolling):
+        is_steered, center = joint.child in turned, tree.poses[joint.child].position
+        specified = WheelJoint(joint, center, drive.wheel_radius, drive.wheel_width, is_steered)
+        given.append(_measure_wheel(tree, joint, is_steered) or specified)
     return given + [w for w in wheels if w.joint.name not in rolling and w.joint.child in turned]
 
 
 def _steered_links(tree: LinkTree, steering_joints: Sequence[Joint]) -> set[str]:
-    """Return the names of all links below the steering joints."""
     return {link for joint in steering_joints for link in tree.subtree(joint.child)}
 
 

@@ -3,7 +3,7 @@
 import math
 from xml.etree import ElementTree as ET
 
-from simscen.core.geometry import Pose3
+from simscen.core.geometry import Array, Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
 from simscen.sim.body.outline import hull_points
 from simscen.sim.body.robot_body import RobotBody
@@ -20,7 +20,7 @@ def to_urdf(body: RobotBody) -> str:
     robot = ET.Element("robot", name=body.name)
     base = ET.SubElement(robot, "link", name=BASE_LINK)
     center = Pose3(*body.chassis.center.tolist())
-    _add_inertial(base, body.chassis.mass, center, [[float(value) for value in row] for row in body.chassis.tensor])
+    _add_inertial(base, body.chassis.mass, center, body.chassis.tensor)
     for solid in (*body.hull, *body.casters):
         _add_shape(base, solid)
     for wheel in body.wheels:
@@ -31,8 +31,7 @@ def to_urdf(body: RobotBody) -> str:
 
 def _add_wheel(robot: ET.Element, wheel: Wheel) -> None:
     link = ET.SubElement(robot, "link", name=f"{wheel.name}_link")
-    tensor = [[float(value) for value in row] for row in wheel.inertia.tensor]
-    _add_inertial(link, wheel.inertia.mass, Pose3(), tensor)
+    _add_inertial(link, wheel.inertia.mass, Pose3(), wheel.inertia.tensor)
     _add_shape(link, Solid(Cylinder(wheel.radius, wheel.width), Pose3.from_rpy(0, 0, 0, math.pi / 2, 0, 0)))
     joint = ET.SubElement(robot, "joint", name=wheel.name, type="continuous")
     ET.SubElement(joint, "parent", link=BASE_LINK)
@@ -41,14 +40,12 @@ def _add_wheel(robot: ET.Element, wheel: Wheel) -> None:
     ET.SubElement(joint, "axis", xyz="0 1 0")
 
 
-def _add_inertial(link: ET.Element, mass: float, center: Pose3, tensor: list[list[float]]) -> None:
+def _add_inertial(link: ET.Element, mass: float, center: Pose3, tensor: Array) -> None:
     inertial = ET.SubElement(link, "inertial")
     _add_origin(inertial, center)
     ET.SubElement(inertial, "mass", value=_join_numbers(mass))
     names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    ET.SubElement(
-        inertial, "inertia", {name: _join_numbers(tensor[row][column]) for name, (row, column) in names.items()}
-    )
+    ET.SubElement(inertial, "inertia", {name: _join_numbers(tensor[index]) for name, index in names.items()})
 
 
 def _add_shape(link: ET.Element, solid: Solid) -> None:

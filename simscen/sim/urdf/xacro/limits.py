@@ -8,6 +8,11 @@ MAX_DEPTH = 150
 """Maximum nesting of elements, macros, includes, properties, and expressions."""
 MAX_LENGTH = 1 << 16
 """Maximum number of characters in a text, or of values in a list."""
+MAX_BITS = 256
+"""Maximum number of bits of an integer."""
+
+Value = Union[int, float, str, bool, None, "list[Value]", "dict[str, Value]"]
+"""Value of a property or expression."""
 
 
 class ExpansionError(Exception):
@@ -42,12 +47,6 @@ class Budget:
 
     def __exit__(self, *_: object) -> None:
         self._depth -= 1
-
-
-Value = Union[int, float, str, bool, None, "list[Value]", "dict[str, Value]"]
-"""Value of a property or expression."""
-MAX_BITS = 256
-"""Maximum number of bits of an integer."""
 
 
 def check_bounds(value: object) -> Value:

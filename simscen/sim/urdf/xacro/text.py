@@ -89,7 +89,6 @@ class TextEvaluator:
         return current
 
     def _part(self, token: str, scope: Scope) -> Value:
-        """Return the value of a part of a text (see TOKEN)."""
         if token.startswith("$$"):
             return token[1:]
         if token.startswith("${"):
