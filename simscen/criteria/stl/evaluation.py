@@ -27,6 +27,7 @@ from simscen.criteria.stl.robustness import (
     WindowRobustness,
 )
 from simscen.criteria.trace_signals.catalog import read_signal
+from simscen.criteria.trace_signals.ground_truth import reject_samples
 from simscen.criteria.trace_signals.sampling import usual_period
 
 if TYPE_CHECKING:
@@ -162,9 +163,7 @@ def _compare(condition: Condition, context: EvaluationContext) -> Robustness:
     assert condition.signal is not None
     trace = context.trace
     values = read_signal(condition.signal, trace, context.case, condition.arguments)
-    if np.isnan(values).any():
-        at = trace.seconds(int(trace.truth.ticks[int(np.argmax(np.isnan(values)))]))
-        raise InvalidTrace(f"{condition.signal} is not a number at t = {at:.2f} s")
+    reject_samples(trace, trace.truth.ticks, np.isnan(values), f"{condition.signal} is not a number at")
     if condition.definition.is_boolean:
         certain = np.where(values, math.inf, -math.inf)
         return ComparisonRobustness(certain, certain, (), condition, values)

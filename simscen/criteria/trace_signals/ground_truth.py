@@ -28,12 +28,17 @@ MIN_MOVE_M = 0.01
 """Minimum length of a move that counts as driven. Shorter moves are jitter."""
 
 
+def reject_samples(trace: Trace, ticks: Ticks, is_invalid: Flags, problem: str) -> None:
+    """Raise InvalidTrace if a sample is invalid. `problem` is the message before the time of the first such sample."""
+    if is_invalid.any():
+        at = trace.seconds(int(ticks[int(np.argmax(is_invalid))]))
+        raise InvalidTrace(f"{problem} t = {at:.2f} s")
+
+
 def check_samples(samples: Samples, name: str, trace: Trace) -> Samples:
     """Return `samples`. Raises InvalidTrace if a value is not finite. `name` is the signal in the message."""
-    bad = ~np.isfinite(samples.values).all(axis=1)
-    if bad.any():
-        at = trace.seconds(int(samples.ticks[int(np.argmax(bad))]))
-        raise InvalidTrace(f"{name} is not finite at t = {at:.2f} s")
+    is_invalid: Flags = np.logical_not(np.isfinite(samples.values).all(axis=1))
+    reject_samples(trace, samples.ticks, is_invalid, f"{name} is not finite at")
     return samples
 
 
@@ -55,10 +60,9 @@ def clearance(trace: Trace) -> Samples:
 
     It is negative by the depth of an overlap. Raises InvalidTrace if a value is nan or -inf; inf is allowed.
     """
-    bad = np.isnan(trace.clearance.values[:, 0]) | np.isneginf(trace.clearance.values[:, 0])
-    if bad.any():
-        at = trace.seconds(int(trace.clearance.ticks[int(np.argmax(bad))]))
-        raise InvalidTrace(f"the clearance is not a number at t = {at:.2f} s")
+    distances = trace.clearance.values[:, 0]
+    is_invalid = np.isnan(distances) | np.isneginf(distances)
+    reject_samples(trace, trace.clearance.ticks, is_invalid, "the clearance is not a number at")
     return trace.clearance
 
 

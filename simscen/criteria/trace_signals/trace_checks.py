@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.records.verdict import Evidence
-from simscen.criteria.findings import InvalidTrace
-from simscen.criteria.trace_signals.ground_truth import check_samples, clearance, speed, truth
+from simscen.criteria.trace_signals.ground_truth import check_samples, clearance, reject_samples, speed, truth
 
 if TYPE_CHECKING:
     from simscen.core.records.trace import Ticks, Trace
@@ -43,9 +42,8 @@ def check_recorded_signals(trace: Trace) -> None:
         check_samples(poses, f"the pose of {name}", trace)
     named = [("truth", trace.truth), ("clearance", trace.clearance), ("belief", trace.belief)]
     for name, samples in named:
-        if (np.diff(samples.ticks) <= 0).any():
-            at = trace.seconds(int(samples.ticks[int(np.argmax(np.diff(samples.ticks) <= 0))]))
-            raise InvalidTrace(f"the samples of the {name} are not in chronological order after t = {at:.2f} s")
+        problem = f"the samples of the {name} are not in chronological order after"
+        reject_samples(trace, samples.ticks, np.diff(samples.ticks) <= 0, problem)
 
 
 def _first_gap(trace: Trace, ticks: Ticks) -> str:
