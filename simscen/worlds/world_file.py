@@ -41,7 +41,33 @@ def world_from_spec(
     notes:  notes of the map's loader, appended to the notes of `base`
     """
     base = base or World(name, ())
-    solids = [*base.solids]
+    solids = _solids_from_spec(spec, grid)
+    bodies = (*map(_object_body, spec.objects), *map(_door_body, spec.doors))
+    places = {**base.places, **{key: place.pose for key, place in spec.places.items()}}
+    regions = {key: tuple((x, y) for x, y in corners) for key, corners in spec.regions.items()}
+    rectangles = [(place.x, place.y, place.x, place.y) for place in places.values()]
+    rectangles += [bounding_rectangle(solid) for solid in solids]
+    rectangles += [bounding_rectangle(solid, body.pose) for body in bodies for solid in body.solids]
+    rectangles += [base.bounds] if any(base.bounds) else []
+    rectangles += [(x, y, x, y) for x, y in grid.corners] if grid is not None else []
+    return replace(
+        base,
+        name=spec.name or name,
+        solids=(*base.solids, *solids),
+        bodies=(*base.bodies, *bodies),
+        places=places,
+        regions={**base.regions, **regions},
+        friction=spec.friction,
+        doors={door.name: _panel_poses(door) for door in spec.doors},
+        bounds=union(rectangles),
+        grid=grid or base.grid,
+        notes=(*base.notes, *notes),
+    )
+
+
+def _solids_from_spec(spec: WorldSpec, grid: OccupancyGrid | None) -> list[Solid]:
+    """Return the static solids that `spec` specifies, without those of an imported world; `grid` is its map."""
+    solids: list[Solid] = []
     if grid is not None:
         from simscen.worlds.maps.occupancy_map import walls_from_map
 
@@ -56,27 +82,7 @@ def world_from_spec(
     for ramp in spec.ramps:
         (start_x, start_y), (end_x, end_y) = ramp.start, ramp.end
         solids.append(ramp_solid((start_x, start_y), (end_x, end_y), ramp.width, ramp.height, ramp.name, ramp.friction))
-    own_bodies = (*map(_object_body, spec.objects), *map(_door_body, spec.doors))
-    places = {**base.places, **{key: place.pose for key, place in spec.places.items()}}
-    regions = {key: tuple((x, y) for x, y in corners) for key, corners in spec.regions.items()}
-    rectangles = [(place.x, place.y, place.x, place.y) for place in places.values()]
-    rectangles += [bounding_rectangle(solid) for solid in solids[len(base.solids) :]]
-    rectangles += [bounding_rectangle(solid, body.pose) for body in own_bodies for solid in body.solids]
-    rectangles += [base.bounds] if any(base.bounds) else []
-    rectangles += [(x, y, x, y) for x, y in grid.corners] if grid is not None else []
-    return replace(
-        base,
-        name=spec.name or name,
-        solids=tuple(solids),
-        bodies=(*base.bodies, *own_bodies),
-        places=places,
-        regions={**base.regions, **regions},
-        friction=spec.friction,
-        doors={door.name: _panel_poses(door) for door in spec.doors},
-        bounds=union(rectangles),
-        grid=grid or base.grid,
-        notes=(*base.notes, *notes),
-    )
+    return solids
 
 
 def _panel_poses(door: Door) -> tuple[Pose2, Pose2]:
