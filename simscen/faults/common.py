@@ -1,4 +1,4 @@
-"""Helpers for several faults: change distances of lidars and cameras, the localizer's correction, or odometry."""
+"""Effects and functions that several faults use to change readings, velocity commands, and beliefs."""
 
 from collections.abc import Callable
 from dataclasses import replace

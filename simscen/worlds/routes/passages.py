@@ -37,12 +37,11 @@ def find_passages(path: Array, goal: str, field: ClearanceField) -> tuple[Passag
     points = resample_polyline(path, max(PROBE_SPACING_M, polyline_length(path) / MAX_PROBES))
     found: dict[tuple[int, int], float] = {}
     for point in points:
-        crossings = (
-            (pair, _crossing_index(field.outline.data[list(pair)], points)) for pair in _candidate_pairs(point, field)
-        )
-        pair, index = next(((pair, index) for pair, index in crossings if index is not None), (None, None))
-        if pair is not None and index is not None:
-            found.setdefault((min(pair), max(pair)), index)
+        for pair in _candidate_pairs(point, field):
+            index = _crossing_index(field.outline.data[list(pair)], points)
+            if index is not None:
+                found.setdefault((min(pair), max(pair)), index)
+                break
     return tuple(_passage(goal, pair, field) for pair in sorted(found, key=lambda pair: found[pair]))
 
 
@@ -75,8 +74,9 @@ def _candidate_pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int,
     reached = np.flatnonzero(np.isfinite(hits[:, 0]))
     if not len(reached):
         return
-    nearest = reached[np.argmin(np.linalg.norm(hits[reached] - point, axis=1))]
-    for hit in dict.fromkeys((int(nearest), int(reached[np.argmin(np.abs(reached - len(RAY_ROTATIONS) // 2))]))):
+    nearest = int(reached[np.argmin(np.linalg.norm(hits[reached] - point, axis=1))])
+    straightest = int(reached[np.argmin(np.abs(reached - len(RAY_ROTATIONS) // 2))])
+    for hit in dict.fromkeys((nearest, straightest)):
         other = int(field.outline.query(hits[hit])[1])
         yield _narrowest_pair(one, other, field)
         yield one, other
@@ -92,9 +92,9 @@ def _ray_hits(point: Array, side: Array, distance: float, field: ClearanceField)
     cells = field.grid.cell_of(rays.reshape(-1, 2))
     inside = field.grid.inside(cells)
     solid = inside & (field.cell_clearance[tuple(np.where(inside[:, None], cells, 0).T)] <= 0)
-    first = solid.reshape(len(RAY_ROTATIONS), -1).argmax(axis=1)
-    numbers = np.arange(len(RAY_ROTATIONS))
-    hits: Array = np.where(solid.reshape(len(RAY_ROTATIONS), -1)[numbers, first][:, None], rays[numbers, first], np.nan)
+    solid = solid.reshape(len(RAY_ROTATIONS), -1)
+    numbers, first = np.arange(len(RAY_ROTATIONS)), solid.argmax(axis=1)
+    hits: Array = np.where(solid[numbers, first][:, None], rays[numbers, first], np.nan)
     return hits
 
 
