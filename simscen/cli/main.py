@@ -206,14 +206,10 @@ def _run_command() -> int:
 
 def _print_error(error: SimscenError) -> Exit:
     """Print an expected error, and return its exit code."""
-    if isinstance(error, InvalidInput):
-        from simscen.cli.diagnostics import as_text, print_text
+    from simscen.cli.diagnostics import as_text, escaped, print_text
 
-        print_text(as_text(error.problems), sys.stderr)
-    else:
-        from simscen.cli.diagnostics import escaped, print_text
-
-        print_text(f"simscen: {escaped(str(error))}", sys.stderr)
+    text = as_text(error.problems) if isinstance(error, InvalidInput) else f"simscen: {escaped(str(error))}"
+    print_text(text, sys.stderr)
     return error.exit
 
 
@@ -222,9 +218,8 @@ def _print_internal_error() -> Exit:
     import traceback
 
     traceback.print_exc()
-    print(
-        "simscen: internal error: this is a bug in simscen; please report it with the traceback above", file=sys.stderr
-    )
+    message = "this is a bug in simscen; please report it with the traceback above"
+    print(f"simscen: internal error: {message}", file=sys.stderr)
     return Exit.INTERNAL
 
 

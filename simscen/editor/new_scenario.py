@@ -12,7 +12,6 @@ from simscen.core.geometry import Array, Pose2
 from simscen.editor.text_editing.value_text import scalar_text
 from simscen.loading.builders import world_from_file
 from simscen.loading.files.single_files import load_world_file
-from simscen.loading.loaded import LoadedWorld
 
 LIDAR_HEIGHT_M = 0.2
 """Height of the horizontal section through the world from which its map is made."""
@@ -32,39 +31,26 @@ def new_scenario_text(file: Path, world_file: Path, root: Path, world_path: tupl
 
     source = load_world_file(world_file, root, world_path)
     built = build_world_and_map(world_from_file(source, root, world_path, lenient), LIDAR_HEIGHT_M)
-    start, goal = _start_and_goal(built)
-    name = file.name.split(".")[0].replace("_", " ")
-    path_text = scalar_text(Path(os.path.relpath(world_file.resolve(), file.resolve().parent)).as_posix())
-    return "\n".join(
-        [
-            "simscen: 1",
-            f"name: {scalar_text(name)}",
-            "description: What this scenario tests, and why.",
-            *_world_lines(source, path_text),
-            "robot:",
-            f"  pose: {_pose_text(start)}",
-            "goals:",
-            f"  - {{name: goal, pose: {_pose_text(goal)}}}",
-            "pass:",
-            "  - goals_reached: {}",
-            "  - collisions: {max: 0}",
-            "",
-        ]
-    )
-
-
-def _world_lines(source: LoadedWorld, path_text: str) -> list[str]:
-    """Return the YAML lines of the key `world`: an inline world for a map or an SDF file.
-
-    `path_text` is the path of the world file as YAML.
-    """
-    if source.spec is not None:
-        return [f"world: {path_text}"]
-    return ["world:", "  simscen: 1", f"  {'sdf' if source.sdf is not None else 'map'}: {path_text}"]
-
-
-def _pose_text(pose: Pose2) -> str:
-    return f"{{x: {pose.x:.2f}, y: {pose.y:.2f}, yaw: 0 deg}}"
+    start, goal = (f"{{x: {pose.x:.2f}, y: {pose.y:.2f}, yaw: 0 deg}}" for pose in _start_and_goal(built))
+    name = scalar_text(file.name.split(".")[0].replace("_", " "))
+    world = scalar_text(Path(os.path.relpath(world_file.resolve(), file.resolve().parent)).as_posix())
+    if source.spec is None:  # a map or an SDF file needs an inline world
+        world = f"\n  simscen: 1\n  {'sdf' if source.sdf is not None else 'map'}: {world}"
+    else:
+        world = f" {world}"
+    return f"""\
+simscen: 1
+name: {name}
+description: What this scenario tests, and why.
+world:{world}
+robot:
+  pose: {start}
+goals:
+  - {{name: goal, pose: {goal}}}
+pass:
+  - goals_reached: {{}}
+  - collisions: {{max: 0}}
+"""
 
 
 def _start_and_goal(built: BuiltWorld) -> tuple[Pose2, Pose2]:

@@ -2,7 +2,6 @@
 
 import math
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -21,6 +20,14 @@ from simscen.spec.registry import all_types
 
 OPTIONAL = "–"
 """Text for the default of an optional key without a default value."""
+_KIND_NAMES: dict[Any, str] = {
+    int: "integer",
+    float: "number",
+    str: "text",
+    bool: "true or false",
+    Amount: "quantity",
+    ErrorCode: "error code",
+}
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
 
@@ -91,11 +98,8 @@ _WITHOUT_PLURAL = frozenset({"text", "names", "true", "false"})
 
 def _plural(kind: str) -> str:
     """Return the plural of a description, such as "lengths in m, each ≥ 0"."""
-    return " or ".join(map(_plural_of_member, kind.split(" or ")))
-
-
-def _plural_of_member(kind: str) -> str:
-    """Return the plural of a description without "or"."""
+    if " or " in kind:
+        return " or ".join(map(_plural, kind.split(" or ")))
     if kind.startswith("list of "):
         return kind.replace("list", "lists", 1)
     match = _NOUN.fullmatch(kind)
@@ -106,19 +110,20 @@ def _plural_of_member(kind: str) -> str:
 
 
 def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
-    """Return the description of a quantity, number, text, Boolean, or mapping, with its bounds."""
-    names = {int: "integer", float: "number", str: "text", bool: "true or false"}
-    quantity = next((mark for mark in _all_marks(metadata) if isinstance(mark, Quantity)), None)
+    """Return the description of a type without alternatives and items, with its bounds."""
+    # The constraints of pydantic's Field are in its own metadata.
+    marks = [one for mark in metadata for one in (mark.metadata if isinstance(mark, FieldInfo) else [mark])]
+    quantity = next((mark for mark in marks if isinstance(mark, Quantity)), None)
     if quantity is not None:
         text = f"{quantity.dimension} in {next(iter(UNITS[quantity.dimension]))}"
+    elif get_origin(kind) is tuple:
+        text = f"list of {len(get_args(kind))} values"
+    elif isinstance(kind, type) and issubclass(kind, BaseModel):
+        text = "mapping"
     else:
-        text = names.get(kind) or _kind_without_name(kind)
-    bounds = {
-        name: getattr(mark, name)
-        for mark in _all_marks(metadata)
-        for name in _BOUNDS
-        if getattr(mark, name, None) is not None
-    }
+        text = _KIND_NAMES.get(kind, "value")
+    found = {name: getattr(mark, name, None) for mark in marks for name in _BOUNDS if hasattr(mark, name)}
+    bounds = {name: bound for name, bound in found.items() if bound is not None}
     if bounds.get("gt", -math.inf) >= bounds.get("ge", math.inf):
         del bounds["ge"]  # of two lower bounds, the stricter one applies
     if bounds.keys() == {"ge", "le"}:
@@ -126,21 +131,6 @@ def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
     else:
         texts = [f"{_BOUNDS[name]} {bound:g}" for name, bound in bounds.items()]
     return ", ".join([text.replace("ratio in %", "ratio"), *texts])
-
-
-def _kind_without_name(kind: Any) -> str:
-    """Return the description of a mapping, a list of fixed length, a quantity of any dimension, or an error code."""
-    if get_origin(kind) is tuple:
-        return f"list of {len(get_args(kind))} values"
-    if isinstance(kind, type) and issubclass(kind, BaseModel):
-        return "mapping"
-    return {Amount: "quantity", ErrorCode: "error code"}.get(kind, "value")
-
-
-def _all_marks(metadata: tuple[Any, ...]) -> Iterator[Any]:
-    """Yield all annotations, including the ones in pydantic's Field."""
-    for mark in metadata:
-        yield from mark.metadata if isinstance(mark, FieldInfo) else [mark]
 
 
 def _default(field: FieldInfo) -> str:

@@ -71,21 +71,18 @@ JUNIT_ERROR_TYPES = {
 
 def code_topics() -> list[Topic]:
     """Return the topics of Nav2's error codes, JUnit's error types, and exit codes."""
-    nav2 = [
-        Topic("error code", code.name, None, f"Nav2's error code {int(code)}.\n\n{_error_code_text(code)}",
-              f"error_code: {{code: {code.name}}}", alias=str(int(code)))
-        for code in NAV2_ERROR_CODES
-    ]  # fmt: skip
-    note = "The run could not be completed: a JUnit `<error>`, and exit code 3."
-    junit = [Topic("error type", kind, None, f"{text}\n\n{note}") for kind, text in JUNIT_ERROR_TYPES.items()]
-    exits = [
-        Topic("exit code", f"exit {code.value}", None, text, alias=f"{code.value}") for code, text in EXIT_CODES.items()
-    ]
-    return [*nav2, *junit, *exits]
-
-
-def _error_code_text(code: ErrorCode) -> str:
-    return f"{NAV2_ERROR_CODES[code]} {EXTERNAL_ONLY_NOTE}" if code in EXTERNAL_ONLY_CODES else NAV2_ERROR_CODES[code]
+    found = []
+    for code, meaning in NAV2_ERROR_CODES.items():
+        number, example = str(int(code)), f"error_code: {{code: {code.name}}}"
+        note = f" {EXTERNAL_ONLY_NOTE}" if code in EXTERNAL_ONLY_CODES else ""
+        text = f"Nav2's error code {number}.\n\n{meaning}{note}"
+        found.append(Topic("error code", code.name, None, text, example, alias=number))
+    for kind, meaning in JUNIT_ERROR_TYPES.items():
+        text = f"{meaning}\n\nThe run could not be completed: a JUnit `<error>`, and exit code 3."
+        found.append(Topic("error type", kind, None, text))
+    for exit_code, meaning in EXIT_CODES.items():
+        found.append(Topic("exit code", f"exit {exit_code.value}", None, meaning, alias=f"{exit_code.value}"))
+    return found
 
 
 SIGNALS_TEXT = """\
@@ -102,33 +99,31 @@ SIGNALS_TEXT = """\
 
 def signal_topics() -> list[Topic]:
     """Return a topic that lists all signals, then a topic for each signal."""
-    rows = tuple(Field(name, signal_kind(signal), OPTIONAL, signal.text) for name, signal in SIGNALS.items())
+    rows = tuple(Field(name, _signal_kind(signal), OPTIONAL, signal.text) for name, signal in SIGNALS.items())
     single = [
-        Topic("signal", name, None, signal_description(signal), signal_example(name, signal))
+        Topic("signal", name, None, _signal_description(signal), _signal_example(name, signal))
         for name, signal in SIGNALS.items()
     ]
     return [Topic("signal", "signals", None, SIGNALS_TEXT, rows=rows), *single]
 
 
-def signal_kind(signal: Signal) -> str:
+def _signal_kind(signal: Signal) -> str:
     """Return the kind of the values of a signal, such as "length in m", "number", or "yes or no"."""
     return f"{signal.dimension} in {signal.unit}" if signal.unit else signal.dimension
 
 
-def signal_description(signal: Signal) -> str:
+def _signal_description(signal: Signal) -> str:
     """Return the description of a signal, with its unit and arguments."""
-    return (
-        f"{signal.text}\n\nIt is a {signal_kind(signal)}.{_arguments_sentence(signal)}"
-        if not signal.is_boolean
-        else signal.text + _arguments_sentence(signal)
-    )
+    text = signal.text if signal.is_boolean else f"{signal.text}\n\nIt is a {_signal_kind(signal)}."
+    if signal.alternative_arguments:
+        text += f" Needs {' or '.join(f'`{key}`' for key in signal.alternative_arguments)}."
+    return text + "".join(f" Optional argument: `{key}`." for key in signal.optional_arguments)
 
 
-def signal_example(name: str, signal: Signal) -> str:
+def _signal_example(name: str, signal: Signal) -> str:
     """Return a YAML example of a condition with this signal."""
-    arguments = "".join(
-        f", {key}: {_EXAMPLE_ARGUMENTS[key]}" for key in (*signal.alternative_arguments[:1], *signal.optional_arguments)
-    )
+    keys = (*signal.alternative_arguments[:1], *signal.optional_arguments)
+    arguments = "".join(f", {key}: {_EXAMPLE_ARGUMENTS[key]}" for key in keys)
     bound = "" if signal.is_boolean else f', op: "<=", value: 1.5 {signal.unit}'.rstrip()
     return f"{{signal: {name}{arguments}{bound}}}"
 
@@ -142,15 +137,6 @@ _EXAMPLE_ARGUMENTS = {
     "recovery": "spin",
     "with": "cart",
 }
-
-
-def _arguments_sentence(signal: Signal) -> str:
-    needed = (
-        f" Needs {' or '.join(f'`{key}`' for key in signal.alternative_arguments)}."
-        if signal.alternative_arguments
-        else ""
-    )
-    return needed + "".join(f" Optional argument: `{key}`." for key in signal.optional_arguments)
 
 
 _SIGNALS_INTRO = """\
@@ -169,17 +155,14 @@ Arguments in parentheses are optional. *True* values are those of the simulator,
 def signals_page() -> str:
     """Return the text of docs/reference/signals.md."""
     head = "| signal | meaning | unit | arguments |\n|---|---|---|---|"
-    rows = [
-        f"| `{name}` | {signal.text} | {signal.unit or signal.dimension} | {_arguments_text(signal)} |"
-        for name, signal in SIGNALS.items()
-    ]
+    rows = []
+    for name, signal in SIGNALS.items():
+        arguments = [f"`{key}`" for key in signal.alternative_arguments]
+        arguments += [f"(`{key}`)" for key in signal.optional_arguments]
+        unit = signal.unit or signal.dimension
+        rows.append(f"| `{name}` | {signal.text} | {unit} | {' or '.join(arguments)} |")
     sampling = f"\n## Values of a signal\n\n{SIGNALS_TEXT}\n"
     return "\n".join([f"# Signals\n\n{_SIGNALS_INTRO}\n{head}", *rows, sampling])
-
-
-def _arguments_text(signal: Signal) -> str:
-    names = [f"`{key}`" for key in signal.alternative_arguments] + [f"(`{key}`)" for key in signal.optional_arguments]
-    return " or ".join(names)
 
 
 METRICS_TEXT = """\

@@ -21,7 +21,9 @@ def all_topics() -> list[Topic]:
 def known_names(keys: bool = False) -> list[str]:
     """Return the names of all topics and problem codes; if `keys` is true, the paths of all keys instead."""
     found = all_topics()
-    return keys_of_topics(found) if keys else [*dict.fromkeys(topic.name for topic in found), *CODES]
+    if keys:
+        return [f"{topic.name}.{field.key}" for topic in found for field in topic.fields]
+    return [*dict.fromkeys(topic.name for topic in found), *CODES]
 
 
 def key_topics(path: str, known: Sequence[Topic]) -> list[Topic]:
@@ -43,11 +45,6 @@ def key_topics(path: str, known: Sequence[Topic]) -> list[Topic]:
         listed = [row for topic in known if topic.name == name for row in topic.rows if row.key == key]
         found += [_key_topic(path, row, ()) for row in listed]
     return list({(topic.name, topic.text): topic for topic in found}.values())
-
-
-def keys_of_topics(known: Sequence[Topic]) -> list[str]:
-    """Return the paths of all keys of all topics."""
-    return [f"{topic.name}.{field.key}" for topic in known for field in topic.fields]
 
 
 def _path_starts(parts: list[str], known: Sequence[Topic]) -> Iterator[tuple[type[BaseModel], list[str]]]:

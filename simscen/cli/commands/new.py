@@ -91,10 +91,11 @@ def command(
     if from_log is not None:
         if like:
             raise UsageError("--like and --from-log exclude each other")
-        from simscen.cli.session.from_log import FromLogOptions, write_scenario_from_log
+        from simscen.cli.session.from_log import write_scenario_from_log
+        from simscen.reconstruction.scenario.given_parts import GivenFiles
 
-        options = FromLogOptions(from_log, _target(name, out, from_log), map_, world, robot, truth, topic or [], root)
-        write_scenario_from_log(options, verify)
+        target, files = _target(name, out, from_log), GivenFiles(world, map_, robot)
+        write_scenario_from_log(from_log, target, files, truth, topic or [], root, verify)
         return
     for option, value in (("--out", out), ("--map", map_), ("--world", world)):
         if value is not None:

@@ -5,7 +5,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from rich import box
@@ -28,46 +27,25 @@ MAX_COLUMNS = 100
 """Width of the table in characters if stdout is not a terminal."""
 
 
-@dataclass(frozen=True)
-class FromLogOptions:
-    """Options of `simscen new --from-log`.
+def write_scenario_from_log(
+    log: Path, out: Path, files: GivenFiles, truth: str | None, topics: list[str], root: Path | None, verify: bool
+) -> None:
+    """Write the scenario `out` and print a summary. With `verify`, also compare a run of the scenario with the log.
 
-    log:     recorded drive: an MCAP file or a rosbag2 folder
-    out:     scenario file to write
-    map:     map of the robot; None for the map in the log
-    world:   world file; None for a world made from the log
-    robot:   robot model or file; "" for the robot in the log
-    truth:   topic of the true pose; "none" to ignore it; None for the topic of simscen's own logs
-    topics:  entries NAME=TOPIC for messages whose topic in the log is not the default, such as scan=/front/scan
-    root:    folder of the files that the recorded scenario refers to; None for the working folder
+    `log` is an MCAP file or a rosbag2 folder. The other parameters are the options of `simscen new` with these names;
+    `files` are the values of --world, --map, and --robot. Raises InvalidInput if the log or another file is unusable,
+    and UsageError if the scenario cannot be written.
     """
-
-    log: Path
-    out: Path
-    map: Path | None = None
-    world: Path | None = None
-    robot: str = ""
-    truth: str | None = None
-    topics: list[str] = field(default_factory=list)
-    root: Path | None = None
-
-
-def write_scenario_from_log(options: FromLogOptions, verify: bool) -> None:
-    """Write the scenario and print a summary. With `verify`, also run the scenario, and compare the run with the log.
-
-    Raises InvalidInput if the log or another file is unusable, and UsageError if the scenario cannot be written.
-    """
-    if not options.log.exists():
-        raise InvalidInput([Problem(str(options.log), 0, 0, "SC001", "no such file or directory")])
-    renamed, files = parse_topics(options.topics, TOPIC_ROLES), GivenFiles(options.world, options.map, options.robot)
-    reading_options = ReconstructionOptions(options.truth, renamed, files, options.root)
-    with create_file(options.out, str(options.out)), paths_from_working_folder(default_root([options.out])):
-        made = scenario_from_log(options.log, options.out, reading_options)
+    if not log.exists():
+        raise InvalidInput([Problem(str(log), 0, 0, "SC001", "no such file or directory")])
+    options = ReconstructionOptions(truth, parse_topics(topics, TOPIC_ROLES), files, root)
+    with create_file(out, str(out)), paths_from_working_folder(default_root([out])):
+        made = scenario_from_log(log, out, options)
     for file in made.files[1:]:
         print_text(f"wrote {escaped(str(file))}")
     for line in made.summary():
         print_text(escaped(line))
-    name = escaped(str(options.out))
+    name = escaped(str(out))
     print_text(f"wrote {name}; try: simscen run {name}")
     for unknown in made.contents.unknowns:
         print_text(f"note: the log does not show: {escaped(unknown)}", sys.stderr)

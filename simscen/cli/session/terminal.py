@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import StringIO
 from pathlib import Path
-from typing import TextIO
 
 from simscen.cli.diagnostics import print_text
 from simscen.cli.process import discard_output
@@ -82,7 +81,14 @@ def open_screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
     job summary. Raises UsageError if the file of the summary is not writable.
     """
     summary = _step_summary() if format_ is Format.GITHUB else None
-    printer = _printer(format_, summary, slow)
+    printer: Reporter
+    match format_:
+        case Format.TEXT:
+            printer = text_reporter(sys.stdout, slow=slow)
+        case Format.JSON:
+            printer = JsonReporter(sys.stdout)
+        case Format.GITHUB:
+            printer = GitHubReporter(sys.stdout, summary, slow, os.environ.get(PICTURES_URL, ""))
     output = Screen(printer)
     printer.__enter__()
     try:
@@ -92,16 +98,6 @@ def open_screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
             printer.__exit__(*sys.exc_info())
         if summary is not None:
             output.append_summary(summary.getvalue())
-
-
-def _printer(format_: Format, summary: TextIO | None, slow: int | None) -> Reporter:
-    match format_:
-        case Format.TEXT:
-            return text_reporter(sys.stdout, slow=slow)
-        case Format.JSON:
-            return JsonReporter(sys.stdout)
-        case Format.GITHUB:
-            return GitHubReporter(sys.stdout, summary, slow, os.environ.get(PICTURES_URL, ""))
 
 
 def _step_summary() -> StringIO | None:

@@ -235,28 +235,25 @@ def _wait_for_changes(state: WatchState, seen: FileStamps) -> Sequence[Path] | N
 
 
 @contextmanager
-def _keys() -> Iterator["_Keys"]:
-    """Provide a reader of single keys without echo within the context, and restore the terminal afterwards."""
-    if not os.isatty(0):
-        yield _Keys()
-        return
-    previous = termios.tcgetattr(0)
-    tty.setcbreak(0, termios.TCSANOW)
-    try:
-        yield _Keys()
-    finally:
-        termios.tcsetattr(0, termios.TCSANOW, previous)
+def _keys() -> Iterator[Callable[[], str]]:
+    """Provide a reader of single keys without echo within the context, and restore the terminal afterwards.
 
+    A call of the reader waits up to POLL_INTERVAL_S, and returns the key, or "" without a key.
+    """
+    inputs = [0]
 
-class _Keys:
-    """Reader of single keys. A call waits up to POLL_INTERVAL_S, and returns the key, or "" without a key."""
-
-    _ended = False
-
-    def __call__(self) -> str:
-        readable, _, _ = select.select([] if self._ended else [0], [], [], POLL_INTERVAL_S)
-        if not readable:
-            return ""
-        key = os.read(0, 1).decode("latin-1")
-        self._ended = not key
+    def read_key() -> str:
+        readable, _, _ = select.select(inputs, [], [], POLL_INTERVAL_S)
+        key = os.read(0, 1).decode("latin-1") if readable else ""
+        if readable and not key:  # the end of stdin, which would always be readable
+            inputs.clear()
         return key
+
+    previous = termios.tcgetattr(0) if os.isatty(0) else None
+    if previous is not None:
+        tty.setcbreak(0, termios.TCSANOW)
+    try:
+        yield read_key
+    finally:
+        if previous is not None:
+            termios.tcsetattr(0, termios.TCSANOW, previous)
