@@ -91,7 +91,6 @@ class LoadedScenario:
     world_path: tuple[Path, ...]
     """Folders of `--world-path`, in which files are searched that the root does not contain."""
     text: str
-    """Content of the file."""
     spec: ScenarioSpec
     """Specification, with poses instead of place names."""
     world: LoadedWorld
@@ -107,13 +106,10 @@ class LoadedScenario:
     read_files: tuple[Path, ...] = ()
     """Other files that were read to build the world and the robot, such as meshes."""
     notes: tuple[Problem, ...] = ()
-    """Warnings."""
     lenient: bool = False
     """Whether unusable parts of an SDF world are skipped with a warning, instead of being errors."""
     keepout_mask: LoadedMap | None = None
-    """Keepout mask of the stack."""
     speed_mask: LoadedMap | None = None
-    """Speed mask of the stack."""
     criterion_masks: Mapping[str, CriterionMask] = field(default_factory=dict)
     """Filter masks of criteria, by path as written in the scenario."""
     choice: StackChoice | None = None

@@ -35,11 +35,9 @@ class WorldCache:
     _simple_paths: list[tuple[tuple[Solid, ...], float, tuple[float, float], SimplePaths | None]] = field(
         default_factory=list
     )
-    """Arguments and results of `simple_paths`."""
     _shortest_paths: list[tuple[tuple[Solid, ...], Bounds, float, tuple[float, float], ShortestPaths]] = field(
         default_factory=list
     )
-    """Arguments and results of `shortest_paths`."""
 
     def world(self, loaded: LoadedScenario) -> World:
         """Return the built world of a scenario, and record its files by `record_read_file`. Raises InvalidInput."""

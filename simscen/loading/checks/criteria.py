@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from simscen.core.messages.navigation import ErrorCode
 from simscen.loading.checks.possible_run import why_no_recovery
 from simscen.loading.checks.registry import MEANING, CheckProblem
 from simscen.loading.known_names import goal_names
@@ -13,8 +14,6 @@ from simscen.model.navigation import expected_failure_name
 
 GOAL_CRITERIA = frozenset({"goals_reached", "time_to_goal", "no_false_success", "stuck", "result", "error_code"})
 """Criteria that have nothing to judge if the robot gets no goal."""
-NO_ERROR = 0
-"""Nav2's error code for success."""
 LOOSE_SPEED_RATIO = 1.2
 """Bounds on the speed above this multiple of the top speed are loose."""
 LOOSE_PATH_RATIO = 10.0
@@ -70,9 +69,9 @@ def _why_impossible(loaded: LoadedScenario, kind: str, criterion: Any) -> str | 
         return None
     if criterion.status == "CANCELED" and not loaded.may_do("cancel_goal"):
         return "no event cancels a goal"
-    if criterion.status == "SUCCEEDED" and criterion.error_code not in (None, NO_ERROR):
+    if criterion.status == "SUCCEEDED" and criterion.error_code not in (None, ErrorCode.NONE):
         return f"a result that SUCCEEDED has no error code such as {criterion.error_code.name}"
-    if criterion.status == "FAILED" and criterion.error_code == NO_ERROR:
+    if criterion.status == "FAILED" and criterion.error_code == ErrorCode.NONE:
         return "a result that FAILED has an error code other than NONE"
     return None
 

@@ -28,11 +28,9 @@ CHECKED_DRAWS = range(1, 21)
 STACK_KINDS = ("stack", NAV2_FILE_KIND)
 """Kinds of files with the parameters of a stack."""
 _ROBOT_KEYS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
-"""Top-level keys that only robot files have."""
 _WORLD_KEYS = frozenset({"walls", "obstacles", "objects", "doors", "places", "regions", "map_height", "sdf"})
-"""Top-level keys that only world files have."""
 _SCENARIO_KEYS = frozenset({"world", "robot", "goals", "pass", "events", "faults", "stack"})
-"""Top-level keys that only scenarios have."""
+"""Top-level keys that only files of this kind have."""
 _SUFFIXES_BY_KIND = (
     ("scenario", SCENARIO_SUFFIXES),
     ("study", STUDY_SUFFIXES),
@@ -41,7 +39,6 @@ _SUFFIXES_BY_KIND = (
     ("robot", (*ROBOT_SUFFIXES, *URDF_SUFFIXES)),
     ("stack", STACK_SUFFIXES),
 )
-"""Kinds of files with their suffixes."""
 
 
 def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = ()) -> list[Problem]:

@@ -32,7 +32,6 @@ MIN_DEPTH_M = 0.1
 ESTIMATE_ERROR_M = 0.5
 """Possible error of the initial estimate. A start is only reported if it is this deep inside a zone."""
 NO_LIMIT_REASON = "no cell of the mask limits the speed with this `base` and `multiplier`"
-"""Reason for messages why a speed mask has no effect."""
 
 
 def stack_masks(scene: Scene) -> FilterMasks:

@@ -15,7 +15,6 @@ from simscen.loading.yaml.tree import Keys
 from simscen.triggers.base import AnyCondition, Condition
 
 RENAME_HINT = "rename one of them"
-"""Hint for two things with the same name."""
 
 
 @NAMES.check("SC030")

@@ -33,7 +33,6 @@ from simscen.worlds.geometry.overlaps import first_solid_in_disc, place_polygon,
 from simscen.worlds.geometry.prisms import upright_prism
 
 FREE_SPACE_HINT = "move it to free space"
-"""Hint for a pose inside an obstacle."""
 MAX_PLATFORM_HEIGHT_M = 0.3
 """Largest height up to which an obstacle in a Gazebo world could be the floor."""
 TOLERANCE_FRACTIONS = (-0.9, 0.0, 0.9)

@@ -37,9 +37,7 @@ class CheckProblem(NamedTuple):
     keys: Keys
     """Keys that lead to the value that the message marks, e.g. ("goals", 0, "pose")."""
     message: str
-    """Description of the problem."""
     hint: str = ""
-    """Next step for the user."""
     at_key: bool = False
     """Whether the message marks the last key instead of its value."""
     warning: bool = False
@@ -65,7 +63,6 @@ class Subject(Protocol):
 
 AnySubject = TypeVar("AnySubject", bound=Subject)
 Check = Callable[[AnySubject], Iterable[CheckProblem]]
-"""Function that yields the problems of a subject."""
 CheckFunction = TypeVar("CheckFunction", bound=Callable[..., Any])
 
 

@@ -31,7 +31,6 @@ MIN_HULL_OVERLAP_M = 0.002
 TOUCH_M = 1e-6
 """Distance below which a point counts as inside a solid."""
 START = ("robot", "pose")
-"""Keys of the start pose in a scenario."""
 MOVING_ACTIONS = frozenset({"open", "close", "move", "remove", "teleport", "push"})
 """Kinds of actions that can move or remove a body."""
 

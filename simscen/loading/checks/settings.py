@@ -17,7 +17,6 @@ from simscen.model.robot import RobotSpec
 from simscen.model.scenario import MAX_GOALS
 
 TICK_RATE_KEYS = ("physics", "tick_rate")
-"""Keys of the tick rate in a scenario."""
 
 
 @NAMES.check("SC034")

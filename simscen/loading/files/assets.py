@@ -27,9 +27,7 @@ Loaded = TypeVar("Loaded", LoadedMap, LoadedRobot, LoadedWorld)
 SDF_SUFFIXES = (".sdf", ".world", ".sdf.xacro", ".world.xacro")
 """Suffixes of the files of Gazebo worlds."""
 XML_STARTS = ("<?xml", "<sdf", "<!--")
-"""Beginnings of XML files."""
 URDF_SUFFIXES = (".urdf", ".xacro")
-"""Suffixes of URDF files."""
 SHIPPED_ROBOT_SUFFIX = ".robot.yaml"
 """Suffix of the files of robots that ship with simscen."""
 

@@ -28,7 +28,6 @@ class LoadedCriteria:
     tree: MappingNode = field(repr=False)
     """YAML tree of `file`, merged with the files that it extends."""
     library: Library = field(repr=False)
-    """Reader of these files."""
     masks: Mapping[str, CriterionMask] = field(default_factory=dict)
     """Filter masks of the criteria, by path as written in the file."""
 

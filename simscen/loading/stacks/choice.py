@@ -16,7 +16,6 @@ COMMON_STACK_KEYS = ("controller_frequency",)
 GOAL_CHECKER = "goal_checker"
 """Key under `stack` with the goal tolerances."""
 TOLERANCES = ("xy_goal_tolerance", "yaw_goal_tolerance")
-"""Keys of the goal tolerances under `goal_checker`."""
 EXTERNAL = "external"
 """Key under `stack` with the name of an external stack."""
 REFERENCE = "reference"
@@ -42,7 +41,6 @@ class StackChoice:
     external_command: ExternalCommand | None = field(default=None, repr=False)
     """Command that starts an external stack; None if VALUE is no command."""
     notes: tuple[Problem, ...] = field(default=(), repr=False)
-    """Warnings about the stack file."""
 
     @property
     def written(self) -> str:

@@ -108,7 +108,6 @@ class Translation:
     covers: str | None = None
     """Common beginning of the names of further parameters that this translation includes; None if there are none."""
     hint: str = "it is ignored"
-    """Hint for the user, shown with the note."""
 
 
 def translate_same_name(

@@ -28,7 +28,6 @@ class Nav2Parameters:
     positions: Mapping[tuple[str, str], Position]
     """Positions of the values, by name of the node and dotted name of the parameter."""
     text: str
-    """Text of the file."""
     notes: tuple[Problem, ...] = ()
     """Warnings about duplicate keys and nodes."""
 

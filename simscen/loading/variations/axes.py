@@ -36,7 +36,6 @@ class AxisBuilder:
     tree: MappingNode
     """YAML tree of the scenario without its key `variations`."""
     problems: list[Problem] = field(default_factory=list)
-    """Problems found so far."""
     targets: dict[str, Target] = field(default_factory=dict)
     """Targets of all varied paths found so far, by path."""
     _names: dict[str, Position] = field(default_factory=dict)

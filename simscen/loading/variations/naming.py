@@ -10,9 +10,7 @@ from simscen.loading.variations.paths import Target, split_path
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
 
 MAX_NAME_CHARS = 100
-"""Largest length of a name."""
 _MAX_VALUE_CHARS = 40
-"""Largest length of a value in a name."""
 _VALID_NAME_PATTERN = re.compile(r"[^\W][\w.,=+%-]*")
 _NUMBERED_NAME_PATTERN = re.compile(r"variation-([1-9][0-9]{0,8})")
 _INVALID_CHARS_PATTERN = re.compile(r"[^\w.+%-]+")
@@ -26,7 +24,6 @@ def name_error(name: str) -> str | None:
 
 
 NAME_HINT = f"up to {MAX_NAME_CHARS} letters, digits, and `_.,=+-%`, starting with a letter, a digit, or `_`"
-"""Hint that describes valid names of variations."""
 
 
 def short_names(targets: Sequence[Target]) -> dict[str, str]:

@@ -12,7 +12,6 @@ from simscen.model.variations import Draw, Integer, LogUniform, Normal, OneOf, S
 from simscen.spec.quantities import Amount, to_common_unit
 
 _SIGNIFICANT_DIGITS = 6
-"""Number of significant digits to which drawn numbers are rounded."""
 
 
 class ChoiceIndex(NamedTuple):

@@ -22,11 +22,9 @@ class SearchSpace:
     tree: MappingNode
     """YAML tree of the scenario without its key `variations`."""
     sampled: Sampled
-    """Distributions by path."""
     distributions: MappingNode
     """YAML tree of the distributions by path."""
     targets: Sequence[Target]
-    """Target of each dimension."""
     conditions: Sequence[Condition]
 
     @property

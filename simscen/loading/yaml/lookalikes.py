@@ -3,7 +3,6 @@
 from simscen.spec.quantities import with_article
 
 _SPACE = "a plain space"
-"""Replacement of lookalike spaces, for messages."""
 LOOKALIKES = {
     "\u00a0": ("no-break space", _SPACE),
     "\u2007": ("figure space", _SPACE),

@@ -20,13 +20,11 @@ _CONSTANTS: dict[str, Scalar] = {
     **dict.fromkeys(("-.inf", "-.Inf", "-.INF"), -math.inf),
     **dict.fromkeys((".nan", ".NaN", ".NAN"), math.nan),
 }
-"""Values of the texts for null, booleans, infinity, and NaN."""
 _INTEGER_PATTERNS = (
     (re.compile(r"[-+]?(0|[1-9][0-9]*)"), 10),
     (re.compile(r"0o[0-7]+"), 8),
     (re.compile(r"0x[0-9a-fA-F]+"), 16),
 )
-"""Patterns of integers, with their bases."""
 _FLOAT_PATTERN = re.compile(r"[-+]?(\.[0-9]+|(0|[1-9][0-9]*)(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 
 
