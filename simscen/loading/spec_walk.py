@@ -1,12 +1,12 @@
 """Search of a specification for nested specifications, references by name, and angles, with their YAML keys."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
 from pydantic import BaseModel, RootModel
 
-from simscen.loading.yaml.tree import Keys
+from simscen.loading.yaml.tree import Key, Keys
 from simscen.spec.places import PlaceAllowed, ReferenceTo
 from simscen.spec.quantities import Quantity
 
@@ -71,19 +71,25 @@ def walk(spec: Any, includes_robot: RobotFilter | None = None) -> Iterator[tuple
 
 def _walk_with_roots(spec: Any, keys: Keys, includes_robot: RobotFilter | None) -> Iterator[tuple[Keys, BaseModel]]:
     """Yield the same as `walk`, and each RootModel. `keys` are the keys of `spec`."""
-    robot = getattr(spec, "robot", None)
-    if includes_robot is not None and isinstance(robot, str) and not includes_robot(robot):
-        return
-    if isinstance(spec, RootModel):
+    parts: Iterable[tuple[Key, Any]]
+    if isinstance(spec, BaseModel):
+        if includes_robot is not None:
+            robot = getattr(spec, "robot", None)
+            if isinstance(robot, str) and not includes_robot(robot):
+                return
         yield keys, spec
-        yield from _walk_with_roots(spec.root, keys, includes_robot)
-    elif isinstance(spec, BaseModel):
-        yield keys, spec
-        for name, field in type(spec).model_fields.items():
-            yield from _walk_with_roots(getattr(spec, name), (*keys, field.alias or name), includes_robot)
-    elif isinstance(spec, list | tuple | dict):
-        for key, item in spec.items() if isinstance(spec, dict) else enumerate(spec):
-            yield from _walk_with_roots(item, (*keys, key), includes_robot)
+        parts = [(key, getattr(spec, name)) for name, key in _keys_by_field(type(spec))]
+    else:
+        parts = spec.items() if isinstance(spec, dict) else enumerate(spec)
+    for key, part in parts:
+        if isinstance(part, BaseModel | list | tuple | dict):
+            yield from _walk_with_roots(part, keys if isinstance(spec, RootModel) else (*keys, key), includes_robot)
+
+
+@cache
+def _keys_by_field(model: type[BaseModel]) -> list[tuple[str, str]]:
+    """Return the name and the YAML key of each field."""
+    return [(name, field.alias or name) for name, field in model.model_fields.items()]
 
 
 def angles_of(spec: BaseModel) -> Iterator[tuple[Keys, float]]:
