@@ -76,15 +76,14 @@ def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """
     sent = {event.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED)}
     goals = [goal for goal in scene.case.every_goal if goal.name in sent or goal not in scene.case.sent]
+    marks = [(goal, _goal_mark(goal, scene)) for goal in goals]
     names: dict[tuple[float, float], list[str]] = {}
-    for goal in goals:
-        mark = _goal_mark(goal, scene)
+    for goal, mark in marks:
         entries = names.setdefault((goal.pose.x, goal.pose.y), [])
         known = any(matches_goal_name(goal.name, other.partition(":")[0]) for other in entries)
         if not known or mark.text:  # goals of a second loop have the same position
             entries.append(f"{goal.name}: {mark.text}" if mark.text else goal.name)
-    for goal in goals:
-        mark = _goal_mark(goal, scene)
+    for goal, mark in marks:
         x, y, yaw = goal.pose
         radius = max(goal.xy_tolerance * canvas.scale, 5.0)
         is_hollow = mark.word in ("not tried", "canceled")

@@ -19,8 +19,8 @@ from simscen.report.replay.packed_columns import PackedColumns, keep_extremes
 
 MAX_SAMPLES = 6000
 """Maximum number of samples per plot."""
-_STEP_OF_UNIT = {"m": 1e-3, "rad": 1e-3, "s": 1e-2, "m/s": 1e-3, "rad/s": 1e-3, "m/s²": 1e-2, "m/s2": 1e-2}
-"""Rounding step of values, by unit."""
+_FINE_UNITS = frozenset({"m", "rad", "m/s", "rad/s"})
+"""Units of values that are rounded to 0.001. Other values are rounded to 0.01."""
 _EXCLUDED_SIGNALS = frozenset({"time", "started"})
 """Signals that are not plotted."""
 _SIGNAL_OF_CRITERION = {
@@ -98,7 +98,7 @@ def _step(unit: str, values: Array) -> float:
     finite = values[np.isfinite(values)]
     if unit == "" and np.array_equal(finite, np.rint(finite)):
         return 1.0
-    return _STEP_OF_UNIT.get(unit, 1e-2)
+    return 1e-3 if unit in _FINE_UNITS else 1e-2
 
 
 def _signals_in_criteria(spec: ScenarioSpec) -> list[SignalPlot]:
