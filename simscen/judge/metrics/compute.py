@@ -77,10 +77,12 @@ def compute_metrics(trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_C
     for names, compute in groups:
         found |= _compute_or_explain(names, compute)
     found |= {name: reason for name in METRICS if (reason := _missing_evidence(name, coverage))}
-    return MetricValues(
-        {name: None if isinstance(found[name], str) else found[name] for name in METRICS},  # type: ignore[misc]
-        {name: value for name in METRICS if isinstance(value := found[name], str)},
-    )
+    return _metric_values({name: found[name] for name in METRICS})
+
+
+def _metric_values(found: Values) -> MetricValues:
+    values = {name: None if isinstance(value, str) else value for name, value in found.items()}
+    return MetricValues(values, {name: value for name, value in found.items() if isinstance(value, str)})
 
 
 def _compute_or_explain(names: Sequence[str], compute: Callable[[], Values]) -> Values:
@@ -228,13 +230,8 @@ def add_plugin_metrics(
 
     Raises InvalidTrace if a plugin metric raises an exception or is not finite.
     """
-    values, undefined = dict(computed.values), dict(computed.undefined)
-    for entry in metrics:
-        found = _value(entry, trace, case, coverage)
-        values[entry.kind] = None if isinstance(found, str) else found
-        if isinstance(found, str):
-            undefined[entry.kind] = found
-    return MetricValues(values, undefined)
+    added = _metric_values({entry.kind: _value(entry, trace, case, coverage) for entry in metrics})
+    return MetricValues({**computed.values, **added.values}, {**computed.undefined, **added.undefined})
 
 
 def _value(entry: AnyMeasure, trace: Trace, case: Case, coverage: LogCoverage) -> float | str:
