@@ -6,7 +6,6 @@ of a planar lidar: each ray is shortened to end at the first triangle that it hi
 
 import math
 from collections.abc import Iterator, Mapping, Set
-from types import MappingProxyType
 
 import numpy as np
 
@@ -31,8 +30,6 @@ MAX_GROUP_TRIANGLES = 20_000
 """Maximum number of triangles of a group of several bodies. Building the scene takes about 10 ms."""
 REGROUPING_THRESHOLD = 16
 """If there are this many groups when a body comes to rest, all bodies are grouped anew."""
-NO_POSES: Mapping[str, Pose3] = MappingProxyType({})
-"""Default of `rest_poses`: all bodies are moving."""
 _MAX_RANGE_M = 1e30
 """Maximum length of a ray, because infinity would overflow in single precision."""
 _INITIAL_LENGTH_RATIO = 1.001
@@ -173,7 +170,7 @@ class RayScene(RayCaster):
         self._resting = RestingBodies(self._static.center)
         self._heights = math.inf, -math.inf
 
-    def set_bodies(self, bodies: Mapping[str, PlacedMesh], rest_poses: Mapping[str, Pose3] = NO_POSES) -> None:
+    def set_bodies(self, bodies: Mapping[str, PlacedMesh], rest_poses: Mapping[str, Pose3]) -> None:
         """Set all bodies that exist now, by name; others are removed.
 
         A body counts as resting if its pose equals its pose in `rest_poses`, otherwise as moving.
@@ -181,7 +178,7 @@ class RayScene(RayCaster):
         previous, self._movers = self._movers, {}
         resting = dict[str, PlacedMesh]()
         for name, (mesh, pose) in bodies.items():
-            if rest_poses and rest_poses.get(name) == pose:
+            if rest_poses.get(name) == pose:
                 resting[name] = mesh, pose
                 continue
             mover = previous.get(name)

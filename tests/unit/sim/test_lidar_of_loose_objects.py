@@ -66,7 +66,8 @@ def test_scan_equals_the_minimum_over_single_objects(simulate):
             {
                 name: (merge_solids(body.solids), pose)
                 for name, (body, pose) in simulation.robot.bodies_and_poses().items()
-            }
+            },
+            {},
         )
         separate.append(np.minimum(scene.sweep(FAN, simulation.base_pose()._replace(z=0.2), 6.0), 6.0))
 

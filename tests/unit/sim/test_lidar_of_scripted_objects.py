@@ -46,7 +46,7 @@ def test_scan_equals_that_of_a_complete_scene(simulate, monkeypatch) -> None:
         if beat == 30:
             simulation.move("late", MotionPath((0.0, 8.0), (Pose2(-6.0, 6.0), Pose2(6.0, -6.0))))
         objects, pose = robot.objects(), simulation.base_pose()._replace(z=0.2)
-        complete.set_bodies({name: (MESH, there) for name, there in objects.items()})
+        complete.set_bodies({name: (MESH, there) for name, there in objects.items()}, {})
         expected = complete.sweep(FAN, pose, RANGE_M)
         if beat % 2 == 1:
             queried.sweep(FAN, Pose3(*rng.uniform(-5, 5, 2).tolist(), 0.2), float(rng.uniform(1, 5)))

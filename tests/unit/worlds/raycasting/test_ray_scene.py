@@ -88,7 +88,7 @@ def test_random_rays_agree_with_pybullet_for_walls_and_moving_bodies(bullet):
     cart = bullet.add(CART)
     origins, directions = random_rays(10_000, 1, (-4.5, -4.5, 0.05), (4.5, 4.5, 1.9))
     for pose in (Pose3(0, -2, 0), Pose3.from_rpy(1, -1, 0.3, 0.2, -0.1, 2.0)):
-        scene.set_bodies({"cart": (CART, pose)})
+        scene.set_bodies({"cart": (CART, pose)}, {})
         bullet.move(cart, pose)
         ours = scene.cast(origins, directions)
         theirs = bullet.cast(origins, directions)
@@ -112,11 +112,11 @@ def test_bodies_are_added_moved_and_removed():
     scene = RayScene(merge_solids([]))
     origins, directions = level_rays(1, (0, 0, 0.3))
     assert scene.cast(origins, directions)[0] == math.inf
-    scene.set_bodies({"cart": (CART, Pose3(3, 0, 0))})
+    scene.set_bodies({"cart": (CART, Pose3(3, 0, 0))}, {})
     assert scene.cast(origins, directions)[0] == pytest.approx(2.6)
-    scene.set_bodies({"cart": (CART, Pose3(5, 0, 0))})
+    scene.set_bodies({"cart": (CART, Pose3(5, 0, 0))}, {})
     assert scene.cast(origins, directions)[0] == pytest.approx(4.6)
-    scene.set_bodies({})
+    scene.set_bodies({}, {})
     assert scene.cast(origins, directions)[0] == math.inf
 
 
@@ -124,10 +124,10 @@ def test_ranges_do_not_depend_on_earlier_queries_or_the_order_of_bodies():
     origins, directions = random_rays(500, 3, (-4, -4, 0.1), (4, 4, 1.5))
     one, other = RayScene(merge_solids(ROOM)), RayScene(merge_solids(ROOM))
     a, b = (CART, Pose3(0, -2, 0)), (CART, Pose3(0, 3, 0))
-    one.set_bodies({"a": a})
+    one.set_bodies({"a": a}, {})
     one.cast(*random_rays(300, 4, (-4, -4, 0.1), (4, 4, 1.5)))
-    one.set_bodies({"b": b, "a": a})
-    other.set_bodies({"a": a, "b": b})
+    one.set_bodies({"b": b, "a": a}, {})
+    other.set_bodies({"a": a, "b": b}, {})
     assert np.array_equal(one.cast(origins, directions), other.cast(origins, directions))
 
 
@@ -139,7 +139,7 @@ def test_many_bodies_give_the_ranges_of_one_merged_world():
         RayScene(merge_solids([*ROOM, *(Solid(Box((0.7, 0.3, 0.5)), pose.compose(Pose3(z=0.2))) for pose in places)])),
     )
     box = merge_solids([Solid(Box((0.7, 0.3, 0.5)), Pose3(z=0.2))])
-    apart.set_bodies({f"box {k}": (box, pose) for k, pose in enumerate(places)})
+    apart.set_bodies({f"box {k}": (box, pose) for k, pose in enumerate(places)}, {})
     origins, directions = random_rays(5000, 7, (-10, -10, 0.05), (10, 10, 1.9))
     assert_agree(apart.cast(origins, directions), together.cast(origins, directions))
 
@@ -200,7 +200,7 @@ def test_fan_gives_the_ranges_of_its_single_rays(first, beams, field):
     """The bodies: one behind the lidar, hit by the first and last rays, one around it, and one out of reach."""
     scene, fan = RayScene(merge_solids(ROOM)), RayFan(first, field / beams, beams)
     places = [(-2.5, 0.1, 0.3), (1.5, -1.5, 2.0), (0.05, 0.0, 1.0), (30.0, 0.0, 0.0)]
-    scene.set_bodies({f"cart {k}": (CART, Pose3.planar(Pose2(*place))) for k, place in enumerate(places)})
+    scene.set_bodies({f"cart {k}": (CART, Pose3.planar(Pose2(*place))) for k, place in enumerate(places)}, {})
     for lens in (Pose3(0.0, 0.0, 0.3), Pose3.from_rpy(0.8, -0.4, 0.6, 0.1, -0.2, 2.5)):
         for reach in (2.0, 20.0):
             seen, single = scene.sweep(fan, lens, reach), scene.cast(*fan.at(lens), reach)
@@ -230,9 +230,9 @@ def test_body_beyond_the_reach_of_all_rays_is_skipped_until_it_is_nearer(spread)
     scene, (origins, directions) = RayScene(merge_solids([])), level_rays(8, (0.0, 0.0, 0.5))
     origins[4:, 0] -= spread
     for x, seen in ((18.0, math.inf), (10.0, 3.5), (30.0, math.inf)):
-        scene.set_bodies({"far": (CART, Pose3(50.0)), "body": (offset_box, Pose3(x))})
+        scene.set_bodies({"far": (CART, Pose3(50.0)), "body": (offset_box, Pose3(x))}, {})
         assert scene.cast(origins, directions, 5.0)[0] == pytest.approx(seen)
-    scene.set_bodies({"body": (offset_box, Pose3(6.0 - 4.0 - spread))})
+    scene.set_bodies({"body": (offset_box, Pose3(6.0 - 4.0 - spread))}, {})
     assert scene.cast(origins, directions, 5.0)[4] == pytest.approx(3.5)
 
 

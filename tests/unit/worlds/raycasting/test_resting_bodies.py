@@ -76,7 +76,7 @@ def test_merged_resting_bodies_give_the_ranges_of_separate_bodies(reach):
     merged, separate = RayScene(WALLS), RayScene(WALLS)
     for poses in list(pose_sequence())[::6]:
         merged.set_bodies(bodies_at(poses), REST_POSES)
-        separate.set_bodies(bodies_at(poses))
+        separate.set_bodies(bodies_at(poses), {})
         ours, theirs = ranges_of(merged, reach), ranges_of(separate, reach)
         hit = np.isfinite(ours) & np.isfinite(theirs)
         assert np.array_equal(np.isfinite(ours), np.isfinite(theirs))
