@@ -19,7 +19,8 @@ _HEADER_PREFIX = "plugin."
 
 def plugins_of(loaded: LoadedScenario) -> tuple[RegisteredType, ...]:
     """Return the types of plug-ins that a scenario and its robots use, sorted by group and name."""
-    specs = [loaded.spec, *(view.robot.spec for view in loaded.robot_views.values())]
+    robots = [view.robot.spec for view in loaded.robot_views.values()]
+    specs = [loaded.spec, *(robot for robot in robots if robot is not None)]  # None for a URDF alone
     return _sorted({entry for spec in specs for keys, part in walk(spec) for entry in _plugins_of_part(keys, part)})
 
 

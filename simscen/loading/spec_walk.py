@@ -60,7 +60,9 @@ def _texts(value: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
             yield from _texts(item, (*keys, key))
 
 
-def walk(spec: Any, includes_robot: RobotFilter | None = None) -> Iterator[tuple[Keys, BaseModel]]:
+def walk(
+    spec: BaseModel | dict[str, Any], includes_robot: RobotFilter | None = None
+) -> Iterator[tuple[Keys, BaseModel]]:
     """Yield a specification and all specifications in it with their keys. A RootModel itself is not yielded.
 
     Parts that name a robot are left out if `includes_robot` is false for it; None includes all parts.

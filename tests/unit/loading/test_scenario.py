@@ -6,6 +6,7 @@ import pytest
 from simscen.core.errors import InvalidInput
 from simscen.loading.files.paths import scenario_id
 from simscen.loading.loaded import LoadedScenario
+from simscen.loading.plugins import plugins_of
 from simscen.loading.scenario import load_scenario
 from tests.scenario_files import try_scenario
 
@@ -85,6 +86,7 @@ def test_gazebo_worlds_and_urdfs_are_known_by_their_suffix(write: Write, scenari
     loaded = _loaded(write("a.scenario.yaml", text), tmp_path)
     assert (loaded.world.sdf, loaded.robot.urdf) == (tmp_path / "sim/hall.world", tmp_path / "sim/bot.urdf")
     assert (loaded.world.spec, loaded.robot.spec) == (None, None)
+    assert plugins_of(loaded) == ()
 
 
 def test_a_shipped_robot_is_known_by_its_name(write: Write, scenario: str, tmp_path: Path) -> None:
