@@ -111,7 +111,7 @@ class RecoveryReporter:
 
     def __init__(self, graph: Graph, report: ReportEvent) -> None:
         self._graph, self._report = graph, report
-        self._executing: dict[bytes, str] = {}
+        self._executing: set[bytes] = set()
         self._known: set[bytes] = set()
         self._behavior_count = self._feedback_count = self._last_number = 0
         self._excess_since: int | None = None
@@ -119,21 +119,20 @@ class RecoveryReporter:
     def subscribe(self) -> None:
         """Subscribe to the status of each of the BEHAVIORS that has a server now."""
         for behavior in BEHAVIORS:
-            self._graph.subscribe_to_status(behavior, partial(self._process_statuses, behavior))
+            self._graph.subscribe_to_status(behavior, partial(self._process_status, behavior))
 
-    def _process_statuses(self, behavior: str, message: Any) -> None:
+    def _process_status(self, behavior: str, message: Any) -> None:
+        """Report the recoveries that have started or ended."""
         for goal in message.status_list:
-            self._process_status(behavior, bytes(goal.goal_info.goal_id.uuid), goal.status)
-
-    def _process_status(self, behavior: str, goal: bytes, status: int) -> None:
-        """Report a recovery that has started or ended. `goal` is the id of the action goal."""
-        if goal not in self._known and (status == EXECUTING or status in OUTCOMES):
-            self._known.add(goal)
-            self._executing[goal] = behavior
-            self._behavior_count += 1
-            self._report("recovery.started", behavior)
-        if status in OUTCOMES and self._executing.pop(goal, None) is not None:
-            self._report("recovery.ended", behavior, outcome=OUTCOMES[status])
+            goal_id, status = bytes(goal.goal_info.goal_id.uuid), goal.status
+            if goal_id not in self._known and (status == EXECUTING or status in OUTCOMES):
+                self._known.add(goal_id)
+                self._executing.add(goal_id)
+                self._behavior_count += 1
+                self._report("recovery.started", behavior)
+            if status in OUTCOMES and goal_id in self._executing:
+                self._executing.remove(goal_id)
+                self._report("recovery.ended", behavior, outcome=OUTCOMES[status])
 
     def update_count(self, number: int) -> None:
         """Update the count of recoveries. `number` is `number_of_recoveries` of the current navigation action."""

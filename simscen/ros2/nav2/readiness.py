@@ -29,12 +29,6 @@ class Nav2Readiness:
             graph.names.namespace,
         )
 
-    def _published_names(self) -> parameter_rules.PublishedNames:
-        """Return the names that simscen publishes. Frames of the user's transforms are additional base frames."""
-        if self.user_transforms is None:
-            return self._names
-        return self._names._replace(base_frames=[*self._names.base_frames, *self.user_transforms.robot_frames])
-
     def node_problems(self) -> List[str]:
         """Return a text for each missing node and each severe problem of the parameter file, except wrong topics."""
         found = self._severe_problems(self._options.parameters or {}, {}, f"{self._options.parameter_file}: ")
@@ -49,17 +43,19 @@ class Nav2Readiness:
     def wrong_parameters(self) -> List[str]:
         """Return one text for each severe problem of the parameters of the running nodes."""
         nodes = [node for node in self._graph.nodes() if node[0] in parameter_rules.RULES]
-        values = {node[0]: self._parameters(full_name(node), node[0]) for node in nodes}
+        values = {}
+        for node in nodes:
+            path = full_name(node)
+            relevant = parameter_rules.relevant_parameters(node[0], self._node_parameters.names(path))
+            values[node[0]] = self._node_parameters.values(path, relevant)
         return self._severe_problems(values, {node[0]: self._graph.subscribed_topics(node) for node in nodes}, "")
 
     def _severe_problems(
         self, nodes: Dict[str, Dict[str, Any]], subscriptions: parameter_rules.Subscriptions, prefix: str
     ) -> List[str]:
         """Return a text, with `prefix`, for each severe problem of the parameters of `nodes`."""
-        found = parameter_rules.check(nodes, self._published_names(), subscriptions)
+        names = self._names
+        if self.user_transforms is not None:
+            names = names._replace(base_frames=[*names.base_frames, *self.user_transforms.robot_frames])
+        found = parameter_rules.check(nodes, names, subscriptions)
         return [f"{prefix}{problem.node}: {problem.message}" for problem in found if problem.is_severe]
-
-    def _parameters(self, path: str, name: str) -> Dict[str, Any]:
-        """Return the parameters of a node that the rules use; empty if the node does not answer."""
-        names = parameter_rules.relevant_parameters(name, self._node_parameters.names(path))
-        return self._node_parameters.values(path, names)
