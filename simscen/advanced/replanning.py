@@ -1,92 +1,21 @@
-"""Replanning of the advanced stack: costs of moving obstacles, reasons for a new plan, and clearing of the costmap."""
+"""Replanning of the advanced stack: additional reasons for a new plan, and plans with more clearance."""
 
 import contextlib
-import math
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
-from simscen.advanced.prediction.avoidance import MIN_DISTANCE_M
-from simscen.advanced.prediction.rollouts import HORIZON_S
-from simscen.core.geometry import Array, Pose2
+from simscen.advanced.predicted_costs import add_predicted_costs, meets_moving_obstacle
+from simscen.core.geometry import Pose2
 from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import Path
 from simscen.core.records.events import Event
 from simscen.model.planners import PlannerSpec
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
-from simscen.stack.costmap.layers import MAX_NON_OBSTACLE
 from simscen.stack.followed_plan import WATCH_DISTANCE_M, FollowedPlan
 from simscen.stack.footprint import distances
-from simscen.stack.moving_obstacles import MAX_INFLATION_M, MovingObstacles
 from simscen.stack.plan_manager import PlanManager, PlanResult
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
-
-DECAY_TIME_S = 2.0
-"""Time constant of the exponential decay of costs with the time of arrival, because obstacles change their velocity."""
-BLOCK_SIZE_M = 0.2
-"""Approximate side length of the blocks of cells that get the same cost."""
-
-
-def add_predicted_costs(costmap: CostmapView, robot: Pose2, speed: float, radius: float) -> CostmapView:
-    """Return the costmap with costs, up to MAX_NON_OBSTACLE, in cells where the robot would meet moving obstacles.
-
-    The robot drives to each cell in a straight line from the pose `robot` at `speed` m/s; its `radius` is in m. The
-    obstacles are predicted for the time of its arrival.
-    """
-    if not len(costmap.moving):
-        return costmap
-    size, (height, width) = costmap.resolution, costmap.costs.shape
-    factor = max(1, round(BLOCK_SIZE_M / size))
-    low, high, centers = [], [], []
-    for center, corner, cells in ((robot.y, costmap.origin[1], height), (robot.x, costmap.origin[0], width)):
-        first = max(0, math.floor((center - speed * HORIZON_S - corner) / size))
-        last = min(cells, math.ceil((center + speed * HORIZON_S - corner) / size))
-        low.append(first)
-        high.append(max(first, last))
-        centers.append(corner + size * (first + factor * (np.arange(-(-max(0, last - first) // factor)) + 0.5)))
-    x, y = np.meshgrid(centers[1], centers[0])
-    predicted = _predicted_costs(costmap.moving, x, y, np.hypot(x - robot.x, y - robot.y) / speed, radius)
-    if not predicted.any():
-        return costmap
-    window = slice(low[0], high[0]), slice(low[1], high[1])
-    cells = predicted.repeat(factor, axis=0).repeat(factor, axis=1)[: high[0] - low[0], : high[1] - low[1]]
-    costs = costmap.costs.copy()
-    np.maximum(costs[window], cells, out=costs[window])
-    return replace(costmap, costs=costs)
-
-
-def _predicted_costs(moving: MovingObstacles, x: Array, y: Array, times: Array, radius: float) -> npt.NDArray[np.uint8]:
-    """Return the costs of the points (x, y), at which the robot arrives after `times` in s."""
-    near, _ = moving.nearness(x, y, times, radius, MIN_DISTANCE_M)
-    cost = MAX_NON_OBSTACLE * np.clip(near, 0.0, 1.0) * np.exp(-times / DECAY_TIME_S)
-    return np.where(times > HORIZON_S, 0.0, cost).astype(np.uint8)
-
-
-def meets_moving_obstacle(
-    moving: MovingObstacles, robot: Pose2, path: Iterable[complex], speed: float, radius: float
-) -> bool:
-    """Return whether a robot that drives from `robot` along `path` (points x + iy) comes too close to an obstacle.
-
-    Obstacles are predicted for HORIZON_S. Too close means that `MovingObstacles.nearness` is positive. The `speed` is
-    in m/s, and the robot's `radius` in m.
-    """
-    moving = moving.near(robot.x, robot.y, radius + MAX_INFLATION_M, speed, HORIZON_S)
-    if not moving.obstacles:
-        return False
-    position, driven = complex(robot.x, robot.y), 0.0
-    for point in path:
-        driven += abs(point - position)
-        position, time = point, driven / speed
-        if time >= HORIZON_S:
-            return False
-        for obstacle in moving.obstacles:
-            distance = min(MIN_DISTANCE_M + obstacle.position_std(time, moving.acceleration), MAX_INFLATION_M)
-            if abs(point - obstacle.position - time * obstacle.velocity) - obstacle.radius < radius + distance:
-                return True
-    return False
-
 
 MIN_PLAN_AGE_S = 0.5
 """Minimum age of a plan that is checked for lost clearance."""
@@ -245,30 +174,3 @@ class AdvancedPlanManager(PlanManager):
         self._checked_revision = self._costmap.view.revision
         self._max_obstacle_cells = self._costmap.obstacle_cell_count
         return event
-
-
-INITIAL_WAIT_S = 10.0
-"""Time after clearing the entire costmap until this may happen again; doubled each time."""
-PROGRESS_M = 1.0
-"""Decrease of the distance to the goal that resets the time between two clearings to INITIAL_WAIT_S."""
-
-
-class ClearingBackoff:
-    """Policy that clears the entire global costmap at increasing intervals, and otherwise only around the robot."""
-
-    def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
-        """Prepare for a new goal."""
-        self._wait, self._due, self._nearest = INITIAL_WAIT_S, 0.0, float("inf")
-
-    def clears_entirely(self, now: float, goal_distance: float) -> bool:
-        """Return whether to clear the entire costmap (see ClearingPolicy). Call it once per clearing."""
-        if goal_distance <= self._nearest - PROGRESS_M:
-            self._wait, self._due = INITIAL_WAIT_S, now
-        if now < self._due:
-            return False
-        self._due, self._wait = now + self._wait, 2 * self._wait
-        self._nearest = min(self._nearest, goal_distance)
-        return True

@@ -8,7 +8,9 @@ import pytest
 from generated_worlds import ROBOT, cheapest_cost, costmap_of, forest, large_maze, maze, random_query, rooms
 
 from simscen.advanced.planners import bit_star_searches, informed_set, medial_axis_planner
-from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner, costly_distance, refine
+from simscen.advanced.planners.medial_axis_planner import MedialAxisPlanner
+from simscen.advanced.planners.path_refinement import refine
+from simscen.advanced.planners.straight_path import costly_distance
 from simscen.advanced.spec import MedialAxisPlanner as MedialAxisSpec
 from simscen.core.geometry import Pose2
 from simscen.model.costmaps import Costmap as CostmapSpec

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from simscen.advanced.spec import SlipEkf
-from simscen.advanced.stack import MAX_TURN_SLIP_RAD_PER_M, TurnSlipObserver
+from simscen.advanced.turn_slip import MAX_TURN_SLIP_RAD_PER_M, TurnSlipObserver
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.goals import Goal

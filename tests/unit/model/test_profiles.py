@@ -3,7 +3,8 @@
 import pytest
 
 from simscen.model.localizers import GroundTruth
-from simscen.model.stack import ADVANCED_BUILDER, NAV2, REFERENCE_BUILDER, StackSpec, apply_profile, merge_parameters
+from simscen.model.profiles import NAV2, apply_profile, merge_parameters
+from simscen.model.stack import ADVANCED_BUILDER, REFERENCE_BUILDER, StackSpec
 
 NAV2_PARAMS = {
     # nav2_bringup/params/nav2_params.yaml, August 2026, by our names

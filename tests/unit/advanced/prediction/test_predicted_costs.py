@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.replanning import add_predicted_costs, meets_moving_obstacle
+from simscen.advanced.predicted_costs import add_predicted_costs, meets_moving_obstacle
 from simscen.core.geometry import Pose2
 from simscen.model.planners import OmplPlanner as Spec
 from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles

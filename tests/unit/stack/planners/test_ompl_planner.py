@@ -6,7 +6,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
 
-from simscen.advanced.planners.medial_axis_planner import refine, smoothed
+from simscen.advanced.planners.path_refinement import refine, smoothed
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model.costmaps import Costmap as CostmapSpec

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from simscen.advanced.planners.medial_axis_planner import MARGIN_BEHIND_M, costly_distance, straight_path
+from simscen.advanced.planners.straight_path import MARGIN_BEHIND_M, costly_distance, straight_path
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model.planners import OmplPlanner as PlannerSpec
