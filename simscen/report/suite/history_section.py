@@ -20,12 +20,17 @@ def history_html(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> st
     if not past:
         return ""
     rows = "".join(_session_row(session) for session in past)
+    changed = [run for run in runs if outcome_change(run, past)]
+    worse = sum(not run.outcome.is_good for run in changed)
+    counts = [(worse, "newly failing"), (len(changed) - worse, "newly passing")]
+    changes = ", ".join(f"{number} {word}" for number, word in counts if number) or "no change since the last session"
     return (
         '<details class="history"><summary><h2>earlier sessions</h2>'
-        f"{_pass_rate_sparkline(runs, past)}{_change_counts(runs, past)}</summary>"
+        f"{_pass_rate_sparkline(runs, past)}"
+        f'<span class="quiet">{changes}</span></summary>'
         '<div class="in"><table><thead><tr><th scope="col">session</th><th scope="col">as expected</th>'
         '<th scope="col">failed</th><th scope="col">errors</th><th scope="col">simulated</th></tr></thead>'
-        f"<tbody>{rows}</tbody></table>{_changed_list(runs, past)}</div></details>"
+        f"<tbody>{rows}</tbody></table>{_changed_list(changed, past)}</div></details>"
     )
 
 
@@ -48,23 +53,14 @@ def _pass_rate_sparkline(runs: Sequence[RunFinished], past: Sequence[PastSession
     return sparkline(shares, f"share of runs as expected, oldest first: {values}", 0.0, 1.0)
 
 
-def _change_counts(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
-    """Return the numbers of newly failing and newly passing runs."""
-    worse = sum(outcome_change(run, past) != "" and not run.outcome.is_good for run in runs)
-    better = sum(outcome_change(run, past) != "" and run.outcome.is_good for run in runs)
-    parts = [f"{number} {word}" for number, word in ((worse, "newly failing"), (better, "newly passing")) if number]
-    return f'<span class="quiet">{", ".join(parts) or "no change since the last session"}</span>'
-
-
-def _changed_list(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
+def _changed_list(changed: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
     """Return a list of the runs whose outcome has changed, failures first, with links to their entries."""
-    changed = [run for run in runs if outcome_change(run, past)]
-    changed.sort(key=lambda run: (run.outcome.is_good, run.key))
+    ordered = sorted(changed, key=lambda run: (run.outcome.is_good, run.key))
     rows = "".join(
         f'<li><a href="#{anchor(run.key)}">{html_text(full_run_name(run.key))}</a>: '
         f"{run.outcome.value.replace('-', ' ')}, "
         f"{outcome_change(run, past)}</li>"
-        for run in changed[:MAX_CHANGES]
+        for run in ordered[:MAX_CHANGES]
     )
     more = f"<li>and {len(changed) - MAX_CHANGES} more</li>" if len(changed) > MAX_CHANGES else ""
     return f"<ul>{rows}{more}</ul>" if rows else ""
