@@ -1,17 +1,13 @@
 """Checks that the installed packages have the versions that simscen requires."""
 
+import operator
 import re
 from collections.abc import Iterator
 
 MIN_TYPER = (0, 20)
 """Oldest supported version of typer (major, minor), as in pyproject.toml."""
 
-_COMPARE = {
-    ">=": lambda installed, required: installed >= required,
-    "<": lambda installed, required: installed < required,
-    "==": lambda installed, required: installed == required,
-    "!=": lambda installed, required: installed != required,
-}
+_COMPARE = {">=": operator.ge, "<": operator.lt, "==": operator.eq, "!=": operator.ne}
 """Comparison of two versions by its operator in a requirement."""
 _CLAUSE = re.compile(r"(>=|<|==|!=)\s*([\w.]+)")
 """One condition of a requirement: operator and version."""

@@ -3,7 +3,7 @@
 from itertools import groupby
 
 from simscen.cli.catalog.fields import OPTIONAL, Field
-from simscen.cli.catalog.topics import HEADINGS, Topic, added_topics, topics
+from simscen.cli.catalog.topics import HEADINGS, Topic, installed_types, topics
 from simscen.criteria.base import AnyMeasure
 from simscen.criteria.trace_signals.catalog import SIGNALS
 from simscen.spec.quantities import UNITS
@@ -64,7 +64,7 @@ _SIGNAL_NAMES = " | ".join(f"`{name}`" for name in SIGNALS)
 
 def language_page(installed: bool = False) -> str:
     """Return the text of docs/reference/language.md. With `installed`, include the types of installed packages."""
-    all_topics = [*topics(installed), *added_topics(AnyMeasure, installed)]
+    all_topics = [*topics(installed), *installed_types(AnyMeasure.group, installed)]
     parts = [f"{GENERATED_NOTE}# Language reference\n", _LANGUAGE_INTRO, _index(all_topics), _units_section()]
     for group, members in groupby(all_topics, key=lambda topic: topic.group):
         title, text = _GROUPS[group]

@@ -2,7 +2,7 @@
 
 from simscen.cli.catalog.commands_page import EXIT_CODES
 from simscen.cli.catalog.fields import OPTIONAL, Field
-from simscen.cli.catalog.topics import Topic, added_topics
+from simscen.cli.catalog.topics import Topic, installed_types
 from simscen.core.errors import BROKEN_COMPONENT
 from simscen.core.messages.navigation import ErrorCode
 from simscen.criteria.base import AnyMeasure
@@ -214,7 +214,7 @@ def metric_topics(installed: bool = False) -> list[Topic]:
     return [
         Topic("metric", "metrics", None, f"{METRICS_TEXT}\n\n{METRICS_CAVEATS}\n\n{SESSION_METRICS_TEXT}", rows=rows),
         *single,
-        *added_topics(AnyMeasure, installed),
+        *installed_types(AnyMeasure.group, installed),
     ]
 
 

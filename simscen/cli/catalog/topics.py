@@ -6,7 +6,7 @@ Choice is a model of a mapping with exactly one main key, such as the kind of a 
 
 import inspect
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import NoneType
 from typing import Annotated, Any, get_args, get_origin
@@ -92,36 +92,31 @@ class Topic:
 def topics(installed: bool = False) -> list[Topic]:
     """Return all topics of the language reference in order. `installed` adds the topics of installed packages."""
     return [
-        *_choices("trigger", AnyCondition),
-        *added_topics(AnyCondition, installed),
+        *_choices(AnyCondition, installed),
         _topic("trigger", "when", Trigger),
-        *_choices("action", AnyAction),
-        *added_topics(AnyAction, installed),
-        *_choices("fault", AnyFault),
-        *added_topics(AnyFault, installed),
+        *_choices(AnyAction, installed),
+        *_choices(AnyFault, installed),
         _topic("fault", "faults", FaultEntry),
-        *_choices("criterion", AnyCriterion),
-        *added_topics(AnyCriterion, installed),
+        *_choices(AnyCriterion, installed),
         _topic("criterion", "pass", AnyCriterion),
-        *(_topic("scenario", name, model) for name, model in _SCENARIO.items()),
-        *(_topic("stack", name, model) for name, model in _STACK.items()),
-        *_installed_types("stack", installed),
-        *(_topic("stack file", name, model) for name, model in _STACK_FILES.items()),
-        *(_topic("localizer", kind, model) for kind, model in members_by_type(localizers.Localizer)),
-        *_installed_types("localizer", installed),
-        *(_topic("planner", name, model) for name, model in _PLANNERS.items()),
-        *_installed_types("planner", installed),
-        *(_topic("controller", kind, model) for kind, model in members_by_type(controllers.Controller)),
-        *(_topic("controller", name, annotation_of(mppi.Mppi.model_fields[name])) for name in _MPPI_SECTIONS),
-        *_installed_types("controller", installed),
-        *(_topic("behavior", name, model) for name, model in _BEHAVIORS.items()),
-        *_installed_types("behavior", installed),
-        *_installed_types("goal_checker", installed),
-        *(_topic("world", name, model) for name, model in _WORLD.items()),
-        *(_topic("robot", name, model) for name, model in _ROBOT.items()),
-        *(_topic("drive", kind, model) for kind, model in members_by_type(robot.Drive)),
-        *_choices("sensor", robot.Sensor),
-        *added_topics(robot.Sensor, installed),
+        *_models("scenario", _SCENARIO),
+        *_models("stack", _STACK),
+        *installed_types("stack", installed),
+        *_models("stack file", _STACK_FILES),
+        *_models("localizer", members_by_type(localizers.Localizer)),
+        *installed_types("localizer", installed),
+        *_models("planner", _PLANNERS),
+        *installed_types("planner", installed),
+        *_models("controller", members_by_type(controllers.Controller)),
+        *_models("controller", _MPPI_SECTIONS),
+        *installed_types("controller", installed),
+        *_models("behavior", _BEHAVIORS),
+        *installed_types("behavior", installed),
+        *installed_types("goal_checker", installed),
+        *_models("world", _WORLD),
+        *_models("robot", _ROBOT),
+        *_models("drive", members_by_type(robot.Drive)),
+        *_choices(robot.Sensor, installed),
     ]
 
 
@@ -172,8 +167,10 @@ _PLANNERS: dict[str, type[BaseModel]] = {
     "navfn": planners.Navfn,
     "smac_2d": planners.Smac2d,
 }
-_MPPI_SECTIONS = [name for name in mppi.Mppi.model_fields if name[0].isupper()]
-"""Keys of `mppi` that are mappings: its critics and its validator."""
+_MPPI_SECTIONS: dict[str, type[BaseModel]] = {
+    name: annotation_of(field) for name, field in mppi.Mppi.model_fields.items() if name[0].isupper()
+}
+"""Models of the keys of `mppi` that are mappings: its critics and its validator."""
 _BEHAVIORS: dict[str, type[BaseModel]] = {
     "clear_costmap": recovery.ClearCostmap,
     "spin": recovery.Spin,
@@ -204,18 +201,26 @@ _ROBOT: dict[str, type[BaseModel]] = {
 """Models of the topics of seven groups by name of the topic."""
 
 
-def members_by_type(union: Any) -> Iterator[tuple[str, type[BaseModel]]]:
-    """Yield the `type` and the model of each shipped member of a union that `type` discriminates."""
+def members_by_type(union: Any) -> dict[str, type[BaseModel]]:
+    """Return the models of the shipped members of a union that `type` discriminates, by `type`."""
     mark = next((mark for mark in get_args(union)[1:] if isinstance(mark, ExtensibleUnion)), None)
     members = get_args(get_args(union if mark is None else mark.built_in_union)[0])
+    models = {}
     for member in members:
         lazy = next((mark for mark in get_args(member)[1:] if isinstance(mark, LazySpec)), None)
         model = lazy.load() if lazy else get_args(member)[0] if get_origin(member) is Annotated else member
-        yield get_args(model.model_fields["type"].annotation)[0], model
+        models[get_args(model.model_fields["type"].annotation)[0]] = model
+    return models
 
 
-def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
-    """Yield a topic for each main key of a Choice."""
+def _models(group: str, models: Mapping[str, type[BaseModel]]) -> Iterator[Topic]:
+    """Yield the topics of models by name."""
+    return (_topic(group, name, model) for name, model in models.items())
+
+
+def _choices(choice: type[Choice], installed: bool) -> Iterator[Topic]:
+    """Yield a topic for each main key of a Choice, including the keys of installed packages if `installed`."""
+    group = choice.group
     docs = field_docs(choice)
     for key, name in choice.choices().items():
         kind = annotation_of(choice.model_fields[name])
@@ -225,14 +230,10 @@ def _choices(group: str, choice: type[Choice]) -> Iterator[Topic]:
             yield _topic(group, key, model)
         else:
             yield Topic(group, key, None, docs.get(name, ""), _SECTION_EXAMPLES.get(f"{group}.{key}", ""))
+    yield from installed_types(group, installed)
 
 
-def added_topics(choice: type[Choice], installed: bool = True) -> Iterator[Topic]:
-    """Return the topics of the main keys that installed packages add to a Choice; none if `installed` is false."""
-    return _installed_types(choice.group, installed)
-
-
-def _installed_types(group: str, installed: bool) -> Iterator[Topic]:
+def installed_types(group: str, installed: bool) -> Iterator[Topic]:
     """Yield the topics of the types with an entry point; only those of simscen itself if `installed` is false."""
     origins = {entry.name: entry.origin for entry in registry.plugin_types(group)}
     for name, model in registry.installed_specs(group, with_plugins=installed).items():

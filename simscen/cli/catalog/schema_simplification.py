@@ -1,0 +1,95 @@
+"""Simplification of a generated JSON Schema, so that editors show short texts, and errors of the used alternative."""
+
+from typing import Any
+
+Schema = dict[str, Any]
+
+
+def simplify_for_editors(node: Any, definitions: Schema) -> Any:
+    """Return an equivalent schema for editors: unions as if/then, no nulls, titles, and defaults that are mappings."""
+    if isinstance(node, list):
+        return [simplify_for_editors(item, definitions) for item in node]
+    if not isinstance(node, dict):
+        return node
+    node = _without_noise(_without_null(node))
+    node = _by_json_type(_by_type(node, definitions))
+    return {
+        # The keys below these are names, not keywords: a property may be named `title`.
+        key: {name: simplify_for_editors(schema, definitions) for name, schema in value.items()}
+        if key in ("properties", "$defs")
+        else simplify_for_editors(value, definitions)
+        for key, value in node.items()
+    }
+
+
+def _by_type(node: Schema, definitions: Schema) -> Schema:
+    """Return a union that is discriminated by `type` as if/then, so that editors show only the selected member."""
+    members = {
+        ref["$ref"]: definitions[ref["$ref"].rpartition("/")[2]] for ref in node.get("oneOf", []) if "$ref" in ref
+    }
+    types = {ref: member["properties"].get("type", {}).get("const") for ref, member in members.items()}
+    untyped = {ref: members[ref].get("required", []) for ref, kind in types.items() if kind is None}
+    if len(members) < 2 or any(len(required) != 1 for required in untyped.values()):
+        return node
+    if untyped:
+        return _by_key(node, {ref: required[0] for ref, required in untyped.items()}, definitions)
+    rest = {key: value for key, value in node.items() if key not in ("oneOf", "discriminator")}
+    cases = []
+    for index, (ref, kind) in enumerate(types.items()):
+        condition: Schema = {"properties": {"type": {"const": kind}}}
+        if index > 0 or "type" in members[ref].get("required", []):  # the first one can be the default
+            condition["required"] = ["type"]
+        cases.append({"if": condition, "then": {"$ref": ref}})
+    needed = {"required": ["type"]} if all("required" in case["if"] for case in cases) else {}
+    return {**rest, "type": "object", "properties": {"type": {"enum": list(types.values())}}, **needed, "allOf": cases}
+
+
+def _by_key(node: Schema, keys: dict[str, str], definitions: Schema) -> Schema:
+    """Return a union as if/then. Members without `type` are selected by their only required key.
+
+    `keys` maps the reference of each such member to this key.
+    """
+    rest = {key: value for key, value in node.items() if key not in ("oneOf", "discriminator")}
+    others = [option for option in node["oneOf"] if option.get("$ref") not in keys]
+    schema = others[0] if len(others) == 1 else _by_type({"oneOf": others}, definitions)
+    for ref, key in keys.items():
+        schema = {"if": {"type": "object", "required": [key]}, "then": {"$ref": ref}, "else": schema}
+    return {**rest, **schema}
+
+
+def _by_json_type(node: Schema) -> Schema:
+    """Return a union of two JSON types, such as text and mapping, as if/then, so that errors refer to the type used."""
+    options = node.get("oneOf", [])
+    plain = [option for option in options if option.get("type") in ("string", "array")]
+    if len(options) != 2 or not plain or options[0].get("type") == options[1].get("type"):
+        return node
+    other = next(option for option in options if option is not plain[0])
+    rest = {key: value for key, value in node.items() if key != "oneOf"}
+    values = plain[0].get("enum", plain[0].get("examples", []))
+    offered = {"examples": values} if values else {}  # an editor uses neither branch for an empty value
+    return {**rest, **offered, "if": {"type": plain[0]["type"]}, "then": plain[0], "else": other}
+
+
+def _without_null(node: Schema) -> Schema:
+    """Return the schema of an optional value without the alternative null."""
+    options = node.get("anyOf", [])
+    if {"type": "null"} not in options:
+        return node
+    rest = [option for option in options if option != {"type": "null"}]
+    outer = {key: value for key, value in node.items() if key not in ("anyOf", "default")}
+    inner: Schema = rest[0] if len(rest) == 1 else {"anyOf": rest}
+    texts = join_descriptions(outer.get("description", ""), inner.get("description", ""))
+    return {**inner, **outer, **({"description": texts} if texts else {})}
+
+
+def _without_noise(node: Schema) -> Schema:
+    """Return the schema without its title, and without a default that is null, a mapping, or a list."""
+    bulky = isinstance(node.get("default"), dict | list) or node.get("default", 0) is None
+    return {key: value for key, value in node.items() if key != "title" and not (key == "default" and bulky)}
+
+
+def join_descriptions(text: str, more: str) -> str:
+    """Return a description, followed by a second one in parentheses if both differ."""
+    if text and more and text != more:
+        return f"{text}\n\n({more})"
+    return text or more
