@@ -91,7 +91,7 @@ def _names_in_built_world(loaded: LoadedScenario, world: World) -> Names:
     }
 
 
-def world_object_names(loaded: LoadedScenario, world: World | None = None) -> list[str]:
+def world_object_names(loaded: LoadedScenario, world: World | None) -> list[str]:
     """Return the names of all objects of the world; without the built `world`, only of objects in the world file."""
     if world is not None:
         return [*(body.name for body in world.bodies), *(solid.name for solid in world.solids)]

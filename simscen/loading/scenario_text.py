@@ -43,12 +43,12 @@ def unexpanded_text(loaded: LoadedScenario) -> str:
     return loaded.text if tree is None or own is None or own.plain == tree.plain else to_yaml(tree.plain)
 
 
-def criteria_and_tree(text: str, name: str, robot: str = "") -> tuple[CriteriaSpec, MappingNode]:
+def criteria_and_tree(text: str, robot: str) -> tuple[CriteriaSpec, MappingNode]:
     """Return the criteria in the text of a scenario or criteria file, and its YAML tree.
 
-    `name` is the path of the text in messages. `robot` selects one of several robots. Raises InvalidInput.
+    `robot` selects one of several robots; "" for a single robot. Raises InvalidInput.
     """
-    tree = _read(text, name)
+    tree = _read(text, "scenario.yaml")
     if isinstance(tree, MappingNode) and robot:
         tree = split_by_robot(tree).get(robot, tree)
     spec = _validated(CriteriaSpec, tree)

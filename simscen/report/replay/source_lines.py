@@ -29,7 +29,7 @@ def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, Scenario
     if not text:
         return SourceLines(), None
     try:
-        spec, tree = criteria_and_tree(text, "scenario.yaml", robot)
+        spec, tree = criteria_and_tree(text, robot)
     except InvalidInput:
         return SourceLines(), None
     names = verdict_names(spec.pass_)
