@@ -11,8 +11,9 @@ from simscen.core.random_streams import Streams
 from simscen.core.records.events import Event, EventKind
 from simscen.model.stack_files import ExternalStackSpec
 from simscen.run.external.stack import build_external_stack
+from simscen.run.faults.command_link import CommandLink
+from simscen.run.faults.fault_setting import FaultSettingFactory
 from simscen.run.faults.injector import FaultInjector
-from simscen.run.faults.interfaces import CommandLink, FaultSettingFactory, LocalizerWithFaults
 from simscen.run.live_world.costmap_filters import CostmapFilters
 from simscen.run.live_world.director import Director
 from simscen.run.live_world.pedestrians import PedestrianSimulation
@@ -33,7 +34,7 @@ from simscen.sensors.sensor import Sensor
 from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import RobotPlacement, Simulation
 from simscen.stack.build import build_stack
-from simscen.stack.protocols import Stack, Surroundings
+from simscen.stack.protocols import Localizer, Stack, Surroundings
 from simscen.worlds.geometry.triangulation import triangulate
 from simscen.worlds.raycasting.ray_scene import RayScene
 
@@ -126,14 +127,7 @@ def _build_robot(
     world, sent = prepared.built.world, prepared.case.sent
     filters = CostmapFilters(prepared.stack, world.regions, prepared.masks)
     stage = LiveStage(world, simulation, robot, stack, filters, clock, sent, pedestrians, Streams(seed), stages)
-    settings = FaultSettingFactory(
-        prepared.robot,
-        clock,
-        lambda: simulation.tick,
-        robot,
-        prepared.built.mesh,
-        lambda mesh, names: LiveRayCaster(RayScene(mesh), robot, names),
-    )
+    settings = FaultSettingFactory(prepared.robot, clock, lambda: simulation.tick, robot, prepared.built.mesh)
     link = CommandLink(control_period, clock.ticks(prepared.robot.limits.command_timeout))
     faults = FaultInjector(spec.faults, streams, settings, link, stage.record_event, prepared.map_faults)
     return RobotUnderTest(
@@ -201,3 +195,17 @@ class TruthSensor:
         """Return the true pose and velocity."""
         truth = self._robot.truth()
         return Odometry(self.name, tick, truth.pose.plane, truth.twist)
+
+
+class LocalizerWithFaults:
+    """The localizer `inner`, but `disturb` changes its published beliefs (pose estimates)."""
+
+    def __init__(self, inner: Localizer, disturb: Callable[[Belief], Belief]) -> None:
+        self._inner, self._disturb = inner, disturb
+        self.reset, self.on_odometry = inner.reset, inner.on_odometry
+        self.on_scan, self.on_imu = inner.on_scan, inner.on_imu
+
+    @property
+    def belief(self) -> Belief:
+        """Belief with the effects of faults."""
+        return self._disturb(self._inner.belief)

@@ -22,7 +22,7 @@ from simscen.core.records.disturbances import BELIEF, COMMAND, WHEELS
 from simscen.core.records.events import Event, EventKind
 from simscen.faults.base import FaultEffect, FaultSetting
 from simscen.model.disturbances import FaultEntry
-from simscen.run.faults.interfaces import CommandLink
+from simscen.run.faults.command_link import CommandLink
 from simscen.run.stream_names import stream_names
 from simscen.stack.localizers.ground_truth import TRUTH
 
@@ -108,8 +108,6 @@ class FaultInjector:
 
     def disturb(self, readings: Readings) -> Readings:
         """Return the readings that the stack receives: disturbed readings, and delayed readings that arrive now."""
-        if not self.active:
-            return readings
         for active in self._in_order():
             if active.index in self._map_faults:
                 self._map_faults.remove(active.index)
@@ -128,10 +126,6 @@ class FaultInjector:
         exactly once at each beat of the robot (tick at which a sensor, the stack, or a truth sample is due).
         """
         is_sent = self._link.send(tick, command)
-        if not self._affects_commands and not self.active:
-            if is_sent:
-                self._link.receive(tick, command)
-            return command
         if self._affects_commands:
             self._transmit_command(tick, command if is_sent else None)
             command = self._link.active_command(tick)
@@ -144,7 +138,7 @@ class FaultInjector:
 
     def belief(self, tick: int, belief: Belief) -> Belief:
         """Return the belief that the navigator receives: `belief`, changed by the faults of the localizer."""
-        if not self.active or not any(active.kind == BELIEF for active in self.active.values()):
+        if not any(active.kind == BELIEF for active in self.active.values()):
             return belief
         if self._last_belief is None or self._last_belief[:2] != (tick, belief):
             disturbed = belief
@@ -156,9 +150,7 @@ class FaultInjector:
 
     def _in_order(self) -> list[_ActiveFault]:
         """Return the active faults in the order of the scenario."""
-        if not self.active:
-            return []
-        return [active for _, active in sorted(self.active.items(), key=lambda item: item[0])]
+        return [self.active[key] for key in sorted(self.active)]
 
     def _delayed_readings(self, active: _ActiveFault) -> Sequence[Reading]:
         """Return the delayed readings that arrive now. Raises RunError if the fault returns anything else."""

@@ -11,8 +11,8 @@ from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.random_streams import Streams
 from simscen.faults.base import FaultSetting
 from simscen.model.disturbances import EventEntry, FaultEntry
+from simscen.run.faults.command_link import CommandLink
 from simscen.run.faults.injector import FaultInjector
-from simscen.run.faults.interfaces import CommandLink
 from simscen.run.stream_names import stream_names
 
 FAULTS = [

@@ -1,7 +1,7 @@
 """Tests of a base with late and lost commands."""
 
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.run.faults.interfaces import CommandLink
+from simscen.run.faults.command_link import CommandLink
 
 GO, FAST = Twist(0.3), Twist(0.5)
 
