@@ -84,7 +84,7 @@ def measure_suite(
     with Supervisor(workers, fork_server_args) as supervisor:
         for update in supervisor.run(jobs, plugins_of_all(scenarios)):
             if isinstance(update, Ended):
-                finished_runs.append(finished_run(update.job, update.end))
+                finished_runs.append(finished_run(jobs[update.number], update.end))
                 if isinstance(update.end, ProcessEnd):
                     ends.append(update.end)
                 report_progress(f"{len(finished_runs)} of {len(jobs)} runs")

@@ -62,7 +62,6 @@ class ProcessEnd:
     """End of a worker process.
 
     Attributes:
-        number: Number of the job.
         code: Exit code; None if a signal ended the process.
         signal: Number of the signal that ended the process, or None.
         killed_for: "timeout" if the process was killed at its limit of wall time, else None.
@@ -74,7 +73,6 @@ class ProcessEnd:
         output: Last part of the worker's output.
     """
 
-    number: int
     code: int | None
     signal: int | None
     killed_for: str | None
@@ -139,14 +137,14 @@ def json_line(message: dict[str, Any]) -> bytes:
 class Started:
     """A job has started."""
 
-    job: Job
+    number: int
 
 
 @dataclass(frozen=True)
 class Progressed:
     """A job has simulated `seconds` of its run."""
 
-    job: Job
+    number: int
     seconds: float
 
 
@@ -154,16 +152,12 @@ class Progressed:
 class Ended:
     """The worker process of a job has ended, or the fork server has died."""
 
-    job: Job
+    number: int
     end: ProcessEnd | ForkServerDeath
 
 
 JobUpdate = Started | Progressed | Ended
-
-
-def always_true() -> bool:
-    """Return True. Default of `should_continue`, with which all jobs are executed."""
-    return True
+"""Update on the job with the number `number`."""
 
 
 class Backend(Protocol):
@@ -177,7 +171,7 @@ class Backend(Protocol):
         self,
         jobs: Iterable[Job],
         plugins: Sequence[RegisteredType] = (),
-        should_continue: Callable[[], bool] = always_true,
+        should_continue: Callable[[], bool] = lambda: True,
     ) -> Iterator[JobUpdate]:
         """Execute jobs, several at a time, and yield their updates: exactly one Ended for each started job.
 

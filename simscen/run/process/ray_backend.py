@@ -18,14 +18,11 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from simscen.core.errors import UsageError
 from simscen.core.version import __version__
-from simscen.run.process.jobs import Ended, ForkServerDeath, Job, JobUpdate, Progressed, Started, always_true
+from simscen.run.process.jobs import Ended, ForkServerDeath, Job, JobUpdate, Progressed, Started
 from simscen.run.process.ray_node import (
     PACKAGE_FOLDER,
     FileChunk,
-    JobEnded,
-    JobProgressed,
     JobQueue,
-    JobStarted,
     NodeRunner,
     NodeUpdate,
     SentFile,
@@ -102,7 +99,7 @@ class RayBackend:
         self,
         jobs: Iterable[Job],
         plugins: Sequence[RegisteredType] = (),
-        should_continue: Callable[[], bool] = always_true,
+        should_continue: Callable[[], bool] = lambda: True,
     ) -> Iterator[JobUpdate]:
         """Run jobs and yield their updates (see `Backend.run`). Raises UsageError for an unusable cluster."""
         batch, start_time = _Batch(jobs, should_continue), time.monotonic()
@@ -299,22 +296,23 @@ class _Batch:
     def updates(self, update: NodeUpdate) -> Iterator[JobUpdate]:
         """Process an update from a node: write file chunks to the job's folder, and yield all other updates."""
         match update:
-            case JobStarted(number):
+            case Started(number):
                 if (job := self.sent.pop(number, None)) is not None:
                     self.running[number] = job
                     shutil.rmtree(job.folder, ignore_errors=True)
                     if number not in self._attempts:
-                        yield Started(job)
-            case JobProgressed(number, seconds):
-                yield Progressed(self.running[number], seconds)
+                        yield update
+            case Progressed():
+                yield update
             case FileChunk(number, name, data):
                 file = (self.running.get(number) or self.sent[number]).folder / name
                 file.parent.mkdir(parents=True, exist_ok=True)
                 with file.open("ab") as output:
                     output.write(data)
-            case JobEnded(number, end):
-                job = self.running.pop(number, None) or self.sent.pop(number)
-                yield Ended(job, end)
+            case Ended(number):
+                if self.running.pop(number, None) is None:
+                    del self.sent[number]
+                yield update
 
     def retry_or_fail(self, number: int, address: str) -> Iterator[JobUpdate]:
         """Queue a job of a lost runner again, or yield its end after MAX_ATTEMPTS."""
@@ -326,4 +324,4 @@ class _Batch:
             self._retries.append(job)
             return
         description = f"was lost with its node {address}, as before on another node"
-        yield Ended(job, ForkServerDeath(description, False, False, ""))
+        yield Ended(number, ForkServerDeath(description, False, False, ""))

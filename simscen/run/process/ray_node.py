@@ -19,7 +19,7 @@ from simscen.core.errors import UsageError
 from simscen.core.version import __version__
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import requirement_of
-from simscen.run.process.jobs import Ended, ForkServerDeath, Job, ProcessEnd, Progressed, Started
+from simscen.run.process.jobs import Ended, Job, JobUpdate
 from simscen.run.process.supervisor import Supervisor
 from simscen.run.reproducibility import source_digest
 from simscen.spec.registry import RegisteredType, find_type
@@ -143,39 +143,16 @@ CHUNK_BYTES = 8 << 20
 
 
 @dataclass(frozen=True)
-class JobStarted:
-    """A job has started."""
-
-    number: int
-
-
-@dataclass(frozen=True)
-class JobProgressed:
-    """A job has simulated `seconds` of its run."""
-
-    number: int
-    seconds: float
-
-
-@dataclass(frozen=True)
 class FileChunk:
-    """Next part of a file in the output folder of a job. `name` is the path of the file relative to the folder."""
+    """Next part of a file in the output folder of job `number`. `name` is the path relative to the folder."""
 
     number: int
     name: str
     data: bytes
 
 
-@dataclass(frozen=True)
-class JobEnded:
-    """A job has ended, and all its files have been sent."""
-
-    number: int
-    end: ProcessEnd | ForkServerDeath
-
-
-NodeUpdate = JobStarted | JobProgressed | FileChunk | JobEnded
-"""Update that a node sends. RayBackend converts it to a JobUpdate. `number` is the number of the job."""
+NodeUpdate = JobUpdate | FileChunk
+"""Update that a node sends. The chunks of all files of a job are sent before the end of the job."""
 
 
 class JobQueue:
@@ -227,48 +204,47 @@ class NodeRunner:
 
         `runner` is the name of this runner. Raises UsageError if a plug-in is missing or has another version here.
         """
-        jobs = _JobsOfQueue(lambda: self._receive(queue.take.remote(runner)), self._unpack_job)
+        jobs = _JobsOfQueue(lambda: self._take_job(queue, runner))
         for update in self._supervisor.run(jobs, [_installed_plugin(entry) for entry in plugins]):
-            job = update.job
-            match update:
-                case Started():
-                    yield JobStarted(job.number)
-                case Progressed(seconds=seconds):
-                    yield JobProgressed(job.number, seconds)
-                case Ended(end=end):
-                    yield from _file_chunks(job)
-                    shutil.rmtree(job.folder, ignore_errors=True)
-                    yield JobEnded(job.number, end)
+            if isinstance(update, Ended):
+                folder = self._output_folder(update.number)
+                yield from _file_chunks(update.number, folder)
+                shutil.rmtree(folder, ignore_errors=True)
+            yield update
 
-    def _unpack_job(self, packed: PackedJob) -> Job:
-        return self._unpacker.unpack(packed, self._folder / f"run-{packed.number}")
+    def _take_job(self, queue: Any, runner: str) -> Job | None:
+        packed: PackedJob | None = self._receive(queue.take.remote(runner))
+        return None if packed is None else self._unpacker.unpack(packed, self._output_folder(packed.number))
+
+    def _output_folder(self, number: int) -> Path:
+        return self._folder / f"run-{number}"
 
 
 class _JobsOfQueue:
     """Iterator over the jobs of the queue. After its end, it yields jobs again if jobs were added to the queue."""
 
-    def __init__(self, take: Callable[[], PackedJob | None], unpack: Callable[[PackedJob], Job]) -> None:
-        self._take, self._unpack = take, unpack
+    def __init__(self, take: Callable[[], Job | None]) -> None:
+        self._take = take
 
     def __iter__(self) -> "_JobsOfQueue":
         return self
 
     def __next__(self) -> Job:
-        packed = self._take()
-        if packed is None:
+        job = self._take()
+        if job is None:
             raise StopIteration
-        return self._unpack(packed)
+        return job
 
 
-def _file_chunks(job: Job) -> Iterator[FileChunk]:
+def _file_chunks(number: int, folder: Path) -> Iterator[FileChunk]:
     """Yield all files in the output folder of a job, in chunks."""
-    for path in sorted(job.folder.rglob("*")):
+    for path in sorted(folder.rglob("*")):
         if path.is_file():
-            name = path.relative_to(job.folder).as_posix()
+            name = path.relative_to(folder).as_posix()
             with path.open("rb") as file:
-                yield FileChunk(job.number, name, file.read(CHUNK_BYTES))
+                yield FileChunk(number, name, file.read(CHUNK_BYTES))
                 while data := file.read(CHUNK_BYTES):
-                    yield FileChunk(job.number, name, data)
+                    yield FileChunk(number, name, data)
 
 
 def _installed_plugin(entry: RegisteredType) -> RegisteredType:

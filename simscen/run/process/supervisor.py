@@ -16,17 +16,7 @@ from tempfile import TemporaryFile
 from typing import Any, NamedTuple
 
 from simscen.run.process.isolation import TAIL_BYTES, clean_environment, plugin_path_arguments
-from simscen.run.process.jobs import (
-    Ended,
-    ForkServerDeath,
-    Job,
-    JobUpdate,
-    ProcessEnd,
-    Progressed,
-    Started,
-    always_true,
-    pack_job,
-)
+from simscen.run.process.jobs import Ended, ForkServerDeath, Job, JobUpdate, ProcessEnd, Progressed, Started, pack_job
 from simscen.spec.registry import RegisteredType
 
 PIPE_BYTES = 1 << 16
@@ -87,7 +77,10 @@ class ForkServerProcess:
             if writable:
                 self._flush()
             if readable:
-                self._receive_buffer += self._read()
+                data = os.read(self._receive_pipe, PIPE_BYTES)
+                if not data:
+                    raise EOFError
+                self._receive_buffer += data
             elif not writable and time.monotonic() >= end:
                 raise Unresponsive
         text, _, rest = bytes(self._receive_buffer).partition(b"\n")
@@ -99,12 +92,6 @@ class ForkServerProcess:
             del self._send_buffer[: os.write(self._send_pipe, self._send_buffer[:PIPE_BYTES])]
         except BrokenPipeError:  # it has exited; its last messages can still be read
             self._send_buffer.clear()
-
-    def _read(self) -> bytes:
-        data = os.read(self._receive_pipe, PIPE_BYTES)
-        if not data:
-            raise EOFError
-        return data
 
     def close(self) -> None:
         """Let the fork server kill its workers and exit; kill it if it does not exit in time."""
@@ -163,7 +150,7 @@ class Supervisor:
         self._plugins: frozenset[RegisteredType] = frozenset()
         self._server: ForkServerProcess | None = None
         self._jobs: Iterator[Job] = iter(())
-        self._should_continue: Callable[[], bool] = always_true
+        self._should_continue: Callable[[], bool] = lambda: True
         self._retries, self._suspects = deque[Job](), deque[Job]()
         self._running: dict[int, Job] = {}
         self._preparing: Job | None = None
@@ -181,7 +168,7 @@ class Supervisor:
         self,
         jobs: Iterable[Job],
         plugins: Sequence[RegisteredType] = (),
-        should_continue: Callable[[], bool] = always_true,
+        should_continue: Callable[[], bool] = lambda: True,
     ) -> Iterator[JobUpdate]:
         """Run jobs and yield their updates (see `Backend.run`). Takes a job from `jobs` only when it can start."""
         if not self._plugins.issuperset(plugins):
@@ -191,7 +178,10 @@ class Supervisor:
         self._reported, self._suspect_numbers = set(), set()
         try:
             while (job := self._next_job()) is not None:
-                yield from self._run_jobs(self._ensure_server(), job)
+                if self._server is None:
+                    self._responded = False
+                    self._server = ForkServerProcess((*self._entry, *plugin_path_arguments(self._plugins)))
+                yield from self._run_jobs(self._server, job)
         finally:
             if self._running:
                 self.close()
@@ -204,13 +194,6 @@ class Supervisor:
         for jobs in (self._running, self._retries, self._suspects):
             jobs.clear()
 
-    def _ensure_server(self) -> ForkServerProcess:
-        """Return the fork server; starts it if it is not running."""
-        if self._server is None:
-            self._responded = False
-            self._server = ForkServerProcess((*self._entry, *plugin_path_arguments(self._plugins)))
-        return self._server
-
     def _run_jobs(self, server: ForkServerProcess, first: Job) -> Iterator[JobUpdate]:
         """Run the job `first` and all following jobs, until the fork server dies."""
         job: Job | None = first
@@ -222,7 +205,9 @@ class Supervisor:
                     job = self._next_job()
                 if not self._running:
                     return
-                update = self._process_message(server.receive_line(self._message_timeout()))
+                # Preparing a job may take as long as the wall limit of the job.
+                timeout = MAX_SILENCE_S + (self._preparing.wall_limit if self._preparing else 0.0)
+                update = self._process_message(server.receive_line(timeout))
                 if update is not None:
                     yield update
                 job = self._next_job()
@@ -246,10 +231,6 @@ class Supervisor:
             return None
         return self._retries.popleft() if self._retries else next(self._jobs, None)
 
-    def _message_timeout(self) -> float:
-        """Return the time in s to wait for a message. Preparing a job may take as long as the job's wall limit."""
-        return MAX_SILENCE_S + (self._preparing.wall_limit if self._preparing else 0.0)
-
     def _process_message(self, text: bytes) -> JobUpdate | None:
         """Process a message of the fork server; return the update of a job, if the message contains one."""
         message: dict[str, Any] = json.loads(text)
@@ -258,14 +239,14 @@ class Supervisor:
                 self._preparing = self._running[number]
                 if number not in self._reported:
                     self._reported.add(number)
-                    return Started(self._running[number])
+                    return Started(number)
             case {"prepared": _}:
                 self._preparing = None
             case {"job": number, "seconds": seconds}:
-                return Progressed(self._running[number], seconds)
-            case {"exit": number}:
-                del message["exit"]
-                return Ended(self._running.pop(number), ProcessEnd(number=number, **message))
+                return Progressed(number, seconds)
+            case {"exit": number, **fields}:
+                del self._running[number]
+                return Ended(number, ProcessEnd(**fields))
             case _:
                 self._responded = True
         return None
@@ -285,7 +266,7 @@ class Supervisor:
         for job in running:
             if job is culprit or job.number in self._suspect_numbers or not self._responded:
                 timed_out = was_unresponsive and job is culprit
-                yield Ended(job, ForkServerDeath(description, job is in_preparation, timed_out, death.output))
+                yield Ended(job.number, ForkServerDeath(description, job is in_preparation, timed_out, death.output))
             elif culprit is not None:
                 self._retries.appendleft(job)
             else:

@@ -112,11 +112,11 @@ def run_session(
     for job in jobs:
         if job.scenario.spec.skip is not None:
             report(job, skipped_run(job, job.scenario.spec.skip))
-    pending = [job for job in jobs if job.number not in positions]
+    pending = {job.number: job for job in jobs if job.number not in positions}
     try:
-        plugins = plugins_of_all([job.scenario for job in pending])
-        for update in backend.run(pending, plugins, lambda: all_good or not options.fail_fast):
-            job = update.job
+        plugins = plugins_of_all([job.scenario for job in pending.values()])
+        for update in backend.run(pending.values(), plugins, lambda: all_good or not options.fail_fast):
+            job = pending[update.number]
             match update:
                 case Started():
                     started.add(job.number)

@@ -10,7 +10,7 @@ from simscen.editor.checking import TextChecks
 from simscen.editor.document import EditedFile
 from simscen.editor.trial_run import TrialRun, TrialRuns
 from simscen.loading.loaded import LoadedScenario
-from simscen.run.process.jobs import Job, JobUpdate, Progressed, Started, always_true
+from simscen.run.process.jobs import Job, JobUpdate, Progressed, Started
 from simscen.spec.registry import RegisteredType
 
 TEXT = """\
@@ -33,14 +33,14 @@ class EndlessBackend:
         pass
 
     def run(
-        self, jobs: Iterable[Job], plugins: Sequence[RegisteredType] = (), go_on: Callable[[], bool] = always_true
+        self, jobs: Iterable[Job], plugins: Sequence[RegisteredType] = (), go_on: Callable[[], bool] = lambda: True
     ) -> Iterator[JobUpdate]:
         (job,) = jobs
         job.folder.mkdir(parents=True)
-        yield Started(job)
+        yield Started(job.number)
         for seconds in range(1_000_000):
             time.sleep(0.01)
-            yield Progressed(job, seconds + 1)
+            yield Progressed(job.number, seconds + 1)
 
 
 @pytest.fixture

@@ -88,8 +88,8 @@ def test_every_job_is_run_once_and_its_files_arrive(cluster, jobs) -> None:
     with RayBackend(cluster.address, 3, ENTRY) as backend:
         for _ in range(2):  # the second time, the runners exist already
             updates = list(backend.run(made))
-            assert sorted(one.job.number for one in updates if isinstance(one, Started)) == list(range(14))
-            ends = {one.job.number: one.end for one in updates if isinstance(one, Ended)}
+            assert sorted(one.number for one in updates if isinstance(one, Started)) == list(range(14))
+            ends = {one.number: one.end for one in updates if isinstance(one, Ended)}
             assert [isinstance(ends[n], ProcessEnd) and ends[n].code for n in range(12)] == [0] * 12
             assert ends[12].signal == signal.SIGSEGV
             assert all((job.folder / "result.json").is_file() for job in made[:12])
@@ -107,7 +107,7 @@ def test_jobs_of_a_killed_node_are_run_again_on_another_one(cluster, jobs) -> No
                 victim = next(node for node in cluster.others if node.node_id != here)
                 cluster.remove_node(victim, allow_graceful=False)
     ends = [one for one in updates if isinstance(one, Ended)]
-    assert sorted(one.job.number for one in ends) == list(range(30))
+    assert sorted(one.number for one in ends) == list(range(30))
     assert all(isinstance(one.end, ProcessEnd) and one.end.code == 0 for one in ends)
 
 

@@ -115,7 +115,7 @@ def test_large_files_are_sent_in_pieces(job: Job, tmp_path: Path, monkeypatch) -
     (tmp_path / "out/inner").mkdir(parents=True)
     (tmp_path / "out/inner/file").write_bytes(b"123456789")
     (tmp_path / "out/empty").write_bytes(b"")
-    assert list(ray_node._file_chunks(job)) == [
+    assert list(ray_node._file_chunks(3, tmp_path / "out")) == [
         FileChunk(3, "empty", b""),
         *(FileChunk(3, "inner/file", data) for data in (b"1234", b"5678", b"9")),
     ]
