@@ -20,7 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from simscen.run.process.isolation import adopt_orphans, die_with_parent, kill_children_except
+from simscen.run.process.isolation import adopt_orphans, die_with_parent, kill_children_except, set_soft_limit
 
 EXIT_GRACE_S = 0.5
 """Time in which a stack can exit by itself after the run."""
@@ -105,9 +105,7 @@ def _restore_user_limits() -> None:
     for limit in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE):
         hard = resource.getrlimit(limit)[1]
         resource.setrlimit(limit, (hard, hard))
-    hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
-    soft = MAX_OPEN_FILES if hard == resource.RLIM_INFINITY else min(MAX_OPEN_FILES, hard)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    set_soft_limit(resource.RLIMIT_NOFILE, MAX_OPEN_FILES)
 
 
 def _send_report(report: int, message: dict[str, Any]) -> None:

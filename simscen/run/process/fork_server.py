@@ -4,7 +4,6 @@ The fork server receives pickled jobs from the supervisor over one pipe, and sen
 another pipe.
 """
 
-import contextlib
 import faulthandler
 import fcntl
 import gc
@@ -14,7 +13,7 @@ import selectors
 import signal
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
 
@@ -28,25 +27,17 @@ from simscen.run.process.isolation import (
     limit_memory,
 )
 from simscen.run.process.jobs import Job, json_line, receive_job
-from simscen.run.process.worker import ExecuteJob, WorkerPipes, run_worker
+from simscen.run.process.worker import ExecuteJob, run_worker
 
 MAX_MESSAGE_BYTES = 1 << 20
 """Maximum size of a message from a worker."""
-DUMP_TIME_S = 0.5
-"""Time for a worker that exceeded its wall-time limit to write its Python traceback, before SIGTERM."""
-TERM_GRACE_S = 2.0
-"""Time between SIGTERM and SIGKILL for a worker that exceeded its wall-time limit."""
-
 _F_SETPIPE_SZ = 1031  # Linux; missing in Python's fcntl before 3.10 and in some builds
 
-_TERMINATION_STEPS = ((signal.SIGUSR1, DUMP_TIME_S), (signal.SIGTERM, TERM_GRACE_S), (signal.SIGKILL, TERM_GRACE_S))
+_TERMINATION_STEPS = ((signal.SIGUSR1, 0.5), (signal.SIGTERM, 2.0), (signal.SIGKILL, 2.0))
 """Signals that end a worker at its wall-time limit, each with the time in s until the next one.
 
 SIGUSR1 makes the worker write its Python traceback.
 """
-
-SendMessage = Callable[[dict[str, Any]], None]
-"""Function that sends a message to the supervisor."""
 
 
 class WorkerHandle:
@@ -56,7 +47,15 @@ class WorkerHandle:
     copied to `log`. `send_message` forwards progress messages to the supervisor.
     """
 
-    def __init__(self, job: Job, pid: int, report: int, output: int, log: CappedLog, send_message: SendMessage) -> None:
+    def __init__(
+        self,
+        job: Job,
+        pid: int,
+        report: int,
+        output: int,
+        log: CappedLog,
+        send_message: Callable[[dict[str, Any]], None],
+    ) -> None:
         self.job, self.pid, self.pidfd, self.report, self.output = job, pid, os.pidfd_open(pid), report, output
         self.started = time.monotonic()
         self.deadline = self.started + job.wall_limit
@@ -123,7 +122,7 @@ class WorkerHandle:
         """Close the pipes of a reaped worker, and return the message about its end.
 
         `status` is the wait status of the process, `cpu` its processor time in s, and `peak_bytes` its peak memory. The
-        message has the fields of jobs.ProcessEnd, but the number of the job has the key `exit`.
+        message has the fields of jobs.ProcessEnd, and the number of the job with the key `exit`.
         """
         for read in (self.read_messages, self.read_output):
             try:
@@ -145,12 +144,6 @@ class WorkerHandle:
             "left_processes": self._left_processes,
             "output": self._log.tail(TAIL_BYTES).decode(errors="replace"),
         }
-
-
-def enlarge_pipe(pipe: int) -> None:
-    """Enlarge the buffer of a pipe, so that a worker can write while the fork server prepares a scenario."""
-    with suppress(OSError):  # the user's limit of pipe memory is reached; a smaller buffer works as well
-        fcntl.fcntl(pipe, _F_SETPIPE_SZ, READ_BYTES)
 
 
 HEARTBEAT_S = 1.0
@@ -176,16 +169,20 @@ class ForkServer:
         limit_memory()
         adopt_orphans()
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        self._selector.register(self._jobs, selectors.EVENT_READ, self._start_job)
+        self._selector.register(self._jobs, selectors.EVENT_READ)
         while True:
             self._send({"alive": True})
             for key, _ in self._selector.select(self._select_timeout()):
-                # An earlier event may have closed the file object.
-                stale = self._selector.get_map().get(key.fileobj) is not key
-                if not stale and key.data() is False:
-                    self._kill_all()
-                    return
-            self._enforce_deadlines()
+                if key.fileobj == self._jobs:
+                    if not self._start_job():
+                        self._kill_all()
+                        return
+                elif self._selector.get_map().get(key.fileobj) is key:  # no earlier event has closed the descriptor
+                    key.data()
+            now = time.monotonic()
+            for child in self._children.values():
+                if now >= child.deadline:
+                    child.escalate()
 
     def _start_job(self) -> bool:
         """Receive a job, prepare its scenario, and fork its worker; return False at the end of the pipe."""
@@ -195,7 +192,7 @@ class ForkServer:
         self._send({"started": job.number})
         log = CappedLog(job.folder / "worker.log")
         # An error occurs again in the worker, which reports it as the error of the run.
-        with contextlib.suppress(Exception, SystemExit), _time_limit(job.wall_limit):
+        with suppress(Exception, SystemExit), _time_limit(job.wall_limit):
             self._warm_up(job)
         log.append(_take_own_output())
         self._fork(job, log)
@@ -211,11 +208,13 @@ class ForkServer:
         pid = os.fork()
         if pid == 0:
             self._close_inherited_descriptors()
-            run_worker(job, parent, WorkerPipes(report_writer, output_writer), self._execute)
+            run_worker(job, parent, report_writer, output_writer, self._execute)
         gc.unfreeze()
         os.close(report_writer)
         os.close(output_writer)
-        enlarge_pipe(output_reader)
+        # A larger buffer, so that the worker can write while the fork server prepares a scenario.
+        with suppress(OSError):  # the user's limit of pipe memory is reached; a smaller buffer works as well
+            fcntl.fcntl(output_reader, _F_SETPIPE_SZ, READ_BYTES)
         child = WorkerHandle(job, pid, report_reader, output_reader, log, self._send)
         self._children[pid] = child
         for pipe, read in ((report_reader, child.read_messages), (output_reader, child.read_output)):
@@ -230,14 +229,13 @@ class ForkServer:
         os.close(self._jobs)
         os.close(self._replies)
 
-    def _read(self, pipe: int, read: Callable[[], bool]) -> bool:
-        """Read from a pipe, and stop watching it at its end. Return True, so that `serve` continues."""
+    def _read(self, pipe: int, read: Callable[[], bool]) -> None:
+        """Read from a pipe, and stop watching it at its end."""
         if not read():
             self._selector.unregister(pipe)
-        return True
 
-    def _reap(self, child: WorkerHandle) -> bool:
-        """Reap an exited worker, kill its descendants, and report its end. Return True, so that `serve` continues."""
+    def _reap(self, child: WorkerHandle) -> None:
+        """Reap an exited worker, kill its descendants, and report its end."""
         for descriptor in (child.pidfd, child.report, child.output):
             if descriptor in self._selector.get_map():
                 self._selector.unregister(descriptor)
@@ -246,18 +244,11 @@ class ForkServer:
         del self._children[child.pid]
         kill_children_except(self._children)
         self._send(child.exit_message(status, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024))
-        return True
 
     def _select_timeout(self) -> float:
         """Return the time in s until the next deadline of a worker, at most HEARTBEAT_S."""
         deadlines = [child.deadline - time.monotonic() for child in self._children.values()]
         return max(0.0, min([HEARTBEAT_S, *deadlines]))
-
-    def _enforce_deadlines(self) -> None:
-        now = time.monotonic()
-        for child in self._children.values():
-            if now >= child.deadline:
-                child.escalate()
 
     def _kill_all(self) -> None:
         for child in self._children.values():
@@ -278,7 +269,7 @@ def _take_own_output() -> bytes:
     return data
 
 
-@contextlib.contextmanager
+@contextmanager
 def _time_limit(seconds: float) -> Iterator[None]:
     """Raise TimeoutError inside a `with` block that takes longer than `seconds`."""
 

@@ -8,8 +8,7 @@ import resource
 import signal
 import site
 import sys
-from collections.abc import Collection, Iterable
-from contextlib import suppress
+from collections.abc import Iterable
 from pathlib import Path, PurePath
 
 from simscen.core.cpu_kernels import kernel_variables
@@ -123,26 +122,21 @@ def die_with_parent(parent: int) -> None:
 
 def limit_memory() -> None:
     """Limit the memory of this process and its future children, and disable core dumps. Sets only soft limits."""
-    _set_soft_limit(resource.RLIMIT_AS, MAX_MEMORY_BYTES)
-    _set_soft_limit(resource.RLIMIT_CORE, 0)
+    set_soft_limit(resource.RLIMIT_AS, MAX_MEMORY_BYTES)
+    set_soft_limit(resource.RLIMIT_CORE, 0)
 
 
-def _set_soft_limit(limit: int, maximum: int) -> None:
+def set_soft_limit(limit: int, maximum: int) -> None:
+    """Set the soft limit of a resource to `maximum`, or to the hard limit if it is lower."""
     hard = resource.getrlimit(limit)[1]
     resource.setrlimit(limit, (maximum if hard == resource.RLIM_INFINITY else min(maximum, hard), hard))
-
-
-def prefer_for_oom_kill() -> None:
-    """Let the kernel kill this process first when the machine runs out of memory."""
-    with suppress(OSError):  # not permitted in some sandboxes
-        Path("/proc/self/oom_score_adj").write_text("500")
 
 
 def limit_resources() -> None:
     """Limit the memory (see `limit_memory`), the file size, and the number of open files of this process."""
     limit_memory()
-    _set_soft_limit(resource.RLIMIT_FSIZE, MAX_FILE_BYTES)
-    _set_soft_limit(resource.RLIMIT_NOFILE, MAX_OPEN_FILES)
+    set_soft_limit(resource.RLIMIT_FSIZE, MAX_FILE_BYTES)
+    set_soft_limit(resource.RLIMIT_NOFILE, MAX_OPEN_FILES)
 
 
 def clean_environment() -> dict[str, str]:
@@ -181,23 +175,16 @@ def kill_children_except(kept: Iterable[int]) -> None:
 
     Call `adopt_orphans` once before.
     """
-    excluded = set(kept)
-    while children := _children_except(excluded):
+    own, excluded = os.getpid(), set(kept)
+    while True:
+        # Not /proc/PID/task/PID/children, which can be incomplete while some children exit (proc(5)).
+        running = [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]
+        children = [pid for pid in running if pid not in excluded and _parent(pid) == own]  # including zombies
+        if not children:
+            return
         for pid in children:
             os.kill(pid, signal.SIGKILL)
             os.waitpid(pid, 0)
-
-
-def _children_except(excluded: Collection[int]) -> list[int]:
-    """Return the ids of the children of this process, including zombies, that are not `excluded`."""
-    own = os.getpid()
-    with suppress(FileNotFoundError):  # a kernel without CONFIG_PROC_CHILDREN
-        listed = map(int, Path(f"/proc/{own}/task/{own}/children").read_text().split())
-        if found := [pid for pid in listed if pid not in excluded]:
-            return found
-    # The kernel's list of children can be incomplete while some of them exit (proc(5)).
-    everything = (int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit())
-    return [pid for pid in everything if pid not in excluded and _parent(pid) == own]
 
 
 def _parent(pid: int) -> int:

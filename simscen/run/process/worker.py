@@ -7,18 +7,13 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 from simscen.core.errors import InvalidInput, RunError
 from simscen.core.records.trace import Moment
-from simscen.run.process.isolation import (
-    adopt_orphans,
-    die_with_parent,
-    has_running_children,
-    limit_resources,
-    prefer_for_oom_kill,
-)
+from simscen.run.process.isolation import adopt_orphans, die_with_parent, has_running_children, limit_resources
 from simscen.run.process.jobs import Job, json_line
 
 PROGRESS_INTERVAL_S = 5.0
@@ -34,23 +29,17 @@ _DISK_FULL_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT})
 _OUT_OF_MEMORY = {"error": "out-of-memory", "message": "the run exceeded its memory limit"}
 
 
-class WorkerPipes(NamedTuple):
-    """File descriptors of the pipes for a worker's messages (`report`), and for its stdout and stderr (`output`)."""
-
-    report: int
-    output: int
-
-
-def run_worker(job: Job, parent: int, pipes: WorkerPipes, execute: ExecuteJob) -> NoReturn:
+def run_worker(job: Job, parent: int, report: int, output: int, execute: ExecuteJob) -> NoReturn:
     """Run the job, send the end record, and exit. `parent` is the process id of the fork server.
 
-    After an error, the end record has the keys `error` and `message`.
+    `report` and `output` are the file descriptors of the pipes for messages, and for stdout and stderr. After an error,
+    the end record has the keys `error` and `message`.
     """
     code = 1
     try:
-        _set_up_process(parent, pipes.output)
-        end = _end_record(job, pipes.report, execute)
-        os.write(pipes.report, json_line({"end": end, "left_processes": has_running_children()}))
+        _set_up_process(parent, output)
+        end = _end_record(job, report, execute)
+        os.write(report, json_line({"end": end, "left_processes": has_running_children()}))
         code = 0
         sys.stdout.flush()
         sys.stderr.flush()
@@ -67,18 +56,28 @@ def _set_up_process(parent: int, output: int) -> None:
     adopt_orphans()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _redirect_output(output)
+    null = os.open(os.devnull, os.O_RDONLY)
+    for descriptor, target in ((null, 0), (output, 1), (output, 2)):  # also of C libraries
+        os.dup2(descriptor, target)
+    os.close(null)
+    os.close(output)
     faulthandler.enable()
     faulthandler.register(signal.SIGUSR1)
-    prefer_for_oom_kill()
+    with suppress(OSError):  # not permitted in some sandboxes
+        # The kernel kills this process first when the machine runs out of memory.
+        Path("/proc/self/oom_score_adj").write_text("500")
     limit_resources()
 
 
 def _end_record(job: Job, report: int, execute: ExecuteJob) -> dict[str, Any]:
     """Run the job and return its end record; an exception becomes a record with `error` and `message`."""
+
+    def send_progress(seconds: float) -> None:
+        os.write(report, json_line({"seconds": seconds}))
+
     try:
         job.folder.mkdir(parents=True, exist_ok=True)
-        return execute(job, lambda seconds: _send_progress(report, seconds))
+        return execute(job, send_progress)
     except RunError as error:
         return {"error": error.kind, "message": str(error), "tail": error.tail, "by_stack": error.by_stack}
     except InvalidInput as error:
@@ -102,20 +101,6 @@ def _end_record(job: Job, report: int, execute: ExecuteJob) -> dict[str, Any]:
 def _innermost_frame(error: BaseException) -> str:
     frame = traceback.extract_tb(error.__traceback__)[-1]
     return f"{Path(frame.filename).name}:{frame.lineno}"
-
-
-def _send_progress(report: int, seconds: float) -> None:
-    os.write(report, json_line({"seconds": seconds}))
-
-
-def _redirect_output(output: int) -> None:
-    """Redirect stdout and stderr, also of C libraries, to the pipe `output`."""
-    null = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(null, 0)
-    os.dup2(output, 1)
-    os.dup2(output, 2)
-    os.close(null)
-    os.close(output)
 
 
 class ProgressReporter:
