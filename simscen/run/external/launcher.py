@@ -14,7 +14,6 @@ import signal
 import struct
 import subprocess
 import sys
-import time
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -53,8 +52,12 @@ def main() -> None:
         return
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.close(stream)
-    released = _watch(process, control, report)
-    _end(process, EXIT_GRACE_S if released else 0.0)
+    pidfd = os.pidfd_open(process.pid)
+    released = _watch(process, pidfd, control, report)
+    if not _has_exited(pidfd, EXIT_GRACE_S if released else 0.0):
+        os.killpg(process.pid, signal.SIGTERM)
+        _has_exited(pidfd, TERM_GRACE_S)
+    kill_children_except(())
 
 
 def _start_failure(error: Exception) -> str:
@@ -68,12 +71,11 @@ def _start_failure(error: Exception) -> str:
     return f"{error.strerror}: {error.filename}" if error.filename else error.strerror
 
 
-def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> bool:
-    """Wait for the end of the run. If the stack exits before, report its exit code.
+def _watch(process: "subprocess.Popen[bytes]", pidfd: int, control: int, report: int) -> bool:
+    """Wait for the end of the run. If the stack exits before, report its exit code. `pidfd` refers to its process.
 
     Returns True if the worker requested the end of the stack, and False if the worker has died.
     """
-    pidfd = os.pidfd_open(process.pid)
     waiting = [control, pidfd]
     while True:
         ready, _, _ = select.select(waiting, [], [])
@@ -84,20 +86,9 @@ def _watch(process: "subprocess.Popen[bytes]", control: int, report: int) -> boo
             return bool(os.read(control, 1))
 
 
-def _end(process: "subprocess.Popen[bytes]", grace: float) -> None:
-    """Terminate the stack's process group if the stack does not exit within `grace` s; then kill all descendants."""
-    _wait(process, grace)
-    if process.poll() is None:
-        os.killpg(process.pid, signal.SIGTERM)
-        _wait(process, TERM_GRACE_S)
-    kill_children_except(())
-
-
-def _wait(process: "subprocess.Popen[bytes]", seconds: float) -> None:
-    """Wait until the process exits, for at most `seconds`."""
-    end = time.monotonic() + seconds
-    while process.poll() is None and time.monotonic() < end:
-        select.select([], [], [], 0.005)
+def _has_exited(pidfd: int, limit_s: float) -> bool:
+    """Wait until a process exits, for at most `limit_s` seconds; return whether it has exited."""
+    return bool(select.select([pidfd], [], [], limit_s)[0])
 
 
 def _restore_user_limits() -> None:
