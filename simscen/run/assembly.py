@@ -10,7 +10,7 @@ from simscen.core.messages.sensor_data import Odometry
 from simscen.core.random_streams import Streams
 from simscen.core.records.events import Event, EventKind
 from simscen.model.stack_files import ExternalStackSpec
-from simscen.run.external.stack import build_external_stack
+from simscen.run.external.build import build_external_stack
 from simscen.run.faults.command_link import CommandLink
 from simscen.run.faults.fault_setting import FaultSettingFactory
 from simscen.run.faults.injector import FaultInjector

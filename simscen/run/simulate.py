@@ -21,7 +21,8 @@ from simscen.record.moment_buffer import MOMENT_DELAY_S, MomentBuffer, MomentSin
 from simscen.record.recorder import Recorder
 from simscen.record.trace_builder import TraceBuilder
 from simscen.run.assembly import assemble
-from simscen.run.external.stack import ExternalStack, robot_file
+from simscen.run.external.build import robot_file
+from simscen.run.external.stack import ExternalStack
 from simscen.run.faults.map_faults import apply_map_faults
 from simscen.run.lockstep import RunSetup, run_lockstep
 from simscen.run.log_header import log_header

@@ -9,7 +9,7 @@ from simscen.core.records.events import EventKind
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.verdict import Status
 from simscen.loading.scenario import load_scenario
-from simscen.run.external.stack import with_external_reference
+from simscen.run.external.build import with_external_reference
 from simscen.run.preparation import PreparedScenario, prepare
 from simscen.run.simulate import simulate
 

@@ -8,7 +8,7 @@ import pytest
 from mcap.reader import make_reader
 
 from simscen.loading.scenario import load_scenario
-from simscen.run.external.stack import with_external_reference
+from simscen.run.external.build import with_external_reference
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 

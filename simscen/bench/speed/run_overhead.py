@@ -17,7 +17,7 @@ from simscen.core.records.run_result import RunKey
 from simscen.core.records.trace import Moment
 from simscen.loading.scenario import load_scenario
 from simscen.record.moment_buffer import MomentSink
-from simscen.run.external.stack import with_external_reference
+from simscen.run.external.build import with_external_reference
 from simscen.run.lockstep import RunSetup
 from simscen.run.preparation import PreparedScenario, prepare
 from simscen.run.process.jobs import Ended, Job, ProcessEnd

@@ -106,7 +106,7 @@ def decode_answer(
         belief=_belief(messages, correction, dead_reckoned),
         correction=correction,
         events=tuple(_decode_all(messages, topics.EVENTS.name, _decode_event)),
-        lines=tuple(_decode_all(messages, topics.ROSOUT.name, _decode_log_line)),
+        lines=tuple(_decode_all(messages, topics.ROSOUT.name, lambda data: decode.log_line(MessageReader(data)))),
         costmaps=tuple(_costmaps(messages)),
         odometry=odometry,
     )
@@ -281,10 +281,6 @@ def _decode_table(data: bytes, width: int) -> Array:
 def _decode_event(data: bytes) -> dict[str, Any]:
     """Return the event in a String message with JSON."""
     return wire.from_json(MessageReader(data).string().encode())
-
-
-def _decode_log_line(data: bytes) -> LogLine:
-    return decode.log_line(MessageReader(data))
 
 
 def _decode_last(messages: MessagesByTopic, name: str, decoder: Callable[[bytes], T]) -> T | None:

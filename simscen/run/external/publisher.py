@@ -12,7 +12,7 @@ from simscen.core.clock import Clock
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose3
 from simscen.core.messages.navigation import Estimate
-from simscen.core.messages.sensor_data import Odometry, Reading, Readings, Scan
+from simscen.core.messages.sensor_data import Odometry, Readings, Scan
 from simscen.peer import messages
 from simscen.record import frame_names, topics
 from simscen.record.frame_names import RobotFrames
@@ -93,7 +93,8 @@ class StepPublisher:
             if reading.sensor not in self._requested_sensors:
                 continue
             self._sensors.write(now, (reading,))
-            self._publish_exact(reading)
+            if isinstance(reading, Scan | Odometry):
+                self._publish_exact(reading)
 
     @property
     def has_messages(self) -> bool:
@@ -113,19 +114,15 @@ class StepPublisher:
         """Publish a message if the stack has subscribed to its topic. `time` is the simulated time in ns."""
         if topic is topics.TF_STATIC and not self._numbers:  # sensor mounts, published before topics are selected
             self._latched.append((topic, data))
-        self._enqueue(topic.name, data)
+        if topic.name in self._requested_topics:
+            self._queue.append((self._numbers[topic.name], data))
 
-    def _enqueue(self, name: str, data: bytes) -> None:
-        if name in self._requested_topics:
-            self._queue.append((self._numbers[name], data))
-
-    def _publish_exact(self, reading: Reading) -> None:
-        """Publish a scan or odometry in full precision, if the stack has subscribed to the exact topic."""
-        if not isinstance(reading, Scan | Odometry):
-            return
+    def _publish_exact(self, reading: Scan | Odometry) -> None:
+        """Publish a reading in full precision, if the stack has subscribed to the exact topic."""
         name = self._sensors.topic_of(reading).name + EXACT_SUFFIX
         if name in self._requested_topics:
-            self._enqueue(name, _exact_scan(reading) if isinstance(reading, Scan) else messages.pose2d(*reading.pose))
+            data = _exact_scan(reading) if isinstance(reading, Scan) else messages.pose2d(*reading.pose)
+            self._queue.append((self._numbers[name], data))
 
 
 def _exact_topics(topic: Topic) -> list[Topic]:

@@ -1,14 +1,10 @@
 """Stack in another process: implements the protocol Stack by exchanging frames over a socket."""
 
-import sys
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path as FilePath
-from typing import Any, TypeVar
+from typing import Any
 
 from simscen.core.clock import Clock
 from simscen.core.environment.costmap_filters import Zones
-from simscen.core.errors import InvalidInput, RunError
 from simscen.core.external_command import ExternalCommand
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
@@ -17,10 +13,6 @@ from simscen.core.messages.navigation import Estimate, Path
 from simscen.core.messages.sensor_data import Odometry, Readings
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Decision
-from simscen.loading.stacks.userconfig import undefined_stack
-from simscen.model.stack import StackSpec
-from simscen.model.stack_base import GoalTolerances, StackBase
-from simscen.model.stack_files import ExternalStackSpec
 from simscen.peer import wire
 from simscen.record import topics
 from simscen.run.external import protocol
@@ -37,16 +29,11 @@ from simscen.run.external.protocol import (
 )
 from simscen.run.external.publisher import StepPublisher
 from simscen.run.external.stack_process import StackProcess
-from simscen.run.external.zone_masks import ZoneMasks, switchable_zones
-from simscen.run.preparation import PreparedScenario
-from simscen.run.process.isolation import clean_environment
-from simscen.run.robot_interface import sensor_kinds, sensor_mounts
-from simscen.sim.urdf.writer import to_urdf
+from simscen.run.external.zone_masks import ZoneMasks
 from simscen.stack.protocols import Surroundings
 
 END_GRACE_S = 2.0
 """Wall time that a stack may take to disconnect after the frame END."""
-T = TypeVar("T")
 _GOAL_ENDS = (EventKind.GOAL_REACHED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED)
 
 
@@ -65,7 +52,7 @@ class ExternalStack:
         command: ExternalCommand,
         surroundings: Surroundings,
         parameters: RunParameters,
-        log_file: FilePath | None = None,
+        log_file: FilePath | None,
     ) -> None:
         """`name` is the name of the stack in error messages. The output of `command` goes to `log_file`.
 
@@ -102,34 +89,28 @@ class ExternalStack:
         ):
             publisher.latch(mask, topic)
         publisher.latch_robot(self._parameters.robot_description, estimate)
-        self._topic_table = topic_table = publisher.topic_table()
+        self._topic_table = publisher.topic_table()
         self._process = StackProcess(self._name, self._command, self._log_file, self._parameters.robot_name)
         hello = hello_content(
             surroundings,
             self._parameters,
-            topic_table,
+            self._topic_table,
             publisher.sensor_topics,
             self._zone_masks.meanings,
             self._command.answer_limit,
         )
-        self._process.send(wire.json_frame(wire.HELLO, hello))
+        self._send(wire.HELLO, hello)
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
-        """Receive WELCOME, and send GOAL with all goals. Calls `begin` if the process is not running."""
-        if self._process is None:
-            self.begin(estimate)
+        """Receive WELCOME, and send GOAL with all goals."""
         assert self._process is not None
-        topic_table = self._topic_table
+        kind, body = self._process.exchange(b"", self._command.start_limit, "answer to HELLO")
         try:
-            kind, body = self._process.exchange(b"", self._command.start_limit, "answer to HELLO")
-            self._welcome = self._checked(
-                "the answer to HELLO", lambda: Welcome.parse(kind, body, topic_table, self._parameters.mode)
-            )
-            self._publisher.subscribe(topic_table, self._welcome.topics)
-            self._process.send(wire.json_frame(wire.GOAL, goal_content(estimate, goals, self._parameters)))
-        except RunError:
-            self.close()
-            raise
+            self._welcome = Welcome.parse(kind, body, self._topic_table, self._parameters.mode)
+        except (ProtocolViolation, wire.Malformed) as error:
+            raise self._process.error(protocol.PROTOCOL, f"the answer to HELLO: {error}") from error
+        self._publisher.subscribe(self._topic_table, self._welcome.topics)
+        self._send(wire.GOAL, goal_content(estimate, goals, self._parameters))
         self._goals.start(goals)
 
     def preempt(self, tick: int, goal: Goal) -> None:
@@ -191,13 +172,13 @@ class ExternalStack:
 
     def end(self, reason: str) -> None:
         """Send END to the stack."""
-        if self._process is not None:
-            self._process.send_end(wire.json_frame(wire.END, {"reason": reason}))
+        assert self._process is not None
+        self._process.send_end(wire.json_frame(wire.END, {"reason": reason}))
 
     def finish(self) -> None:
         """Wait until the stack disconnects, for at most END_GRACE_S after `end`, and keep the `about` of its BYE."""
-        if self._process is not None:
-            self._welcome = self._welcome.with_bye(self._process.receive_bye(END_GRACE_S))
+        assert self._process is not None
+        self._welcome = self._welcome.with_bye(self._process.receive_bye(END_GRACE_S))
 
     def release(self) -> None:
         """Request the end of the process, without waiting for it."""
@@ -223,9 +204,10 @@ class ExternalStack:
         kind, body = self._process.exchange(
             wire.step_frame(header, self._publisher.drain()), limit, f"answer to {when} (tick {tick})"
         )
-        return self._checked(
-            f"the answer to {when}", lambda: self._decode_answer_frame(kind, body, tick, is_command_due)
-        )
+        try:
+            return self._decode_answer_frame(kind, body, tick, is_command_due)
+        except (ProtocolViolation, wire.Malformed) as error:
+            raise self._process.error(protocol.PROTOCOL, f"the answer to {when}: {error}") from error
 
     def _decode_answer_frame(self, kind: int, body: bytes, tick: int, is_command_due: bool) -> Answer:
         if kind != wire.ANSWER:
@@ -271,71 +253,9 @@ class ExternalStack:
         self._send(kind, content)
 
     def _send(self, kind: int, content: dict[str, Any]) -> None:
-        if self._process is not None:
-            self._process.send(wire.json_frame(kind, content))
-
-    def _checked(self, what: str, function: Callable[[], T]) -> T:
-        """Call a function that decodes the frame `what`, and convert its errors to RunError."""
         assert self._process is not None
-        try:
-            return function()
-        except (ProtocolViolation, wire.Malformed) as error:
-            raise self._process.error(protocol.PROTOCOL, f"{what}: {error}") from error
+        self._process.send(wire.json_frame(kind, content))
 
 
 def _frame_name(kind: int) -> str:
     return wire.KIND_NAMES[kind] if 0 < kind < len(wire.KIND_NAMES) else f"of kind {kind}"
-
-
-def build_external_stack(
-    prepared: PreparedScenario,
-    spec: ExternalStackSpec,
-    surroundings: Surroundings,
-    seed: int,
-    log_file: FilePath | None,
-) -> ExternalStack:
-    """Build the external stack of a robot. Raises InvalidInput if the name of the stack is not defined.
-
-    The output of the stack goes to `log_file` (None: no file); see `robot_file` for its name with several robots.
-    """
-    command = prepared.loaded.external_command
-    if command is None:
-        raise InvalidInput([problem] if (problem := undefined_stack(prepared.loaded)) else [])
-    parameters = RunParameters(
-        seed=seed,
-        control_period=Clock(surroundings.tick_rate).period(spec.controller_frequency),
-        sensors=sensor_kinds(prepared),
-        mounts=sensor_mounts(prepared.robot),
-        rates={name: float(getattr(sensor.chosen, "rate", 0.0)) for name, sensor in prepared.robot.sensors.items()},
-        robot_description=to_urdf(prepared.body),
-        stop_on_failure=prepared.spec.on_goal_failure == "stop",
-        mode=prepared.spec.navigation.mode,
-        robot_name=prepared.loaded.robot_name,
-        switchable_zones=switchable_zones(prepared),
-    )
-    robot_log = log_file and robot_file(log_file, parameters.robot_name)
-    return ExternalStack(spec.external, command, surroundings, parameters, robot_log)
-
-
-def robot_file(file: FilePath, robot: str) -> FilePath:
-    """Return the file name for one of several robots, such as stack.a.log for the robot "a"."""
-    return file.with_stem(f"{file.stem}.{robot}") if robot else file
-
-
-def with_external_reference(prepared: PreparedScenario) -> PreparedScenario:
-    """Return the scenario with the reference stack of each robot in an external process, for tests and benchmarks."""
-    if prepared.robots:
-        parts = {name: with_external_reference(part) for name, part in prepared.robots.items()}
-        loaded = replace(prepared.loaded, robots={name: part.loaded for name, part in parts.items()})
-        return replace(next(iter(parts.values())), loaded=loaded, robots=parts)
-    stack = prepared.stack
-    assert isinstance(stack, StackSpec)
-    stack_json = stack.model_dump_json(by_alias=True, exclude_none=True)
-    argv = (sys.executable, "-I", "-m", "simscen.run.external.reference_stack", stack_json)
-    tolerances = {name: getattr(stack.goal_checker, name) for name in GoalTolerances.model_fields}
-    shared = {name: getattr(stack, name) for name in StackBase.model_fields if name != "goal_checker"}
-    external = ExternalStackSpec(
-        external="reference", ground_truth=stack.gets_ground_truth, goal_checker=GoalTolerances(**tolerances), **shared
-    )
-    command = ExternalCommand(argv, clean_environment(), str(FilePath.cwd()))
-    return replace(prepared, stack=external, loaded=replace(prepared.loaded, external_command=command))

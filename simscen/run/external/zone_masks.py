@@ -6,6 +6,7 @@ Each filter (keepout, speed) has one mask with the enabled zones and the mask fi
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -78,7 +79,7 @@ class ZoneMasks:
             cells = _cells_of(zones.masks.keepout, self._keepout)
             for polygon in zones.keepout:
                 cells[_cells_inside(self._keepout, polygon)] = OCCUPIED
-            yield KEEPOUT_ZONES, _with_cells(self._keepout, cells)
+            yield KEEPOUT_ZONES, replace(self._keepout, cells=cells)
         if self._speed.grid is not None:
             yield SPEED_ZONES, self._speed.draw(self._speed.grid, zones)
 
@@ -131,7 +132,7 @@ class _SpeedMask:
         rounded = np.floor(values + 1e-9) if self._multiplier > 0 else np.ceil(values - 1e-9)
         cells = np.full(grid.shape, FREE, dtype=np.int8)
         cells[limited] = np.clip(rounded, 1, OCCUPIED)
-        return _with_cells(grid, cells)
+        return replace(grid, cells=cells)
 
 
 def _grid_around(polygons: list[Polygon]) -> OccupancyGrid:
@@ -168,7 +169,3 @@ def _centers(grid: OccupancyGrid) -> Array:
     """Return the centers (n, 2) in m of all cells, row by row."""
     rows, columns = np.indices(grid.shape)
     return grid.center_of(np.column_stack((rows.ravel(), columns.ravel())))
-
-
-def _with_cells(grid: OccupancyGrid, cells: npt.NDArray[np.int8]) -> OccupancyGrid:
-    return OccupancyGrid(cells, grid.resolution, grid.origin)
