@@ -1,14 +1,10 @@
-"""Execute one run: simulate a prepared scenario in lockstep, record and judge the run, and write its files."""
+"""Execute one run: simulate a prepared scenario in lockstep, record the run, and judge it."""
 
-import gc
-import hashlib
-import json
 import traceback
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from simscen.core.clock import Clock
 from simscen.core.errors import InvalidInput, RunError
@@ -21,7 +17,6 @@ from simscen.record.moment_buffer import MOMENT_DELAY_S, MomentBuffer, MomentSin
 from simscen.record.recorder import Recorder
 from simscen.record.trace_builder import TraceBuilder
 from simscen.run.assembly import assemble
-from simscen.run.external.build import robot_file
 from simscen.run.external.stack import ExternalStack
 from simscen.run.faults.map_faults import apply_map_faults
 from simscen.run.lockstep import RunSetup, run_lockstep
@@ -61,7 +56,7 @@ def simulate(
 
 
 def _run_and_judge(
-    prepared: PreparedScenario, seed: int, log: Path | None, attach: AttachLogs | None, stack_log: Path | None = None
+    prepared: PreparedScenario, seed: int, log: Path | None, attach: AttachLogs | None, stack_log: Path | None
 ) -> Run:
     prepared = apply_map_faults(prepared, seed)
     clock = Clock(prepared.spec.physics.tick_rate)
@@ -93,10 +88,17 @@ def _run_and_judge(
         for stack in externals.values():
             stack.finish()
         _close(externals.values())
-        run = judge_traces(prepared, seed, {name: builder.finish(end.tick) for name, builder in builders.items()}, log)
+        run = _judge_traces(prepared, seed, {name: builder.finish(end.tick) for name, builder in builders.items()}, log)
         if recorder:
-            recorder.close(end.tick, to_json(run.result), _stack_facts(externals))
-    return _with_stack_descriptions(run, {name: stack.description for name, stack in externals.items()})
+            facts = {  # by `FACT` for a single robot, else by `ROBOT.FACT`
+                f"{name}.{fact}" if name else fact: value
+                for name, stack in externals.items()
+                for fact, value in stack.facts.items()
+            }
+            recorder.close(end.tick, to_json(run.result), facts)
+    descriptions = {name: stack.description for name, stack in externals.items()}
+    robots = {name: replace(one, stack=descriptions.get(name, {})) for name, one in run.robots.items()}
+    return replace(run, robots=robots, stack=descriptions.get(next(iter(robots), ROBOT_NAME), {}))
 
 
 def _close(stacks: Collection[ExternalStack]) -> None:
@@ -107,28 +109,14 @@ def _close(stacks: Collection[ExternalStack]) -> None:
         stack.close()
 
 
-def _stack_facts(externals: Mapping[str, ExternalStack]) -> dict[str, str]:
-    """Return the facts about external stacks for the log, by `FACT` for a single robot, else by `ROBOT.FACT`."""
-    return {
-        f"{name}.{fact}" if name else fact: value
-        for name, stack in externals.items()
-        for fact, value in stack.facts.items()
-    }
-
-
-def _with_stack_descriptions(run: Run, descriptions: Mapping[str, Mapping[str, Any]]) -> Run:
-    """Return the run with the descriptions of its external stacks, which are given by robot name."""
-    robots = {name: replace(one, stack=descriptions.get(name, {})) for name, one in run.robots.items()}
-    return replace(run, robots=robots, stack=descriptions.get(next(iter(robots), ROBOT_NAME), {}))
-
-
-def judge_traces(prepared: PreparedScenario, seed: int, traces: Mapping[str, Trace], log: Path | None = None) -> Run:
+def _judge_traces(prepared: PreparedScenario, seed: int, traces: Mapping[str, Trace], log: Path | None) -> Run:
     """Judge the traces (recorded states and events) of all robots, given by robot name. `log` is the MCAP file."""
+    runs = {name: _judge_robot(part, seed, traces[name], log) for name, part in prepared.by_robot.items()}
+    first = next(iter(runs.values()))
     if not prepared.robots:
-        return _judge_robot(prepared, seed, traces[ROBOT_NAME], log)
-    runs = {name: _judge_robot(part, seed, traces[name], log) for name, part in prepared.robots.items()}
+        return first
     result = combine_robots({name: run.result for name, run in runs.items()}, traces, prepared.loaded.expectation)
-    return replace(next(iter(runs.values())), result=result, robots=runs)
+    return replace(first, result=result, robots=runs)
 
 
 def _judge_robot(prepared: PreparedScenario, seed: int, trace: Trace, log: Path | None) -> Run:
@@ -152,49 +140,14 @@ def _judge_robot(prepared: PreparedScenario, seed: int, trace: Trace, log: Path 
 
 def plugin_error(error: Exception, plugins: Sequence[RegisteredType]) -> RunError | None:
     """Return a RunError with the name of the plug-in that raised an exception, or None if no plug-in raised it."""
-    packages = {entry.value.partition(":")[0].partition(".")[0] for entry in plugins}
     for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
         module = str(frame.f_globals.get("__name__", ""))
-        if module.partition(".")[0] in packages:
-            entry = _plugin_of_module(module, plugins)
+        package = module.partition(".")[0]
+        candidates = [entry for entry in plugins if entry.value.partition(":")[0].partition(".")[0] == package]
+        if candidates:
+            # The plug-in that is defined in this module, or else the first one of the package.
+            entry = next((one for one in candidates if one.value.partition(":")[0] == module), candidates[0])
             place = f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"
             summary = f"{type(error).__name__}: {error}".splitlines()[0]
             return RunError("crashed", f"{entry.group} `{entry.name}` of {entry.origin}: {summary} ({place})")
     return None
-
-
-def _plugin_of_module(module: str, plugins: Sequence[RegisteredType]) -> RegisteredType:
-    """Return the plug-in that is defined in a module, or else the first plug-in of the module's package."""
-    package = module.partition(".")[0]
-    candidates = [entry for entry in plugins if entry.value.partition(":")[0].partition(".")[0] == package]
-    return next((entry for entry in candidates if entry.value.partition(":")[0] == module), candidates[0])
-
-
-GC_THRESHOLD = 20_000
-"""Number of new objects after which Python collects garbage in a worker process; large, to save time."""
-
-WriteExtras = Callable[[PreparedScenario, Run, Path], None]
-"""Function that writes additional files of a run to a folder, for example a picture."""
-
-
-def execute_run(
-    prepared: PreparedScenario, seed: int, folder: Path, logs: tuple[MomentSink, ...], write_extras: WriteExtras
-) -> dict[str, Any]:
-    """Execute a run in a worker process, and write all its files to `folder`.
-
-    The files are run.mcap, result.json, scenario.yaml, and for an external stack stack.log and stack.json (with several
-    robots stack.ROBOT.log and stack.ROBOT.json). `write_extras` writes more files. The moments (recorded beats) of the
-    first robot are also sent to `logs`. Returns a dict with the keys `outcome` and `sha256` (of run.mcap).
-    """
-    if not prepared.plugins:  # plug-ins can create any amount of garbage
-        gc.set_threshold(GC_THRESHOLD)
-    log = folder / "run.mcap"
-    (folder / "scenario.yaml").write_text(log_header(prepared, seed).scenario, encoding="utf-8")
-    run = simulate(prepared, seed, log=log, attach=lambda *_: logs, stack_log=folder / "stack.log")
-    (folder / "result.json").write_text(to_json(run.result), encoding="utf-8")
-    for name, one in (run.robots or {ROBOT_NAME: run}).items():
-        if one.stack:
-            file = robot_file(folder / "stack.json", name)
-            file.write_text(json.dumps(one.stack, indent=1) + "\n", encoding="utf-8")
-    write_extras(prepared, run, folder)
-    return {"outcome": run.result.outcome.value, "sha256": hashlib.sha256(log.read_bytes()).hexdigest()}

@@ -19,7 +19,8 @@ from simscen.loading.scenario import load_scenario
 from simscen.record.moment_buffer import MomentSink
 from simscen.run.lockstep import RunSetup
 from simscen.run.preparation import PreparedScenario, lidar_height, prepare
-from simscen.run.simulate import GC_THRESHOLD, simulate
+from simscen.run.run_files import GC_THRESHOLD
+from simscen.run.simulate import simulate
 from simscen.sim.bullet.baseline import PyBulletBaseline
 from simscen.stack.checked_stack import CheckedStack
 from simscen.stack.reference import ReferenceStack

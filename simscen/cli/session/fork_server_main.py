@@ -32,8 +32,8 @@ from simscen.run.process.fork_server import ForkServer
 from simscen.run.process.isolation import MAX_MEMORY_BYTES, apply_plugin_path
 from simscen.run.process.jobs import Job, ReplayMode
 from simscen.run.process.worker import ProgressReporter
+from simscen.run.run_files import execute_run
 from simscen.run.scenario_cache import CachedWorldBuilder, DiskCache, ScenarioCache, cache_folder
-from simscen.run.simulate import execute_run
 from simscen.sim.bullet.client_pool import CLIENT_POOL
 from simscen.sim.scene import walls
 from simscen.spec.base import Component

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from simscen.loading.scenario import load_scenario
-from simscen.run import simulate
+from simscen.run import run_files
 from simscen.run.preparation import prepare
 from simscen.spec.registry import RegisteredType
 
@@ -39,12 +39,12 @@ def test_garbage_collection_threshold_is_not_changed_if_a_run_has_plugins(
     def stop(*_: object, **__: object) -> None:
         raise Begun(gc.get_threshold()[0])
 
-    monkeypatch.setattr(simulate, "simulate", stop)
+    monkeypatch.setattr(run_files, "simulate", stop)
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     package = RegisteredType("planner", "theirs", "theirs:Planner", distribution="theirs", version="1.0")
     prepared = replace(
         prepare(load_scenario(tmp_path / "a.scenario.yaml", tmp_path)), plugins=(package,) if others else ()
     )
     with pytest.raises(Begun) as begun:
-        simulate.execute_run(prepared, 1, tmp_path, (), lambda *_: None)
-    assert begun.value.args == ((thresholds[0] if others else simulate.GC_THRESHOLD),)
+        run_files.execute_run(prepared, 1, tmp_path, (), lambda *_: None)
+    assert begun.value.args == ((thresholds[0] if others else run_files.GC_THRESHOLD),)

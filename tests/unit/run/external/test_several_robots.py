@@ -13,8 +13,9 @@ from simscen.core.errors import RunError
 from simscen.core.records.run_result import Outcome
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import prepare
+from simscen.run.run_files import execute_run
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session
-from simscen.run.simulate import execute_run, simulate
+from simscen.run.simulate import simulate
 
 FLEET = """\
 simscen: 1
