@@ -18,7 +18,8 @@ from simscen.loading.files.discovery import default_root
 from simscen.loading.files.single_files import load_robot_file
 
 if TYPE_CHECKING:
-    from simscen.run.robot_check import DriveCheck, Motion, RobotCheckResult, Trial
+    from simscen.run.robot_check import DriveCheck, RobotCheckResult
+    from simscen.run.robot_trials import Motion, Trial
     from simscen.sim.body.robot_body import RobotBody
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False, no_args_is_help=True)
