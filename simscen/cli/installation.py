@@ -13,8 +13,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from simscen.cli.requirements import unmet_requirements
+from simscen.run.platform_fingerprint import PACKAGES, cpu_flags
 from simscen.run.process.isolation import MAX_FILE_BYTES, MAX_MEMORY_BYTES, MAX_OPEN_FILES
-from simscen.run.reproducibility import PACKAGES, cpu_flags
 
 SUPPORTED_PYTHONS = ((3, 10), (3, 11), (3, 12), (3, 13))
 MIN_DISK_BYTES = 500 << 20

@@ -1,124 +1,34 @@
-"""Digests of everything on which the result of a run depends: files, software, plug-ins, and processor.
+"""Digests of the files, plug-ins, and software on which the results of a scenario depend.
 
 They show whether an earlier result can be reused, and whether two results can be compared.
 """
 
 import hashlib
-import importlib
 import importlib.util
 import json
-import math
 import platform
-from collections.abc import Iterable, Iterator, Mapping
-from functools import cache, lru_cache
-from importlib.metadata import PackageNotFoundError, version
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
-from simscen.core.geometry import Array
-from simscen.core.version import PACKAGE
 from simscen.loading.loaded import LoadedMap, LoadedScenario
 from simscen.loading.plugins import plugins_of
 from simscen.loading.yaml.library import DEFAULTS_FILE
 from simscen.model.stack_base import StackBase
+from simscen.run.platform_fingerprint import arithmetic_fingerprints, cpu_flags, software_versions, source_digest
 from simscen.spec.registry import RegisteredType
 
-PACKAGES = (
-    *("simscen", "pybullet", "ompl", "filterpy", "numpy", "scipy", "embreex", "trimesh", "mapbox-earcut", "pycollada"),
-    *("pillow", "mcap", "zstandard", "pydantic", "pyyaml"),
-)
-"""Python packages that affect the results or the log of a run."""
-_RELEVANT_CPU_FLAGS = frozenset({"fma", "avx", "avx2", "avx512f", "sse4_2"})
-"""Instruction sets that affect the last bits of results."""
 
-
-def software_versions() -> dict[str, str]:
-    """Return the versions of Python and all packages that affect results; "" for a missing package."""
-    return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
-
-
-def cpu_flags() -> list[str]:
-    """Return the instruction sets of this machine that affect results; empty if /proc/cpuinfo cannot be read."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return []
-    flags = next((line.split(":", 1)[1].split() for line in lines if line.startswith("flags")), [])
-    return sorted(_RELEVANT_CPU_FLAGS.intersection(flags))
-
-
-@cache
-def arithmetic_fingerprints() -> dict[str, str]:
-    """Return digests of sample results of OpenBLAS, the C math library, and NumPy, and the CPU features of NumPy.
-
-    These libraries choose processor instructions at run time, so that results can differ in the last bits.
-    """
-    import numpy as np
-
-    numbers = [(0.37 + 1.618 * k) * 1.7 ** (k % 23) for k in range(400)]
-    functions = (math.sin, math.cos, math.tan, math.atan, math.sqrt, lambda x: math.exp(-x / 1e5), math.log)
-    libm = [function(number) for function in functions for number in numbers]
-    array = np.array(numbers)
-    array_results = [
-        np.sin(array),
-        np.exp(-array / 1e5),
-        np.arctan2(array, array[::-1]),
-        np.outer(array, array) @ array,
-    ]
-    square = np.sin(np.arange(8100.0)).reshape(90, 90) + 90 * np.eye(90)
-    blas = [
-        function(square[:k, :k])
-        for k in (3, 16, 90)
-        for function in (_times_transpose, np.linalg.inv, np.linalg.cholesky)
-    ]
-    return {
-        "blas": hashlib.sha256(b"".join(part.tobytes() for part in blas)).hexdigest()[:16],
-        "libm": hashlib.sha256(repr(libm).encode()).hexdigest()[:16],
-        "numpy": hashlib.sha256(b"".join(part.tobytes() for part in array_results)).hexdigest()[:16],
-        "numpy_dispatch": " ".join(sorted(name for name, used in _numpy_features().items() if used)),
-    }
-
-
-def _times_transpose(matrix: Array) -> Array:
-    """Return matrix · matrixᵀ."""
-    product: Array = matrix @ matrix.T
-    return product
-
-
-def _numpy_features() -> dict[str, bool]:
-    import numpy as np
-
-    core = "numpy._core" if np.lib.NumpyVersion(np.__version__) >= "2.0.0" else "numpy.core"
-    return dict(importlib.import_module(f"{core}._multiarray_umath").__cpu_features__)
-
-
-@cache
-def source_digest(*parts: str) -> str:
-    """Return the SHA-256 of simscen's source files, or only of the subpackages and modules (`name.py`) in `parts`."""
-    sha, folder = hashlib.sha256(), PACKAGE
-    roots = [folder / part for part in parts or (".",)]
-    files = [path for root in roots for path in ([root] if root.is_file() else root.rglob("*"))]
-    for file in sorted(path for path in files if path.suffix in (".py", ".yaml", ".json")):
-        sha.update(f"{file.relative_to(folder).as_posix()}\0".encode() + file.read_bytes())
-    return sha.hexdigest()
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return ""
-
-
-def plugin_packages(plugins: Iterable[RegisteredType]) -> dict[str, dict[str, object]]:
+def plugin_packages(plugins: Sequence[RegisteredType]) -> dict[str, dict[str, object]]:
     """Return the `version` and the `used` entry points of each package with plug-ins, by package name."""
-    found: dict[str, dict[str, object]] = {}
-    for entry in plugins:
-        package = found.setdefault(entry.distribution, {"version": entry.version, "used": []})
-        used = package["used"]
-        assert isinstance(used, list)
-        used.append(f"{entry.group} {entry.name}")
-    return found
+    return {
+        package.distribution: {
+            "version": package.version,
+            "used": [f"{entry.group} {entry.name}" for entry in plugins if entry.distribution == package.distribution],
+        }
+        for package in plugins
+    }
 
 
 def plugin_fingerprints(plugins: Iterable[RegisteredType]) -> dict[str, list[str]]:
@@ -142,11 +52,6 @@ def _digest_of_files(files: tuple[tuple[str, Path, int, int], ...]) -> str:
     for name, file, _, _ in files:
         _hash_file(sha, name, file.read_bytes())
     return sha.hexdigest()
-
-
-def plugin_files(plugins: Iterable[RegisteredType]) -> list[Path]:
-    """Return the files of the top-level packages that contain the plug-ins."""
-    return [file for entry in plugins for _, file in _package_files(entry.value)]
 
 
 def _package_files(class_path: str) -> Iterator[tuple[str, Path]]:
@@ -276,26 +181,15 @@ def scenario_files(loaded: LoadedScenario) -> set[Path]:
     Includes `defaults.yaml` next to the scenario even if it does not exist.
     """
     choice = loaded.choice
-    programs = [
-        part
-        for view in loaded.robot_views.values()
-        if view.external_command is not None
-        for part in _files_in_command(view)
-    ]
+    commands = [view.external_command for view in loaded.robot_views.values()]
+    programs = [Path(command.cwd, argument) for command in commands if command is not None for argument in command.argv]
     return {
         loaded.file,
         loaded.file.with_name(DEFAULTS_FILE),
         *loaded.files.values(),
         *loaded.read_files,
         *referenced_files(loaded),
-        *plugin_files(plugins_of(loaded)),
+        *(file for entry in plugins_of(loaded) for _, file in _package_files(entry.value)),
         *(() if choice is None else choice.files.values()),
-        *programs,
+        *(path for path in programs if path.is_file()),
     }
-
-
-def _files_in_command(loaded: LoadedScenario) -> list[Path]:
-    """Return the files among the arguments of an external stack's command."""
-    assert loaded.external_command is not None
-    paths = [Path(loaded.external_command.cwd, argument) for argument in loaded.external_command.argv]
-    return [path for path in paths if path.is_file()]

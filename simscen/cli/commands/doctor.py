@@ -82,7 +82,7 @@ def _line(sign: str, name: str, result: str) -> str:
 
 def check_cache() -> str:
     """Check that only the user can write the cache of maps and shortest paths, and return its folder and size."""
-    from simscen.run.scenario_cache import (
+    from simscen.run.disk_cache import (
         CACHE_DIR_VARIABLE,
         MAX_CACHE_BYTES,
         cache_folder,

@@ -26,6 +26,7 @@ from simscen.model.stack import StackSpec
 from simscen.record.log_reader import read_run
 from simscen.report.picture.map_picture import write_picture
 from simscen.report.picture.scene import Scene, scene_with_robots
+from simscen.run.disk_cache import DiskCache, cache_folder
 from simscen.run.log_header import log_header, world_scenery
 from simscen.run.preparation import PreparedScenario
 from simscen.run.process.fork_server import ForkServer
@@ -33,7 +34,7 @@ from simscen.run.process.isolation import MAX_MEMORY_BYTES, apply_plugin_path
 from simscen.run.process.jobs import Job, ReplayMode
 from simscen.run.process.worker import ProgressReporter
 from simscen.run.run_files import execute_run
-from simscen.run.scenario_cache import CachedWorldBuilder, DiskCache, ScenarioCache, cache_folder
+from simscen.run.scenario_cache import CachedWorldBuilder, ScenarioCache
 from simscen.sim.bullet.client_pool import CLIENT_POOL
 from simscen.sim.scene import walls
 from simscen.spec.base import Component

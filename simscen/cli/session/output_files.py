@@ -25,7 +25,7 @@ from simscen.report.junit import Family, xml_parts
 from simscen.report.results_json import json_parts
 from simscen.report.session_history import PastSession, past_sessions
 from simscen.report.suite import RunningSession, SessionReport, to_html
-from simscen.run.reproducibility import arithmetic_fingerprints, cpu_flags, software_versions
+from simscen.run.platform_fingerprint import arithmetic_fingerprints, cpu_flags, software_versions
 from simscen.run.sessions.output_folder import RUNS_FOLDER, probe_writable, write_atomically
 
 PAGE = "report.html"

@@ -18,6 +18,7 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from simscen.core.errors import UsageError
 from simscen.core.version import __version__
+from simscen.run.platform_fingerprint import source_digest
 from simscen.run.process.jobs import Ended, ForkServerDeath, Job, JobUpdate, Progressed, Started
 from simscen.run.process.ray_node import (
     PACKAGE_FOLDER,
@@ -29,7 +30,6 @@ from simscen.run.process.ray_node import (
     digest_of,
     pack,
 )
-from simscen.run.reproducibility import source_digest
 from simscen.spec.registry import RegisteredType
 
 MAX_ATTEMPTS = 2

@@ -19,9 +19,9 @@ from simscen.core.errors import UsageError
 from simscen.core.version import __version__
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import requirement_of
+from simscen.run.platform_fingerprint import source_digest
 from simscen.run.process.jobs import Ended, Job, JobUpdate
 from simscen.run.process.supervisor import Supervisor
-from simscen.run.reproducibility import source_digest
 from simscen.spec.registry import RegisteredType, find_type
 
 PACKAGE_FOLDER = Path(__file__).parents[2]

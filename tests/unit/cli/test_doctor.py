@@ -12,7 +12,7 @@ import pytest
 from simscen.bench.speed import run_speed
 from simscen.cli import installation
 from simscen.cli.commands import doctor
-from simscen.run.scenario_cache import DiskCache, cache_folder
+from simscen.run.disk_cache import DiskCache, cache_folder
 
 
 @pytest.fixture

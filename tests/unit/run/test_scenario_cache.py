@@ -4,7 +4,8 @@ from pathlib import Path
 
 from simscen.loading.scenario import load_scenario, try_variations
 from simscen.run import scenario_cache
-from simscen.run.scenario_cache import CachedWorldBuilder, DiskCache, ScenarioCache
+from simscen.run.disk_cache import DiskCache
+from simscen.run.scenario_cache import CachedWorldBuilder, ScenarioCache
 
 TEXT = """\
 simscen: 1

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.run.scenario_cache import CACHE_FORMAT, DiskCache, cache_folder, disk_usage, is_private_folder
+from simscen.run.disk_cache import CACHE_FORMAT, DiskCache, cache_folder, disk_usage, is_private_folder
 
 KEY, OTHER = "a" * 64, "b" * 64
 

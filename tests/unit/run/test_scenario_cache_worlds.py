@@ -10,7 +10,8 @@ from simscen.core.geometry.shapes import Box, Solid
 from simscen.core.messages.goals import Goal
 from simscen.loading.scenario import load_scenario
 from simscen.run import scenario_cache
-from simscen.run.scenario_cache import CachedWorldBuilder, DiskCache, ScenarioCache
+from simscen.run.disk_cache import DiskCache
+from simscen.run.scenario_cache import CachedWorldBuilder, ScenarioCache
 from simscen.run.simulate import simulate
 
 SCENARIO = """\

@@ -10,8 +10,9 @@ from simscen.core.errors import Problem
 from simscen.loading.checks.scene_runner import check_in_world
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
+from simscen.run.disk_cache import DiskCache
 from simscen.run.preparation import prepare
-from simscen.run.scenario_cache import CachedWorldBuilder, DiskCache, ScenarioCache
+from simscen.run.scenario_cache import CachedWorldBuilder, ScenarioCache
 
 GROUND = "<include><uri>model://ground_plane</uri></include>"
 SCENARIO = """

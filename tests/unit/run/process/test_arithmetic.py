@@ -12,7 +12,7 @@ import pytest
 
 from simscen.core.cpu_kernels import CPUINFO, kernel_variables
 
-SHOWN = "from simscen.run.reproducibility import arithmetic_fingerprints; print(arithmetic_fingerprints())"
+SHOWN = "from simscen.run.platform_fingerprint import arithmetic_fingerprints; print(arithmetic_fingerprints())"
 PINNED = f"from simscen.core.cpu_kernels import pin_kernels; pin_kernels(); {SHOWN}"
 BOTH = f"""
 import subprocess, sys

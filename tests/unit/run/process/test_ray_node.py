@@ -123,6 +123,6 @@ def test_large_files_are_sent_in_pieces(job: Job, tmp_path: Path, monkeypatch) -
 
 def test_a_runner_reports_the_version_and_the_code_of_its_simscen() -> None:
     from simscen.core.version import __version__
-    from simscen.run.reproducibility import source_digest
+    from simscen.run.platform_fingerprint import source_digest
 
     assert NodeRunner(1, (), receive).software() == (__version__, source_digest())
