@@ -16,9 +16,10 @@ from simscen.run.faults.fault_setting import FaultSettingFactory
 from simscen.run.faults.injector import FaultInjector
 from simscen.run.live_world.costmap_filters import CostmapFilters
 from simscen.run.live_world.director import Director
+from simscen.run.live_world.event_data import body_data
 from simscen.run.live_world.pedestrians import PedestrianSimulation
 from simscen.run.live_world.ray_caster import LiveRayCaster
-from simscen.run.live_world.stage import LiveStage, body_data
+from simscen.run.live_world.stage import LiveStage
 from simscen.run.lockstep import EndCondition, RobotUnderTest, RunSetup
 from simscen.run.preparation import PreparedScenario
 from simscen.run.robot_interface import (

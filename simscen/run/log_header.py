@@ -41,37 +41,29 @@ def log_header(prepared: PreparedScenario, seed: int) -> LogHeader:
     """Return the log header of a run. Builds it only once for all runs of a scenario."""
     header = _HEADERS.get(prepared)
     if header is None:
-        header = _HEADERS[prepared] = _build_header(prepared)
+        header = _HEADERS[prepared] = replace(
+            _robot_header(prepared),
+            files={SCENERY_FILE: scenery_to_json(world_scenery(prepared))},
+            robots={name: _robot_header(part) for name, part in prepared.robots.items()},
+        )
     return replace(header, seed=seed, robots={name: replace(part, seed=seed) for name, part in header.robots.items()})
 
 
-def _build_header(prepared: PreparedScenario) -> LogHeader:
-    """Return the header with the scenery and, with several robots, the header of each robot."""
-    robots = {name: _robot_header(part) for name, part in prepared.robots.items()}
-    return replace(
-        _robot_header(prepared), files={SCENERY_FILE: scenery_to_json(world_scenery(prepared))}, robots=robots
-    )
-
-
 def _robot_header(prepared: PreparedScenario) -> LogHeader:
+    loaded = prepared.loaded
+    facts = {STACK_FACT: loaded.stack, STACK_NAME_FACT: loaded.stack_name, VARIATION_FACT: loaded.variation}
     return LogHeader(
-        name=prepared.loaded.id,
+        name=loaded.id,
         seed=prepared.spec.seed,
         case=prepared.case,
-        scenario=resolved_text(prepared.loaded),
+        scenario=resolved_text(loaded),
         map=prepared.map,
         robot_description=to_urdf(prepared.body),
         mounts=sensor_mounts(prepared.robot),
         sensors=sensor_kinds(prepared),
-        facts={**_run_facts(prepared), **{log_header_key(entry): requirement_of(entry) for entry in prepared.plugins}},
+        facts={name: value for name, value in facts.items() if value}
+        | {log_header_key(entry): requirement_of(entry) for entry in prepared.plugins},
     )
-
-
-def _run_facts(prepared: PreparedScenario) -> dict[str, str]:
-    """Return the stack from the command line, its name, and the name of the variation, if there are any."""
-    loaded = prepared.loaded
-    facts = {STACK_FACT: loaded.stack, STACK_NAME_FACT: loaded.stack_name, VARIATION_FACT: loaded.variation}
-    return {name: value for name, value in facts.items() if value}
 
 
 DECIMALS = 3

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from pathlib import Path
 
 from simscen.core.environment.costmap_filters import FilterMasks, MaskBlocks
@@ -109,18 +110,10 @@ def prepare(
     loaded: LoadedScenario, build: BuildWorld = build_world, find_legs: FindLegs = legs_between
 ) -> PreparedScenario:
     """Return the prepared scenario. Raises InvalidInput for unusable files."""
+    build_once = cache(partial(build, loaded))  # several robots share a world, with a map for each height of lidars
     if not loaded.robots:
-        return _prepare_robot(loaded, build, find_legs)
-    parts: dict[str, PreparedScenario] = {}
-    built_by_height: dict[float, BuiltWorld] = {}
-
-    def build_once(_view: LoadedScenario, height: float) -> BuiltWorld:
-        if height not in built_by_height:
-            built_by_height[height] = build(loaded, height)
-        return built_by_height[height]
-
-    for name, view in loaded.robots.items():
-        parts[name] = _prepare_robot(view, build_once, find_legs)
+        return _prepare_robot(loaded, build_once, find_legs)
+    parts = {name: _prepare_robot(view, build_once, find_legs) for name, view in loaded.robots.items()}
     clearance_range = max(part.case.clearance_range for part in parts.values())
     parts = {
         name: replace(part, case=replace(part.case, clearance_range=clearance_range)) for name, part in parts.items()
@@ -128,11 +121,13 @@ def prepare(
     return replace(next(iter(parts.values())), loaded=loaded, robots=parts, plugins=plugins_of(loaded))
 
 
-def _prepare_robot(loaded: LoadedScenario, build: BuildWorld, find_legs: FindLegs) -> PreparedScenario:
-    """Prepare the scenario of one robot."""
+def _prepare_robot(
+    loaded: LoadedScenario, build: Callable[[float], BuiltWorld], find_legs: FindLegs
+) -> PreparedScenario:
+    """Prepare the scenario of one robot. `build` returns the world with its map at a height in m."""
     spec = loaded.spec
     robot, body = load_robot(loaded)
-    built = build(loaded, lidar_height(robot))
+    built = build(lidar_height(robot))
     world = built.world
     blocking = blocking_solids(world.solids, body)
     obstacles = built.mesh if blocking is world.solids else merge_solids(blocking)
@@ -208,11 +203,9 @@ def lidar_height(robot: RobotSpec) -> float:
 def effective_stack(spec: ScenarioSpec) -> AnyStack:
     """Return the stack of a scenario. Without a map, dead reckoning replaces the default localizer AMCL."""
     stack = spec.stack
-    if not isinstance(stack, StackSpec):
-        return stack
-    is_default = "localizer" not in stack.model_fields_set
-    if spec.map == "none" and is_default and stack.localizer.needs_map:
-        return stack.model_copy(update={"localizer": OdometryOnly(type="odometry")})
+    if isinstance(stack, StackSpec) and spec.map == "none" and stack.localizer.needs_map:
+        is_default = "localizer" not in stack.model_fields_set
+        return stack.model_copy(update={"localizer": OdometryOnly(type="odometry")}) if is_default else stack
     return stack
 
 

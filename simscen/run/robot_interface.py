@@ -90,13 +90,12 @@ def _uses_robot_latency(stack: StackBase) -> bool:
 class SensorSuite:
     """Sensors of a robot. A reading reaches the stack after the latency of its sensor."""
 
-    def __init__(self, sensors: Sequence[Sensor], latencies: Mapping[str, int] | None = None) -> None:
-        """`latencies` are in ticks by sensor name (default: 0)."""
+    def __init__(self, sensors: Sequence[Sensor], latencies: Mapping[str, int]) -> None:
+        """`latencies` are in ticks by sensor name; 0 for sensors that are missing."""
         self._sensors = tuple(sensors)
-        latencies = latencies or {}
         self._latencies = [latencies.get(sensor.name, 0) for sensor in self._sensors]
-        self._delayed: list[deque[Reading]] = [deque() for _ in self._sensors]
-        self._with_latency = list(zip(self._sensors, self.periods, self._latencies, self._delayed, strict=True))
+        delayed: list[deque[Reading]] = [deque() for _ in self._sensors]
+        self._with_latency = list(zip(self._sensors, self.periods, self._latencies, delayed, strict=True))
         self._without_latency = None if any(self._latencies) else list(zip(self._sensors, self.periods, strict=True))
 
     @property

@@ -59,7 +59,6 @@ class Director:
             situation = self._situations.get(index)
             for _ in range(0 if situation is None or trigger.is_exhausted else trigger.count_firings(situation)):
                 self._perform_step(index, step)
-                self._observe_next_step(index)
         if self._ends:
             self._end_due_faults()
         for index, trigger in enumerate(self._starts):
@@ -74,9 +73,7 @@ class Director:
         self._stage.record_world_event(
             Event(0, EventKind.EVENT_ENDED, step.name, {"entry": index, "effects": effect_data})
         )
-
-    def _observe_next_step(self, index: int) -> None:
-        """From now on, evaluate the trigger of the next step of the same sequence, if there is one."""
+        # From now on, evaluate the trigger of the next step of the same sequence.
         if index + 1 < len(self._steps) and self._steps[index + 1][0].after == index:
             self._situations[index + 1] = cast(Situation, RelativeSituation(self._stage))
 
@@ -112,9 +109,14 @@ class TriggerState:
 
     def count_firings(self, now: Situation) -> int:
         """Evaluate the trigger in the situation `now`, and return how often it fires. Call it once at each beat."""
-        if self._remaining and self._has_edge(now) and self._passes_probability():
+        trigger = self._trigger
+        if (
+            self._remaining
+            and self._has_edge(now)
+            and (trigger.probability >= 1 or self._rng.random() < trigger.probability)
+        ):
             self._remaining -= 1
-            self._scheduled.append(now.tick + now.clock.ticks(self._trigger.delay))
+            self._scheduled.append(now.tick + now.clock.ticks(trigger.delay))
         due = sum(scheduled <= now.tick for scheduled in self._scheduled)
         self._scheduled = self._scheduled[due:]
         return due
@@ -128,9 +130,6 @@ class TriggerState:
         """Return whether the condition has changed in the direction that fires the trigger."""
         before, self._was_true = self._was_true, self._condition.holds(now)
         return self._was_true != before and self._was_true == (self._trigger.edge == "rising")
-
-    def _passes_probability(self) -> bool:
-        return self._trigger.probability >= 1 or bool(self._rng.random() < self._trigger.probability)
 
 
 class ConditionState:

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from simscen.core.clock import Clock
-from simscen.core.environment.world_model import BuiltWorld, PedestrianAction, WalkingPedestrian
+from simscen.core.environment.world_model import BuiltWorld, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.polygons import distance_to_polygon
 from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid
@@ -132,15 +132,12 @@ class PedestrianSimulation:
             path = MotionPath((0.0, step_s), (before[name], pose))
             self._simulation.follow(name, path, crowd.top_speed(name))
         for action in actions:
-            event = self._to_event(action)
+            data: dict[str, Value] = {"behavior": self._behaviors[action.name], "robot": action.about}
+            if action.what == "reached":
+                data = {"goal": int(action.about)}
+            event = Event(self._simulation.tick, EVENT_KINDS[action.what], action.name, data)
             for listener in self.listeners:
                 listener(event)
-
-    def _to_event(self, action: PedestrianAction) -> Event:
-        data: dict[str, Value] = {"behavior": self._behaviors[action.name], "robot": action.about}
-        if action.what == "reached":
-            data = {"goal": int(action.about)}
-        return Event(self._simulation.tick, EVENT_KINDS[action.what], action.name, data)
 
     # Perception of the pedestrians
 

@@ -10,7 +10,7 @@ from simscen.core.clock import Clock
 from simscen.core.environment.costmap_filters import ZoneSwitch
 from simscen.core.environment.world_model import Patch, WalkingPedestrian, World
 from simscen.core.geometry import Polygon, Pose2
-from simscen.core.geometry.shapes import Body, Box, Capsule, Cone, Cylinder, Extrusion, MotionPath, Shape, Sphere
+from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import Belief, Path
 from simscen.core.messages.sensor_data import Readings, Scan
@@ -19,13 +19,12 @@ from simscen.core.records.events import Event, EventKind, Value
 from simscen.core.records.trace import Decision, Truth
 from simscen.run.external.stack import ExternalStack
 from simscen.run.live_world.costmap_filters import CostmapFilters
+from simscen.run.live_world.event_data import body_data, path_data, pose_data
 from simscen.run.live_world.pedestrians import PedestrianSimulation
-from simscen.sim.body.outline import outlines_in_z_range
 from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
 from simscen.stack.checked_stack import CheckedStack
 from simscen.stack.protocols import Stack
-from simscen.worlds.routes.shortest_paths import Z_RANGE_M
 
 
 class LiveStage:
@@ -79,7 +78,7 @@ class LiveStage:
 
     # Updates by the lockstep loop
 
-    def begin_beat(self, truth: Truth | None, is_due: bool = True) -> None:
+    def begin_beat(self, truth: Truth | None, is_due: bool) -> None:
         """Update the robot's pose at a beat, from a truth sample if there is one.
 
         If `is_due`, the beat belongs to this robot, and orders are delivered at once.
@@ -108,7 +107,7 @@ class LiveStage:
         else:
             self._pose, self.twist = self._robot.base_pose(), self._robot.base_twist()
 
-    def update_from_stack(self, decision: Decision, readings: Readings = ()) -> None:
+    def update_from_stack(self, decision: Decision, readings: Readings) -> None:
         """Update belief, events, and ticks of scans from the stack's decision and the readings that it received."""
         for reading in readings:
             if isinstance(reading, Scan):
@@ -216,7 +215,7 @@ class LiveStage:
         """
         pose = self.object(name)
         if pose is not None and self._pedestrians.simulates(name):
-            return MotionPath((0.0, 1.0), (pose, pose), "loop"), 0.0  # the future path of a pedestrian is unknown
+            return MotionPath((0.0, 1.0), (pose, pose), "loop"), 0.0
         return self._simulation.motion(name)
 
     def mass(self, name: str) -> float:
@@ -227,13 +226,13 @@ class LiveStage:
         """Teleport an object to a pose."""
         self._pedestrians.remove(name)
         self._simulation.place(name, pose)
-        self.record_world_event(Event(0, EventKind.OBJECT_PLACED, name, {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
+        self.record_world_event(Event(0, EventKind.OBJECT_PLACED, name, pose_data(pose)))
 
     def place_robot(self, pose: Pose2) -> None:
         """Teleport the robot to a pose."""
         self._simulation.place_robot(self._robot.name, pose)
         self._update_pose()
-        self.record_event(Event(0, EventKind.ROBOT_PLACED, "", {"x": pose.x, "y": pose.y, "yaw": pose.yaw}))
+        self.record_event(Event(0, EventKind.ROBOT_PLACED, "", pose_data(pose)))
 
     def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
         """Push an object (None: the robot) with an impulse in N s (x, y in the world frame), spread over `seconds`."""
@@ -287,34 +286,3 @@ class LiveStage:
         stamped = event if event.tick else replace(event, tick=self.tick)
         self.new_events.append(stamped)
         self.events += (stamped,)
-
-
-def path_data(path: MotionPath) -> dict[str, Value]:
-    """Return the parameters of a path as event data."""
-    poses: list[Value] = [[pose.x, pose.y, pose.yaw] for pose in path.poses]
-    clock: dict[str, Value] = {"start": path.start, "phase": path.phase}
-    return {"waypoints": poses, "times": list(path.times), "repeat": path.mode, "ease": path.ease, **clock}
-
-
-def body_data(body: Body) -> dict[str, Value]:
-    """Return the pose, mass, first shape, and outlines (in the body frame) of a body as event data."""
-    pose = body.pose.plane
-    fields: dict[str, Value] = {"x": pose.x, "y": pose.y, "yaw": pose.yaw, "mass": body.mass}
-    outlines: list[Value] = [
-        [[round(x, 3), round(y, 3)] for x, y in outline] for outline in outlines_in_z_range(body.solids, Z_RANGE_M)
-    ]
-    return {**fields, **_shape_data(body.solids[0].shape), "parts": outlines}
-
-
-def _shape_data(shape: Shape) -> dict[str, Value]:
-    match shape:
-        case Box(size):
-            return {"shape": "box", "size": list(size)}
-        case Cylinder(radius, length) | Capsule(radius, length) | Cone(radius, length):
-            return {"shape": "cylinder", "size": [radius, length]}
-        case Sphere(radius):
-            return {"shape": "cylinder", "size": [radius, 2 * radius]}
-        case Extrusion(polygon, height):
-            return {"shape": "polygon", "points": [list(corner) for corner in polygon], "size": [height]}
-        case _:
-            return {"shape": "mesh", "size": []}
