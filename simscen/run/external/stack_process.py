@@ -18,7 +18,8 @@ from simscen.core.errors import RunError
 from simscen.core.external_command import ExternalCommand
 from simscen.peer import wire
 from simscen.run.external import protocol
-from simscen.run.process.isolation import READ_BYTES, TAIL_BYTES, CappedLog, clean_environment, output_tail
+from simscen.run.process.captured_output import READ_BYTES, TAIL_BYTES, CappedLog, output_tail
+from simscen.run.process.isolation import clean_environment
 
 EXIT_TIMEOUT_S = 2.0
 """Time to wait until a stack that has closed its socket exits."""

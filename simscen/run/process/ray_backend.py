@@ -1,10 +1,8 @@
 """Backend that runs jobs on a Ray cluster. One runner (a Ray actor) on each node supervises the processes there."""
 
 import logging
-import shutil
 import socket
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,23 +15,14 @@ from ray.exceptions import RayActorError, RayTaskError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from simscen.core.errors import UsageError
-from simscen.core.version import __version__
+from simscen.core.version import PACKAGE, __version__
 from simscen.run.platform_fingerprint import source_digest
-from simscen.run.process.jobs import Ended, ForkServerDeath, Job, JobUpdate, Progressed, Started
-from simscen.run.process.ray_node import (
-    PACKAGE_FOLDER,
-    FileChunk,
-    JobQueue,
-    NodeRunner,
-    NodeUpdate,
-    SentFile,
-    digest_of,
-    pack,
-)
+from simscen.run.process.job_batch import JobBatch
+from simscen.run.process.job_transfer import SentFile, digest_of, pack
+from simscen.run.process.jobs import Job, JobUpdate
+from simscen.run.process.ray_node import JobQueue, NodeRunner
 from simscen.spec.registry import RegisteredType
 
-MAX_ATTEMPTS = 2
-"""Largest number of attempts at a job if its runner or node is lost."""
 QUEUED_JOBS_PER_WORKER = 2
 """Number of jobs in the queue for each worker."""
 NODE_SEARCH_PERIOD_S = 5.0
@@ -102,7 +91,7 @@ class RayBackend:
         should_continue: Callable[[], bool] = lambda: True,
     ) -> Iterator[JobUpdate]:
         """Run jobs and yield their updates (see `Backend.run`). Raises UsageError for an unusable cluster."""
-        batch, start_time = _Batch(jobs, should_continue), time.monotonic()
+        batch, start_time = JobBatch(jobs, should_continue), time.monotonic()
         try:
             while batch.is_unfinished():
                 self._add_runners()
@@ -158,7 +147,7 @@ class RayBackend:
         call = runner.actor.run.options(num_returns="streaming", _generator_backpressure_num_objects=MAX_UNREAD_UPDATES)
         runner.call = call.remote(self._queue, runner.name, list(plugins))
 
-    def _send(self, batch: "_Batch") -> None:
+    def _send(self, batch: JobBatch) -> None:
         """Put jobs into the queue until it has QUEUED_JOBS_PER_WORKER jobs for each worker."""
         limit = QUEUED_JOBS_PER_WORKER * sum(runner.workers for runner in self._runners)
         while len(batch.sent) < limit and (job := batch.next()) is not None:
@@ -176,7 +165,7 @@ class RayBackend:
         return self._files[path]
 
     def _process_reply(
-        self, runner: _Runner, batch: "_Batch", plugins: Sequence[RegisteredType]
+        self, runner: _Runner, batch: JobBatch, plugins: Sequence[RegisteredType]
     ) -> Iterator[JobUpdate]:
         """Process the next reply of a runner. Raises UsageError if its version of simscen or a plug-in differs."""
         try:
@@ -201,10 +190,10 @@ class RayBackend:
         if found != (__version__, source_digest()):
             raise UsageError(
                 f"node {runner.address} has simscen {found[0]} with other code than simscen {__version__} in "
-                f"{PACKAGE_FOLDER}; install the same version on all nodes"
+                f"{PACKAGE}; install the same version on all nodes"
             )
 
-    def _remove_lost_runner(self, runner: _Runner, batch: "_Batch") -> Iterator[JobUpdate]:
+    def _remove_lost_runner(self, runner: _Runner, batch: JobBatch) -> Iterator[JobUpdate]:
         """Remove a runner that has died, and queue its jobs again or report them as ended."""
         self._runners.remove(runner)
         ray.kill(runner.actor)  # it may only be unreachable
@@ -261,67 +250,3 @@ def cluster_cpus(address: str) -> int:
 def _nodes() -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = ray.nodes()  # type: ignore[no-untyped-call]
     return found
-
-
-class _Batch:
-    """Jobs of one call of `run`. `sent` are the jobs in the queue, and `running` the jobs on a node, by number."""
-
-    def __init__(self, jobs: Iterable[Job], should_continue: Callable[[], bool]) -> None:
-        self._jobs, self._should_continue = iter(jobs), should_continue
-        self._retries = deque[Job]()
-        self._attempts: dict[int, int] = {}
-        self._next_job: Job | None = None
-        self.sent: dict[int, Job] = {}
-        self.running: dict[int, Job] = {}
-
-    def next(self) -> Job | None:
-        """Return the next job to send, or None if there is none."""
-        if not self._should_continue():
-            return None
-        job, self._next_job = self._next_job, None
-        if job is None:
-            job = self._retries.popleft() if self._retries else next(self._jobs, None)
-        return job
-
-    def is_unfinished(self) -> bool:
-        """Return whether any job is running or can still start."""
-        if self.running:
-            return True
-        if not self._should_continue():
-            return False
-        if not self.sent and self._next_job is None:
-            self._next_job = self.next()
-        return bool(self.sent) or self._next_job is not None
-
-    def updates(self, update: NodeUpdate) -> Iterator[JobUpdate]:
-        """Process an update from a node: write file chunks to the job's folder, and yield all other updates."""
-        match update:
-            case Started(number):
-                if (job := self.sent.pop(number, None)) is not None:
-                    self.running[number] = job
-                    shutil.rmtree(job.folder, ignore_errors=True)
-                    if number not in self._attempts:
-                        yield update
-            case Progressed():
-                yield update
-            case FileChunk(number, name, data):
-                file = (self.running.get(number) or self.sent[number]).folder / name
-                file.parent.mkdir(parents=True, exist_ok=True)
-                with file.open("ab") as output:
-                    output.write(data)
-            case Ended(number):
-                if self.running.pop(number, None) is None:
-                    del self.sent[number]
-                yield update
-
-    def retry_or_fail(self, number: int, address: str) -> Iterator[JobUpdate]:
-        """Queue a job of a lost runner again, or yield its end after MAX_ATTEMPTS."""
-        job = self.running.pop(number, None) or self.sent.pop(number, None)
-        if job is None:
-            return
-        self._attempts[number] = self._attempts.get(number, 1) + 1
-        if self._attempts[number] <= MAX_ATTEMPTS:
-            self._retries.append(job)
-            return
-        description = f"was lost with its node {address}, as before on another node"
-        yield Ended(number, ForkServerDeath(description, False, False, ""))

@@ -15,7 +15,8 @@ from simscen.loading.files.discovery import default_root
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.stacks.choice import StackChoice
 from simscen.record.log_file import PARTIAL_SUFFIX
-from simscen.run.process.isolation import MAX_MEMORY_BYTES, innermost_frame, output_tail
+from simscen.run.process.captured_output import innermost_frame, output_tail
+from simscen.run.process.isolation import MAX_MEMORY_BYTES
 from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd
 
 MAX_RECOVER_BYTES = 64 << 20

@@ -7,20 +7,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from simscen.core.version import PACKAGE
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import prepare
+from simscen.run.process.job_transfer import PackedJob, SentFile, Unpacker, digest_of, pack
 from simscen.run.process.jobs import Job
-from simscen.run.process.ray_node import (
-    PACKAGE_FOLDER,
-    FileChunk,
-    JobQueue,
-    NodeRunner,
-    PackedJob,
-    SentFile,
-    Unpacker,
-    digest_of,
-    pack,
-)
+from simscen.run.process.ray_node import FileChunk, JobQueue, NodeRunner
 from simscen.run.simulate import simulate
 
 SCENARIO = """
@@ -90,8 +82,8 @@ def test_a_machine_without_the_files_gets_them_and_writes_the_same_log(job: Job,
 
 def test_files_of_simscen_are_read_from_the_package_on_each_machine(job: Job, tmp_path: Path) -> None:
     packed = pack(job, send)
-    assert job.scenario.robot.path.is_relative_to(PACKAGE_FOLDER)
-    assert not any(Path(path).is_relative_to(PACKAGE_FOLDER) for path in packed.files)
+    assert job.scenario.robot.path.is_relative_to(PACKAGE)
+    assert not any(Path(path).is_relative_to(PACKAGE) for path in packed.files)
     unpacked = Unpacker(tmp_path / "there", receive).unpack(packed, tmp_path / "run")
     assert unpacked.scenario.robot.path == job.scenario.robot.path
 
