@@ -4,6 +4,7 @@ import json
 import os
 import shlex
 import signal
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -78,13 +79,13 @@ def _existing_artifacts(folder: Path) -> Artifacts:
 
 
 def _stack_warnings(folder: Path) -> tuple[str, ...]:
-    """Return the distinct `warnings` of external stacks, which stack.json contains."""
+    """Return the distinct `warnings` of external stacks, which stack.json contains. Ignores incomplete files."""
     warnings: dict[str, None] = {}
     for file in sorted(folder.glob("stack*.json")):
-        given = json.loads(file.read_text(encoding="utf-8")).get("about", {}).get("warnings", [])
-        warnings.update(
-            dict.fromkeys(text for text in given if isinstance(text, str)) if isinstance(given, list) else {}
-        )
+        with suppress(ValueError):  # the worker was killed, or the disk was full
+            given = json.loads(file.read_text(encoding="utf-8")).get("about", {}).get("warnings", [])
+            if isinstance(given, list):
+                warnings.update(dict.fromkeys(text for text in given if isinstance(text, str)))
     return tuple(warnings)
 
 

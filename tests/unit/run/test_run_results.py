@@ -1,0 +1,40 @@
+"""Tests of the results of runs whose process ended early."""
+
+from pathlib import Path
+
+from simscen.loading.scenario import load_scenario
+from simscen.run.process.jobs import Job, ProcessEnd
+from simscen.run.sessions.results import finished_run
+
+SCENARIO = """\
+simscen: 1
+world: {simscen: 1}
+robot: {pose: {x: 1, y: 1}}
+time_limit: 1
+pass: [collisions: {max: 0}]
+"""
+
+
+def test_incomplete_description_of_a_stack_is_ignored(tmp_path: Path) -> None:
+    """The worker was killed, or its disk was full, while it wrote the file."""
+    file = tmp_path / "a.scenario.yaml"
+    file.write_text(SCENARIO)
+    loaded = load_scenario(file, tmp_path)
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (folder / "stack.a.json").write_text('{"about": {"warnings": ["no odome')
+    (folder / "stack.b.json").write_text('{"about": {"warnings": ["no lidar"]}}')
+    killed = ProcessEnd(
+        code=None,
+        signal=9,
+        killed_for="timeout",
+        final_message=None,
+        wall=60.0,
+        cpu=1.0,
+        peak_bytes=1,
+        left_processes=False,
+        output="",
+    )
+    run = finished_run(Job(0, loaded, loaded.key(1), folder, 60.0), killed)
+    assert run.result.error.kind == "timeout"
+    assert run.warnings == ("no lidar",)
