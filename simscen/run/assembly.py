@@ -74,7 +74,7 @@ def assemble(prepared: PreparedScenario, seed: int, stack_log: Path | None = Non
     directors = tuple(director for director in _directors(prepared, streams, robots) if director.has_disturbances)
     for stage in stages.values():
         stage.is_observed = bool(directors)
-    return RunSetup(simulation, tuple(robots.values()), directors, clock.period(spec.physics.truth_rate))
+    return RunSetup(simulation, tuple(robots.values()), directors)
 
 
 def _directors(

@@ -159,14 +159,12 @@ class RunSetup:
     robots: Sequence[RobotUnderTest]
     directors: Sequence[Director]
     """Directors, which start and end events and faults."""
-    truth_period: int
-    """Ticks between two samples of the true state."""
 
 
 def run_lockstep(setup: RunSetup) -> Event:
     """Simulate and log a run until it ends; return the event that ended it."""
     simulation, robots, directors = setup.simulation, setup.robots, setup.directors
-    time_limit_tick = robots[0].end_condition.time_limit_tick
+    truth_period, time_limit_tick = robots[0].truth_period, robots[0].end_condition.time_limit_tick
     while True:
         tick = simulation.tick
         for robot in robots:
@@ -174,7 +172,7 @@ def run_lockstep(setup: RunSetup) -> Event:
         for director in directors:
             director.process_beat()
 
-        may_end = tick % setup.truth_period == 0 or tick == time_limit_tick
+        may_end = tick % truth_period == 0 or tick == time_limit_tick
         for robot in robots:
             if robot.is_due:
                 robot.decide(tick)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
 
-from simscen.core.environment.costmap_filters import FilterMasks, MaskBlocks
+from simscen.core.environment.costmap_filters import FilterMasks
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.geometry import Pose2
@@ -232,10 +232,5 @@ def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()
         footprint=() if body is None else body.footprint,
         inscribed_radius=0.0 if body is None else inscribed_radius(body.radius, body.footprint),
         time_limit=criteria.spec.time_limit,
-        masks=masks_from_criteria(criteria),
+        masks=load_criterion_masks(criteria.masks, criteria.tree, criteria.library.texts),
     )
-
-
-def masks_from_criteria(criteria: LoadedCriteria) -> dict[str, MaskBlocks]:
-    """Load the filter masks that the criteria of a criteria file use, by path. Raises InvalidInput."""
-    return load_criterion_masks(criteria.masks, criteria.tree, criteria.library.texts)

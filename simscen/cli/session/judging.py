@@ -148,10 +148,10 @@ class LogJudge:
         """Return the costmap filter masks that the criteria use, by file."""
         if criteria is self._criteria and self._file_masks is not None:
             return self._file_masks
-        from simscen.run.preparation import masks_from_criteria
+        from simscen.loading.builders import load_criterion_masks
 
         with _scenario_errors(criteria):
-            masks = masks_from_criteria(criteria) if criteria.masks else {}
+            masks = load_criterion_masks(criteria.masks, criteria.tree, criteria.library.texts)
         self._file_masks = masks if criteria is self._criteria else self._file_masks
         return masks
 

@@ -71,16 +71,13 @@ class Answer:
     odometry: tuple[Odometry, ...] = ()
 
 
-def group_by_topic(messages: Messages, topic_names: dict[int, str]) -> MessagesByTopic:
-    """Return the messages of an answer by topic. `topic_names` has the names of topics by number.
-
-    Raises ProtocolViolation for an unknown number.
-    """
+def group_by_topic(messages: Messages) -> MessagesByTopic:
+    """Return the messages of an answer by topic. Raises ProtocolViolation for an unknown number of a topic."""
     found: MessagesByTopic = {}
     for number, data in messages:
-        if number not in topic_names:
+        if not 1 <= number <= len(STACK_TOPICS):
             raise ProtocolViolation(f"a message on topic number {number}, which does not exist")
-        found.setdefault(topic_names[number], []).append(data)
+        found.setdefault(STACK_TOPICS[number - 1].name, []).append(data)
     return found
 
 

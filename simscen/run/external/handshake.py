@@ -4,6 +4,7 @@ docs/reference/stack-protocol.md defines these frames.
 """
 
 import json
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,7 +16,7 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.version import __version__
 from simscen.peer import wire
 from simscen.record.topics import Topic
-from simscen.run.external.protocol import EXACT_SUFFIX, ProtocolViolation, TopicTable
+from simscen.run.external.protocol import EXACT_SUFFIX, STACK_TOPICS, ProtocolViolation
 from simscen.stack.protocols import RobotModel, Surroundings
 
 
@@ -50,15 +51,16 @@ class RunParameters:
 def hello_content(
     surroundings: Surroundings,
     parameters: RunParameters,
-    topic_table: TopicTable,
+    available: Mapping[str, Topic],
     sensor_topics: list[tuple[str, Topic]],
     zone_masks: list[dict[str, Any]],
     answer_limit: float,
 ) -> dict[str, Any]:
     """Return the content of HELLO.
 
-    `sensor_topics` are pairs of a sensor name and a topic with its readings. `zone_masks` describes the values of zone
-    masks (see `ZoneMasks.meanings`). `answer_limit` is the wall time in s that the stack may take for each answer.
+    `available` are the topics to which the stack can subscribe, by name. `sensor_topics` are pairs of a sensor name and
+    a topic with its readings. `zone_masks` describes the values of zone masks (see `ZoneMasks.meanings`).
+    `answer_limit` is the wall time in s that the stack may take for each answer.
     """
     masks = surroundings.masks
     sensor_of = {topic.name: sensor for sensor, topic in sensor_topics}
@@ -86,10 +88,10 @@ def hello_content(
         "zone_masks": zone_masks,
         "lidars": list(surroundings.lidars),
         "sensors": {name: _sensor_data(name, parameters) for name in parameters.sensors},
-        "says": [_topic_data(topic, topic_table.numbers[name], sensor_of) for name, topic in topic_table.sent.items()],
+        "says": [_topic_data(topic, number, sensor_of) for number, topic in enumerate(available.values(), start=1)],
         "hears": [
-            {"topic": name, "type": topic_table.accepted[name].type, "number": number}
-            for number, name in topic_table.accepted_by_number.items()
+            {"topic": topic.name, "type": topic.type, "number": number}
+            for number, topic in enumerate(STACK_TOPICS, start=1)
         ],
     }
 
@@ -187,8 +189,11 @@ class Welcome:
     first_answer_until: float = 0.0
 
     @classmethod
-    def parse(cls, kind: int, body: bytes, topic_table: TopicTable, mode: Mode = "navigate_to_pose") -> "Welcome":
-        """Parse the first frame of a stack. Raises Malformed or ProtocolViolation."""
+    def parse(cls, kind: int, body: bytes, available: Collection[str], mode: Mode = "navigate_to_pose") -> "Welcome":
+        """Parse the first frame of a stack. Raises Malformed or ProtocolViolation.
+
+        `available` are the names of the topics to which the stack can subscribe.
+        """
         if kind != wire.WELCOME:
             raise ProtocolViolation("its first frame is not a WELCOME")
         content = wire.from_json(body)
@@ -208,10 +213,9 @@ class Welcome:
         topics = content.get("topics", [])
         if not isinstance(topics, list) or not all(isinstance(topic, str) for topic in topics):
             raise ProtocolViolation("`topics` is not a list of names")
-        if unknown := [topic for topic in topics if topic not in topic_table.sent]:
+        if unknown := [topic for topic in topics if topic not in available]:
             raise ProtocolViolation(
-                f"it requests the topic `{unknown[0][:80]}`, which does not exist; "
-                f"available: {', '.join(topic_table.sent)}"
+                f"it requests the topic `{unknown[0][:80]}`, which does not exist; available: {', '.join(available)}"
             )
         return cls(
             name=_checked_text(content, "name"),

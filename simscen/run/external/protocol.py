@@ -4,9 +4,6 @@ ROS messages lose precision: headings become quaternions, and ranges become floa
 the values of the topic `NAME` in full precision. In one STEP or ANSWER, the n-th messages on both belong together.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-
 from simscen.record import topics
 from simscen.record.topics import Topic
 
@@ -33,31 +30,7 @@ STACK_TOPICS = (
     *(topics.GLOBAL_COSTMAP, topics.LOCAL_COSTMAP),
     *(topics.FILTERED_ODOMETRY, Topic(topics.FILTERED_ODOMETRY.name + EXACT_SUFFIX, FLOAT64_ARRAY)),
 )
-"""Topics on which a stack may publish."""
-
-
-@dataclass(frozen=True)
-class TopicTable:
-    """Topics of one run by name: `sent` to the stack, and `accepted` from it. Each of the two is numbered from 1."""
-
-    sent: Mapping[str, Topic]
-    accepted: Mapping[str, Topic]
-
-    @classmethod
-    def build(cls, sent: Iterable[Topic]) -> "TopicTable":
-        """Return the table with the topics `sent` to the stack. The stack may publish on STACK_TOPICS."""
-        return cls({topic.name: topic for topic in sent}, {topic.name: topic for topic in STACK_TOPICS})
-
-    @property
-    def numbers(self) -> dict[str, int]:
-        """Number of each topic that is sent to the stack, by name."""
-        return {name: number for number, name in enumerate(self.sent, start=1)}
-
-    @property
-    def accepted_by_number(self) -> dict[int, str]:
-        """Name of each topic that is accepted from the stack, by number."""
-        return dict(enumerate(self.accepted, start=1))
-
+"""Topics on which a stack may publish, numbered from 1 in messages."""
 
 TIMEOUT = "stack-timeout"
 """Kind of error: no answer within the limit of wall time."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +21,7 @@ from simscen.record.publishers.message_sinks import BatchWriter, Layouts
 from simscen.record.publishers.sensors import SensorPublisher
 from simscen.record.topics import Topic
 from simscen.record.trace_thinning import Thinning
-from simscen.run.external.protocol import EXACT_SUFFIX, FLOAT64_ARRAY, INITIAL_POSE, POSE2D, TopicTable
+from simscen.run.external.protocol import EXACT_SUFFIX, FLOAT64_ARRAY, INITIAL_POSE, POSE2D
 
 if TYPE_CHECKING:
     from simscen.peer.wire import Messages
@@ -63,20 +63,21 @@ class StepPublisher:
             covariance = np.diag(np.square(estimate.std)).ravel().tolist()
             self._latched.append((INITIAL_POSE, pack_pose(_FIRST_STAMP, Pose3.planar(estimate.pose), covariance)))
 
-    def topic_table(self) -> TopicTable:
-        """Return the table of all topics to and from the stack. Call it after all calls of `latch`."""
+    def available_topics(self) -> dict[str, Topic]:
+        """Return all topics to which the stack can subscribe, by name. Call it after all calls of `latch`."""
         sent: list[Topic] = []
         for _, topic in self.sensor_topics:
             sent += [topic, *_exact_topics(topic)]
-        known = dict.fromkeys(topic for topic, _ in self._latched)
-        return TopicTable.build([*sent, topics.TF, *known])
+        latched = [topic for topic, _ in self._latched]
+        return {topic.name: topic for topic in (*sent, topics.TF, *latched)}
 
-    def subscribe(self, topic_table: TopicTable, names: Collection[str]) -> None:
+    def subscribe(self, available: Iterable[str], names: Collection[str]) -> None:
         """Publish only the topics `names` from now on, and queue the latched messages on them.
 
-        `topic_table` is the result of `topic_table()`.
+        `available` are the names of the `available_topics`, which are numbered from 1 in messages.
         """
-        self._numbers, self._requested_topics = topic_table.numbers, frozenset(names)
+        self._numbers = {name: number for number, name in enumerate(available, start=1)}
+        self._requested_topics = frozenset(names)
         self._requested_sensors = {
             sensor
             for sensor, topic in self.sensor_topics

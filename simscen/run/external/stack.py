@@ -15,18 +15,12 @@ from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Decision
 from simscen.peer import wire
 from simscen.record import topics
+from simscen.record.topics import Topic
 from simscen.run.external import protocol
 from simscen.run.external.answer_decoder import Answer, decode_answer, group_by_topic
 from simscen.run.external.goal_tracker import GoalTracker
 from simscen.run.external.handshake import RunParameters, Welcome, goal_content, goal_data, hello_content
-from simscen.run.external.protocol import (
-    KEEPOUT_MASK,
-    KEEPOUT_ZONES,
-    SPEED_MASK,
-    SPEED_ZONES,
-    ProtocolViolation,
-    TopicTable,
-)
+from simscen.run.external.protocol import KEEPOUT_MASK, KEEPOUT_ZONES, SPEED_MASK, SPEED_ZONES, ProtocolViolation
 from simscen.run.external.publisher import StepPublisher
 from simscen.run.external.stack_process import StackProcess
 from simscen.run.external.zone_masks import ZoneMasks
@@ -65,7 +59,7 @@ class ExternalStack:
         self._publisher = StepPublisher(surroundings.tick_rate, parameters.sensors, parameters.mounts)
         self._zone_masks = ZoneMasks(surroundings, parameters.switchable_zones)
         self._process: StackProcess | None = None
-        self._topic_table = TopicTable.build(())
+        self._available_topics: dict[str, Topic] = {}
         self._welcome = Welcome()
         self._plan: Path | None = None
         self._decision = Decision(STOP)
@@ -89,12 +83,12 @@ class ExternalStack:
         ):
             publisher.latch(mask, topic)
         publisher.latch_robot(self._parameters.robot_description, estimate)
-        self._topic_table = publisher.topic_table()
+        self._available_topics = publisher.available_topics()
         self._process = StackProcess(self._name, self._command, self._log_file, self._parameters.robot_name)
         hello = hello_content(
             surroundings,
             self._parameters,
-            self._topic_table,
+            self._available_topics,
             publisher.sensor_topics,
             self._zone_masks.meanings,
             self._command.answer_limit,
@@ -106,10 +100,10 @@ class ExternalStack:
         assert self._process is not None
         kind, body = self._process.exchange(b"", self._command.start_limit, "answer to HELLO")
         try:
-            self._welcome = Welcome.parse(kind, body, self._topic_table, self._parameters.mode)
+            self._welcome = Welcome.parse(kind, body, self._available_topics, self._parameters.mode)
         except (ProtocolViolation, wire.Malformed) as error:
             raise self._process.error(protocol.PROTOCOL, f"the answer to HELLO: {error}") from error
-        self._publisher.subscribe(self._topic_table, self._welcome.topics)
+        self._publisher.subscribe(self._available_topics, self._welcome.topics)
         self._send(wire.GOAL, goal_content(estimate, goals, self._parameters))
         self._goals.start(goals)
 
@@ -216,13 +210,7 @@ class ExternalStack:
         if answered_tick != tick:
             raise ProtocolViolation(f"it answers tick {answered_tick} instead of {tick}")
         dead_reckoned = None if self._odometry is None else self._odometry.pose
-        answer = decode_answer(
-            group_by_topic(messages, self._topic_table.accepted_by_number),
-            tick,
-            self._time,
-            self._correction,
-            dead_reckoned,
-        )
+        answer = decode_answer(group_by_topic(messages), tick, self._time, self._correction, dead_reckoned)
         self._correction = answer.correction
         if is_command_due and answer.command is None:
             raise ProtocolViolation(f"no message on {topics.COMMAND.name}, though a command is due")

@@ -14,7 +14,7 @@ from simscen.peer.cdr import HEADER
 from simscen.run.external.answer_decoder import Answer, decode_answer
 from simscen.run.external.goal_tracker import GoalTracker
 from simscen.run.external.handshake import Welcome
-from simscen.run.external.protocol import STACK_TOPICS, ProtocolViolation, TopicTable
+from simscen.run.external.protocol import STACK_TOPICS, ProtocolViolation
 
 TIME = Clock(240)
 EXAMPLES = {
@@ -135,7 +135,7 @@ def test_any_event_is_accepted_or_refused_and_can_be_logged(said) -> None:
 def test_any_welcome_is_accepted_or_refused_and_can_be_logged(told) -> None:
     told.setdefault("protocol", 1)
     with suppress(ProtocolViolation, wire.Malformed):
-        welcome = Welcome.parse(wire.WELCOME, json.dumps(told).encode(), TopicTable.build([]))
+        welcome = Welcome.parse(wire.WELCOME, json.dumps(told).encode(), ())
         assert all(text.encode() is not None for text in welcome.facts.values())
 
 
@@ -169,4 +169,4 @@ def test_an_event_that_cannot_be_logged_is_refused(said: str) -> None:
 @pytest.mark.parametrize("told", ['{"protocol": 1, "name": "\\ud800"}', '{"protocol": 1, "about": {"x": NaN}}'])
 def test_a_welcome_that_cannot_be_logged_is_refused(told: str) -> None:
     with pytest.raises((ProtocolViolation, wire.Malformed)):
-        Welcome.parse(wire.WELCOME, told.encode(), TopicTable.build([]))
+        Welcome.parse(wire.WELCOME, told.encode(), ())
