@@ -153,16 +153,16 @@ def _prepare_robot(
         masks=load_masks(loaded),
         robot=robot,
         body=body,
-        stack=effective_stack(spec),
+        stack=_effective_stack(spec),
         start=start,
         estimate=initial_estimate(spec.only_robot, start),
-        case=with_shortest_paths(case, built, obstacles, find_legs),
+        case=_with_shortest_paths(case, built, obstacles, find_legs),
         obstacles=obstacles,
         plugins=plugins_of(loaded),
     )
 
 
-def with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh, find_legs: FindLegs) -> Case:
+def _with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh, find_legs: FindLegs) -> Case:
     """Return the case with the lengths of the shortest paths to its goals, and the narrow passages on these paths.
 
     The path to a goal starts at the previous goal that the robot is expected to reach, or at the initial pose.
@@ -200,7 +200,7 @@ def lidar_height(robot: RobotSpec) -> float:
     return heights[0] if heights else DEFAULT_LIDAR_HEIGHT_M
 
 
-def effective_stack(spec: ScenarioSpec) -> AnyStack:
+def _effective_stack(spec: ScenarioSpec) -> AnyStack:
     """Return the stack of a scenario. Without a map, dead reckoning replaces the default localizer AMCL."""
     stack = spec.stack
     if isinstance(stack, StackSpec) and spec.map == "none" and stack.localizer.needs_map:

@@ -19,10 +19,11 @@ from simscen.record.topics import Topic
 from simscen.run.external import protocol
 from simscen.run.external.answer_decoder import Answer, decode_answer, group_by_topic
 from simscen.run.external.goal_tracker import GoalTracker
-from simscen.run.external.handshake import RunParameters, Welcome, goal_content, goal_data, hello_content
+from simscen.run.external.handshake import RunParameters, goal_content, goal_data, hello_content
 from simscen.run.external.protocol import KEEPOUT_MASK, KEEPOUT_ZONES, SPEED_MASK, SPEED_ZONES, ProtocolViolation
 from simscen.run.external.publisher import StepPublisher
 from simscen.run.external.stack_process import StackProcess
+from simscen.run.external.welcome import Welcome
 from simscen.run.external.zone_masks import ZoneMasks
 from simscen.stack.protocols import Surroundings
 

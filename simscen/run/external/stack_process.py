@@ -158,19 +158,14 @@ class StackProcess:
         end = time.monotonic() + limit_s
         while not done():
             remaining = end - time.monotonic()
-            ready = self._poll.poll(max(0.0, remaining) * 1e3)
-            for descriptor, events in ready:
-                self._serve(descriptor, events)
+            for descriptor, events in self._poll.poll(max(0.0, remaining) * 1e3):
+                if events & select.POLLOUT:
+                    self._flush()
+                if events & ~select.POLLOUT and not self._readers[descriptor]():
+                    self._poll.unregister(descriptor)  # at its end
+                    del self._readers[descriptor]
             if remaining <= 0:
                 return
-
-    def _serve(self, descriptor: int, events: int) -> None:
-        """Write to or read from a descriptor with these poll events, and stop watching it at its end."""
-        if events & select.POLLOUT:
-            self._flush()
-        if events & ~select.POLLOUT and not self._readers[descriptor]():
-            self._poll.unregister(descriptor)
-            del self._readers[descriptor]
 
     def _flush(self) -> None:
         """Send as many queued bytes as the socket accepts."""

@@ -50,7 +50,8 @@ class ForkServer:
         self._selector.register(self._jobs, selectors.EVENT_READ)
         while True:
             self._send({"alive": True})
-            for key, _ in self._selector.select(self._select_timeout()):
+            deadlines = [child.deadline - time.monotonic() for child in self._children.values()]
+            for key, _ in self._selector.select(max(0.0, min([HEARTBEAT_S, *deadlines]))):
                 if key.fileobj == self._jobs:
                     if not self._start_job():
                         self._kill_all()
@@ -122,11 +123,6 @@ class ForkServer:
         del self._children[child.pid]
         kill_children_except(self._children)
         self._send(child.exit_message(status, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024))
-
-    def _select_timeout(self) -> float:
-        """Return the time in s until the next deadline of a worker, at most HEARTBEAT_S."""
-        deadlines = [child.deadline - time.monotonic() for child in self._children.values()]
-        return max(0.0, min([HEARTBEAT_S, *deadlines]))
 
     def _kill_all(self) -> None:
         for child in self._children.values():

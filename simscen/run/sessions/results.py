@@ -14,7 +14,6 @@ from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.judge.result_json import from_json
 from simscen.loading.files.discovery import default_root
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.stacks.choice import StackChoice
 from simscen.record.log_file import PARTIAL_SUFFIX
 from simscen.run.process.captured_output import innermost_frame, output_tail
 from simscen.run.process.isolation import MAX_MEMORY_BYTES
@@ -155,12 +154,9 @@ def repeat_command(scenario: LoadedScenario, seed: int) -> str:
     for folder in scenario.world_path:
         words += ["--world-path", display_path(folder)]
     if scenario.choice is not None:
-        words += ["--stack", _stack_option(scenario.choice)]
+        choice = scenario.choice
+        words += ["--stack", choice.written if choice.file is None else f"{choice.name}={display_path(choice.file)}"]
     return shlex.join([*words, *(["--lenient"] if scenario.lenient else [])])
-
-
-def _stack_option(choice: StackChoice) -> str:
-    return choice.written if choice.file is None else f"{choice.name}={display_path(choice.file)}"
 
 
 def display_path(path: Path) -> str:

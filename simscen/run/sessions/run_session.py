@@ -1,21 +1,20 @@
 """Run a session: plan the runs, execute them, and report exactly one result for each run."""
 
-import filecmp
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
-from simscen.core.errors import Exit, InvalidInput, UsageError
+from simscen.core.errors import Exit, UsageError
 from simscen.core.random_streams import MAX_SEED
-from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.records.run_result import RunFailure, RunKey
 from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import Listener, RunFinished, RunProgress, RunStarted
-from simscen.judge.result_json import from_json
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.run.process.jobs import Backend, Ended, Job, KeptLogs, Progressed, ReplayMode, Started
 from simscen.run.process.supervisor import Interrupted
+from simscen.run.sessions.log_comparison import compare_twins, compare_with_session
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.results import finished_run, skipped_run, unfinished_run
 
@@ -149,86 +148,8 @@ def delete_log(run: RunFinished) -> RunFinished:
     return replace(run, artifacts=replace(run.artifacts, mcap="", picture="", replay=""))
 
 
-def compare_twins(run: RunFinished, twin: RunFinished | None) -> RunFinished:
-    """Return `run`, or an error with the first difference if its log differs from the log of `twin`.
-
-    `twin` is an earlier run of the same session with the same scenario and seed. Without a twin, or if a log is
-    missing, nothing is compared.
-    """
-    if twin is None or not run.artifacts.mcap or not twin.artifacts.mcap:
-        return run
-    if filecmp.cmp(run.artifacts.mcap, twin.artifacts.mcap, shallow=False):
-        return run
-    from simscen.record.log_reader import read_log
-    from simscen.record.trace_difference import first_difference
-
-    logs = [read_log(Path(path)) for path in (twin.artifacts.mcap, run.artifacts.mcap)]
-    pairs = zip(*(log.traces for log in logs), strict=False)
-    difference = (
-        next((text for pair in pairs if (text := first_difference(*pair))), "")
-        or "the logs differ in something that is not part of the trace"
-    )
-    failure = RunFailure("nondeterministic", f"two runs with the same seed differ: {difference}")
-    return replace(run, result=replace(run.result, outcome=Outcome.ERROR, error=failure))
-
-
 def _unfinished_reason(was_started: bool, stopped: Exit | None) -> RunFailure:
     """Return why a run has no result. `stopped` is the exit code of an interrupted session, else None."""
     if was_started:
         return RunFailure("interrupted", "interrupted before it was finished")
     return RunFailure("not-run", "interrupted" if stopped else "another run did not pass (--fail-fast)")
-
-
-def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
-    """Return the run, or an error if it differs from the same run of an earlier session, or if that run is missing.
-
-    `earlier` is the output folder of that session. Verdicts must be equal, and trajectories nearly equal, because the
-    last bits differ between machines. A run that is an error or has no log is not compared.
-    """
-    if run.result.outcome is Outcome.ERROR or not run.artifacts.mcap:
-        return run
-    earlier_log = _folder(run, earlier) / "run.mcap"
-    try:
-        if earlier_log.read_bytes() == Path(run.artifacts.mcap).read_bytes():
-            return run
-        difference = _disagreement(Path(run.artifacts.mcap), earlier_log)
-    except OSError as error:
-        difference = f"{earlier_log}: {error.strerror}"
-    except InvalidInput as error:
-        difference = str(error)
-    if difference is None:
-        return run
-    failure = RunFailure("nondeterministic", f"not as in {earlier}: {difference}")
-    return replace(run, result=replace(run.result, outcome=Outcome.ERROR, error=failure))
-
-
-def _folder(run: RunFinished, earlier: Path) -> Path:
-    """Return the folder of the same run in an earlier session. Its name can contain the name of the stack."""
-    stack = run.result.stack.partition("=")[0]
-    labeled = run_folder(earlier, replace(run.key.original, stack_name=stack))
-    return labeled if not run.key.original.stack_name and labeled.is_dir() else run_folder(earlier, run.key.original)
-
-
-def _disagreement(new_path: Path, earlier_path: Path) -> str | None:
-    """Return the verdicts that differ in two logs, or else the first difference of true poses; None without both.
-
-    Raises InvalidInput for an unreadable log.
-    """
-    from simscen.record.log_reader import read_log
-    from simscen.record.trace_difference import first_pose_difference
-
-    new_log, earlier_log = read_log(new_path), read_log(earlier_path)
-    if not earlier_log.result or not new_log.result:
-        return f"{earlier_path}: the run did not finish"
-    statuses, earlier_statuses = (_statuses(from_json(log.result)) for log in (new_log, earlier_log))
-    changed = [name for name in {**earlier_statuses, **statuses} if statuses.get(name) != earlier_statuses.get(name)]
-    differences = [
-        f"{name}: {statuses.get(name, 'absent')} instead of {earlier_statuses.get(name, 'absent')}" for name in changed
-    ]
-    pairs = zip(new_log.traces, earlier_log.traces, strict=False)
-    return "; ".join(differences) or next((parts for pair in pairs if (parts := first_pose_difference(*pair))), None)
-
-
-def _statuses(result: RunResult) -> dict[str, str]:
-    """Return the status of each verdict by its id."""
-    return {verdict.id: verdict.status.value for verdict in result.verdicts}

@@ -13,8 +13,8 @@ from simscen.peer import messages, wire
 from simscen.peer.cdr import HEADER
 from simscen.run.external.answer_decoder import Answer, decode_answer
 from simscen.run.external.goal_tracker import GoalTracker
-from simscen.run.external.handshake import Welcome
 from simscen.run.external.protocol import STACK_TOPICS, ProtocolViolation
+from simscen.run.external.welcome import Welcome
 
 TIME = Clock(240)
 EXAMPLES = {
