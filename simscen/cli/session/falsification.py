@@ -144,7 +144,7 @@ class Falsification:
             by_key = {finished.key: finished for finished in finished_runs}
             ordered = [None if job is None else by_key[job.key] for job in jobs]
             self.finished_runs += [finished for finished in ordered if finished is not None]
-            self._search.tell(points, [_margin(finished) for finished in ordered])
+            self._search.tell([_margin(finished) for finished in ordered])
             for finished in ordered:
                 if finished is not None and stopped is None:
                     self._save_failure(finished)

@@ -104,7 +104,7 @@ class _SpeedMask:
         zones: tuple[tuple[Polygon, float], ...],
         surroundings: Surroundings,
     ) -> None:
-        self.grid, self._file, self._full_speed = grid, file, surroundings.robot.max_linear
+        self.grid, self._full_speed = grid, surroundings.robot.max_linear
         fastest = max((limit for _, limit in zones), default=0.0)
         self._percent = file is not None and file.percent
         self._base = 0.0 if file is None else file.base

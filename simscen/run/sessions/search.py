@@ -34,7 +34,7 @@ class Search(Protocol):
         """Return the next `count` points."""
         ...
 
-    def tell(self, points: Sequence[Point], margins: Sequence[float]) -> None:
+    def tell(self, margins: Sequence[float]) -> None:
         """Learn from the margins of the runs at the points that the last `ask` returned (nan: unknown)."""
         ...
 
@@ -66,7 +66,7 @@ class RandomSearch:
         """Return random points."""
         return [tuple(_clip(u) for u in row) for row in self._rng.random((count, self._dimensions)).tolist()]
 
-    def tell(self, points: Sequence[Point], margins: Sequence[float]) -> None:
+    def tell(self, margins: Sequence[float]) -> None:
         """Ignore the margins."""
 
 
@@ -84,7 +84,7 @@ class SobolSearch:
         rows = (np.concatenate([self._sequence.random(1) for _ in range(count)]) + self._shift) % 1.0
         return [tuple(_clip(u) for u in row) for row in rows.tolist()]
 
-    def tell(self, points: Sequence[Point], margins: Sequence[float]) -> None:
+    def tell(self, margins: Sequence[float]) -> None:
         """Ignore the margins."""
 
 
@@ -112,7 +112,7 @@ class TpeSearch:
         self._trials = [self._study.ask(self._distributions) for _ in range(count)]
         return [self._point(trial.params) for trial in self._trials]
 
-    def tell(self, points: Sequence[Point], margins: Sequence[float]) -> None:
+    def tell(self, margins: Sequence[float]) -> None:
         """Learn from the margins."""
         for trial, margin in zip(self._trials, margins, strict=True):
             if math.isnan(margin):

@@ -21,7 +21,7 @@ def runs_to_failure(search: Search, plant: Callable[[Array], Array], threshold: 
         failed = [number for number, margin in enumerate(margins, start=1) if margin < 0]
         if failed:
             return runs + failed[0]
-        search.tell(points, margins)
+        search.tell(margins)
         runs += 8
     return limit
 
@@ -43,7 +43,7 @@ def test_a_search_is_repeatable_and_stays_within_the_bounds(method: SearchMethod
         search, found = make_search(method, [0, 3, 0], 7), []
         for _ in range(6):
             batch = search.ask(8)
-            search.tell(batch, [math.nan, *(sum(point) for point in batch[1:])])
+            search.tell([math.nan, *(sum(point) for point in batch[1:])])
             found += batch
         return found
 

@@ -61,7 +61,7 @@ def first_failure(plant: Callable[[Array], Array], threshold: float, seed: int) 
         margins = [threshold - float(plant(np.array(point))) for point in points]
         if min(margins) < 0:
             return points[int(np.argmin(margins))]
-        search.tell(points, margins)
+        search.tell(margins)
 
 
 @pytest.mark.sample(1)
