@@ -10,7 +10,6 @@ import numpy as np
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.polylines import polyline_length
-from simscen.core.geometry.shapes import Solid
 from simscen.editor.checking import TextChecks
 from simscen.loading.checks.scene import Scene
 from simscen.loading.goals import scenario_goals
@@ -35,11 +34,11 @@ def preview_data(checks: TextChecks, text: str) -> dict[str, Any]:
     loaded = checks.load(text)
     if isinstance(loaded, list):
         return {"reason": _reason(loaded), "robots": {}}
-    first, robots = loaded[0], {}
     try:
-        for name, view in first.robot_views.items():
-            key = f"robots/{name}" if first.robots else "robot"
-            robots[key] = _robot_data(view, checks)
+        robots = {
+            f"robots/{name}" if loaded[0].robots else "robot": _robot_data(view, checks)
+            for name, view in loaded[0].robot_views.items()
+        }
     except InvalidInput as error:
         return {"reason": _reason(error.problems), "robots": {}}
     return {"reason": "", "robots": robots}
@@ -57,7 +56,9 @@ def _robot_data(loaded: LoadedScenario, checks: TextChecks) -> dict[str, Any]:
     scene = Scene(loaded, blocking_world(loaded, world), size, checks.cache)
     goals = scenario_goals(loaded.spec)[: len(loaded.spec.goals)]
     stops = [scene.start, *(goal.pose for goal in goals)]
-    solids = _static_solids(scene)
+    # Without immovable bodies, the tuple stays the same: the cache of shortest paths compares identities.
+    immovable = scene.immovable_bodies
+    solids = (*scene.world.solids, *immovable) if immovable else scene.world.solids
     paths = checks.cache.shortest_paths(solids, extend_bounds(world.bounds, stops), size.inscribed, scene.z_range)
     legs = [_leg(paths, *ends) for ends in list(pairwise(stops))[:MAX_LEGS]]
     return {
@@ -65,13 +66,6 @@ def _robot_data(loaded: LoadedScenario, checks: TextChecks) -> dict[str, Any]:
         "legs": legs,
         "clearances": [_clearance(paths, size, stop) for stop in stops],
     }
-
-
-def _static_solids(scene: Scene) -> tuple[Solid, ...]:
-    """Return the solids that block the robot: solids of the world, and immovable bodies."""
-    # Without such bodies, returns the same tuple: the cache of shortest paths compares identities.
-    immovable = scene.immovable_bodies
-    return (*scene.world.solids, *immovable) if immovable else scene.world.solids
 
 
 def _leg(paths: ShortestPaths, start: Pose2, goal: Pose2) -> dict[str, Any]:

@@ -101,7 +101,7 @@ class EditorSession:
         if self._opened.version != NEW:
             with suppress(InvalidInput, OSError):
                 self._opened = self._document.read()
-        return self._opened_data(self._opened)
+        return self._opened_data()
 
     def reload(self, _: Data) -> Data:
         """Read the file again, and return its text."""
@@ -109,7 +109,7 @@ class EditorSession:
             self._opened = self._document.read()
         except InvalidInput as error:
             raise RequestRefused(_first_message(error.problems)) from error
-        return self._opened_data(self._opened)
+        return self._opened_data()
 
     def scene(self, request: Data) -> Data:
         """Return the background and the objects of the map.
@@ -214,8 +214,9 @@ class EditorSession:
         except EditRefused as error:
             raise RequestRefused(str(error), 422) from error
 
-    def _opened_data(self, content: Content) -> Data:
+    def _opened_data(self) -> Data:
         """Return the answer to `open` and `reload`."""
+        content = self._opened
         return {
             "name": self.file.display_name,
             "kind": self.file.kind,

@@ -45,12 +45,15 @@ def command() -> None:
     Exit code 0: all checks passed; 3: a check failed.
     """
     passed = True
+    width = max(40, shutil.get_terminal_size((80, 24)).columns)
     for name, check in checks():
         try:
             sign, result = "✓", check()
         except CheckFailed as failure:
             passed, sign, result = False, "✗", str(failure)
-        print_text(_line(sign, name, escaped(result)))
+        indents = f"  {sign} {name:10} ", " " * RESULT_COLUMN
+        wrapper = textwrap.TextWrapper(width, *indents, break_long_words=False, break_on_hyphens=False)
+        print_text(wrapper.fill(escaped(result)))
         sys.stdout.flush()
     sys.exit(Exit.PASSED if passed else Exit.INCOMPLETE)
 
@@ -70,14 +73,6 @@ def checks() -> Iterator[Check]:
     yield "stacks", check_stacks
     yield "run", check_run
     yield "speed", check_speed
-
-
-def _line(sign: str, name: str, result: str) -> str:
-    """Return the printed lines of one check, wrapped to the width of the terminal. `sign` is ✓ or ✗."""
-    width = max(40, shutil.get_terminal_size((80, 24)).columns)
-    first = f"  {sign} {name:10} "
-    wrapper = textwrap.TextWrapper(width, first, " " * RESULT_COLUMN, break_long_words=False, break_on_hyphens=False)
-    return wrapper.fill(result)
 
 
 def check_cache() -> str:

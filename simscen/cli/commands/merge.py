@@ -33,13 +33,6 @@ def command(
     Exit code as for `simscen run`: 0: all passed; 1: a criterion failed; 2: a folder is not an output folder, still in
     use, or does not match the others, or a shard is missing; 3: a run was not completed.
     """
-    folder = _merge(shards, allow_missing, out)
-    Reports(folder, junit, junit_family.value).begin()
-    write_reports(read_journal(folder), folder, junit, junit_family, format_, only_junit=False)
-
-
-def _merge(shards: list[Path], allow_missing: bool, out: Path) -> Path:
-    """Write the journal and the run folders of all shards to a new folder. Raises UsageError and InvalidInput."""
     sessions = read_shards(shards, allow_missing)
     for shard in shards:
         require_unlocked(shard)
@@ -48,4 +41,5 @@ def _merge(shards: list[Path], allow_missing: bool, out: Path) -> Path:
         merge_shards(sessions, folder, RUNS_FOLDER)
     except OSError as error:
         raise UsageError(f"cannot write {folder}: {error.strerror}") from error
-    return folder
+    Reports(folder, junit, junit_family.value).begin()
+    write_reports(read_journal(folder), folder, junit, junit_family, format_, only_junit=False)

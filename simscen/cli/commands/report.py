@@ -42,18 +42,13 @@ def command(
     require_unlocked(folder)
     past = read_journal(folder)
     if parquet is not None:
-        _write_tables(past, parquet)
+        try:
+            files = write_parquet(parquet, past.runs, {run.key: run.varied for run in past.planned})
+        except OSError as error:
+            raise UsageError(f"cannot write to {parquet}: {error.strerror or error}") from error
+        for file in files:
+            print_text(f"wrote {escaped(str(file))}", sys.stderr)  # stdout may be JSON
     write_reports(past, folder, junit, junit_family, format_, only_junit=junit is not None)
-
-
-def _write_tables(past: JournaledSession, target: Path) -> None:
-    """Write the results as Parquet tables. Raises UsageError if that fails."""
-    try:
-        files = write_parquet(target, past.runs, {run.key: run.varied for run in past.planned})
-    except OSError as error:
-        raise UsageError(f"cannot write to {target}: {error.strerror or error}") from error
-    for file in files:
-        print_text(f"wrote {escaped(str(file))}", sys.stderr)  # stdout may be JSON
 
 
 def write_reports(
@@ -73,9 +68,8 @@ def write_reports(
         for finished in finished_runs:
             output(finished)
         comparison = compare_stacks((finished.result for finished in finished_runs), past.stacks)
-        study = (
-            None if past.study is None else evaluate_study(past.study, (finished.result for finished in finished_runs))
-        )
+        results = (finished.result for finished in finished_runs)
+        study = None if past.study is None else evaluate_study(past.study, results)
         written = reports.write(finished_runs, comparison, study)
         output(reports.finished_event(finished_runs, past.wall, past.interrupted, comparison, study))
     if format_ is Format.TEXT:

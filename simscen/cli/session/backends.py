@@ -35,7 +35,7 @@ def interrupt_on_signals(clock: Callable[[], float] = time.monotonic) -> Iterato
             first.append(clock())
             raise Interrupted(number)
         if clock() - first[0] > REPEATED_SIGNAL_S:
-            exit_at_once(number)
+            _exit_at_once(number)
 
     handled = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
@@ -51,7 +51,7 @@ def interrupt_on_signals(clock: Callable[[], float] = time.monotonic) -> Iterato
                 signal.signal(number, handler)
 
 
-def exit_at_once(number: int) -> None:
+def _exit_at_once(number: int) -> None:
     """Show the cursor of the terminal, and exit immediately with the exit code of signal `number`."""
     if os.isatty(1):
         os.write(1, SHOW_CURSOR + b"\n")
@@ -61,9 +61,6 @@ def exit_at_once(number: int) -> None:
 
 FORK_SERVER = ("-m", "simscen.cli.session.fork_server_main")
 """Arguments of Python that start the fork server, the process from which runs are forked."""
-
-DEFAULT_CLUSTER = "auto"
-"""Address with which Ray uses the environment variable RAY_ADDRESS, or else the cluster of this machine."""
 
 
 class BackendName(str, Enum):
@@ -99,8 +96,8 @@ def workers_and_cluster(jobs: int | None, backend: BackendName, address: str | N
         from simscen.run.process.ray_backend import cluster_cpus
     except ModuleNotFoundError:
         raise UsageError("--backend ray needs Ray; install it with: pip install ray") from None
-    cpus = cluster_cpus(address or DEFAULT_CLUSTER)
-    return jobs or cpus, address or DEFAULT_CLUSTER
+    cluster = address or "auto"  # with "auto", Ray uses RAY_ADDRESS, or else the cluster of this machine
+    return jobs or cluster_cpus(cluster), cluster
 
 
 def backend_of(options: SessionOptions) -> Backend:

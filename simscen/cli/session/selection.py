@@ -105,9 +105,7 @@ def scenario_times(folders: Sequence[Path]) -> dict[str, float]:
 
     `folders` are output folders of earlier sessions. Raises InvalidInput if a folder has no journal.
     """
-    from simscen.report.journal_reader import (
-        read_journal,  # light commands, which also select scenarios, do not need it
-    )
+    from simscen.report.journal_reader import read_journal  # not needed by light commands
 
     wall_times = defaultdict(list)
     for folder in folders:
@@ -163,7 +161,7 @@ def load_selection(
     named = {path.absolute() for path in paths if not is_folder(path)}
     for file, choice in product(discover(paths, root_folder), choices):
         variations, found = checker.check_scenario(file, choice, selection.variation_numbers)
-        if choice is not None and file not in named and (reason := stack_limitation(choice, found)):
+        if choice is not None and file not in named and (reason := _stack_limitation(choice, found)):
             variations, found = checker.check_scenario(file, None, selection.variation_numbers)
             variations = [one.as_skipped(choice, reason) for one in variations]
         for scenario in variations:
@@ -172,15 +170,14 @@ def load_selection(
         problems.update(dict.fromkeys(found))
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(relative_to_working_folder(problems, root_folder))
-    unique = select_variations([with_stacks[0] for with_stacks in loaded.values()], selection.variations)
+    unique = _select_variations([with_stacks[0] for with_stacks in loaded.values()], selection.variations)
     selected = scenarios_of_shard(select(unique, selection.keyword, selection.tags), *selection.shard, selection.times)
     relevant = dict.fromkeys(warning for one in selected for warning in warnings[one.id])
-    return [scenario for one in selected for scenario in loaded[one.title]], relative_to_working_folder(
-        relevant, root_folder
-    )
+    scenarios = [scenario for one in selected for scenario in loaded[one.title]]
+    return scenarios, relative_to_working_folder(relevant, root_folder)
 
 
-def stack_limitation(choice: StackChoice, problems: Sequence[Problem]) -> str:
+def _stack_limitation(choice: StackChoice, problems: Sequence[Problem]) -> str:
     """Return why a stack cannot run a scenario with these problems; "" without such an error, or with other errors."""
     errors = [problem for problem in problems if problem.severity == "error"]
     if not errors or any(problem.code != UNSUPPORTED_BY_STACK for problem in errors):
@@ -189,7 +186,7 @@ def stack_limitation(choice: StackChoice, problems: Sequence[Problem]) -> str:
     return f"--stack {choice.name} cannot run it: {first.place}: {first.message}"
 
 
-def select_variations(scenarios: list[LoadedScenario], names: Sequence[str]) -> list[LoadedScenario]:
+def _select_variations(scenarios: list[LoadedScenario], names: Sequence[str]) -> list[LoadedScenario]:
     """Return the variations with one of these names; all for no names. Raises NothingSelected for an unknown name."""
     known = dict.fromkeys(one.variation for one in scenarios if one.variation)
     if missing := [name for name in names if name not in known]:

@@ -1,6 +1,7 @@
 """Background of the editor's map: a ROS map as an image, or an SDF world as lines."""
 
 import base64
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
@@ -47,18 +48,11 @@ class Backgrounds:
         if not files:
             return {"id": "", "bounds": None}
         if self._cached_files != files:
-            self._cached = {"id": str(hash(files)), "bounds": None, **self._image_or_segments(source)}
+            self._cached = {"id": str(hash(files)), "bounds": None}
+            with suppress(InvalidInput):  # `validate` reports it
+                self._cached |= _image_part(load_map(source.map)) if source.map else self._segments_part(source)
             self._cached_files = files
         return self._cached
-
-    def _image_or_segments(self, source: LoadedWorld) -> dict[str, Any]:
-        """Return the background without `id`; {} for an invalid world."""
-        try:
-            if source.map is not None:
-                return _image_part(load_map(source.map))
-            return self._segments_part(source)
-        except InvalidInput:
-            return {}  # `validate` reports it
 
     def _segments_part(self, source: LoadedWorld) -> dict[str, Any]:
         """Return `bounds` and `segments` of an SDF world; {} for a world without solids."""
