@@ -27,7 +27,7 @@ from simscen.reconstruction.drive.recorded_drive import (
 )
 from simscen.record import topics
 from simscen.record.foreign.raw_messages import UnusableLog, is_simscen_log, unusable_log_as_invalid_input
-from simscen.record.foreign.transforms import TransformTree, is_upside_down, lidar_mount
+from simscen.record.foreign.transforms import TransformTree, UnknownTransform, is_upside_down, lidar_mount
 from simscen.record.messages.decode import ScanMessage, StampedPose
 
 BASE_FRAMES = ("base_link", "base_footprint")
@@ -172,13 +172,14 @@ class _DriveReader:
     def _poses_of_tf(self, outer: str, inner: str) -> TimedValues | None:
         """Return the poses x, y, yaw of the frame `inner` in `outer`; None if /tf does not contain the transform."""
         try:
-            found = self._transforms.between(outer, inner)
+            stamped, poses = self._transforms.between(outer, inner)
+        except UnknownTransform:
+            return None
         except UnusableLog as error:
             self._notes.append(f"tf {outer}:{inner} is not used: {error}")
             return None
-        if isinstance(found, str) or len(found[1]) < MIN_POSES:
+        if len(poses) < MIN_POSES:
             return None
-        stamped, poses = found
         times = (stamped.stamps - self._stamp_start) / NS_PER_SECOND
         order = np.argsort(times, kind="stable")
         planar = np.array([Pose3(*pose).plane for pose in poses[order].tolist()])

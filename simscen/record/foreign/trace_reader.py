@@ -23,6 +23,7 @@ from simscen.record.foreign.tracks import (
     track_from_topic,
     velocity_from_poses,
 )
+from simscen.record.foreign.transforms import UnknownTransform
 from simscen.record.messages.decode import POSE_DECODERS
 from simscen.record.trace_builder import TraceRows, to_planar
 
@@ -85,11 +86,11 @@ class ForeignTraceReader:
         frames = self._options.frames
         if frames is None:
             return self._track("truth", Evidence.TRUTH, Evidence.VELOCITY)
-        track = track_from_tf(*frames, self._decoded, self._options)
-        if isinstance(track, str):
-            self.missing |= dict.fromkeys((Evidence.TRUTH, Evidence.VELOCITY), track)
+        try:
+            return track_from_tf(*frames, self._decoded, self._options)
+        except UnknownTransform as error:
+            self.missing |= dict.fromkeys((Evidence.TRUTH, Evidence.VELOCITY), str(error))
             return None
-        return track
 
     def _track(self, role: str, *evidence: Evidence) -> Track | None:
         """Return the track (poses over time) of a role. If it has no messages, add `evidence` to `missing`."""

@@ -79,16 +79,13 @@ def track_from_topic(topic: str, messages: Sequence[tuple[int, StampedPose]], op
     )
 
 
-def track_from_tf(outer: str, inner: str, decoded: DecodedMessages, options: ForeignLogOptions) -> Track | str:
-    """Return the track of the frame `inner` in the frame `outer` from tf, or the reason why it is unknown."""
+def track_from_tf(outer: str, inner: str, decoded: DecodedMessages, options: ForeignLogOptions) -> Track:
+    """Return the track of the frame `inner` in the frame `outer` from tf. Raises UnknownTransform."""
     tree = TransformTree()
     for role in ("tf_static", "tf"):
         for logged, links in decoded.by_role[role]:
             tree.add(logged, links, is_static=role == "tf_static")
-    result = tree.between(outer, inner)
-    if isinstance(result, str):
-        return result
-    times, poses = result
+    times, poses = tree.between(outer, inner)
     covariances = np.tile(NO_COVARIANCE, (len(poses), 1))
     stamped = None if options.clock == "log" or not times.stamps.any() else times
     return Track(times.topic, outer, times.logged, stamped, poses, covariances, None)

@@ -9,6 +9,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose3
 from simscen.core.records.trace import Ticks
+from simscen.record.foreign.raw_messages import UnusableLog
 from simscen.record.foreign.timebase import StampedMessages
 from simscen.record.messages.decode import StampedPose
 
@@ -22,6 +23,10 @@ class _Link:
     stamps: list[int] = field(default_factory=list)
     poses: list[tuple[float, ...]] = field(default_factory=list)
     is_static: bool = False
+
+
+class UnknownTransform(UnusableLog):
+    """Transform between two frames that tf does not contain. The message states the reason."""
 
 
 class TransformTree:
@@ -43,18 +48,16 @@ class TransformTree:
             link.stamps.append(transform.stamp)
             link.poses.append(transform.pose)
 
-    def between(self, outer: str, inner: str) -> tuple[StampedMessages, Array] | str:
-        """Return times and poses (n, 7) of the frame `inner` in `outer`, or the reason why they are unknown.
+    def between(self, outer: str, inner: str) -> tuple[StampedMessages, Array]:
+        """Return times and poses (n, 7) of the frame `inner` in `outer`. Raises UnknownTransform, or UnusableLog.
 
         Each message of the dynamic transform nearest to `inner` yields one pose. Other transforms are not interpolated:
         they have the value of their latest message.
         """
         chain = self._chain(outer, inner)
-        if isinstance(chain, str):
-            return chain
         moving = next((link for link in chain if not link.is_static), None)
         if moving is None:
-            return f"tf between {outer} and {inner} never changes"
+            raise UnknownTransform(f"tf between {outer} and {inner} never changes")
         times = np.array(moving.stamps, dtype=np.int64)
         begin = max(min(link.stamps) for link in chain if not link.is_static)
         is_connected = times >= begin
@@ -62,19 +65,20 @@ class TransformTree:
         for link in chain:
             poses = _compose(_latest_poses(link, times[is_connected]), poses)
         if not is_connected.any():
-            return f"tf never connects {outer} and {inner} at the same time"
+            raise UnknownTransform(f"tf never connects {outer} and {inner} at the same time")
         logged = np.array(moving.logged, dtype=np.int64)[is_connected]
         return StampedMessages(f"tf {outer}:{inner}", logged, times[is_connected]), poses
 
-    def _chain(self, outer: str, inner: str) -> list[_Link] | str:
-        """Return the transforms from `inner` up to `outer`, or the reason why the frames are not connected."""
+    def _chain(self, outer: str, inner: str) -> list[_Link]:
+        """Return the transforms from `inner` up to `outer`. Raises UnknownTransform if they are not connected."""
         chain: list[_Link] = []
         frame = inner
         while frame != outer:
             link = self._links.get(frame)
             if link is None or link in chain:
                 frames = sorted({*self._links, *(link.parent for link in self._links.values())})
-                return f"tf does not connect {outer} with {inner}; frames: {', '.join(frames) or 'none'}"
+                listed = ", ".join(frames) or "none"
+                raise UnknownTransform(f"tf does not connect {outer} with {inner}; frames: {listed}")
             chain.append(link)
             frame = link.parent
         return chain

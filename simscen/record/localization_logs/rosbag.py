@@ -51,10 +51,7 @@ class _Messages:
 
     def between(self, outer: str, inner: str) -> list[LoggedMessage]:
         """Return the poses of the frame `inner` in `outer` as messages. Raises UnusableLog if the poses are unknown."""
-        result = self.transforms.between(outer, inner)
-        if isinstance(result, str):
-            raise UnusableLog(result)
-        times, poses = result
+        times, poses = self.transforms.between(outer, inner)
         return [
             (logged, self.tf_indices[logged], StampedPose(stamp, outer, tuple(pose), child=inner))
             for logged, stamp, pose in zip(times.logged.tolist(), times.stamps.tolist(), poses.tolist(), strict=True)
