@@ -90,7 +90,7 @@ def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, 
     reach = max((wheel.radius for wheel in body.wheels), default=0.0)
     if has_no_drivable_solids(solids, reach):
         return solids
-    from simscen.sim.body.robot_body import compute_climb_limits
+    from simscen.sim.body.climb_limits import compute_climb_limits
     from simscen.worlds.geometry.drive_obstacles import drive_obstacles
 
     return drive_obstacles(solids, reach, *compute_climb_limits(body))

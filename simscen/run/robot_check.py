@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from simscen.model.robot import Drive, Mecanum, SkidSteer
 from simscen.run.robot_trials import RestingState, Trial, run_trials
-from simscen.sim.body.robot_body import ClimbLimits, RobotBody, compute_climb_limits
+from simscen.sim.body.climb_limits import ClimbLimits, compute_climb_limits
+from simscen.sim.body.robot_body import RobotBody
 
 MAX_REST_TILT_RAD, MAX_REST_HEIGHT_M, MAX_REST_DRIFT_M = math.radians(1.0), 0.002, 0.001
 """Largest values at rest: tilt, distance of the wheels from the ground, and drift in a second."""

@@ -69,7 +69,7 @@ def goals_without_route(scene: Scene) -> Iterator[CheckProblem]:
 def _ramp_hint(scene: Scene) -> str:
     """Return the hint that a tilted solid on the way could be a ramp, and which slopes the robot can climb."""
     from simscen.loading.builders import load_robot
-    from simscen.sim.body.robot_body import compute_climb_limits
+    from simscen.sim.body.climb_limits import compute_climb_limits
 
     slope = math.degrees(compute_climb_limits(load_robot(scene.loaded)[1]).slope)
     climbs = f"climbs slopes up to {slope:.1f}°" if slope else "cannot climb slopes"

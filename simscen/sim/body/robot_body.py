@@ -1,17 +1,11 @@
-"""Rigid-body model of a robot, independent of the physics engine: hull, wheels, masses, and climbing limits.
-
-The climbing limits are valid for slow driving. Sources: Bekker, Introduction to Terrain-Vehicle Systems, 1969; Wong,
-Theory of Ground Vehicles, chapters 2 and 4.
-"""
+"""Rigid-body model of a robot, independent of the physics engine: hull, wheels, and masses."""
 
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Polygon, Pose3, Vector
 from simscen.core.geometry.polygons import polygon_contains
@@ -23,8 +17,6 @@ from simscen.sim.body.undercarriage import (
     Wheel,
     add_casters,
     add_motors,
-    caster_gap,
-    casters_for_uneven_ground,
     wheel_guards,
 )
 
@@ -158,71 +150,3 @@ def check_robot_size(body: RobotBody, file: Path | None) -> None:
         message = f"robot {body.name!r} reaches {farthest:.4g} m from its base, more than {MAX_EXTENT_M:g} m"
         hint = "are lengths in millimeters? they are in meters here"
         raise InvalidInput([Problem(str(file or body.name), 0, 0, "SC402", message, hint)])
-
-
-MAX_SLOPE_DEG, SLOPE_STEP_DEG = 50.0, 0.1
-"""Steepest slope that `approach_angle` examines, and the difference between two examined slopes."""
-
-
-class ClimbLimits(NamedTuple):
-    """Steepest slope in rad and highest step in m that a robot can climb.
-
-    Both are 0 for omnidirectional and mecanum drives.
-    """
-
-    slope: float
-    step: float
-
-
-def compute_climb_limits(body: RobotBody, friction: float = 1.0) -> ClimbLimits:
-    """Return the climbing limits that follow from the hull, the motors, and the friction coefficient of the wheels."""
-    wheels = [wheel for wheel in body.wheels if wheel.is_driven and wheel.stall_torque > 0]
-    if not wheels:
-        return ClimbLimits(0.0, 0.0)
-    pull = sum(wheel.stall_torque / wheel.radius for wheel in wheels) / (body.mass * GRAVITY_M_S2)
-    slope = min(approach_angle(body), grip_angle(body, friction), math.asin(min(1.0, pull)))
-    return ClimbLimits(slope, min(wheel.radius for wheel in wheels) * (1 - 1 / math.hypot(1.0, friction)))
-
-
-def grip_angle(body: RobotBody, friction: float) -> float:
-    """Return the slope θ in rad above which the wheels spin: tan θ = μ · (weight on driven wheels / total weight).
-
-    The ratio includes the weight that shifts to a caster behind the axle on a slope.
-    """
-    x, z = (float(body.chassis.center[axis]) for axis in (0, 2))
-    ground_casters = [caster.pose.x for caster in body.casters if not caster_gap(caster)]
-    if not ground_casters:
-        return math.atan(friction * _driven_weight_ratio(body))
-    chassis_ratio = body.chassis.mass / body.mass
-    span = abs(ground_casters[0])
-    level = 1.0 - chassis_ratio * abs(x) / span
-    # tan θ = μ (level - chassis_ratio z tan θ / span), if the caster is behind the axle.
-    return math.atan(friction * level / (1.0 + friction * chassis_ratio * z / span))
-
-
-def _driven_weight_ratio(body: RobotBody) -> float:
-    """Return the weight on the driven wheels divided by the total weight, on level ground and without casters."""
-    driven = [wheel.x for wheel in body.wheels if wheel.is_driven]
-    idle = [wheel.x for wheel in body.wheels if not wheel.is_driven]
-    if not idle:
-        return 1.0
-    driven_x, idle_x = sum(driven) / len(driven), sum(idle) / len(idle)
-    center = float(body.chassis.center[0]) * body.chassis.mass + sum(w.x * w.inertia.mass for w in body.wheels)
-    return min(1.0, max(0.0, (idle_x - center / body.mass) / (idle_x - driven_x)))
-
-
-def approach_angle(body: RobotBody) -> float:
-    """Return the slope in rad of the flattest ramp that touches the hull when the front wheels are at its foot.
-
-    Raised casters count as hull. Returns the steepest examined slope if no ramp touches the hull.
-    """
-    foremost = max(body.wheels, key=lambda wheel: wheel.x)
-    raised = [c for c in casters_for_uneven_ground(body.casters) if caster_gap(c) > 0 and c.pose.x > foremost.x]
-    points = np.concatenate([solid.pose.apply(hull_points(solid.shape)) for solid in body.hull])
-    corners = [(x - foremost.x, z, 0.0) for x, _, z in points.tolist() if x > foremost.x]
-    corners += [(c.pose.x - foremost.x, c.pose.z, c.shape.radius) for c in raised if isinstance(c.shape, Sphere)]
-    radius = foremost.radius
-    slopes = np.radians(np.arange(0.0, MAX_SLOPE_DEG, SLOPE_STEP_DEG))
-    is_clear = [-x * np.sin(slopes) + (z - radius) * np.cos(slopes) >= size - radius for x, z, size in corners]
-    touches = ~np.logical_and.reduce(is_clear) if is_clear else np.zeros(len(slopes), np.bool_)
-    return float(slopes[np.argmax(touches)]) if touches.any() else float(slopes[-1])

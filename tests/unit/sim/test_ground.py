@@ -9,8 +9,8 @@ from simulation_helpers import box, robot_spec
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, Box, Mesh, Solid
+from simscen.sim.body.climb_limits import compute_climb_limits, grip_angle
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.body.robot_body import compute_climb_limits, grip_angle
 from simscen.worlds.geometry.drive_obstacles import drive_obstacles
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.world_file import ramp_solid

@@ -7,8 +7,9 @@ from simulation_helpers import robot_spec
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
+from simscen.sim.body.climb_limits import compute_climb_limits
 from simscen.sim.body.from_spec import build_robot_body
-from simscen.sim.body.robot_body import add_payload, center_of_mass, compute_climb_limits, is_stable, scale_motor_torque
+from simscen.sim.body.robot_body import add_payload, center_of_mass, is_stable, scale_motor_torque
 from simscen.worlds.world_file import ramp_solid
 
 TICKS, GRAVITY_M_S2 = 240, 9.81
