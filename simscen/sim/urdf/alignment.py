@@ -8,7 +8,7 @@ import numpy as np
 from simscen.core.errors import Problem
 from simscen.model.robot import Drive
 from simscen.sim.body.outline import hull_points
-from simscen.sim.urdf.elements import LinkTree
+from simscen.sim.urdf.link_tree import LinkTree
 from simscen.sim.urdf.wheels import WheelJoint, select_wheels
 
 ALIGNMENT_CODE = "SC405"

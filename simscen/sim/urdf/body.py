@@ -15,7 +15,8 @@ from simscen.sim.body.inertia import MassProperties, combine
 from simscen.sim.body.outline import hull_points
 from simscen.sim.body.robot_body import MIN_GROUND_CLEARANCE_M, RobotBody, assemble_body
 from simscen.sim.body.undercarriage import Wheel, wheel_inertia
-from simscen.sim.urdf.elements import LinkTree, MeshReader, MeshSource, build_tree
+from simscen.sim.urdf.elements import MeshReader, MeshSource
+from simscen.sim.urdf.link_tree import LinkTree, build_tree
 from simscen.sim.urdf.wheels import WheelJoint, check_front_steering, describe_wheels, examine_joints, select_wheels
 from simscen.sim.urdf.xacro.expand import UnknownArgument, expand
 from simscen.sim.urdf.xml_source import URDF_ERROR_CODE, RobotFiles, read_xml

@@ -24,7 +24,8 @@ from simscen.model.robot import (
 )
 from simscen.sim.body.robot_body import hull_height
 from simscen.sim.urdf.body import body_from_tree, read_tree
-from simscen.sim.urdf.elements import LinkTree, MeshReader
+from simscen.sim.urdf.elements import MeshReader
+from simscen.sim.urdf.link_tree import LinkTree
 from simscen.sim.urdf.wheels import WheelJoint, check_front_steering, describe_wheels, examine_joints
 
 AXLE_TOLERANCE_M = 0.02

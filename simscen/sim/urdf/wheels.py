@@ -11,7 +11,8 @@ from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Cylinder, Mesh, Solid, Sphere
 from simscen.model.robot import Ackermann, Differential, Drive, Omnidirectional
 from simscen.sim.body.outline import hull_points
-from simscen.sim.urdf.elements import Joint, LinkTree
+from simscen.sim.urdf.elements import Joint
+from simscen.sim.urdf.link_tree import LinkTree
 
 MIN_AXIS_COSINE = 0.99
 """Smallest cosine of the angle between two axes that count as parallel (8 degrees)."""
