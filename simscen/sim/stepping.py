@@ -188,7 +188,7 @@ class Stepper:
     def change(self) -> Iterator[None]:
         """Context in which an object is added, removed, or moved, or a robot is placed."""
         for robot in self._robots:
-            robot.sampler.compute_deferred()
+            robot.compute_deferred()
         yield
         self._activate_actors(moved=0.0)
         for robot in self._robots:

@@ -151,8 +151,7 @@ def _watch_parts(watch: Stopwatch, setup: RunSetup, listeners: Sequence[MomentSi
     (agent,) = setup.robots
     watch.watch("physics", setup.simulation, "step")
     watch.watch("physics", agent.robot, "drive")
-    watch.watch("truth and contacts", agent.robot, "truth", "sample", "collisions")
-    watch.watch("truth and contacts", agent.robot.sampler, "compute_deferred")
+    watch.watch("truth and contacts", agent.robot, "truth", "sample", "collisions", "compute_deferred")
     watch.watch("sensors", agent.sensors, "read")
     if isinstance(agent.stack, CheckedStack) and isinstance(agent.stack.inner, ReferenceStack):
         for name, component, methods in agent.stack.inner.components:

@@ -20,10 +20,12 @@ from simscen.sim.contact.collisions import BodyMotion, CollisionTracker, Contact
 from simscen.sim.objects.actors import NEVER
 from simscen.sim.objects.proximity import ProximityQuery
 from simscen.sim.robots.drive_factory import build_drive
-from simscen.sim.robots.robot_state import RobotState, TruthSampler
+from simscen.sim.robots.robot_state import PendingTruth, RobotState
 from simscen.sim.scene.camera import render_image
 from simscen.sim.scene.scene import Scene
 
+_new = tuple.__new__
+"""Creates a named tuple without the call overhead of its class."""
 NO_BODY = -1
 """Invalid body id."""
 
@@ -63,7 +65,8 @@ class Robot:
         self._collisions = CollisionTracker(scene.tick_rate)
         self._placements, self._placed_tick = 0, -1
         self.clearance = Clearance(scene, static, obstacles, body, self.base, self.state, clearance_range)
-        self.sampler = TruthSampler(self.clearance.static_clearance)
+        self._deferred: list[PendingTruth] = []
+        """Samples whose clearances are computed in one batch, when one of them is needed."""
         self._names: dict[int, str | None] = {}
         """Names of all bodies that the robot can touch, by body id (None: a wall)."""
         self._query_point: Vector = (math.inf, math.inf, math.inf)
@@ -90,9 +93,19 @@ class Robot:
         state = self._checked_state(tick)
         self._scene.actors.poses.prefetch(tick, period)
         if not self._collisions.is_colliding and self.clearance.can_defer(tick, period, state.pose):
-            return self.sampler.defer(state, self.objects())
-        self.sampler.compute_deferred()
+            sample = PendingTruth(self.compute_deferred, state, self.objects())
+            self._deferred.append(sample)
+            return sample
+        self.compute_deferred()
         return self._truth(tick, state, period)
+
+    def compute_deferred(self) -> None:
+        """Compute the clearances of all deferred samples: their distances to the static world."""
+        deferred, self._deferred = self._deferred, []
+        for sample in deferred:
+            state = sample.state
+            clearance = self.clearance.static_clearance(state.pose)
+            sample.result = _new(Truth, (state.pose, state.twist, clearance, sample.objects))
 
     def _checked_state(self, tick: int) -> RobotState:
         """Return the state; raises RunError if the physics of the robot or of a movable object has diverged."""
@@ -264,5 +277,5 @@ class Robot:
 
     def close(self) -> None:
         """Compute the deferred samples, and release the engine clients."""
-        self.sampler.compute_deferred()
+        self.compute_deferred()
         self.clearance.close()

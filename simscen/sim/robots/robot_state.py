@@ -1,4 +1,4 @@
-"""Pose and velocity of a robot, and samples of the true state whose clearances are computed later in one batch."""
+"""Pose and velocity of a robot, and samples of the true state whose clearances are computed later."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -31,37 +31,16 @@ class RobotState(NamedTuple):
 class PendingTruth:
     """Sample of the true state at one tick whose clearance is computed later. Implements DeferredTruth."""
 
-    __slots__ = ("objects", "result", "sampler", "state")
+    __slots__ = ("compute", "objects", "result", "state")
 
-    def __init__(self, sampler: "TruthSampler", state: RobotState, objects: Mapping[str, Pose3]) -> None:
-        self.sampler, self.state, self.objects = sampler, state, objects
+    def __init__(self, compute: Callable[[], None], state: RobotState, objects: Mapping[str, Pose3]) -> None:
+        """Take the function that sets `result` to the sample with its clearance."""
+        self.compute, self.state, self.objects = compute, state, objects
         self.result: Truth | None = None
 
     def truth(self) -> Truth:
         """Return the sample with its clearance."""
         if self.result is None:
-            self.sampler.compute_deferred()
+            self.compute()
         assert self.result is not None
         return self.result
-
-
-class TruthSampler:
-    """Collects the deferred samples of one robot, and computes all their clearances when one is needed."""
-
-    def __init__(self, static_clearance: Callable[[Pose3], float]) -> None:
-        """Begin without samples; `static_clearance` returns the distance in m to the static world at a pose."""
-        self._static_clearance = static_clearance
-        self._deferred: list[PendingTruth] = []
-
-    def defer(self, state: RobotState, objects: Mapping[str, Pose3]) -> PendingTruth:
-        """Return a sample whose clearance is computed later. The static world must be the nearest object."""
-        sample = PendingTruth(self, state, objects)
-        self._deferred.append(sample)
-        return sample
-
-    def compute_deferred(self) -> None:
-        """Compute the clearances of all deferred samples."""
-        deferred, self._deferred = self._deferred, []
-        for sample in deferred:
-            state = sample.state
-            sample.result = _new(Truth, (state.pose, state.twist, self._static_clearance(state.pose), sample.objects))
