@@ -26,8 +26,10 @@ def _limited_range(*bounds: int) -> list[int]:
     return list(numbers)
 
 
-def _tokenize(text: str, separators: str = ",; ", skip_empty: bool = True) -> list[str]:
+def _tokenize(text: object, separators: str = ",; ", skip_empty: bool = True) -> list[str]:
     """Split a text at each of the separators, as `xacro.tokenize` does."""
+    if not isinstance(text, str):
+        raise ExpansionError("tokenize() takes a text")
     for separator in separators[1:]:
         text = text.replace(separator, separators[0])
     return [word for word in text.split(separators[0]) if word or not skip_empty]

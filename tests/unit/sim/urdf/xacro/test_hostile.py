@@ -63,6 +63,12 @@ def test_expression_cannot_access_python(refusal, expression):
     assert problem.message.startswith(f"${{{expression.replace('&lt;', '<')}}}: ")
 
 
+@pytest.mark.parametrize("argument", ["5", "[1]"])
+def test_function_with_an_argument_of_another_type_is_refused(refusal, argument):
+    problem = refusal(f'<a v="${{xacro.tokenize({argument})}}"/>')
+    assert problem.message == f"${{xacro.tokenize({argument})}}: tokenize() takes a text"
+
+
 @pytest.mark.parametrize("expression", COSTLY)
 def test_expression_that_needs_much_time_or_memory_is_refused(refusal, expression):
     assert refusal(f'<a v="${{{expression}}}"/>').code == "SC400"
