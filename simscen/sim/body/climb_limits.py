@@ -14,6 +14,8 @@ from simscen.sim.body.outline import hull_points
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.body.undercarriage import caster_gap, casters_for_uneven_ground
 
+WHEEL_FRICTION = 1.0
+"""Friction coefficient of the wheels on the ground, as for rubber on dry concrete."""
 MAX_SLOPE_DEG, SLOPE_STEP_DEG = 50.0, 0.1
 """Steepest slope that `approach_angle` examines, and the difference between two examined slopes."""
 
@@ -28,14 +30,14 @@ class ClimbLimits(NamedTuple):
     step: float
 
 
-def compute_climb_limits(body: RobotBody, friction: float = 1.0) -> ClimbLimits:
-    """Return the climbing limits that follow from the hull, the motors, and the friction coefficient of the wheels."""
+def compute_climb_limits(body: RobotBody) -> ClimbLimits:
+    """Return the climbing limits that follow from the hull, the motors, and the friction of the wheels."""
     wheels = [wheel for wheel in body.wheels if wheel.is_driven and wheel.stall_torque > 0]
     if not wheels:
         return ClimbLimits(0.0, 0.0)
     pull = sum(wheel.stall_torque / wheel.radius for wheel in wheels) / (body.mass * GRAVITY_M_S2)
-    slope = min(approach_angle(body), grip_angle(body, friction), math.asin(min(1.0, pull)))
-    return ClimbLimits(slope, min(wheel.radius for wheel in wheels) * (1 - 1 / math.hypot(1.0, friction)))
+    slope = min(approach_angle(body), grip_angle(body, WHEEL_FRICTION), math.asin(min(1.0, pull)))
+    return ClimbLimits(slope, min(wheel.radius for wheel in wheels) * (1 - 1 / math.hypot(1.0, WHEEL_FRICTION)))
 
 
 def grip_angle(body: RobotBody, friction: float) -> float:

@@ -27,7 +27,7 @@ CARRIER_MASS_KG = 0.001
 class PlanarBase:
     """Hull on three joints from the world: along x, along y, and about z. It stays at z = 0 and cannot tip."""
 
-    def __init__(self, client: int, body: RobotBody, pose: Pose2, visual_shape: int = engine.DEFAULT_VISUAL) -> None:
+    def __init__(self, client: int, body: RobotBody, pose: Pose2, visual_shape: int) -> None:
         """Place the base at `pose`; the renderer shows `visual_shape`."""
         self._client = client
         wheels = [wheel.inertia.transformed(Pose3(wheel.x, wheel.y, wheel.radius)) for wheel in body.wheels]

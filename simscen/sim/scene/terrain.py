@@ -7,7 +7,7 @@ import numpy as np
 
 from simscen.core.environment.world_model import Patch
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.core.geometry.meshes import SolidIndices, drivable_solids, is_convex, submesh
+from simscen.core.geometry.meshes import drivable_solids, is_convex, submesh
 from simscen.core.geometry.polygons import polygon_contains
 from simscen.core.geometry.shapes import Body, TriangleMesh
 from simscen.sim.bullet import collision_shapes, engine, pybullet
@@ -21,22 +21,22 @@ MIN_NORMAL_Z_WHEEL, MIN_NORMAL_Z_CASTER = 0.6, 0.1
 class Terrain:
     """Solids of a static world that wheels can roll on, as bodies in the engine. An instance is true if there are any.
 
-    `solids` has the indices of the solids, and `names` has their names by body id.
+    `names` has the names of the solids by body id.
     """
 
     def __init__(self, client: int, static: TriangleMesh, max_step: float) -> None:
         """Create the solids that wheels can roll on. `max_step` is the highest step in m that a wheel can climb."""
         self._client = client
-        self.solids: SolidIndices = drivable_solids(static, max_step)
+        solids = sorted(drivable_solids(static, max_step))
         self.names: dict[int, str | None] = {}
         self.obstacles = static
         """All other solids of the static world."""
-        for solid in sorted(self.solids):
+        for solid in solids:
             self._add(static, solid)
-        if self.solids:
+        if solids:
             # Rays only hit bodies after a first collision detection.
             pybullet.performCollisionDetection(physicsClientId=client)
-            is_obstacle = ~np.isin(static.owners, sorted(self.solids))
+            is_obstacle = ~np.isin(static.owners, solids)
             faces, owners = static.faces[is_obstacle], static.owners[is_obstacle]
             self.obstacles = TriangleMesh(static.vertices, faces, owners, static.names)
 
