@@ -2,7 +2,6 @@
 
 import sys
 from collections import Counter
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
@@ -52,17 +51,21 @@ def command(
     checker = FileChecker(
         root_folder, world_path or [], lenient, fast, picture, stacks=stacks, requires_commands=bool(stack)
     )
-    checked = _Checked()
+    kinds, invalid_files, found = Counter[str](), 0, dict[Problem, None]()
     for file in discover(paths, root_folder, SUFFIXES):
         kind = file_kind(file, root_folder)
-        checked.add(kind, relative_to_working_folder(_problems(kind, file, checker), root_folder))
+        of_file = relative_to_working_folder(_problems(kind, file, checker), root_folder)
+        kinds[kind] += 1
+        invalid_files += any(problem.severity == "error" for problem in of_file)
+        found.update(dict.fromkeys(of_file))
+    problems = list(found)
     if format_ is Format.JSON:
-        print(as_json(checked.problems, valid=not checked.invalid_files, files=checked.kinds.total()))
+        print(as_json(problems, valid=not invalid_files, files=kinds.total()))
     else:
-        if checked.problems:
-            print_text(as_github(checked.problems) if format_ is Format.GITHUB else as_text(checked.problems))
-        print_text(checked.summary)
-    if checked.invalid_files:
+        if problems:
+            print_text(as_github(problems) if format_ is Format.GITHUB else as_text(problems))
+        print_text(_summary(kinds, problems, invalid_files))
+    if invalid_files:
         sys.exit(Exit.USAGE)
 
 
@@ -79,29 +82,17 @@ def _problems(kind: str, file: Path, checker: FileChecker) -> list[Problem]:
     return [*found, *check_built(file)]
 
 
-@dataclass
-class _Checked:
-    """Result of the checks: number of files by kind, problems of all files, and number of invalid files."""
+def _summary(kinds: Counter[str], problems: list[Problem], invalid_files: int) -> str:
+    """Return the last line of the output, such as "2 scenarios and 1 world are valid".
 
-    kinds: Counter[str] = field(default_factory=Counter)
-    problems: list[Problem] = field(default_factory=list)
-    invalid_files: int = 0
-
-    def add(self, kind: str, problems: list[Problem]) -> None:
-        """Add the result of one file."""
-        self.kinds[kind] += 1
-        self.invalid_files += any(problem.severity == "error" for problem in problems)
-        self.problems += [problem for problem in problems if problem not in self.problems]
-
-    @property
-    def summary(self) -> str:
-        """Last line of the output, such as "2 scenarios and 1 world are valid"."""
-        if self.invalid_files:
-            errors = sum(problem.severity == "error" for problem in self.problems)
-            return f"{_count(errors, 'problem')} in {self.invalid_files} of {_count(self.kinds.total(), 'file')}"
-        counts = [_count(number, kind) for kind, number in self.kinds.items()]
-        listed = " and ".join([", ".join(counts[:-1]), counts[-1]] if len(counts) > 1 else counts)
-        return f"{listed} {'is' if self.kinds.total() == 1 else 'are'} valid"
+    `kinds` are the numbers of checked files by kind.
+    """
+    if invalid_files:
+        errors = sum(problem.severity == "error" for problem in problems)
+        return f"{_count(errors, 'problem')} in {invalid_files} of {_count(kinds.total(), 'file')}"
+    counts = [_count(number, kind) for kind, number in kinds.items()]
+    listed = " and ".join([", ".join(counts[:-1]), counts[-1]] if len(counts) > 1 else counts)
+    return f"{listed} {'is' if kinds.total() == 1 else 'are'} valid"
 
 
 def _count(number: int, kind: str) -> str:
