@@ -91,7 +91,6 @@ def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
 
 
 def _legs_by_trial(body: RobotBody) -> dict[str, list[_TrialLeg]]:
-    """Return the legs of each trial by its name."""
     model = robot_model(body)
     radius = CIRCLE_RADIUS_FACTOR * model.turning_radius
     circle, corner = (_TrialLeg(turn * radius, 0.0, turn) for turn in (2 * math.pi, math.pi / 2))

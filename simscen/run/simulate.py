@@ -120,7 +120,6 @@ def _judge_traces(prepared: PreparedScenario, seed: int, traces: Mapping[str, Tr
 
 
 def _judge_robot(prepared: PreparedScenario, seed: int, trace: Trace, log: Path | None) -> Run:
-    """Judge the trace of one robot."""
     loaded = prepared.loaded
     places = [loaded.position_of("pass", index) for index in range(len(prepared.spec.pass_))]
     # Entries from `extends` or defaults.yaml have no line in the file that reports name.

@@ -287,12 +287,10 @@ def _decode_last(messages: MessagesByTopic, name: str, decoder: Callable[[bytes]
 
 
 def _decode_all(messages: MessagesByTopic, name: str, decoder: Callable[[bytes], T]) -> list[T]:
-    """Decode all messages on the topic `name`. Raises ProtocolViolation."""
     return [_decode_message(name, decoder, data) for data in messages.get(name, ())]
 
 
 def _decode_message(name: str, decoder: Callable[[bytes], T], data: bytes) -> T:
-    """Decode a message on the topic `name`. Raises ProtocolViolation."""
     try:
         return decoder(data)
     except ProtocolViolation:

@@ -61,7 +61,6 @@ def main() -> None:
 
 
 def _start_failure(error: Exception) -> str:
-    """Return a message with the reason why the program could not be started."""
     if not isinstance(error, OSError) or error.strerror is None:
         return str(error)
     if error.errno == errno.ENOEXEC:

@@ -231,7 +231,6 @@ def _describe_exit(report: dict[str, Any]) -> str:
 
 
 def _error_message(body: bytes) -> str:
-    """Return the message in the body of a frame ERROR."""
     try:
         return str(wire.from_json(body)["message"])[:MAX_MESSAGE_LENGTH]
     except (wire.Malformed, KeyError):

@@ -142,7 +142,6 @@ class PedestrianSimulation:
     # Perception of the pedestrians
 
     def _surroundings(self) -> Surroundings:
-        """Return the robots and objects that pedestrians observe."""
         robots = tuple(self._observe_robot(robot) for robot in self._simulation.robots.values())
         bodies = self._simulation.bodies_and_poses()
         others = [(name, body, pose) for name, (body, pose) in bodies.items() if name not in self._behaviors]
@@ -151,7 +150,6 @@ class PedestrianSimulation:
         )
 
     def _world_outlines(self, body: Body, pose: Pose3) -> tuple[Array, ...]:
-        """Return the outlines of an object in the world frame."""
         cached = self._outlines.get(body.name)
         if cached is None or cached[0] is not body.solids:
             cached = (

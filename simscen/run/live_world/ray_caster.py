@@ -90,7 +90,6 @@ class ReachableObjects(NamedTuple):
 
 
 def _parts(body: Body) -> list[tuple[Shape, Pose3]]:
-    """Return the shape and pose of each solid of a body."""
     return [(solid.shape, solid.pose) for solid in body.solids]
 
 

@@ -211,7 +211,6 @@ class RayBackend:
                 self._runners.remove(runner)
 
     def _kill_runners(self) -> None:
-        """Kill all runners with their processes."""
         for runner in self._runners:
             ray.kill(runner.actor)
         self._runners.clear()

@@ -119,7 +119,6 @@ class _JobsOfQueue:
 
 
 def _file_chunks(number: int, folder: Path) -> Iterator[FileChunk]:
-    """Yield all files in the output folder of a job, in chunks."""
     for path in sorted(folder.rglob("*")):
         if path.is_file():
             name = path.relative_to(folder).as_posix()

@@ -50,7 +50,6 @@ def run_worker(job: Job, parent: int, report: int, output: int, execute: Execute
 
 
 def _set_up_process(parent: int, output: int) -> None:
-    """Set up the POSIX session, signals, output, resource limits, and faulthandler of this process."""
     os.setsid()
     die_with_parent(parent)
     adopt_orphans()

@@ -83,5 +83,4 @@ def _disagreement(new_path: Path, earlier_path: Path) -> str | None:
 
 
 def _statuses(result: RunResult) -> dict[str, str]:
-    """Return the status of each verdict by its id."""
     return {verdict.id: verdict.status.value for verdict in result.verdicts}

@@ -56,7 +56,6 @@ def skipped_run(job: Job, reason: str) -> RunFinished:
 
 
 def _without_log(job: Job, result: RunResult) -> RunFinished:
-    """Return `result` as a finished run that has no log."""
     again, file = repeat_command(job.scenario, job.key.seed), display_path(job.scenario.file)
     return RunFinished(result, again=again, file=file, tags=tuple(job.scenario.spec.tags))
 

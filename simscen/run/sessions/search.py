@@ -121,7 +121,6 @@ class TpeSearch:
                 self._study.tell(trial, margin)
 
     def _point(self, parameters: dict[str, Any]) -> Point:
-        """Return the point for parameters of an Optuna trial."""
         values = (parameters[f"x{index}"] for index in range(len(self._choices)))
         return tuple(
             (value + 0.5) / count if count else _clip(value) for value, count in zip(values, self._choices, strict=True)
@@ -129,5 +128,4 @@ class TpeSearch:
 
 
 def _clip(u: float) -> float:
-    """Return `u` clipped to the open interval from 0 to 1."""
     return min(max(u, 2.0**-53), 1 - 2.0**-53)
