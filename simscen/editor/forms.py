@@ -4,6 +4,7 @@
 value.
 """
 
+import math
 import re
 from typing import Any
 
@@ -166,11 +167,10 @@ def _first_mapping(root: Schema, schema: Schema, depth: int) -> dict[str, Any] |
 
 def _first_number(schema: Schema) -> float:
     """Return 0, 1, or another number within the limits of the schema."""
-    low: float = schema["minimum"] if "minimum" in schema else schema.get("exclusiveMinimum", -1.0)
-    high: float = schema["maximum"] if "maximum" in schema else schema.get("exclusiveMaximum", 1.0)
-    if low < 0 or (low == 0 and "exclusiveMinimum" not in schema):
-        return 0
-    return max(1.0, low) if high > max(1.0, low) else (low + high) / 2
+    above, below = schema.get("exclusiveMinimum", -math.inf), schema.get("exclusiveMaximum", math.inf)
+    low, high = max(schema.get("minimum", -math.inf), above), min(schema.get("maximum", math.inf), below)
+    numbers: tuple[float, ...] = (0, 1.0, low, low + 1.0, (low + high) / 2, high, high - 1.0)
+    return next(n for n in numbers if math.isfinite(n) and low <= n <= high and above < n < below)
 
 
 def _help_and_example(schema: Schema) -> tuple[str, str]:

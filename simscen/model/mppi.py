@@ -251,7 +251,7 @@ class Mppi(PathFollowerSpec):
     gamma: Annotated[float, Field(ge=0, le=10)] = 0.015
     """Weight of the control effort relative to the cost of a sample."""
     prune_distance: PositiveLength = 2.0
-    """Minimum length of the plan ahead that is considered (Nav2: always 1.5 m)."""
+    """Minimum length of the plan ahead that is considered (Nav2's default: 1.5 m)."""
     command_free_time: Annotated[PositiveDuration, Field(le=60)] = 0.5
     """Time for which a constant command must be free of collisions; otherwise the command is slowed down. Nav2 has no
     such check."""

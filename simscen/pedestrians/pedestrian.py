@@ -182,7 +182,7 @@ class Pedestrian:
 
     def _blocking_intent(self, robot: ObservedRobot) -> Intent:
         """Return the intent to stand in front of the robot."""
-        # HuNavSim's blockRobot swaps sine and cosine.
+        # HuNavSim's blockRobot swaps sine and cosine here, so that its pedestrians do not stand in front of the robot.
         gap = max(BLOCKING_DISTANCE_M, robot.radius + self.spec.radius + STOPPING_DISTANCE_M)
         yaw = robot.pose.yaw
         target = robot.pose.x + gap * math.cos(yaw), robot.pose.y + gap * math.sin(yaw)

@@ -73,7 +73,7 @@ def from_json(body: bytes) -> dict[str, Any]:
     """Return the JSON object in the body of a frame. Raises Malformed for invalid or too deeply nested JSON."""
     try:
         content = json.loads(body.decode(), parse_constant=_reject_constant)
-        json.dumps(content, ensure_ascii=False).encode()
+        json.dumps(content, ensure_ascii=False).encode()  # raises ValueError for text that UTF-8 cannot represent
     except (ValueError, RecursionError) as error:
         raise Malformed(f"its body is not JSON: {error}") from None
     if not isinstance(content, dict):

@@ -32,7 +32,12 @@ class TimedPush:
 
 
 class Stepper:
-    """Steps a scene with its robots. Add, remove, or place objects and robots only in the context `change`."""
+    """Steps a scene with its robots. Add, remove, or place objects and robots only in the context `change`.
+
+    Three measures save time. While no robot can touch anything, only the physics and the firmware of the robots run.
+    Walls are created in the engine when a robot or a pushable object can reach them. Actors (movable objects) that
+    cannot be pushed collide only from the time on at which a robot is near.
+    """
 
     def __init__(self, scene: Scene, robots: Iterable[Robot], firmware_period: int) -> None:
         """Take the robots, sorted by name. Their firmware runs every `firmware_period` ticks."""
@@ -80,7 +85,11 @@ class Stepper:
         self._activate_actors()
 
     def _step_uninterrupted(self, ticks: int) -> None:
-        """Simulate `ticks` ticks without the periodic updates that `step` makes."""
+        """Simulate `ticks` ticks without the periodic updates that `step` makes.
+
+        The loop does everything that a tick can need. Spans of ticks without pushes, changed friction, and possible
+        contact need only `_step_without_contact`.
+        """
         scene, no_contact_before = self._scene, -1
         until, is_plain = scene.tick + ticks, not (self._pushes or self._periodic_call or scene.floor)
         if is_plain and (no_contact_before := self._no_contact_before(ticks)) >= until:
@@ -211,7 +220,7 @@ class Stepper:
         return bool(self._pushes)
 
     def on_push(self) -> None:
-        """Discard all predictions of robots and actors, because something is pushed during the next step."""
+        """Discard all predictions of robots and actors, because something is or will be pushed."""
         self._scene.actors.on_push(self._scene.tick)
         for robot in self._robots:
             robot.clearance.on_push(self._scene.tick)

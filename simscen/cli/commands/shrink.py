@@ -149,9 +149,9 @@ def _planned_run(folder: Path) -> PlannedRun:
     """Return the run with this folder from the journal of its session. Raises UsageError."""
     for session in folder.parents:
         if (session / JOURNAL_FILE).is_file():
-            inside = folder.relative_to(session / RUNS_FOLDER).as_posix()
+            inside = folder.relative_to(session).as_posix()
             for planned in read_journal(session).planned:
-                if f"{planned.key.scenario}/{planned.key.folder}" == inside:
+                if f"{RUNS_FOLDER}/{planned.key.scenario}/{planned.key.folder}" == inside:
                     return planned
     raise UsageError(f"{folder} is not the folder of a run, such as simscen-out/latest/runs/NAME/seed-1")
 

@@ -42,8 +42,8 @@ METRICS: dict[str, Metric] = {
     ),
     "barn_score": Metric(
         "",
-        "OT / clip(t, 2 OT, 8 OT), OT = shortest_length / (2 m/s), t = time_to_goal; 0 without success. For runs with "
-        "one goal.",
+        "OT / clip(t, 2 OT, 8 OT), optimal time OT = shortest_length / (2 m/s), t = time_to_goal; 0 without success. "
+        "For runs with one goal.",
         "BARN challenge, run.py",
         evidence=_SUCCESS,
     ),

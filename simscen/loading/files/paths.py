@@ -65,6 +65,7 @@ class PathSandbox:
     def resolve_argument(self, path: Path) -> Path | Problem:
         """Return the absolute path of a file on the command line, which need not exist.
 
+        If the file is a symbolic link, the path is that of the link.
         Return a problem if it is outside the sandbox, or if its path has invalid characters.
         """
         file = _resolved(path.parent) / path.name

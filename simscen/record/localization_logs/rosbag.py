@@ -77,19 +77,20 @@ def read_rosbag_rows(path: Path, odometry: str, scan: str, reference: str | None
     rows = LocalizationRows(hint=f"its topics: {names}; name others with --odom, --scan and --reference")
     if reference is not None and not messages.truth:
         raise UnusableLog(f"it has no messages on {reference}", rows.hint)
-    by_topic = {odometry: messages.odometry, scan: messages.scans, reference or topics.TRUTH.name: messages.truth}
+    truth = reference or topics.TRUTH.name
+    by_topic = {odometry: messages.odometry, scan: messages.scans, truth: messages.truth}
     unstamped = [name for name, logged in by_topic.items() if logged and not any(each.stamp for *_, each in logged)]
     if unstamped:
         names = ", ".join(unstamped)
         rows.notes.append(f"{names}: all stamps are zero, so the times of logging are used for all topics")
     use_log_time = bool(unstamped)
     rows.odometry += _poses(odometry, messages.odometry, use_log_time, rows.notes)
-    rows.truth += _poses(reference or "the ground truth", messages.truth, use_log_time, rows.notes)
+    rows.truth += _poses(truth, messages.truth, use_log_time, rows.notes)
     rows.initial += _poses(INITIAL_POSE_TOPIC, messages.initial, use_log_time, rows.notes)
     rows.scans += _scans(scan, messages, use_log_time, rows.notes)
     frames_of_truth = sorted({pose.frame for *_, pose in messages.truth if pose.frame != "map"})
     if frames_of_truth:
-        rows.notes.append(f"{reference} is in the frame {', '.join(frames_of_truth)!r}, which is used as the map frame")
+        rows.notes.append(f"{truth} is in the frame {', '.join(frames_of_truth)!r}, which is used as the map frame")
     return rows
 
 

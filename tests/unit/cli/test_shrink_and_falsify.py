@@ -8,10 +8,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import yaml
+
+from simscen.cli.commands import shrink
 
 SCENARIO = """\
 # Many irrelevant parts, and one cause of failure.
@@ -124,6 +127,17 @@ def test_unusable_options_of_shrink_are_an_error(
     done = simscen("shrink", *options)
     assert done.code == 2
     assert message in done.err
+
+
+def test_other_folder_of_a_session_is_not_the_folder_of_a_run(
+    simscen: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shrink, "read_journal", lambda _: SimpleNamespace(planned=[]))
+    (tmp_path / "out" / "page").mkdir(parents=True)
+    (tmp_path / "out" / shrink.JOURNAL_FILE).touch()
+    done = simscen("shrink", "out/page")
+    assert done.code == 2
+    assert "out/page is not the folder of a run" in done.err
 
 
 @pytest.mark.slow
