@@ -43,6 +43,7 @@ def test_resampling_ends_at_the_last_grid_point() -> None:
     assert evenly_spaced(samples(0, 10, 20, 29), RATE).ticks.tolist() == [0, 10, 20]
     assert evenly_spaced(samples(0, 10, 20, 31), RATE).ticks.tolist() == [0, 10, 20, 30]
     assert evenly_spaced(samples(0, 10, 20, 30, 39), RATE).ticks.tolist() == [0, 10, 20, 30]
+    assert evenly_spaced(samples(0, 1, 3, 5), RATE).ticks.tolist() == [0, 2, 4]
 
 
 def test_too_few_samples_are_refused() -> None:
