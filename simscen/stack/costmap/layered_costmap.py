@@ -147,6 +147,7 @@ class LayeredCostmap:
         """Clear the cells that a sensor sees through, then mark its obstacles. `base` is the pose of the robot."""
         if self._rolling and should_roll(self._frame, base, self._max_offset):
             self._roll(base)
+        self._latest_readings.pop(reading.sensor, None)  # so that the newest reading is the last one
         self._latest_readings[reading.sensor] = (base, reading)
         if isinstance(reading, Image):
             self._mark_cells_changed(self._live.on_image(base, reading, self._static_squared))

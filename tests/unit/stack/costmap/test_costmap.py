@@ -267,6 +267,20 @@ def test_clearing_around_the_robot_keeps_distant_obstacles() -> None:
     assert at(map_, 2.0, 4.12)[0] != 254
 
 
+def test_costmap_is_cleared_around_the_robot_although_one_of_its_lidars_is_silent() -> None:
+    world = Flatland([], [(2.0, 4.2, 0.1), (6.0, 4.2, 0.1)]).room(8, 6)
+    map_ = costmap(Flatland().room(8, 6))
+    blind = replace(scan_of(world, Pose2(2.0, 3.0)), ranges=np.full(360, np.nan))
+    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
+    map_.update(Pose2(2.0, 3.0), replace(blind, sensor="rear"))  # its last scan
+    map_.update(Pose2(6.0, 3.0), scan_of(world, Pose2(6.0, 3.0)))
+    map_.update(Pose2(6.0, 3.0), blind)
+    assert (at(map_, 2.0, 4.12)[0], at(map_, 6.0, 4.12)[0]) == (254, 254)
+    map_.clear(1.5)
+    assert at(map_, 2.0, 4.12)[0] == 254
+    assert at(map_, 6.0, 4.12)[0] != 254
+
+
 def test_cells_under_the_robot_are_free() -> None:
     world = Flatland().room(8, 6)
     map_ = costmap(world)
