@@ -62,6 +62,7 @@ def _pose_edits(
         yield SetValue((*keys, "x"), x)
         yield SetValue((*keys, "y"), y)
         if yaw is not None:
+            # SetValue keeps the unit of an existing number.
             yield SetValue((*keys, "yaw"), yaw if "yaw" in node.entries else degrees_text(yaw))
         return
     pose: dict[str, Any] = {"x": x, "y": y} if not yaw else {"x": x, "y": y, "yaw": degrees_text(yaw)}
@@ -73,13 +74,18 @@ def _pose_edits(
 
 
 def _list_edits(keys: Keys, axes: dict[int, float], source: SourceNode | None) -> Iterator[Edit]:
-    """Yield edits that set numbers of a list such as [x, y] or [t, x, y, yaw]. `axes` are the new numbers by index."""
+    """Yield edits that set numbers of a list such as [x, y] or [t, x, y, yaw]. `axes` are the new numbers by index.
+
+    Raises EditRefused if the text has no such list and `axes` do not contain its first number, such as t.
+    """
     node = None if source is None else source_at(source, keys)
     if node is not None and node.kind == "sequence":
         for index, value in axes.items():
             yield SetValue((*keys, index), value)
+    elif 0 in axes:
+        yield SetValue(keys, list(axes.values()))
     else:
-        yield SetValue(keys, [axes[0], axes[1]] if 0 in axes else list(axes.values()))
+        raise EditRefused("the keyframe is not a list in this file; change it where it is written")
 
 
 def degrees_text(yaw: float) -> str:

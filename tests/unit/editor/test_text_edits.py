@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from simscen.editor.map_view.map_edits import read_edits
 from simscen.editor.text_editing.splices import EditRefused
 from simscen.editor.text_editing.text_edits import AddItem, Edit, RemovePart, SetValue, apply_edits
 from simscen.editor.text_editing.value_text import is_same_value
@@ -213,3 +214,10 @@ def test_setting_each_value_to_itself_does_not_change_a_shipped_file(file: Path)
     numbers = [keys for keys in _leaves(data) if isinstance(_at(data, keys), int | float)]
     kept = [SetValue(keys, _at(data, keys)) for keys in numbers]
     assert edited(text, *kept) == text
+
+
+def test_keyframe_that_is_not_in_the_text_is_refused() -> None:
+    """Its time is unknown, so that the list cannot be written."""
+    change = {"op": "keyframe", "keys": ["events", 0, "do", "move", "keyframes", 1], "x": 1, "y": 2}
+    with pytest.raises(EditRefused, match="not a list in this file"):
+        read_edits([change], "simscen: 1\nextends: base.scenario.yaml\n", "scenario")
