@@ -77,7 +77,7 @@ def measure_worlds(rounds: int) -> Iterator[WorldCost]:
 
 def _measure_world(name: str, file: Path, rounds: int) -> WorldCost:
     """Measure `rounds` runs of a scenario file. `name` describes its world."""
-    gc.collect()  # the memory of the previous world must not count
+    gc.collect()  # garbage of the previous world must not add to the maximum memory
     start = time.process_time()
     prepared = prepare(load_scenario(file, file.parent))
     preparing = time.process_time() - start
