@@ -58,9 +58,10 @@ def test_reasons_without_a_comparison_are_in_order():
         "shortest": dict.fromkeys("abcdefg", 1.0),
     }
     assert found({"max_ratio": 1.0}, case=twice).measured.startswith("several goals are called a, b, c, d, e, f, g,")
-    sent = {**CASE, "sent": [{"name": n, "pose": [4, 0]} for n in "dcb"]}
-    events = [[k, "goal.accepted", name] for k, name in enumerate("dcb")]
-    assert found({"max_ratio": 1.0}, case=sent, events=events).measured.startswith("b, c, d was sent by an event")
+    sent = {**CASE, "sent": [{"name": n, "pose": [4, 0]} for n in "hgfedcb"]}
+    events = [[k, "goal.accepted", name] for k, name in enumerate("hgfedcb")]
+    measured = found({"max_ratio": 1.0}, case=sent, events=events).measured
+    assert measured.startswith("b, c, d, e, f, g, h was sent by an event")
     assert (
         found({"max_ratio": 1.0}, case={**CASE, "shortest": {"a": 0.0}}).measured == "the shortest path has no length"
     )
