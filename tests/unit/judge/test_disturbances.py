@@ -132,3 +132,39 @@ def test_disturbance_has_no_line_without_lines_of_criteria():
     result = judge_run(RunKey("a", 1), "run.mcap", [AnyCriterion.model_validate({"collisions": {}})], trace, case)
     assert len(result.verdicts) == 2
     assert result.lines == ()
+
+
+SEQUENCE = [
+    {**FAULT, "required": False},
+    EVENT,
+    {"name": "b", "kind": "event", "when": "then", "line": 8, "after": 0},
+    {"name": "c", "kind": "event", "when": "then", "line": 9, "after": 1},
+]
+NEVER = "it never began; the run ended at t = 10.00 s (navigation ended)"
+
+
+def test_only_the_first_missing_step_of_a_sequence_is_reported():
+    result = judged([], *SEQUENCE)
+    assert [verdict.id for verdict in result.verdicts] == ["pallet falls", "collisions"]
+    not_due = f"it was not due, because pallet falls had not happened; {NEVER}"
+    assert [one.effect for one in result.disturbances] == [NEVER, NEVER, not_due, not_due]
+
+
+def test_step_after_one_without_effect_is_reported_too():
+    result = judged(event(3, False, "nothing there"), *SEQUENCE[:3])
+    assert [verdict.id for verdict in result.verdicts] == ["pallet falls", "b", "collisions"]
+
+
+def test_missing_step_states_when_it_was_due():
+    result = judged([*event(3), *event(5)], *SEQUENCE[:3])
+    assert result.disturbances[2].effect == f"it was due from t = 3.00 s, after pallet falls; {NEVER}"
+
+
+def test_event_without_actions_happens_at_its_first_trigger():
+    times = [
+        [at, kind, "pallet falls", {"entry": 0, "effects": []}]
+        for at in (3, 5)
+        for kind in ("event.started", "event.ended")
+    ]
+    (happened,) = judged(times, EVENT).disturbances
+    assert (happened.happened, happened.effect, happened.tick) == (True, "its trigger fired", 720)
