@@ -73,7 +73,7 @@ class SwitchKeepout(Spec, Action):
     region: RegionName | None = None
     """A region of the world, which need not be in `stack.keepout`; default: the whole filter with its mask."""
     enabled: bool = True
-    """Whether the robot must keep out from now on."""
+    """Whether the robot must keep out of the zone after this action."""
 
     def perform(self, stage: Stage) -> Effect:
         """Send the command; has no effect if nothing changes or the stack cannot receive it."""
@@ -95,7 +95,7 @@ class SwitchSpeedZone(Spec, Action):
     speed_limit: PositiveSpeed | None = None
     """Limit while the estimated pose is in the region; default: the limit of the region in `stack.speed_zones`."""
     enabled: bool = True
-    """Whether the limit applies from now on."""
+    """Whether the limit applies after this action."""
 
     @model_validator(mode="after")
     def _check_limit(self) -> SwitchSpeedZone:

@@ -21,7 +21,7 @@ def plugins_of(loaded: LoadedScenario) -> tuple[RegisteredType, ...]:
     """Return the types of plug-ins that a scenario and its robots use, sorted by group and name."""
     robots = [view.robot.spec for view in loaded.robot_views.values()]
     specs = [loaded.spec, *(robot for robot in robots if robot is not None)]  # None for a URDF alone
-    return _sorted({entry for spec in specs for keys, part in walk(spec) for entry in _plugins_of_part(keys, part)})
+    return _sorted({entry for spec in specs for keys, part in walk(spec) for entry in _plugin_types(keys, part)})
 
 
 def plugins_of_all(scenarios: Iterable[LoadedScenario]) -> tuple[RegisteredType, ...]:
@@ -65,8 +65,11 @@ def _sorted(entries: Iterable[RegisteredType]) -> tuple[RegisteredType, ...]:
     return tuple(sorted(entries, key=lambda entry: (entry.group, entry.name)))
 
 
-def _plugins_of_part(keys: Keys, part: Any) -> Iterator[RegisteredType]:
-    """Yield the type of `part`, the part of a specification at `keys`; nothing for a type that simscen ships."""
+def _plugin_types(keys: Keys, part: Any) -> Iterator[RegisteredType]:
+    """Yield the plug-in type of the part of a specification at `keys`; nothing if simscen ships its type.
+
+    If a package registers the same class under several names, yield the names that the part has as its `type` or key.
+    """
     if isinstance(part, Choice):
         entry = find_type(part.group, part.kind) if part.original_class is not None else None
         if entry is not None and not entry.is_shipped:

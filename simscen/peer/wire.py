@@ -27,7 +27,7 @@ COMMAND_DUE = 1
 MAX_FRAME_BYTES = 256 << 20
 
 MAX_JSON_DEPTH = 32
-"""Maximum nesting depth of JSON."""
+"""Maximum number of levels of JSON content; the innermost value is a level, too."""
 
 SIZE = struct.Struct("<I")
 """First field of a frame: size of the rest of the frame in bytes."""
@@ -78,7 +78,7 @@ def from_json(body: bytes) -> dict[str, Any]:
         raise Malformed(f"its body is not JSON: {error}") from None
     if not isinstance(content, dict):
         raise Malformed("its body is not a JSON object")
-    if _is_nested_deeper(content, MAX_JSON_DEPTH):
+    if _has_more_levels(content, MAX_JSON_DEPTH):
         raise Malformed(f"its body is nested deeper than {MAX_JSON_DEPTH}")
     return content
 
@@ -88,10 +88,10 @@ def _reject_constant(word: str) -> None:
     raise ValueError(f"{word} is not a JSON number")
 
 
-def _is_nested_deeper(content: Any, remaining: int) -> bool:
-    """Return whether JSON content has more than `remaining` levels."""
+def _has_more_levels(content: Any, limit: int) -> bool:
+    """Return whether JSON content has more than `limit` levels. A number is one level, and a list of numbers two."""
     inner = content.values() if isinstance(content, dict) else content if isinstance(content, list) else ()
-    return remaining == 0 or any(_is_nested_deeper(item, remaining - 1) for item in inner)
+    return limit == 0 or any(_has_more_levels(item, limit - 1) for item in inner)
 
 
 def step_frame(header: StepHeader, messages: Messages) -> bytes:

@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from simscen.core.messages.navigation import ErrorCode
-from simscen.spec.base import field_docs
+from simscen.spec.base import Typed, field_docs
 from simscen.spec.choice import Choice
 from simscen.spec.extensible_union import ExtensibleUnion, TypeName
 from simscen.spec.places import PlaceAllowed, PlaceShorthand
@@ -28,6 +28,8 @@ _KIND_NAMES: dict[Any, str] = {
     Amount: "quantity",
     ErrorCode: "error code",
 }
+_DEFAULT_TYPES = frozenset({"reference", "amcl", "bit_star", "regulated_pure_pursuit", "simple"})
+"""Types that components have without the key `type`. All other types require this key."""
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
 
@@ -52,7 +54,7 @@ def fields_of(model: type[BaseModel]) -> list[Field]:
     docs = field_docs(model)
     names = model.modifiers if issubclass(model, Choice) else model.model_fields.keys()
     return [
-        Field(field.alias or name, kind_of(field), _default(field), docs.get(name, ""))
+        Field(field.alias or name, kind_of(field), _default(model, name, field), docs.get(name, ""))
         for name, field in model.model_fields.items()
         if name in names
     ]
@@ -133,9 +135,10 @@ def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
     return ", ".join([text.replace("ratio in %", "ratio"), *texts])
 
 
-def _default(field: FieldInfo) -> str:
+def _default(model: type[BaseModel], name: str, field: FieldInfo) -> str:
     """Return the default value of a key as in the attribute `default` of Field."""
-    if field.is_required():
+    selects_model = name == "type" and issubclass(model, Typed)
+    if field.is_required() or (selects_model and field.default not in _DEFAULT_TYPES):
         return ""
     value = field.get_default(call_default_factory=True)
     if value in (PydanticUndefined, None, "") or isinstance(value, BaseModel | dict):

@@ -119,7 +119,7 @@ class _Generator(GenerateJsonSchema):
             for key, choice in added.items():
                 nullable = core_schema.nullable_schema(choice.__pydantic_core_schema__)
                 result["properties"][key] = self.generate_inner(nullable)
-            result.update(_exactly_one(model, [*model.choices(), *added]))
+            result.update(_require_one_key(model, [*model.choices(), *added]))
         return result
 
     def function_wrap_schema(self, schema: core_schema.WrapValidatorFunctionSchema) -> JsonSchemaValue:
@@ -137,7 +137,7 @@ class _Generator(GenerateJsonSchema):
                 members.append(member)
             else:
                 others.append({"allOf": [member, {"properties": {"type": {"const": name}}, "required": ["type"]}]})
-        extended = _extend_union(result, names, members)
+        extended = _with_options(result, names, members)
         return {"anyOf": [extended, *others]} if others else extended
 
 
@@ -147,21 +147,24 @@ class _InstalledTypesGenerator(_Generator):
     with_plugins = True
 
 
-def _extend_union(union: Schema, names: list[str], members: list[Schema]) -> Schema:
-    """Return the schema of a union of names and mappings with further names and further references to mappings."""
+def _with_options(union: Schema, names: list[str], mappings: list[Schema]) -> Schema:
+    """Return the schema of a union with more options: texts `names`, and `mappings` as references to their schemas.
+
+    A union is an `enum` of names, a reference to a mapping or a `oneOf` of them, or a `oneOf` of both kinds.
+    """
     if "enum" in union:
         return {**union, "enum": [*union["enum"], *names]}
     options = union.get("oneOf", [union])
     if all("$ref" in option for option in options):
         rest = union if "oneOf" in union else {}
-        return {**rest, "oneOf": [*options, *members]} if members else union
-    return {**union, "oneOf": [_extend_union(option, names, members) for option in options]}
+        return {**rest, "oneOf": [*options, *mappings]} if mappings else union
+    return {**union, "oneOf": [_with_options(option, names, mappings) for option in options]}
 
 
-def _exactly_one(model: type[Choice], keys: list[str]) -> Schema:
-    """Return a schema that requires exactly one of `keys`.
+def _require_one_key(model: type[Choice], keys: list[str]) -> Schema:
+    """Return the part of a Choice's schema that rejects a mapping with several of `keys`, or with none of them.
 
-    For a mapping with only modifiers of the model, editors show "expected one of: …".
+    If a mapping has no key except modifiers, editors show "expected one of: …".
     """
     # With `maxProperties`, yaml-language-server would count the key that is being typed, and offer no completions.
     present: list[Schema] = [{"type": "object", "required": [key]} for key in keys]

@@ -14,8 +14,9 @@ _GROUPS = {
     "action": ("Actions", "Value of `do`: one of these keys, or a list of such mappings in order."),
     "fault": (
         "Faults",
-        "Entries of `faults`: exactly one of these keys, with `sensor` and optionally with the modifiers in the "
-        "section `faults` below.",
+        "Entries of `faults`: exactly one of these keys, with the target of the fault (`sensor`), and optionally with "
+        "the modifiers in the section `faults` below. [Faults](../guides/faults.md#targets) has a table of the targets "
+        "that each fault can have.",
     ),
     "criterion": ("Criteria", "Entries of `pass`: exactly one of these keys, optionally with [modifiers](#pass)."),
     "scenario": (

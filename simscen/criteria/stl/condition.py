@@ -62,10 +62,10 @@ class Condition(Spec):
     eventually: Windowed | None = None
     """True if the given condition is true at least once in its window."""
     until: Release | None = None
-    """True if `hold` is true from now on until `release` becomes true."""
+    """True if `release` becomes true in its window, and `hold` is true until then."""
     whenever: Condition | None = None
-    """True if, from now on, the condition `then` is true each time that the given condition is true. Undecided if the
-    given condition is never true."""
+    """True if the condition `then` is true each time that the given condition is true until the end of the run.
+    Undecided if the given condition is never true."""
     then: Condition | None = None
     """Condition that must be true each time that the condition of `whenever` is true."""
 
@@ -126,14 +126,14 @@ class Condition(Spec):
 
 
 class Window(Spec):
-    """Interval of time after the time of evaluation ("now"). Without any key, it is the rest of the run."""
+    """Interval of time after the evaluation of its condition. Without any key, it is the rest of the run."""
 
     within: PositiveDuration | None = None
-    """End of the window in s from now. The window begins now."""
+    """Length of the window, which begins when its condition is evaluated: for a criterion, at the start of the run."""
     after: PositiveDuration | None = None
-    """Start of the window in s from now. The window lasts until the end of the run."""
+    """Time from the evaluation of its condition to the start of the window, which lasts until the end of the run."""
     between: Annotated[list[Duration], Field(min_length=2, max_length=2)] | None = None
-    """Start and end of the window in s from now."""
+    """Times from the evaluation of its condition to the start and to the end of the window."""
 
     @model_validator(mode="after")
     def _check_interval(self) -> Window:
@@ -146,7 +146,7 @@ class Window(Spec):
 
     @property
     def interval(self) -> tuple[float, float | None]:
-        """Start and end in s from now. An end of None is the end of the run."""
+        """Start and end of the window in s after the evaluation. An end of None is the end of the run."""
         if self.between is not None:
             return self.between[0], self.between[1]
         return self.after or 0.0, self.within
@@ -228,7 +228,7 @@ for _model in (Condition, Windowed, Whenever, Release):
 
 
 def decision_horizon(condition: Condition, holds: bool = True) -> float:
-    """Return the earliest time in s from now at which a condition can be known to be true.
+    """Return the earliest time in s after its evaluation at which a condition can be known to be true.
 
     If `holds` is False, return the earliest time at which it can be known to be false. A window that lasts to the end
     of the run counts only with its start.

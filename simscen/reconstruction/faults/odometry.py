@@ -146,7 +146,7 @@ def _fit(matrix: Array, values: Array) -> tuple[Array, Array, Array]:
 def _drift(steps: MotionSteps) -> Iterator[FoundFault]:
     """Yield a fault if the odometry reports motion while the robot stands."""
     rest = (np.abs(steps.true[:, :2]).max(axis=1) < REST_M) & (np.abs(steps.true[:, 2]) < REST_RAD)
-    # Wheels also turn in place when something holds the robot that is commanded to drive.
+    # While an obstacle blocks a robot that is commanded to drive, its wheels spin. This is slip, not drift.
     rest &= np.abs(steps.commanded).max(axis=1) < REST_M
     if int(rest.sum()) < MIN_REST_STEPS:
         return

@@ -12,11 +12,12 @@ from simscen.sim.objects.actor import Actor
 EXTRA_RADIUS_M = 2.0
 """Additional search radius, so that later searches can reuse the list of nearby actors."""
 REQUERY_DISTANCE_M = 1.0
-"""Largest distance that a robot moves between two queries of deferred actors."""
-EARLY_QUERY_DISTANCE_M = 0.5
-"""Smallest distance that a robot has moved before a periodic query of deferred actors."""
+"""Distance that a robot moves after which the result of its last query of deferred actors is invalid."""
 ACTIVATION_PERIOD_S = 0.05
-"""Time between periodic queries of deferred actors. A robot moves at most EARLY_QUERY_DISTANCE_M in this time."""
+"""Period in which the Stepper checks whether a robot must query again. In this time, a robot moves at most
+REQUERY_DISTANCE_M - EARLY_QUERY_DISTANCE_M."""
+EARLY_QUERY_DISTANCE_M = 0.5
+"""Distance that a robot moves after which it queries again at the next check, before its last result is invalid."""
 ROUNDING_MARGIN_M = 1e-3
 """Upper bound of rounding errors in the distances of deferred actors."""
 

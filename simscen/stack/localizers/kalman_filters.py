@@ -27,7 +27,8 @@ def _import_filters() -> ModuleType:
     try:
         return import_module("filterpy.kalman")
     finally:
-        del sys.modules[STATISTICS_MODULE]  # the next import of it imports the module itself
+        # Code that imports `filterpy.stats` from now on gets the module itself. filterpy.kalman keeps the substitute.
+        del sys.modules[STATISTICS_MODULE]
         vars(substitute)["__getattr__"] = lambda name: getattr(import_module(STATISTICS_MODULE), name)
 
 
