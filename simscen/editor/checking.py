@@ -4,10 +4,8 @@ from dataclasses import dataclass, field
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.editor.document import EditedFile
-from simscen.loading.builders import world_from_file
-from simscen.loading.checks.built_world import check_built_world
 from simscen.loading.checks.runner import check_world_file
-from simscen.loading.checks.scene_runner import check_in_world, world_reader_notes
+from simscen.loading.checks.scene_runner import world_file_warnings, world_problems
 from simscen.loading.files.single_files import load_world_file
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_variations
@@ -57,22 +55,13 @@ class TextChecks:
         if isinstance(loaded, list):
             return loaded
         checked = [
-            VariationProblems(scenario.variation, scenario.varied_paths, self._variation_problems(scenario))
-            for scenario in loaded
+            VariationProblems(one.variation, one.varied_paths, [*one.notes, *world_problems(one, self.cache)])
+            for one in loaded
         ]
         return merge_problems(checked)
-
-    def _variation_problems(self, loaded: LoadedScenario) -> list[Problem]:
-        """Return the problems of one variation and of its world, such as a start inside a wall."""
-        try:
-            return [*loaded.notes, *check_in_world(loaded, self.cache)]
-        except InvalidInput as error:
-            return [*loaded.notes, *error.problems]
 
     def _world_problems(self, text: str) -> list[Problem]:
         file = self.file
         source = load_world_file(file.path, file.root, file.world_path, {file.path: text})
-        own = check_world_file(source)
-        world = world_from_file(source, file.root, file.world_path, self.lenient)
-        notes = list(source.map.notes) if source.map else []
-        return [*notes, *own, *check_built_world(world, source), *world_reader_notes(world, source, file.root)]
+        warnings = world_file_warnings(source, file.root, file.world_path, self.lenient)
+        return [*check_world_file(source), *warnings]

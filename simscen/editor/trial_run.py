@@ -126,8 +126,7 @@ class TrialRuns:
             trial.state, trial.message = "error", one_line(str(error))
 
     def _finish(self, trial: TrialRun, result: RunResult) -> None:
-        lines = result.lines or (0,) * len(result.verdicts)
-        for verdict, line in zip(result.verdicts, lines, strict=False):
+        for verdict, line in result.verdicts_with_lines:
             finding = verdict.tightest
             text = "" if finding is None else f"{one_line(finding.measured)} (limit {one_line(finding.limit)})"
             status = verdict.status.value

@@ -67,12 +67,13 @@ def from_data(data: dict[str, Any]) -> RunResult:
     """
     if data["format"] != FORMAT:
         raise ValueError(f"a result of format {data['format']}; this version reads {FORMAT}")
+    lines = tuple(verdict["line"] for verdict in data["verdicts"])
     return RunResult(
         key=read_key(data),
         path=data["path"],
         outcome=Outcome(data["outcome"]),
         verdicts=tuple(_read_verdict(verdict) for verdict in data["verdicts"]),
-        lines=tuple(verdict["line"] for verdict in data["verdicts"]),
+        lines=lines if any(lines) else (),
         metrics=data["metrics"],
         undefined=data["undefined"],
         events=data["events"],

@@ -16,12 +16,13 @@ from _pytest._code.code import ReprEntryNative, ReprExceptionInfo, ReprFileLocat
 import simscen
 from simscen.cli.diagnostics import as_text
 from simscen.cli.session.backends import FORK_SERVER
-from simscen.cli.session.file_checks import FileChecker, world_problems
+from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.stacks import parse_stacks
 from simscen.core.errors import InvalidInput, Problem, SimscenError, UsageError
 from simscen.core.records.case import Run
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
+from simscen.loading.checks.scene_runner import world_problems
 from simscen.loading.files.discovery import default_root
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of

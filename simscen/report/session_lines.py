@@ -46,12 +46,13 @@ class RunNaming:
 
     @classmethod
     def for_session(cls, session: SessionStarted, columns: int | None = None) -> "RunNaming":
-        """Return the rule for a session. Names contain seeds if there are several, or if each run is repeated.
+        """Return the rule for a session. Names contain seeds if there are several.
 
         `columns` is the width of the terminal; None for no limit.
         """
         stacks = [text.partition("=")[0] for text in session.stacks] if len(session.stacks) > 1 else []
-        has_seeds = session.total != (len(session.ids) or session.scenarios) * max(1, len(stacks))
+        runs_per_seed = (len(session.ids) or session.scenarios) * max(1, len(stacks)) * (2 if session.twice else 1)
+        has_seeds = session.total != runs_per_seed
         prefix = _common_folder(session.ids)
         longest = max((len(scenario_id) for scenario_id in session.ids), default=0) - len(prefix)
         stack = ".".join(

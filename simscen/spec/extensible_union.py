@@ -12,7 +12,7 @@ from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, Val
 
 from simscen.core.messages.navigation import RecoveryBehavior
 from simscen.spec.base import LazySpec, Typed
-from simscen.spec.registry import BrokenPlugin, RegisteredType, built_in_types, find_type, installed_types
+from simscen.spec.registry import BrokenPlugin, RegisteredType, all_types, built_in_types, find_type
 
 GROUP_KEY = "simscen group"
 """Key in the metadata of a pydantic schema: the value is the name of the registry group."""
@@ -91,7 +91,7 @@ def _find_or_raise(group: str, name: str) -> RegisteredType:
 
 
 def _unknown_type_error(group: str, name: str) -> PydanticCustomError:
-    names = [*(entry.name for entry in built_in_types(group)), *(entry.name for entry in installed_types(group))]
+    names = dict.fromkeys(entry.name for entry in all_types(group))  # two packages can add the same name
     return PydanticCustomError("unknown_type", "no such type", {"value": name, "names": ", ".join(names)})
 
 

@@ -12,11 +12,11 @@ from simscen.bench.navigation.summary import ExperimentSummary, Trial, mean, sum
 from simscen.cli.benchmarks.results import print_progress
 from simscen.cli.diagnostics import print_text
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
-from simscen.cli.session.file_checks import world_problems
 from simscen.cli.session.pending_runs import plan_session
 from simscen.core.errors import Exit, InvalidInput
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished, SessionEvent
+from simscen.loading.checks.scene_runner import world_problems
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
 from simscen.record.log_reader import read_log

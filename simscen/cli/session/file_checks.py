@@ -7,10 +7,8 @@ from pathlib import Path
 from simscen.cli.session.stacks import Stacks
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.files import collect_read_files
-from simscen.loading.builders import world_from_file
-from simscen.loading.checks.built_world import check_built_world
 from simscen.loading.checks.robot_geometry import robot_problems
-from simscen.loading.checks.scene_runner import check_in_world, world_reader_notes
+from simscen.loading.checks.scene_runner import world_file_warnings, world_problems
 from simscen.loading.files.single_files import load_robot_file, load_world_file
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import try_variations
@@ -87,10 +85,7 @@ class FileChecker:
         try:
             source = load_world_file(file, self.root, self.world_path)
             notes = list(source.map.notes) if source.map else []
-            if self.fast:
-                return notes
-            world = world_from_file(source, self.root, self.world_path, self.lenient)
-            return [*notes, *check_built_world(world, source), *world_reader_notes(world, source, self.root)]
+            return notes if self.fast else world_file_warnings(source, self.root, self.world_path, self.lenient)
         except InvalidInput as error:
             return error.problems
 
@@ -102,16 +97,3 @@ class FileChecker:
             return robot_problems(load_robot_file(str(file), self.root, self.world_path))
         except InvalidInput as error:
             return error.problems
-
-
-def world_problems(
-    scenario: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None
-) -> list[Problem]:
-    """Return the problems of a scenario in its built world, such as a blocked start.
-
-    `pictures` is the folder for pictures of the problems; None for no pictures.
-    """
-    try:
-        return check_in_world(scenario, cache, pictures)
-    except InvalidInput as error:
-        return error.problems

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from simscen.cli.diagnostics import paths_from_working_folder, relative_to_working_folder
-from simscen.cli.session.logs import COMPLETE_LOG, PARTIAL_LOG, recorded_result
+from simscen.cli.session.logs import COMPLETE_LOG, PARTIAL_LOG, evaluate_recorded_criteria, recorded_result
 from simscen.core.environment.costmap_filters import MaskBlocks
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose2
@@ -14,12 +14,11 @@ from simscen.core.records.case import Case
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult, error_result, skipped_result
 from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.core.records.trace import Trace
-from simscen.core.records.verdict import Evidence, LogCoverage
+from simscen.core.records.verdict import Evidence, ExpectedFailure, LogCoverage
 from simscen.judge.run_result import judge_run
 from simscen.judge.several_robots import combine_robots
 from simscen.loading.files.criteria_file import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
-from simscen.loading.scenario_text import criteria_of_text
 from simscen.model.scenario import expected_failure
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.raw_messages import is_simscen_log
@@ -95,31 +94,31 @@ class LogJudge:
 
     def _judge_simscen_log(self, log: Path) -> RunFinished:
         read = read_run(log)
+        if self._criteria is None:
+            result = evaluate_recorded_criteria(read, log, str(log))
+            return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
         if not read.robots:
-            return self._judge_robot(log, read, "")
-        runs = {name: self._judge_robot(log, robot_log, name) for name, robot_log in read.robots.items()}
+            return self._judge_robot(log, read, self._criteria, "")
+        runs = {name: self._judge_robot(log, one, self._criteria, name) for name, one in read.robots.items()}
         traces = {name: robot_log.trace for name, robot_log in read.robots.items()}
-        recorded = criteria_of_text(read.header.scenario, str(log), read.header.facts)
-        expected = expected_failure(recorded if self._criteria is None else self._criteria.spec)
+        expected = expected_failure(self._criteria.spec)
         result = combine_robots({name: run.result for name, run in runs.items()}, traces, expected)
         return replace(next(iter(runs.values())), result=result)
 
-    def _judge_robot(self, log: Path, read: Log, robot: str) -> RunFinished:
-        """Evaluate the part of a log about one robot. `robot` is its name; "" for the only robot."""
+    def _judge_robot(self, log: Path, read: Log, written: LoadedCriteria, robot: str) -> RunFinished:
+        """Evaluate the part of a log about one robot with criteria of the criteria file.
+
+        `robot` is its name; "" for the only robot.
+        """
         header, case = read.header, read.header.case
-        if self._criteria is None:
-            spec = criteria_of_text(header.scenario, str(log), header.facts, robot)
-            expected = expected_failure(spec)
-            result = judge_run(
-                header.key, str(log), spec.pass_, read.trace, case, (), read.coverage, spec.metrics, expected
-            )
-            return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
-        with _scenario_errors(self._criteria):
-            criteria = self._criteria.for_robot(robot)
+        with _scenario_errors(written):
+            criteria = written.for_robot(robot)
         # The disturbances are in the scenario of the log, at lines that the criteria file does not have.
         case = replace(case, disturbances=tuple(replace(disturbance, line=0) for disturbance in case.disturbances))
         case = replace(case, masks={**case.masks, **self._masks(criteria)})
-        return self._judge_by_file(log, header.key, read.trace, case, read.coverage, criteria)
+        # `expected` of a file without `robots` applies to the run, not to each robot.
+        expected = None if robot else expected_failure(criteria.spec)
+        return self._judge_by_file(log, header.key, read.trace, case, read.coverage, criteria, expected)
 
     def _judge_foreign(self, log: Path) -> RunFinished:
         self.foreign_count += 1
@@ -142,7 +141,8 @@ class LogJudge:
         if case.footprint:
             del missing[Evidence.FOOTPRINT]
         coverage = replace(read.coverage, missing=missing)
-        return read, self._judge_by_file(log, RunKey(log.stem, 0), read.trace, case, coverage, criteria).result
+        key, expected = RunKey(log.stem, 0), expected_failure(criteria.spec)
+        return read, self._judge_by_file(log, key, read.trace, case, coverage, criteria, expected).result
 
     def _masks(self, criteria: LoadedCriteria) -> Mapping[str, MaskBlocks]:
         """Return the costmap filter masks that the criteria use, by file."""
@@ -166,11 +166,17 @@ class LogJudge:
         return self._case
 
     def _judge_by_file(
-        self, log: Path, key: RunKey, trace: Trace, case: Case, coverage: LogCoverage, criteria: LoadedCriteria
+        self,
+        log: Path,
+        key: RunKey,
+        trace: Trace,
+        case: Case,
+        coverage: LogCoverage,
+        criteria: LoadedCriteria,
+        expected: ExpectedFailure | None,
     ) -> RunFinished:
         """Evaluate a trace (the recorded states of a run) with criteria of the criteria file."""
         file, spec = str(self._scenario), criteria.spec
-        expected = expected_failure(spec)
         result = judge_run(key, file, spec.pass_, trace, case, criteria.lines, coverage, spec.metrics, expected)
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=file)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from simscen.core.errors import InvalidInput, NothingSelected, Problem
 from simscen.core.records.run_result import RunResult
+from simscen.core.records.verdict import ExpectedFailure
 from simscen.judge.result_json import from_json
 from simscen.judge.run_result import judge_run
 from simscen.judge.several_robots import combine_robots
@@ -13,6 +14,7 @@ from simscen.loading.files.paths import is_folder
 from simscen.loading.scenario_text import criteria_of_text
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
+from simscen.model.scenario import CriteriaSpec, expected_failure
 from simscen.record.log_reader import Log
 
 COMPLETE_LOG, PARTIAL_LOG = "run.mcap", "run.partial.mcap"
@@ -75,14 +77,26 @@ def log_file(run: Path) -> Path:
 
 def recorded_result(log: Log, file: Path) -> RunResult:
     """Return the result in a log. If the log has none because it is incomplete, evaluate its criteria instead."""
-    if log.result:
-        return from_json(log.result)
-    results = {name: _evaluate(robot_log, file, name) for name, robot_log in (log.robots or {"": log}).items()}
-    traces = {name: robot_log.trace for name, robot_log in log.robots.items()}
-    return combine_robots(results, traces) if traces else results[""]
+    return from_json(log.result) if log.result else evaluate_recorded_criteria(log, file, log.header.name)
 
 
-def _evaluate(log: Log, file: Path, robot: str) -> RunResult:
+def evaluate_recorded_criteria(log: Log, file: Path, path: str) -> RunResult:
+    """Return the result of a log according to the criteria of the scenario in the log.
+
+    `file` is the log in messages. `path` is the path of the scenario in the result.
+    """
     header = log.header
-    spec = criteria_of_text(header.scenario, str(file), header.facts, robot)
-    return judge_run(header.key, header.name, spec.pass_, log.trace, header.case, (), log.coverage, spec.metrics)
+
+    def criteria(robot: str) -> CriteriaSpec:
+        return criteria_of_text(header.scenario, str(file), header.facts, robot)
+
+    def judge(one: Log, spec: CriteriaSpec, expected: ExpectedFailure | None) -> RunResult:
+        case, coverage = one.header.case, one.coverage
+        return judge_run(header.key, path, spec.pass_, one.trace, case, (), coverage, spec.metrics, expected)
+
+    spec = criteria("")
+    expected = expected_failure(spec)
+    if not log.robots:
+        return judge(log, spec, expected)
+    results = {name: judge(one, criteria(name), None) for name, one in log.robots.items()}
+    return combine_robots(results, {name: one.trace for name, one in log.robots.items()}, expected)

@@ -5,9 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from simscen.core.environment.world_model import World
-from simscen.core.errors import Problem, UsageError
+from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.files import require_regular_file
-from simscen.loading.builders import load_robot
+from simscen.loading.builders import load_robot, world_from_file
 from simscen.loading.checks import masks, placement, regions, routes
 from simscen.loading.checks.built_world import check_built_world
 from simscen.loading.checks.runner import check_scenario
@@ -46,6 +46,16 @@ def check_in_world(
             [Scene(view, world, robot_size(view), cache) for view in views]
         )
     return problems
+
+
+def world_problems(
+    loaded: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None
+) -> list[Problem]:
+    """Return the problems of `check_in_world`, or those for which it raises InvalidInput."""
+    try:
+        return check_in_world(loaded, cache, pictures)
+    except InvalidInput as error:
+        return error.problems
 
 
 def _check_robot(loaded: LoadedScenario, world: World, cache: WorldCache, pictures: Path | None) -> list[Problem]:
@@ -105,6 +115,13 @@ def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path
     except OSError as error:
         raise UsageError(f"cannot write the picture {file}: {error.strerror}") from error
     return file
+
+
+def world_file_warnings(source: LoadedWorld, root: Path, world_path: Sequence[Path], lenient: bool) -> list[Problem]:
+    """Build the world of the file `source`, and return warnings about it. Raises InvalidInput for unusable files."""
+    notes = list(source.map.notes) if source.map else []
+    world = world_from_file(source, root, world_path, lenient)
+    return [*notes, *check_built_world(world, source), *world_reader_notes(world, source, root)]
 
 
 def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Problem]:

@@ -35,6 +35,14 @@ class ImuMessage(NamedTuple):
     turn_rate: float
 
 
+class PolygonMessage(NamedTuple):
+    """geometry_msgs/msg/PolygonStamped: stamp in ns, frame, and corners (x, y) in m."""
+
+    stamp: int
+    frame: str
+    corners: tuple[tuple[float, float], ...]
+
+
 EXTRA_TOPICS = {
     "imu": "/imu",
     "bumper": "/bumper",
@@ -58,11 +66,11 @@ def decode_imu(reader: MessageReader) -> ImuMessage:
     return ImuMessage(stamp, frame, turn_rate)
 
 
-def decode_polygon(reader: MessageReader) -> list[tuple[float, float]]:
-    """Decode the corners (x, y in m) of geometry_msgs/msg/PolygonStamped."""
-    reader.header()
+def decode_polygon(reader: MessageReader) -> PolygonMessage:
+    """Decode geometry_msgs/msg/PolygonStamped."""
+    stamp, frame = reader.header()
     corners = (reader.take("3f") for _ in range(reader.count()))
-    return [(x, y) for x, y, _ in corners]
+    return PolygonMessage(stamp, frame, tuple((x, y) for x, y, _ in corners))
 
 
 _DECODERS: dict[str, Decoders] = {

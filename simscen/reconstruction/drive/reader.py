@@ -16,7 +16,7 @@ from simscen.core.clock import NS_PER_SECOND
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.reconstruction.drive.goals import find_goals, trim_to_first_goal
-from simscen.reconstruction.drive.log_messages import LoggedMessage, LogMessages, collect_messages
+from simscen.reconstruction.drive.log_messages import LoggedMessage, LogMessages, PolygonMessage, collect_messages
 from simscen.reconstruction.drive.recorded_drive import (
     DEFAULT_LIDAR_HEIGHT_M,
     Polygon,
@@ -41,7 +41,7 @@ MIN_POSES = 2
 MIN_LIDAR_HEIGHT_M = 0.05
 """Lower limit of the height of any lidar."""
 MAX_FOOTPRINT_M = 5.0
-"""Maximum coordinate of a usable footprint, in the frame in which the footprint is published."""
+"""Maximum coordinate of a usable footprint, in the base frame."""
 
 
 def read_drive(
@@ -103,7 +103,7 @@ class _DriveReader:
                 goal if goal.name else replace(goal, name=f"goal-{number}")
                 for number, goal in enumerate(find_goals(self._messages, self._seconds, poses), 1)
             ),
-            footprint=self._footprint(poses),
+            footprint=self._footprint(poses, odometry),
             notes=tuple(self._notes),
         )
 
@@ -250,18 +250,34 @@ class _DriveReader:
         # The message rounds the resolution to single precision.
         return OccupancyGrid(grid.cells, round(grid.resolution, 6), grid.origin)
 
-    def _footprint(self, poses: TimedValues) -> Polygon:
-        """Return the footprint in the base frame; () if unknown."""
+    def _footprint(self, poses: TimedValues, odometry: TimedValues) -> Polygon:
+        """Return the footprint in the base frame; () if unknown. Nav2 publishes it in the frame of the local costmap.
+
+        `poses` are the poses in the map frame. The first footprint counts.
+        """
         messages = self._messages.of("footprint")
         if not messages:
             return ()
-        corners = np.array(messages[0].content, dtype=np.float64).reshape(-1, 2)
-        if len(corners) < 3 or np.abs(corners).max() > MAX_FOOTPRINT_M:
+        polygon: PolygonMessage = messages[0].content
+        corners = np.array(polygon.corners, dtype=np.float64).reshape(-1, 2)
+        if not self._is_base(polygon.frame):
+            in_frame = self._poses_in(polygon.frame, odometry)
+            x, y, yaw = (poses if in_frame is None else in_frame).poses_at(self._times(messages[:1])[0])[0].tolist()
+            corners = Pose2(x, y, yaw).inverse().apply(corners)
+        if len(corners) < 3 or not np.abs(corners).max() <= MAX_FOOTPRINT_M:  # also false for nan
             return ()
-        x, y, yaw = poses.poses_at(np.array([self._seconds(messages[0].log_time)]))[0].tolist()
-        inside = np.hypot(*corners.mean(axis=0)) < 0.5
-        local = corners if inside else Pose2(x, y, yaw).inverse().apply(corners)
-        return tuple((round(a, 3), round(b, 3)) for a, b in local.tolist())
+        return tuple((round(a, 3), round(b, 3)) for a, b in corners.tolist())
+
+    def _is_base(self, frame: str) -> bool:
+        """Return whether a frame is the base of the robot."""
+        return frame in BASE_FRAMES or any(message.content.child == frame for message in self._messages.of("odom")[:1])
+
+    def _poses_in(self, frame: str, odometry: TimedValues) -> TimedValues | None:
+        """Return the poses of the robot in the frame of the odometry or of /tf; None if they are unknown."""
+        if len(odometry) and self._messages.of("odom")[0].content.frame == frame:
+            return odometry
+        found = (self._poses_of_tf(frame, base) for base in BASE_FRAMES)
+        return next((poses for poses in found if poses is not None), None)
 
 
 _LATCHED = frozenset({"map", "tf_static", "footprint", "events"})

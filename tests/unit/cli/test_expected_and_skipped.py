@@ -1,12 +1,15 @@
 """`expected` and `skip` in all reports."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
 import simscen as package
+from simscen.cli.session.logs import recorded_result
+from simscen.record.log_reader import read_run
 
 TEXT = """\
 simscen: 1
@@ -61,6 +64,9 @@ def test_reports_distinguish_expected_failures_and_skipped_runs(simscen, project
     page = (project / "out/report.html").read_text()
     assert "2 failed as expected" in page
     assert "no lift here, NAV-2" in page
+    log = project / "out/runs/a/seed-1-known/run.mcap"
+    read = read_run(log)
+    assert recorded_result(replace(read, result=""), log).outcome is recorded_result(read, log).outcome
     judged = simscen("judge", "out")
     assert judged.code == 1
     assert "0 passed, 2 failed, 2 failed as expected, 1 skipped" in judged.out

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from simscen.cli.main import main
-from simscen.cli.session import judging
+from simscen.cli.session import logs
 from simscen.core.records.run_result import RunKey, RunResult
 from simscen.judge.run_result import judge_run
 
@@ -64,7 +64,7 @@ def test_internal_error_for_one_log_keeps_the_verdicts_of_the_others(
             raise AssertionError("a defect")
         return judge_run(key, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(judging, "judge_run", fail_on_bad)
+    monkeypatch.setattr(logs, "judge_run", fail_on_bad)
     ended = simscen("judge", "out")
     bad, good, total = ended.out.splitlines()
     assert ended.code == 3

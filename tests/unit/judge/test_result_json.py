@@ -46,6 +46,12 @@ def test_verdicts_without_a_line_have_line_0():
     assert [verdict["line"] for verdict in result_data(FAILED)["verdicts"]] == [0, 0]
 
 
+@pytest.mark.parametrize("lines", [(), (3, 0)])
+def test_lines_of_verdicts_are_unchanged_after_writing_and_reading(lines):
+    result = replace(FAILED, lines=lines)
+    assert from_json(to_json(result)) == result
+
+
 def test_run_failure_is_unchanged_after_writing_and_reading():
     crashed = RunResult(RunKey("a", 7), "a", Outcome.ERROR, error=RunFailure("crashed", "SIGSEGV", "last words"))
     assert result_data(FAILED)["error"] is None

@@ -136,6 +136,24 @@ def test_without_a_map_the_walls_are_built_from_the_scans(tmp_path):
     assert np.percentile(far, 95) < 0.15
 
 
+@pytest.mark.parametrize("frame", ["odom", "map", "base_link", "unknown"])
+def test_the_footprint_is_read_far_from_the_origin(frame, tmp_path):
+    """The local costmap of Nav2 publishes it in its global frame, which is the odometry by default."""
+    corners, (x, y, yaw) = [(0.4, 0.3), (-0.4, 0.3), (-0.4, -0.3), (0.4, -0.3)], (40.0, -30.0, 2.0)
+    T, said = logs.T, []
+    for time in range(logs.BEGIN, logs.BEGIN + 5 * logs.SECOND, logs.SECOND):
+        said.append(logs.Message("/odom", time, odometry(time, x, y, yaw)))
+        said.append(logs.Message("/tf", time, logs.link(time, "map", "base_link", 7.0, 8.0, 1.0)))
+    at = {"odom": (x, y, yaw), "base_link": (0.0, 0.0, 0.0)}.get(frame, (7.0, 8.0, 1.0))
+    points = [T["geometry_msgs/msg/Point32"](a, b, 0.0) for a, b in drives.Pose2(*at).apply(np.array(corners))]
+    polygon = T["geometry_msgs/msg/PolygonStamped"](
+        header=logs.header(logs.BEGIN, frame), polygon=T["geometry_msgs/msg/Polygon"](points=points)
+    )
+    said.append(logs.Message("/local_costmap/published_footprint", logs.BEGIN, polygon))
+    found = read_drive(logs.write_bag(tmp_path / "bag", said)).footprint
+    assert np.allclose(found, corners, atol=0.001)
+
+
 @pytest.mark.slow
 def test_the_user_can_give_the_map(tmp_path):
     save_map(drives.room().grid, tmp_path / "office.yaml")

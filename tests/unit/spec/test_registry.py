@@ -2,12 +2,14 @@ import subprocess
 import sys
 
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
 import simscen.plugin
 from simscen.advanced.spec import MedialAxisPlanner
 from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import Sensor
 from simscen.spec.choice import Choice
+from simscen.spec.extensible_union import BehaviorName
 from simscen.spec.registry import (
     GROUPS,
     BrokenPlugin,
@@ -86,6 +88,14 @@ def test_name_added_by_two_packages_is_unusable(packages, calm_module) -> None:
     packages("a", "2.0", {"criterion": {"calm": "calm:Calm"}})
     with pytest.raises(BrokenPlugin, match=r"added by a 2.0 \(calm:Calm\) and by b 1.0"):
         find_type("criterion", "calm").load()
+
+
+def test_unknown_name_lists_a_name_added_by_two_packages_once(packages, calm_module) -> None:
+    packages("alpha", "1.0", {"behavior": {"zen": "calm:Calm"}}, calm=calm_module)
+    packages("beta", "1.0", {"behavior": {"zen": "calm:Calm"}})
+    with pytest.raises(ValidationError) as raised:
+        TypeAdapter(BehaviorName).validate_python("zzen")
+    assert raised.value.errors()[0]["ctx"]["names"].split(", ").count("zen") == 1
 
 
 def test_packages_cannot_redefine_shipped_names(packages, calm_module) -> None:

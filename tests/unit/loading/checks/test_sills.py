@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.cli.session.file_checks import world_problems
+from simscen.loading.checks.scene_runner import world_problems
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
