@@ -9,7 +9,8 @@ from pathlib import Path
 from simscen.cli.catalog.commands_page import commands_page
 from simscen.cli.catalog.json_schema import MODELS, as_text, schema_of
 from simscen.cli.catalog.language_page import GENERATED_NOTE, language_page
-from simscen.cli.catalog.reference_topics import metrics_page, signals_page
+from simscen.cli.catalog.metric_topics import metrics_page
+from simscen.cli.catalog.signal_topics import signals_page
 from simscen.loading.codes import CODES
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -4,9 +4,11 @@ from collections.abc import Iterator, Sequence
 
 from pydantic import BaseModel
 
+from simscen.cli.catalog.code_topics import code_topics
 from simscen.cli.catalog.fields import OPTIONAL, Field, fields_of
 from simscen.cli.catalog.json_schema import MODELS
-from simscen.cli.catalog.reference_topics import code_topics, metric_topics, signal_topics
+from simscen.cli.catalog.metric_topics import metric_topics
+from simscen.cli.catalog.signal_topics import signal_topics
 from simscen.cli.catalog.topics import Topic, topics
 from simscen.loading.codes import CODES
 from simscen.loading.schema.lookup import models_at

@@ -14,6 +14,7 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel, RootModel
 
 from simscen.actions.base import AnyAction
+from simscen.cli.catalog.examples import EXAMPLES
 from simscen.cli.catalog.fields import Field, fields_of, kind_of
 from simscen.criteria import error_codes
 from simscen.criteria.registry import AnyCriterion
@@ -229,7 +230,7 @@ def _choices(choice: type[Choice], installed: bool) -> Iterator[Topic]:
         if model is not None:
             yield _topic(group, key, model)
         else:
-            yield Topic(group, key, None, docs.get(name, ""), _SECTION_EXAMPLES.get(f"{group}.{key}", ""))
+            yield Topic(group, key, None, docs.get(name, ""), EXAMPLES.get(f"{group}.{key}", ""))
     yield from installed_types(group, installed)
 
 
@@ -240,47 +241,9 @@ def installed_types(group: str, installed: bool) -> Iterator[Topic]:
         yield replace(_topic(group, name, model), origin=origins.get(name, ""))
 
 
-_SECTION_EXAMPLES = {
-    "trigger.all": "when: {all: [{robot_in: {region: hall}}, {speed_above: 0.4 m/s}]}",
-    "trigger.any": "when: {any: [{travelled: 5 m}, {time: 30 s}]}",
-    "trigger.not": "when: {not: {robot_in: {region: hall}}}",
-    "trigger.when": "when: {speed_above: 0.4 m/s, for: 2 s, delay: 1 s, times: 3}",
-    "fault.faults": "faults: [{sensor: lidar, off: {}, name: blackout, when: {travelled: 3 m}, for: 2 s}]",
-    "criterion.pass": "pass: [{clearance: {min: 10 cm}, id: near miss, severity: warn}]",
-    "scenario.robot entry": "robot: {model: amr, pose: dock}",
-    "scenario.initial_estimate": "initial_estimate: {x: 1 m, y: 2 m, yaw: 90 deg, std: [0.1, 0.1, 5 deg]}",
-    "scenario.payload": "payload: {mass: 30 kg, at: [0, 0, 0.5]}",
-    "scenario.goals": "goals: [{name: shelf, pose: {x: 5, y: 3, yaw: 90 deg}, timeout: 60 s}]",
-    "scenario.events": "events: [{name: robot is pushed, when: {time: 10 s}, do: {push: {impulse: [0, 2]}}}]",
-    "scenario.then": "then: [{when: {time: 3 s}, do: {open: {name: gate}}}]",
-    "scenario.pose": "pose: {x: 5 m, y: 3 m, yaw: 90 deg}",
-    "scenario.physics": "physics: {truth_rate: 80 Hz}",
-    "scenario.variations": "variations: {grid: {robot.motor_torque: [50 %, 100 %], robot.model: [amr, jackal]}}",
-    "scenario.sampled": "sampled: {count: 20, values: {robot.motor_torque: {uniform: [50 %, 100 %]}}}",
-    "scenario.acceptance": "acceptance: {pass_rate: {min: 95 %, confidence: 95 %}}",
-    "stack.stack": "stack: {profile: advanced, controller: {type: dwb}, costmap: {inflation_radius: 0.5 m}}",
-    "stack.speed_zones": "speed_zones: [{region: crossing, speed_limit: 0.2 m/s}]",
-    "stack.speed_mask": "speed_mask: {file: masks/speed.yaml, type: percent, base: 100, multiplier: -1}",
-    "stack.recovery": "recovery: {behaviors: [clear_costmap, spin], number_of_retries: 3}",
-    "stack.latency": "latency: {planner: 200 ms, controller: 25 ms}",
-    "world.walls": "walls: [{name: north wall, points: [[0, 8], [12, 8]], thickness: 20 cm}]",
-    "world.obstacles": "obstacles: [{name: pillar, cylinder: [0.25, 1.0], pose: {x: 4, y: 3}}]",
-    "world.ramps": "ramps: [{name: ramp, start: [2, 1], end: [4, 1], width: 1 m, height: 10 cm}]",
-    "world.objects": "objects: [{name: crate, box: [0.4, 0.4, 0.4], mass: 3 kg, pose: {x: 3, y: 6}}]",
-    "world.doors": "doors: [{name: gate, points: [[6, 5.2], [6, 4.2]], closed: true}]",
-    "robot.body": "body: [{box: [0.80, 0.50, 0.20], z: 0.04}]",
-    "robot.limits": "limits: {linear: 1.2 m/s, angular: 1.5 rad/s, linear_acceleration: 1, angular_acceleration: 2}",
-    "robot.mount": "mount: {x: 0.2, z: 0.4, pitch: 20 deg}",
-    "drive.differential": "drive: {type: differential, wheel_radius: 8 cm, wheel_separation: 42 cm}",
-    "sensor.lidar": "sensors: {front: {lidar: {beams: 541, field_of_view: 270 deg, mount: {x: 0.35, z: 0.18}}}}",
-    "sensor.camera": "sensors: {left_eye: {camera: {width: 64, height: 48, mount: {y: 0.2, yaw: 90 deg}}}}",
-}
-"""Example of each topic whose docstring has none, by its group and name."""
-
-
 def _topic(group: str, name: str, model: type[BaseModel]) -> Topic:
     """Return the topic of a model, from its docstring. A line "Example: …" becomes the example."""
     text = inspect.cleandoc(model.__doc__ or "")
     example = _EXAMPLE.search(text)
-    shown = example[1] if example else _SECTION_EXAMPLES.get(f"{group}.{name}", "")
+    shown = example[1] if example else EXAMPLES.get(f"{group}.{name}", "")
     return Topic(group, name, model, _EXAMPLE.sub("", text).strip(), shown)

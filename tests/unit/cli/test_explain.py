@@ -5,7 +5,7 @@ from pydantic import ValidationError
 
 import simscen as package
 from simscen.cli.catalog import topic_lookup
-from simscen.cli.catalog.reference_topics import EXTERNAL_ONLY_CODES, NAV2_ERROR_CODES
+from simscen.cli.catalog.code_topics import EXTERNAL_ONLY_CODES, NAV2_ERROR_CODES
 from simscen.cli.catalog.topic_lookup import known_names
 from simscen.cli.commands import explain
 from simscen.cli.commands.explain import explanation
