@@ -77,9 +77,15 @@ class Journal:
         }
         self._write({"event": "planned", **facts, "runs": [planned_run_to_data(run) for run in runs]})
 
-    def add(self, runs: Sequence[PlannedRun], study: StudyPlan) -> None:
-        """Write a line with further runs of a study. `study` is the new plan of the study."""
+    def add(self, runs: Sequence[PlannedRun], version: str, workers: int, study: StudyPlan) -> None:
+        """Write a line with the next runs of a study: the line of `plan` for the first runs, later a shorter line.
+
+        `study` is the plan of the study with these runs. The other parameters are those of `plan`.
+        """
         first = len(self._numbers)
+        if not first:
+            self.plan(runs, version, workers, study=study)
+            return
         self._numbers |= {run.key: number for number, run in enumerate(runs, start=first)}
         data = [planned_run_to_data(run) for run in runs]
         self._write({"event": "added", "runs": data, "study": study_plan_to_data(study)})

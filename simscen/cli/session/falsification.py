@@ -221,12 +221,8 @@ class Falsification:
     def _plan(self, journal: Journal, jobs: Sequence[Job]) -> None:
         """Write the planned runs of a batch to the journal."""
         planned = plan_runs(jobs)
-        is_first = not self._planned
         self._planned += planned
-        if is_first:
-            journal.plan(planned, __version__, self._request.options.workers, study=self._study_plan())
-        else:
-            journal.add(planned, self._study_plan())
+        journal.add(planned, __version__, self._request.options.workers, self._study_plan())
 
     def _study_plan(self) -> StudyPlan:
         """Return the plan of the search in the form of a study, for the journal and the reports."""

@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import count, islice
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,7 +32,7 @@ from simscen.loading.files.discovery import default_root
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import read_variation_space
 from simscen.loading.variations.conditions import ConditionError
-from simscen.loading.variations.expand import MAX_REJECTED_DRAWS, VariationSpace
+from simscen.loading.variations.expand import VariationSpace
 from simscen.loading.variations.naming import number_of
 from simscen.model.acceptance import PassRate
 from simscen.report.journal import Journal
@@ -247,14 +247,9 @@ class _StudySession:
         """Write the runs of a batch to the journal, and return the jobs to execute, and the reused results."""
         planned = plan_runs(jobs)
         remaining, reused = divide_runs(jobs, planned, earlier)
-        is_first = not self._planned
         self._planned += planned
         self._drawn = self._batch[-1].drawn
-        plan = self._study_plan()
-        if is_first:
-            journal.plan(planned, __version__, self._request.options.workers, study=plan)
-        else:
-            journal.add(planned, plan)
+        journal.add(planned, __version__, self._request.options.workers, self._study_plan())
         return remaining, reused
 
     def _study_plan(self) -> StudyPlan:
@@ -276,16 +271,11 @@ def _allowed_numbers(space: VariationSpace, file: Path) -> Iterator[int]:
 
     Raises InvalidInput if no variation meets the conditions, or none of MAX_REJECTED_DRAWS consecutive draws.
     """
-    numbers = count(1) if space.is_random else range(1, space.count + 1)
-    rejected, found = 0, False
+    number = 0
     try:
-        for number in numbers:
-            if space.meets_conditions(number):
-                rejected, found = 0, True
-                yield number
-            elif (rejected := rejected + 1) == MAX_REJECTED_DRAWS and space.is_random:
-                raise ConditionError(f"none of {MAX_REJECTED_DRAWS} draws in a row meets the conditions in `require`")
-        if not found:
+        for number in space.numbers():
+            yield number
+        if not number:
             raise ConditionError("no variation meets the conditions in `require`")
     except ConditionError as error:
         raise InvalidInput([Problem(str(file), 0, 0, "SC016", str(error))]) from error

@@ -4,6 +4,7 @@
 variation of a block combines one option of each axis.
 """
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -116,31 +117,26 @@ class VariationSpace:
         options = self._options(number)
         return None if options is None else self._build(numbered_name(number), options)
 
-    def meets_conditions(self, number: int) -> bool:
-        """Return whether the variation with this number meets the conditions. Raises ConditionError and IndexError."""
-        return self._options(number) is not None
-
     def numbers(self) -> Iterator[int]:
-        """Yield the numbers of the variations that meet the conditions; with `is_random`, only the first `count`.
+        """Yield the numbers of the variations that meet the conditions in `require`; with `is_random`, without end.
 
         Raises ConditionError if a condition cannot be evaluated, or if MAX_REJECTED_DRAWS consecutive draws do not meet
         the conditions.
         """
-        if not self.is_random:
-            yield from (number for number in range(1, self.count + 1) if self._options(number) is not None)
-            return
-        found, number, rejected = 0, 0, 0
-        while found < self.count:
-            number += 1
+        rejected = 0
+        for number in itertools.count(1) if self.is_random else range(1, self.count + 1):
             if self._options(number) is not None:
-                found, rejected = found + 1, 0
+                rejected = 0
                 yield number
-            elif (rejected := rejected + 1) == MAX_REJECTED_DRAWS:
-                raise ConditionError(f"none of {MAX_REJECTED_DRAWS} draws in a row meets the conditions")
+            elif (rejected := rejected + 1) == MAX_REJECTED_DRAWS and self.is_random:
+                raise ConditionError(f"none of {MAX_REJECTED_DRAWS} draws in a row meets the conditions in `require`")
 
     def named_variations(self) -> list[Variation]:
-        """Return the variations of `numbers()`. Their names state the values that differ. Raises ConditionError."""
-        numbers = list(self.numbers())
+        """Return the first `count` variations of `numbers()`, with names that state the values that differ.
+
+        Raises ConditionError.
+        """
+        numbers = list(itertools.islice(self.numbers(), self.count))
         chosen = [options for number in numbers if (options := self._options(number)) is not None]
         values = [
             {change.target.path: change.value.plain for o in options for change in o.changes} for options in chosen
