@@ -14,6 +14,7 @@ from simscen.loading.yaml.tree import (
     Node,
     ScalarNode,
     SequenceNode,
+    child,
     dotted_path,
     key_position,
     node_at,
@@ -94,6 +95,30 @@ def with_seed(tree: MappingNode, seed: int) -> MappingNode:
     position = key_position(tree, ("seed",))
     rest = tree.without_keys("acceptance", "expected", "variations")
     return rest.with_value(("seed",), ScalarNode(position, seed), position)
+
+
+def with_only_criterion(tree: MappingNode, criterion: str, verdict_id: str, seed: int) -> MappingNode:
+    """Return the scenario with this seed, only keys that affect a run, and only one criterion.
+
+    The criterion is the one with the id `verdict_id` of the kind `criterion`, e.g. "collisions". If no criterion of
+    this kind has this id, all criteria of this kind are kept; if there is none, or `criterion` is "", all criteria.
+    """
+    entries = {key: entry for key, entry in tree.entries.items() if key not in UNNEEDED_KEYS}
+    criteria = tree.entries.get("pass")
+    if criterion and criteria is not None and isinstance(criteria.value, SequenceNode):
+        items = [item for item in criteria.value.items if child(item, criterion) is not None]
+        named = [item for item in items if (name := child(item, "id")) and name.plain == verdict_id]
+        if selected := named or items:
+            entries["pass"] = Entry(criteria.key, replace(criteria.value, items=tuple(selected)))
+    return with_seed(MappingNode(tree.position, entries), seed)
+
+
+def with_inline_world(tree: MappingNode, world: MappingNode | None) -> MappingNode | None:
+    """Return the scenario with its world inline instead of in a file; None if the world is not in a file."""
+    entry = tree.entries.get("world")
+    if world is None or entry is None or not isinstance(entry.value, ScalarNode):
+        return None
+    return MappingNode(tree.position, {**tree.entries, "world": Entry(entry.key, world)})
 
 
 def removed_parts(before: MappingNode, after: MappingNode) -> list[str]:

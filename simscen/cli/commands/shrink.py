@@ -11,16 +11,7 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, backend_of, workers_and_cluster
 from simscen.cli.session.file_checks import FileChecker
-from simscen.cli.session.shrinking import (
-    BudgetSpent,
-    CandidateRuns,
-    Failure,
-    Shrinker,
-    Stopped,
-    failure_of,
-    with_inline_world,
-    with_only_failed_criterion,
-)
+from simscen.cli.session.shrinking import BudgetSpent, CandidateRuns, Failure, Shrinker, Stopped, failure_of
 from simscen.cli.session.stacks import parse_stacks
 from simscen.cli.session.user_files import save
 from simscen.cli.shared_options import (
@@ -33,7 +24,7 @@ from simscen.cli.shared_options import (
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.run_result import RunResult
 from simscen.loading.files.discovery import default_root, sibling
-from simscen.loading.reduction import changed_values, removed_parts
+from simscen.loading.reduction import changed_values, removed_parts, with_inline_world, with_only_criterion
 from simscen.loading.scenario import ChangedScenario
 from simscen.loading.yaml.rewriting import changed_text
 from simscen.loading.yaml.tree import Keys, MappingNode, Node, SequenceNode, child
@@ -167,7 +158,7 @@ def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: 
         raise UsageError(f"{scenario.file} is not valid; see simscen validate")
     failure = failure_of(first, criterion, keep)
     print_text(f"the run fails: {_failure_text(first, failure)}")
-    tree = with_only_failed_criterion(scenario.tree, failure, candidates.seed)
+    tree = with_only_criterion(scenario.tree, failure.criterion, failure.verdict_id, candidates.seed)
     if not keep_world and (loaded := candidates.load(tree)) is not None:
         inline = with_inline_world(tree, loaded.world.tree)
         if inline is not None and candidates.first_accepted([inline], failure.occurs_in) is not None:
@@ -190,7 +181,7 @@ def _value_at(tree: MappingNode, keys: Keys) -> Node | None:
     """Return the value at `keys`; None if the tree has no such value."""
     node: Node | None = tree
     for key in keys:
-        node = None if node is None else child(node, key)
+        node = child(node, key)
     return node
 
 

@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TypeVar
@@ -16,17 +16,15 @@ from simscen.core.records.verdict import Status, Verdict
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.reduction import (
     MAX_DIGITS,
-    UNNEEDED_KEYS,
     find_roundings,
     max_depth,
     removable_parts,
     with_roundings,
-    with_seed,
     with_values,
     without_parts,
 )
 from simscen.loading.scenario import ChangedScenario
-from simscen.loading.yaml.tree import Entry, Keys, MappingNode, Node, ScalarNode, SequenceNode, child
+from simscen.loading.yaml.tree import Keys, MappingNode, Node
 from simscen.run.process.jobs import Backend, Job
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
@@ -259,24 +257,3 @@ def _smallest_margin(verdict: Verdict) -> float | None:
     """Return the smallest margin of a verdict's failed findings (checked bounds); None without margins."""
     failed = [finding for finding in verdict.findings if finding.status is Status.FAIL]
     return min((finding.margin for finding in failed if finding.margin is not None), default=None)
-
-
-def with_only_failed_criterion(tree: MappingNode, failure: Failure, seed: int) -> MappingNode:
-    """Return the scenario with this seed, only the failed criterion, and only keys that affect the run."""
-    entries = {key: entry for key, entry in tree.entries.items() if key not in UNNEEDED_KEYS}
-    criteria = tree.entries.get("pass")
-    if failure.criterion and criteria is not None and isinstance(criteria.value, SequenceNode):
-        items = [item for item in criteria.value.items if child(item, failure.criterion) is not None]
-        named = [item for item in items if (name := child(item, "id")) and name.plain == failure.verdict_id]
-        selected = named or items
-        if selected:
-            entries["pass"] = Entry(criteria.key, replace(criteria.value, items=tuple(selected)))
-    return with_seed(MappingNode(tree.position, entries), seed)
-
-
-def with_inline_world(tree: MappingNode, world: MappingNode | None) -> MappingNode | None:
-    """Return the scenario with its world inline instead of in a file; None if the world is not in a file."""
-    entry = tree.entries.get("world")
-    if world is None or entry is None or not isinstance(entry.value, ScalarNode):
-        return None
-    return MappingNode(tree.position, {**tree.entries, "world": Entry(entry.key, world)})
