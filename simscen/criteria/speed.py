@@ -58,8 +58,9 @@ class Speed(Spec, Criterion):
     tolerance: NonNegativeSpeed = 0.05
     """Maximum speed above a limit of the mask."""
     grace: Duration = 1.0
-    """Time for slowing down after the robot enters cells of the mask with a lower limit, or after a zone is enabled. It
-    may also accelerate this long before it leaves such cells. Entering the region `in` gives the robot no such time."""
+    """Time that the robot may take to slow down after it enters cells of the mask with a lower limit, or after a zone
+    is enabled. It may also accelerate this long before it leaves such cells. After the robot enters the region `in`, it
+    has no such time."""
 
     @model_validator(mode="after")
     def _check_keys(self) -> Speed:

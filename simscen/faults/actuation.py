@@ -33,7 +33,7 @@ def twist_from_sides(left: float, right: float, lateral: float, wheel_separation
 
 
 def inapplicable_side(fault: Gain | Saturation, target: FaultTarget) -> tuple[str, str] | None:
-    """Return (`left` or `right`, reason) if it is set but the target has no left and right wheels, otherwise None."""
+    """Return (key, reason) if `left` or `right` is set although the target has no such wheels, otherwise None."""
     given = [key for key in ("left", "right") if key in fault.model_fields_set and getattr(fault, key) is not None]
     if given and target.kind != "Wheels":
         return given[0], f"`{given[0]}` does not apply there: a command has no sides; set it on `wheels`"
@@ -108,7 +108,7 @@ class Gain(Spec, Fault):
     """Ratio of driven to commanded speed of the right wheels; only on `wheels`."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return (`left` or `right`, reason) if it is set but the target has no left and right wheels."""
+        """Return (key, reason) if `left` or `right` is set although the target has no such wheels."""
         return inapplicable_side(self, target)
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
@@ -151,7 +151,7 @@ class Saturation(Spec, Fault):
     """Maximum speed of the right wheels in both directions; only on `wheels`."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return (`left` or `right`, reason) if it is set but the target has no left and right wheels."""
+        """Return (key, reason) if `left` or `right` is set although the target has no such wheels."""
         return inapplicable_side(self, target)
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:

@@ -40,7 +40,10 @@ class WorldCache:
     )
 
     def world(self, loaded: LoadedScenario) -> World:
-        """Return the built world of a scenario, and record its files by `record_read_file`. Raises InvalidInput."""
+        """Return the built world of a scenario. Raises InvalidInput.
+
+        Calls `record_read_file` for each file from which the world was built, also if it was built by an earlier call.
+        """
         known = next((entry for entry in self._worlds if entry[0] == loaded.world), None)
         if known is None:
             with collect_read_files() as read:

@@ -18,7 +18,7 @@ from simscen.pedestrians.surroundings import (
     Surroundings,
     WallMap,
     nearest_by_solid,
-    nearest_points_of,
+    nearest_outline_points,
 )
 
 INTERACTION_RANGE_M = 10.0
@@ -189,11 +189,11 @@ class Crowd:
         first = nearest_by_solid(person, solid, np.hypot(*(nearest - positions[person]).T))
         contacts = [(person[first], nearest[first])]
         aware = np.array([k for k, p in enumerate(people) if "objects" not in p.spec.blind_to], np.int64)
-        contacts += [nearest_points_of(item.outlines, aware, positions) for item in surroundings.objects]
+        contacts += [nearest_outline_points(item.outlines, aware, positions) for item in surroundings.objects]
         impassive = np.array([k for k, p in enumerate(people) if p.spec.behavior == "impassive"
                               and "robots" not in p.spec.blind_to], np.int64)  # fmt: skip
         for robot in surroundings.robots:
-            contacts.append(nearest_points_of([robot.pose.apply(robot.outline)], impassive, positions))
+            contacts.append(nearest_outline_points([robot.pose.apply(robot.outline)], impassive, positions))
         person = np.concatenate([indices for indices, _ in contacts])
         away = positions[person] - np.concatenate([points for _, points in contacts])
         distance = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)

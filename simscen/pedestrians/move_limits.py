@@ -8,7 +8,7 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.pedestrians.forces import Indices
 from simscen.pedestrians.pedestrian import Pedestrian
-from simscen.pedestrians.surroundings import OBSTACLE_RANGE_M, NearestPoints, Surroundings, nearest_points_of
+from simscen.pedestrians.surroundings import OBSTACLE_RANGE_M, NearestPoints, Surroundings, nearest_outline_points
 
 MAX_PROJECTIONS = 8
 """Maximum number of limits that a move is projected onto. A move that still exceeds a limit is scaled down."""
@@ -42,7 +42,7 @@ def move_limits(
         *(("robots", (robot.pose.apply(robot.outline),)) for robot in surroundings.robots),
     ]:
         aware = np.array([k for k, person in enumerate(people) if kind not in person.spec.blind_to], np.int64)
-        near, points = nearest_points_of(outlines, aware, positions, of_each_segment=True)
+        near, points = nearest_outline_points(outlines, aware, positions, of_each_segment=True)
         limits.append(_limits_towards(near, points - positions[near], radii[near], 0.5))
     towards = positions[np.newaxis] - positions[:, np.newaxis]
     distance = np.hypot(towards[..., 0], towards[..., 1])

@@ -156,9 +156,9 @@ def _nearest_points_on(segments: Array, points: Array) -> Array:
 
 
 def nearest_by_solid(person: Indices, solid: Indices, distance: Array) -> Indices:
-    """Return the index of the nearest of the given points for each pair of a pedestrian and a solid.
+    """Return for each pair of a pedestrian and a solid the index k of the point on the solid nearest to the pedestrian.
 
-    Point k belongs to the solid `solid[k]` and is `distance[k]` m away from the pedestrian `person[k]`.
+    Point k is on the solid `solid[k]`, `distance[k]` m away from the pedestrian `person[k]`.
     """
     order = np.lexsort((distance, solid, person))
     pairs = np.stack((person[order], solid[order]), axis=1)
@@ -168,16 +168,16 @@ def nearest_by_solid(person: Indices, solid: Indices, distance: Array) -> Indice
     return first
 
 
-def nearest_points_of(
+def nearest_outline_points(
     outlines: Sequence[Array], indices: Indices, positions: Array, of_each_segment: bool = False
 ) -> tuple[Indices, Array]:
-    """Return indices (k,) of pedestrians, and for each the nearest point (k, 2) in m of closed outlines.
+    """Find the pedestrians within OBSTACLE_RANGE_M of closed outlines, and the nearest point of the outlines to each.
 
-    Pedestrians farther than OBSTACLE_RANGE_M are left out. With `of_each_segment`, each segment in range has its own
-    entry.
+    Returns the indices (k,) of these pedestrians, and the points (k, 2) in m. With `of_each_segment`, returns instead
+    one entry for each pedestrian and each segment of an outline within this range.
 
     outlines:          corners (m, 2) of each outline
-    indices:           pedestrians to examine
+    indices:           indices of the pedestrians to examine
     positions (n, 2):  positions of all pedestrians in m
     """
     rings = [np.stack((ring, np.roll(ring, -1, axis=0)), axis=1) for ring in outlines]

@@ -79,7 +79,11 @@ class Goals:
 
     @property
     def ahead(self) -> list[Goal]:
-        """Goals that follow the current one without a stop in between: up to the first without `via`."""
+        """Goals that the robot reaches after the current one without a stop in between.
+
+        They are the next goals with `via`, and the first goal without `via`, at which the robot stops. There are none
+        if the robot stops at the current goal.
+        """
         if self.current is None or not self.current.via:
             return []
         stop = next((k for k, goal in enumerate(self.waiting) if not goal.via), len(self.waiting) - 1)

@@ -10,7 +10,7 @@ import typer
 
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import Exit, InvalidInput, Problem
-from simscen.judge.metrics.comparison import compare_sessions, comparison_data, labeled_key
+from simscen.judge.metrics.comparison import compare_sessions, comparison_data, comparison_key
 from simscen.judge.significance import Significance
 from simscen.report.comparison import Links, session_comparison_lines
 from simscen.report.comparison_markup import session_comparison_markdown
@@ -116,7 +116,7 @@ def _links(sessions: dict[str, JournaledSession]) -> Links:
     A key consists of BASELINE or CANDIDATE, the name of the run without its seed, and the seed.
     """
     return {
-        (name, labeled_key(run.key, name).test, run.key.seed): next(
+        (name, comparison_key(run.key, name).test, run.key.seed): next(
             (file for file in (run.artifacts.replay, run.artifacts.mcap) if file and Path(file).is_file()), run.again
         )
         for name, session in sessions.items()

@@ -132,9 +132,9 @@ def upward_faces(mesh: TriangleMesh) -> Mask:
 def drivable_solids(mesh: TriangleMesh, max_step: float) -> SolidIndices:
     """Return the indices of the solids onto which a robot can drive if its wheels climb steps of `max_step` m.
 
-    The search starts with the solids whose upward faces begin at most `max_step` m above z = 0. It adds solids whose
-    upward faces are at most `max_step` m away, along each axis, from those of a solid that was found. The bounding
-    boxes of the upward faces are compared.
+    Each solid is represented by the bounding box of its upward faces. The robot can drive onto a solid if the bottom of
+    this box is at most `max_step` m above z = 0, or if the box is at most `max_step` m along each axis from the box of
+    another solid onto which it can drive.
     """
     faces = np.flatnonzero(upward_faces(mesh))
     corners = mesh.vertices[mesh.faces[faces]]

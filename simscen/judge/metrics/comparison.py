@@ -51,14 +51,15 @@ def compare_sessions(
 
     `sessions` are the results and `folders` the output folders, by name of the session.
     """
-    runs = [replace(run, key=labeled_key(run.key, name)) for name, own in sessions.items() for run in own]
+    runs = [replace(run, key=comparison_key(run.key, name)) for name, own in sessions.items() for run in own]
     return _compare(runs, folders, significance)
 
 
-def labeled_key(key: RunKey, session: str) -> RunKey:
-    """Return the key of a run with the session as its stack, and with the stack as part of the scenario name.
+def comparison_key(key: RunKey, session: str) -> RunKey:
+    """Return the key by which a run of a session is compared with runs of another session.
 
-    Keys of repetitions are returned unchanged.
+    The session takes the place of the stack, and the stack becomes part of the name of the scenario. The keys of
+    repetitions are returned unchanged.
     """
     if key.is_repetition:
         return key

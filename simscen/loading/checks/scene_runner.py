@@ -1,4 +1,7 @@
-"""Runner of the checks that need the built world, but no physics engine: stages BUILT_WORLD, WORLD, and TIMING."""
+"""Runner of the checks that need the built world, but no physics engine.
+
+These are the checks of the stages BUILT_WORLD, WORLD, and TIMING, which `registry.py` describes.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace

@@ -106,7 +106,8 @@ class Translation:
     note: str = ""
     """Message for the user; "" for none."""
     covers: str | None = None
-    """Common beginning of the names of further parameters that this translation includes; None if there are none."""
+    """Prefix of the names of other parameters that this translation includes, so that they need no translation of their
+    own; None if there are none."""
     hint: str = "it is ignored"
 
 

@@ -28,12 +28,13 @@ from simscen.record.messages.decode import POSE_DECODERS
 from simscen.record.trace_builder import TraceRows, to_planar
 
 MAX_TRUTH_GAP_S = 1.0
-"""Maximum time without ground truth for complete evidence."""
+"""Maximum time without ground truth. With a longer gap, the ground truth is partial evidence."""
 MIN_LATE_SUBSCRIPTION_S, MAX_LATE_SUBSCRIPTION_S = 0.05, 2.0
 """If the first ground truth or the first scan comes between these times after the first message, the recorder
 subscribed late. The log is then judged from this ground truth or scan on."""
 MAX_DISTANCE_BEFORE_BELIEF_M = 0.3
-"""Maximum diagonal of the area in which the robot drives before the first pose of AMCL, for complete evidence."""
+"""Maximum diagonal of the area in which the robot drives before the first pose of AMCL. If it drives farther, the poses
+of AMCL are partial evidence."""
 MAX_LISTED_TOPICS = 12
 """Maximum number of topics in a message to the user."""
 _NOT_ON_STANDARD_TOPICS = (
@@ -52,7 +53,7 @@ _EVIDENCE_OF_ROLE = {"cmd_vel": Evidence.COMMANDS, "scan": Evidence.SCANS, "plan
 
 
 class ForeignTraceReader:
-    """Signals and events of one log, converted from the `decoded` messages.
+    """Converter of the `decoded` messages of one log to signals and events, which are in `rows`.
 
     `topics` has the message types of all topics of the log.
 

@@ -29,9 +29,9 @@ class Interrupted(BaseException):
 class Supervisor:
     """Runs jobs in worker processes of a fork server on this machine, `workers` at a time.
 
-    If the fork server dies while it prepares a job, this job fails, and all other running jobs are repeated. After any
-    other death, or a SIGKILL, each running job may be the cause: it is repeated alone, and fails if the fork server
-    dies again. If the fork server cannot start, all jobs fail.
+    If the fork server dies while it prepares a job, this job fails, and all other running jobs are repeated. If it dies
+    at another time, or is killed from outside (SIGKILL), any running job may be the cause: each of them is repeated
+    alone, and fails if the fork server dies again meanwhile. If the fork server cannot start, all jobs fail.
     """
 
     def __init__(self, workers: int, entry: Sequence[str]) -> None:

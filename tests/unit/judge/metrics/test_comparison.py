@@ -20,7 +20,7 @@ from simscen.judge.metrics.comparison import (
     compare_sessions,
     compare_stacks,
     comparison_data,
-    labeled_key,
+    comparison_key,
 )
 from simscen.judge.significance import PASS_RATE, Significance, signed_rank_test
 
@@ -199,10 +199,10 @@ def test_pairs_without_any_difference_have_p_1() -> None:
 
 
 def test_session_keys_contain_the_stack_in_the_scenario_name() -> None:
-    assert labeled_key(RunKey("a", 1, "slow"), "now") == RunKey("a", 1, "slow", "now")
-    assert labeled_key(RunKey("a", 1, "slow", "dwb"), "now") == RunKey("a (dwb)", 1, "slow", "now")
+    assert comparison_key(RunKey("a", 1, "slow"), "now") == RunKey("a", 1, "slow", "now")
+    assert comparison_key(RunKey("a", 1, "slow", "dwb"), "now") == RunKey("a (dwb)", 1, "slow", "now")
     second = RunKey("a", 1).repetition
-    assert labeled_key(second, "now") == second
+    assert comparison_key(second, "now") == second
 
 
 def test_scenarios_are_sorted_in_any_order_of_runs() -> None:
