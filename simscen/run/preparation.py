@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
-from pathlib import Path
 
 from simscen.core.environment.costmap_filters import FilterMasks
 from simscen.core.environment.occupancy_grid import OccupancyGrid
@@ -14,17 +13,8 @@ from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import Estimate
 from simscen.core.records.case import CLEARANCE_RANGE_M, ROBOT_NAME, Case
 from simscen.criteria.base import Criterion
-from simscen.loading.builders import (
-    load_criterion_masks,
-    load_map,
-    load_masks,
-    load_robot,
-    load_world,
-    robot_from_file,
-    world_from_file,
-)
+from simscen.loading.builders import load_criterion_masks, load_map, load_masks, load_robot, load_world
 from simscen.loading.disturbances import disturbances_of
-from simscen.loading.files.criteria_file import LoadedCriteria
 from simscen.loading.goals import event_goals, expected_failures, scenario_goals
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.open_ground import with_stops_in_bounds
@@ -35,7 +25,6 @@ from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, initial_estimate
 from simscen.model.stack import StackSpec
 from simscen.model.stack_files import AnyStack
-from simscen.model.world import WorldSpec
 from simscen.sim.body.robot_body import RobotBody
 from simscen.spec.registry import RegisteredType
 from simscen.triggers.robot_state import ClearanceBelow
@@ -43,7 +32,6 @@ from simscen.worlds.built_world import build_world_and_map
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.map_size import MAP_RESOLUTION_M, fitting_resolution
 from simscen.worlds.routes.shortest_paths import Leg, legs_between
-from simscen.worlds.world_file import world_from_spec
 
 DEFAULT_LIDAR_HEIGHT_M = 0.2
 """Height above the ground at which the map of the world is made for a robot without a lidar."""
@@ -55,7 +43,8 @@ class PreparedScenario:
 
     The stack receives `map` (None: no map), `masks`, and `estimate` (the initial pose estimate). `start` is the true
     initial pose. `case` has the facts that criteria need besides the log. With several robots, `robots` has a
-    PreparedScenario for each robot by name, and the other fields, except `loaded` and `plugins`, are of the first one.
+    PreparedScenario for each robot by name, and the other fields, except `loaded` and `plugins`, are those of the first
+    robot.
     """
 
     loaded: LoadedScenario
@@ -71,7 +60,7 @@ class PreparedScenario:
     obstacles: TriangleMesh
     """The part of the world's mesh that blocks the robot."""
     map_faults: tuple[int, ...] = ()
-    """Indices of the faults that have changed the map."""
+    """Indices of the faults of the scenario that have changed `map`; see `apply_map_faults`."""
     plugins: tuple[RegisteredType, ...] = ()
     """Plug-ins that the scenario uses."""
     robots: Mapping[str, "PreparedScenario"] = field(default_factory=dict)
@@ -100,9 +89,15 @@ def build_world(loaded: LoadedScenario, height: float) -> BuiltWorld:
     return build_world_and_map(world, height, map_resolution(loaded, world))
 
 
+def lidar_height(robot: RobotSpec) -> float:
+    """Return the height in m of the robot's first lidar, or DEFAULT_LIDAR_HEIGHT_M without a lidar."""
+    heights = [sensor.lidar.mount.z for sensor in robot.sensors.values() if sensor.lidar]
+    return heights[0] if heights else DEFAULT_LIDAR_HEIGHT_M
+
+
 def map_resolution(loaded: LoadedScenario, world: World) -> float:
     """Return the cell size in m of the world's map. It is larger if the world is large and no robot uses the map."""
-    is_used = any(view.map is None for view in loaded.robot_views.values())
+    is_used = any(view.map is None for view in loaded.robot_views.values())  # a robot without `map` uses it
     return MAP_RESOLUTION_M if is_used else fitting_resolution(world.bounds)
 
 
@@ -110,10 +105,11 @@ def prepare(
     loaded: LoadedScenario, build: BuildWorld = build_world, find_legs: FindLegs = legs_between
 ) -> PreparedScenario:
     """Return the prepared scenario. Raises InvalidInput for unusable files."""
-    build_once = cache(partial(build, loaded))  # several robots share a world, with a map for each height of lidars
+    build_once = cache(partial(build, loaded))  # the world is built once for each height of the robots' lidars
     if not loaded.robots:
         return _prepare_robot(loaded, build_once, find_legs)
     parts = {name: _prepare_robot(view, build_once, find_legs) for name, view in loaded.robots.items()}
+    # The simulation measures the clearances of all robots up to the same distance.
     clearance_range = max(part.case.clearance_range for part in parts.values())
     parts = {
         name: replace(part, case=replace(part.case, clearance_range=clearance_range)) for name, part in parts.items()
@@ -170,7 +166,7 @@ def _with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh,
     ends, pose = [], case.start
     for goal in case.goals:
         ends.append((pose, goal))
-        pose = pose if goal.name in case.expected else goal.pose
+        pose = pose if goal.name in case.expected else goal.pose  # `expected` has the goals that should fail
     legs = find_legs(replace(built, mesh=obstacles), ends, case.inscribed_radius)
     return replace(
         case,
@@ -194,12 +190,6 @@ def _robot_map(loaded: LoadedScenario, built: BuiltWorld) -> OccupancyGrid | Non
     return load_map(loaded.map) if loaded.map is not None else built.map
 
 
-def lidar_height(robot: RobotSpec) -> float:
-    """Return the height in m of the robot's first lidar, or DEFAULT_LIDAR_HEIGHT_M without a lidar."""
-    heights = [sensor.lidar.mount.z for sensor in robot.sensors.values() if sensor.lidar]
-    return heights[0] if heights else DEFAULT_LIDAR_HEIGHT_M
-
-
 def _effective_stack(spec: ScenarioSpec) -> AnyStack:
     """Return the stack of a scenario. Without a map, dead reckoning replaces the default localizer AMCL."""
     stack = spec.stack
@@ -207,30 +197,3 @@ def _effective_stack(spec: ScenarioSpec) -> AnyStack:
         is_default = "localizer" not in stack.model_fields_set
         return stack.model_copy(update={"localizer": OdometryOnly(type="odometry")}) if is_default else stack
     return stack
-
-
-def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()) -> Case:
-    """Return the case (facts that criteria need besides the log) of a criteria file. Raises InvalidInput.
-
-    The case has no footprint if the file names no robot.
-    """
-    loaded_world, loaded_robot = criteria.load_world_and_robot()
-    root = criteria.library.sandbox.root
-    world = (
-        world_from_spec(WorldSpec(simscen=1), "")
-        if loaded_world is None
-        else world_from_file(loaded_world, root, world_path)
-    )
-    folders = (root, *criteria.library.sandbox.world_path)
-    body = None if loaded_robot is None else robot_from_file(loaded_robot, folders)[1]
-    goals = scenario_goals(criteria.spec)
-    return Case(
-        start=Pose2(0.0, 0.0, 0.0),
-        goals=goals,
-        expected=expected_failures(criteria.spec, goals),
-        regions=world.regions,
-        footprint=() if body is None else body.footprint,
-        inscribed_radius=0.0 if body is None else inscribed_radius(body.radius, body.footprint),
-        time_limit=criteria.spec.time_limit,
-        masks=load_criterion_masks(criteria.masks, criteria.tree, criteria.library.texts),
-    )

@@ -159,7 +159,7 @@ class LogJudge:
         """Return what criteria need from the criteria file, such as goals, regions, and footprint."""
         assert self._criteria is not None
         if self._case is None:
-            from simscen.run.preparation import case_from_criteria
+            from simscen.run.criteria_case import case_from_criteria
 
             with _scenario_errors(self._criteria):
                 self._case = case_from_criteria(self._criteria, self._world_path)

@@ -1,0 +1,40 @@
+"""Case of a criteria file: the facts that criteria need besides the log of a real robot."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from simscen.core.geometry import Pose2
+from simscen.core.records.case import Case
+from simscen.loading.builders import load_criterion_masks, robot_from_file, world_from_file
+from simscen.loading.files.criteria_file import LoadedCriteria
+from simscen.loading.goals import expected_failures, scenario_goals
+from simscen.loading.robot_size import inscribed_radius
+from simscen.model.world import WorldSpec
+from simscen.worlds.world_file import world_from_spec
+
+
+def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()) -> Case:
+    """Return the case of a criteria file. Raises InvalidInput.
+
+    The case has no footprint if the file names no robot.
+    """
+    loaded_world, loaded_robot = criteria.load_world_and_robot()
+    root = criteria.library.sandbox.root
+    world = (
+        world_from_spec(WorldSpec(simscen=1), "")
+        if loaded_world is None
+        else world_from_file(loaded_world, root, world_path)
+    )
+    folders = (root, *criteria.library.sandbox.world_path)
+    body = None if loaded_robot is None else robot_from_file(loaded_robot, folders)[1]
+    goals = scenario_goals(criteria.spec)
+    return Case(
+        start=Pose2(0.0, 0.0, 0.0),
+        goals=goals,
+        expected=expected_failures(criteria.spec, goals),
+        regions=world.regions,
+        footprint=() if body is None else body.footprint,
+        inscribed_radius=0.0 if body is None else inscribed_radius(body.radius, body.footprint),
+        time_limit=criteria.spec.time_limit,
+        masks=load_criterion_masks(criteria.masks, criteria.tree, criteria.library.texts),
+    )
