@@ -22,8 +22,8 @@ from simscen.reconstruction.static_world import StaticWorld, offset_poses
 MIN_DISPLACEMENT_M = 0.4
 """Minimum displacement of a moving object."""
 MIN_FREED_FRACTION = 0.5
-"""An object has moved only if beams pass through more than this fraction of its first points later, or passed through
-more than this fraction of its points at its farthest position before."""
+"""Minimum fraction of points that shows that an object has moved: of its first points, through which beams pass later,
+or of its points at the farthest position, through which beams passed before."""
 SEEN_FREE_FRACTION = 0.6
 """Minimum fraction of an object's points through which beams pass while the object is absent."""
 COMPARED_CLUSTERS = 5

@@ -20,7 +20,7 @@ _new = tuple.__new__
 KNUCKLE_MASS_RATIO = 0.2
 """Mass of a steering knuckle divided by the mass of its wheel."""
 PIN_RADIUS_M = 0.001
-"""Radius of the small sphere that `_wheel_shape` adds to a wheel."""
+"""Radius of the pin, a small sphere on the axle of a fast wheel (see `_wheel_shape`)."""
 ROLL_MARGIN_FACTOR = 1.1
 """Factor by which a wheel may roll farther in a step than the robot's velocity limits allow."""
 HULL_LINK_MASS_KG = 0.001
