@@ -55,8 +55,9 @@ class StackChoice:
 def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
     """Return a scenario tree of one robot with the selected stack.
 
-    Zones, masks, and goal tolerances of the scenario are kept. A stack file replaces all other parameters. A type or a
-    command leaves them unchanged if the scenario's stack has this type; otherwise, it keeps only COMMON_STACK_KEYS.
+    Zones, masks, and goal tolerances of the scenario are kept. A stack file replaces all other parameters. They are also
+    kept if a type of stack is selected and the scenario's stack has this type, or if a command is selected and the
+    scenario's stack is external. Otherwise, only COMMON_STACK_KEYS are kept.
     """
     own = child(tree, "stack")
     if own is not None and not isinstance(own, MappingNode):
