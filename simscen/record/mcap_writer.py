@@ -102,7 +102,10 @@ class Channel:
             chunk.on_full()
 
     def record(self, message: Template) -> "list[bytes | Slot]":
-        """Return the parts of a Message record for `compile_writer`: the field `time` in ns, and `message`."""
+        """Return the template of a Message record, from which `compile_writer` makes a function that writes the record.
+
+        Its fields are `time` in ns, and the fields of `message`.
+        """
         head = struct.pack("<BQHI", _MESSAGE, 22 + len(message.buffer), self.number, 0)
         return [head, Slot("Q", "time"), Slot("Q", "time"), *message.parts]
 

@@ -140,7 +140,8 @@ Bytes = npt.NDArray[np.uint8]
 class TransformBatchPacker:
     """Callable encoder of the transforms of the same links at many times.
 
-    The bytes for each time are the end of a tf2_msgs/msg/TFMessage. The caller must put another transform before them.
+    It returns the last part of a tf2_msgs/msg/TFMessage for each time. The caller writes the start of the message, with
+    at least one transform, before this part.
     """
 
     def __init__(self, links: Sequence[tuple[str, str]]) -> None:
