@@ -115,7 +115,7 @@ def test_first_search_in_a_maze_of_large_blocks_finds_the_cheapest_path(
     optimum = cheapest_cost(rates, start, goal)
     for seed in range(3):
         (first,) = next(bit_star_searches.searches(rates, find_endpoints(rates, start, goal, 0.5), seed))
-        points = first.search(seed, 20_000).solve(simplify=False)
+        points = first.solve(seed, 20_000)
         assert points is not None
         assert rates.along(refine(rates, np.array(points))) < 1.05 * optimum
 

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from simscen.advanced.planners.informed_set import InformedSet, cells_with_most_clearance, pool_blocks
+from simscen.advanced.cell_blocks import cells_with_most_clearance, pool_blocks
+from simscen.advanced.planners.informed_set import InformedSet
 from simscen.core.geometry import Array
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.planners.endpoints import Endpoints
 from simscen.stack.planners.ompl_planner import make_problem
-from simscen.stack.planners.ompl_search import MotionCost, OmplSearch, Problem, StateValidity, Termination
+from simscen.stack.planners.ompl_search import MotionCost, OmplSearch, Point, Problem, StateValidity, Termination
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView
 
@@ -111,11 +112,14 @@ class Leg:
     samples: Array | None = None
     reach: float = LATER_REACH_M
 
-    def search(self, seed: int, max_iterations: int) -> OmplSearch:
-        """Return the search for this leg. Its method `solve` starts it."""
-        if self.samples is None:
-            return OmplSearch(PlannerSpec(max_iterations=max_iterations), self.problem, seed)
-        return SampledSearch(self.problem, self.samples, self.reach, seed, max_iterations)
+    def solve(self, seed: int, max_iterations: int) -> list[Point] | None:
+        """Return the points of this part of the path; None if BIT* finds none."""
+        search = (
+            OmplSearch(PlannerSpec(max_iterations=max_iterations), self.problem, seed)
+            if self.samples is None
+            else SampledSearch(self.problem, self.samples, self.reach, seed, max_iterations)
+        )
+        return search.solve(simplify=False)
 
 
 def searches(costs: TraversalCosts, ends: Endpoints, seed: int) -> Iterator[Iterator[Leg]]:

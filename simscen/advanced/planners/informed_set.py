@@ -1,20 +1,18 @@
 """Informed set: the region of near-shortest paths over a coarse grid, in which OMPL's planners sample.
 
 Source: Gammell et al., Informed RRT* (2014). Their informed set is an ellipse: for its points, the sum of the straight
-distances from start and goal has a limit. Here, both distances are measured along paths over a coarse grid.
-
-A block of the grid consists of several costmap cells. Two blocks are connected if free cells touch across their border.
-A gap narrower than a block therefore stays open, and a wall thinner than a block stays closed.
+distances from start and goal has a limit. Here, both distances are measured along paths over a coarse grid, whose
+blocks consist of several costmap cells.
 """
 
 import math
-from functools import reduce
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from simscen.advanced.cell_blocks import cells_with_most_clearance
+from simscen.advanced.planners.block_graph import block_graph
 from simscen.core.geometry import Array
 from simscen.stack.planners.ompl_search import Point
 from simscen.stack.planners.traversal_costs import TraversalCosts
@@ -51,7 +49,7 @@ class InformedSet:
         end_blocks = [self._index(*start), self._index(*goal)]
         graph = costs.cache.get((self._factor, by_cost))
         if graph is None:
-            costs.cache[self._factor, by_cost] = graph = _move_graph(costs, self._factor, by_cost)
+            costs.cache[self._factor, by_cost] = graph = block_graph(costs, self._factor, by_cost)
         lengths, self._before = dijkstra(graph, directed=False, indices=end_blocks, return_predecessors=True)
         distances: Array = lengths * self._size
         self._from_start, self._through, self._end = distances[0], distances[0] + distances[1], end_blocks[1]
@@ -94,9 +92,7 @@ class InformedSet:
         while blocks[-1] >= 0:
             blocks.append(int(self._before[0, blocks[-1]]))
         inner = np.array(blocks[:-2], dtype=np.int64)
-        rows, columns = cells_with_most_clearance(
-            costmap.distance, np.column_stack(np.divmod(inner, self._width)), self._factor
-        )
+        rows, columns = self._cells_with_most_clearance(costmap, inner)
         stride = max(1, round(PATH_SPACING_M / self._size))
         chosen = (costmap.distance[rows, columns] < ample_clearance) | (np.arange(len(rows)) % stride == 0)
         points: Array = (np.column_stack((columns, rows))[chosen] + 0.5) * costmap.resolution + self._origin
@@ -113,18 +109,19 @@ class InformedSet:
     def _point_with_most_clearance(self, costmap: CostmapView, along: float) -> tuple[Point, float]:
         """Return the point with the most clearance on near-shortest paths, `along` m from the start, and `along`."""
         near_shortest = self._through <= self.length + 2 * self._size
-        blocks = np.flatnonzero(near_shortest & (np.abs(self._from_start - along) <= self._size)).tolist()
-        cells = [self._best_cell(costmap, *divmod(block, self._width)) for block in blocks]
-        _, row, column = max(cells)
-        x = self._origin[0] + (column + 0.5) * costmap.resolution
-        return (x, self._origin[1] + (row + 0.5) * costmap.resolution), along
+        blocks = np.flatnonzero(near_shortest & (np.abs(self._from_start - along) <= self._size))
+        rows, columns = self._cells_with_most_clearance(costmap, blocks)
+        best = np.lexsort((columns, rows, costmap.distance[rows, columns]))[-1]
+        x = self._origin[0] + (int(columns[best]) + 0.5) * costmap.resolution
+        return (x, self._origin[1] + (int(rows[best]) + 0.5) * costmap.resolution), along
 
-    def _best_cell(self, costmap: CostmapView, row: int, column: int) -> tuple[float, int, int]:
-        """Return the largest clearance in m in a block, and the row and the column of its cell."""
-        top, left = row * self._factor, column * self._factor
-        part = costmap.distance[top : top + self._factor, left : left + self._factor]
-        best, width = int(part.argmax()), part.shape[1]
-        return float(part.flat[best]), top + best // width, left + best % width
+    def _cells_with_most_clearance(
+        self, costmap: CostmapView, blocks: npt.NDArray[np.int64]
+    ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+        """Return the row and the column of the cell with the most clearance in each of the blocks (n,)."""
+        return cells_with_most_clearance(
+            costmap.distance, np.column_stack(np.divmod(blocks, self._width)), self._factor
+        )
 
     def bounds(self) -> tuple[float, float, float, float]:
         """Return (min x, min y, max x, max y) of the set in m."""
@@ -146,107 +143,3 @@ class InformedSet:
         column = min(self._width - 1, max(0, int((x - self._origin[0]) / self._size)))
         row = min(self._height - 1, max(0, int((y - self._origin[1]) / self._size)))
         return int(row * self._width + column)
-
-
-def _as_blocks(free: Mask, factor: int) -> Mask:
-    """Return cells as blocks (rows, columns, factor, factor). The last blocks are filled up with occupied cells."""
-    height, width = (-(-side // factor) * factor for side in free.shape)
-    padded = np.zeros((height, width), dtype=bool)
-    padded[: free.shape[0], : free.shape[1]] = free
-    return np.asarray(padded.reshape(height // factor, factor, width // factor, factor).transpose(0, 2, 1, 3))
-
-
-def _possible_moves(blocks: Mask) -> dict[tuple[int, int], Mask]:
-    """Return, for 8 of the 16 moves (rows, columns), the mask of blocks from which the move is possible.
-
-    A move to an adjacent block is possible if free cells touch across the border. A diagonal move needs one of the two
-    ways over adjacent blocks, a knight's move needs both of its ways. The other 8 moves are the reverse moves.
-    """
-    right, up = np.zeros(blocks.shape[:2], dtype=bool), np.zeros(blocks.shape[:2], dtype=bool)
-    right[:, :-1] = (blocks[:, :-1, :, -1] & blocks[:, 1:, :, 0]).any(axis=2)
-    up[:-1] = (blocks[:-1, :, -1] & blocks[1:, :, 0]).any(axis=2)
-    left = _shifted(right, 0, -1)
-    right_up = (right & _shifted(up, 0, 1)) | (up & _shifted(right, 1, 0))
-    left_up = (left & _shifted(up, 0, -1)) | (up & _shifted(left, 1, 0))
-    return {
-        (0, 1): right,
-        (1, 0): up,
-        (1, 1): right_up,
-        (1, -1): left_up,
-        (1, 2): right & _shifted(right_up, 0, 1) & right_up & _shifted(right, 1, 1),
-        (2, 1): up & _shifted(right_up, 1, 0) & right_up & _shifted(up, 1, 1),
-        (1, -2): left & _shifted(left_up, 0, -1) & left_up & _shifted(left, 1, -1),
-        (2, -1): up & _shifted(left_up, 1, 0) & left_up & _shifted(up, 1, -1),
-    }
-
-
-def _shifted(mask: Mask, rows: int, columns: int) -> Mask:
-    """Return the mask shifted by `rows` and `columns`, with False beyond its edge."""
-    moved = np.zeros_like(mask)
-    height, width = mask.shape
-    left = max(0, -columns)
-    moved[: height - rows, left : width - max(0, columns)] = mask[rows:, left + columns : width + min(0, columns)]
-    return moved
-
-
-def _move_graph(costs: TraversalCosts, factor: int, by_cost: bool) -> csr_matrix:
-    """Return the graph of moves between blocks. Its weights are lengths in blocks, times the mean cost if `by_cost`."""
-    blocks = _as_blocks(costs.free, factor)
-    height, width = blocks.shape[:2]
-    steps = _possible_moves(blocks)
-    moves = sorted(steps, key=lambda move: move[0] * width + move[1])
-    offsets = np.array([rows * width + columns for rows, columns in moves])
-    lengths = np.array([math.hypot(*move) for move in moves])
-    possible = np.stack([steps[move].reshape(-1) for move in moves], axis=1)
-    from_block, move = possible.nonzero()  # in the row order of the matrix
-    to_block = from_block + offsets[move]
-    if by_cost:
-        costs_per_meter = _block_costs(costs, factor)
-        length = (0.5 * lengths).astype(np.float32)[move] * (costs_per_meter[from_block] + costs_per_meter[to_block])
-    else:
-        length = lengths[move]
-    row_starts = np.concatenate(([0], possible.sum(axis=1).cumsum()))
-    return csr_matrix((length, to_block, row_starts), shape=(height * width, height * width))
-
-
-def _block_costs(costs: TraversalCosts, factor: int) -> Array:
-    """Return the cost per m (blocks,) of each block: the mean of the cheapest cell and the average of free cells.
-
-    The average alone would be too high for a block in a narrow gap, where the robot drives in the center.
-    """
-    finite = np.isfinite(costs.rates)
-    minimum = pool_blocks(costs.rates, factor, np.minimum, np.inf)
-    total = pool_blocks(np.where(finite, costs.rates, np.float32(0.0)), factor, np.add, 0.0)
-    mean: Array = 0.5 * (minimum + total / np.maximum(pool_blocks(finite, factor, np.add, 0.0), 1.0))
-    return mean.reshape(-1)
-
-
-Numbers = npt.NDArray[np.float32]
-
-
-def pool_blocks(cells: Numbers | npt.NDArray[np.bool_], factor: int, ufunc: np.ufunc, padding: float) -> Numbers:
-    """Reduce each block of `factor` x `factor` cells to one value with a ufunc such as np.maximum.
-
-    Incomplete blocks at the end are filled up with `padding`.
-    """
-    height, width = (-(-side // factor) * factor for side in cells.shape)
-    padded = np.full((height, width), padding, dtype=np.float32)
-    padded[: cells.shape[0], : cells.shape[1]] = cells
-    parts = [padded[row::factor, column::factor] for row in range(factor) for column in range(factor)]
-    reduced: Numbers = reduce(ufunc, parts)
-    return reduced
-
-
-def cells_with_most_clearance(
-    clearance: Numbers, blocks: npt.NDArray[np.int64], factor: int
-) -> tuple[npt.NDArray[np.int64], ...]:
-    """Return the rows (n,) and columns (n,) of the cells with the most clearance in blocks (n, 2: row, column).
-
-    A block consists of `factor` x `factor` cells.
-    """
-    inner = np.arange(factor)
-    rows = np.minimum(blocks[:, 0, None] * factor + np.repeat(inner, factor), clearance.shape[0] - 1)
-    columns = np.minimum(blocks[:, 1, None] * factor + np.tile(inner, factor), clearance.shape[1] - 1)
-    best = clearance[rows, columns].argmax(axis=1)
-    indices = np.arange(len(blocks))
-    return rows[indices, best], columns[indices, best]

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simscen.advanced.planners.bit_star_searches import Leg, searches
+from simscen.advanced.planners.bit_star_searches import searches
 from simscen.advanced.planners.informed_set import InformedSet
 from simscen.advanced.planners.path_refinement import refine
 from simscen.advanced.planners.straight_path import straight_path
@@ -18,7 +18,6 @@ from simscen.stack.planners.ompl_planner import (
     PosePlanner,
     state_space_for,
 )
-from simscen.stack.planners.ompl_search import Point
 from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, densify, with_headings
 from simscen.stack.planners.planning_window import plan_in_windows
 from simscen.stack.planners.pose_search import POSE_SPACING_M
@@ -83,7 +82,7 @@ class MedialAxisPlanner:
             for number, legs in enumerate(searches(costs, ends, seed)):
                 points = [ends.start]
                 for leg in legs:
-                    found = self._solve(leg, seed + number)
+                    found = leg.solve(seed + number, self._spec.max_iterations)
                     if found is None:
                         break
                     points += found[1:]
@@ -96,10 +95,6 @@ class MedialAxisPlanner:
                 break
         message = f"medial_axis: no path in {self._spec.max_iterations} iterations"
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
-
-    def _solve(self, leg: Leg, seed: int) -> list[Point] | None:
-        """Return the points of a leg of the path; None if the search fails."""
-        return leg.search(seed, self._spec.max_iterations).solve(simplify=False)
 
 
 def _postprocessed(costs: TraversalCosts, points: Array) -> Array | None:
