@@ -3,13 +3,10 @@
 from dataclasses import dataclass, replace
 
 from simscen.advanced import spec as model
+from simscen.advanced.localizers.covariance_estimator import MapResiduals
 from simscen.advanced.localizers.global_search import GlobalSearch
-from simscen.advanced.localizers.map_trust import FIT_DISTANCE_M, MapResiduals, MapTrust
-from simscen.advanced.localizers.particle_filter import (
-    ScanMatchingParticleFilter,
-    TemperedLikelihoodField,
-    unmapped_cells,
-)
+from simscen.advanced.localizers.map_trust import FIT_DISTANCE_M, MapTrust, unmapped_cells
+from simscen.advanced.localizers.particle_filter import ScanMatchingParticleFilter, TemperedLikelihoodField
 from simscen.advanced.localizers.scan_matching_amcl import ScanMatchingAmclLocalizer
 from simscen.core.decorators import cached_on_instance
 from simscen.core.environment.occupancy_grid import OccupancyGrid

@@ -5,14 +5,58 @@ A correction is an update of the estimated pose by comparing a scan with the map
 
 import math
 from collections import deque
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from simscen.advanced.localizers.map_trust import ScanResiduals
 from simscen.advanced.localizers.scan_matcher import COVARIANCE_FLOOR
 from simscen.advanced.localizers.scan_memory import step_length
 from simscen.core.geometry import Array, Pose2, wrap_array
+from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.dead_reckoning import propagate_covariance, rotation_matrix
+from simscen.stack.localizers.distance_field import DistanceField
+
+
+class ScanResiduals(NamedTuple):
+    """Residuals of the beams of one scan that end on the mapped area.
+
+    explained:    share of these beams that the map explains
+    mean_square:  mean square of the distances of the endpoints from obstacles, in units of `sigma_hit`². Each distance
+                  is multiplied by the probability that the map explains the beam.
+    """
+
+    explained: float
+    mean_square: float
+
+
+@dataclass(frozen=True, eq=False)
+class MapResiduals:
+    """Computes how well the map explains scans.
+
+    The map explains a beam with the probability hit / (hit + random). Both are terms of AMCL's likelihood of a beam,
+    weighted by `z_hit` and `z_rand`. Residuals are multiplied by this probability, so that people, who are not on the
+    map, do not increase them. `unmapped` marks cells of `field.table` outside the mapped area.
+    """
+
+    field: DistanceField
+    unmapped: npt.NDArray[np.bool_]
+    z_hit: float
+    z_rand: float
+    sigma_hit: float
+
+    def residuals(self, beams: Beams, pose: Pose2) -> ScanResiduals | None:
+        """Return the residuals of a scan taken at `pose`; None if the map explains none of its beams."""
+        cells = self.field.endpoint_cells(np.array([pose]), beams.ends)[0]
+        is_mapped = ~self.unmapped.take(cells, mode="clip")
+        distances = self.field.table.take(cells, mode="clip")[is_mapped] / self.sigma_hit
+        hit = self.z_hit * np.exp(-0.5 * np.square(distances, dtype=np.float64))
+        if not len(hit) or not hit.any():
+            return None
+        explained = hit / (hit + self.z_rand / beams.range_max)
+        return ScanResiduals(float(explained.mean()), float(np.mean(np.square(explained * distances))))
+
 
 WINDOW_SIZE = 36
 """Number of recent corrections whose poses are compared, about 9 m of driving."""

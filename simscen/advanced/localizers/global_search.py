@@ -12,11 +12,13 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
+from simscen.advanced.cell_blocks import pool_blocks
+from simscen.core.environment.occupancy_grid import FREE, OccupancyGrid
 from simscen.core.geometry import Array, wrap_array
 from simscen.stack.localizers.beams import ComplexPoints, evenly_spaced
 from simscen.stack.localizers.distance_field import DistanceField, Float32
-from simscen.stack.localizers.sensor_models import surfaces
+from simscen.stack.localizers.particles import pose_errors
+from simscen.stack.localizers.sensor_models import obstacle_field
 
 ENDPOINT_STD_M = 0.2
 """Standard deviation of the distance of an endpoint from an obstacle, in the score of the endpoint."""
@@ -90,23 +92,24 @@ class GlobalSearch:
         if not len(near_view.ends):
             return np.empty((0, 3)), np.empty(0)
         poses = self._search_coarse_grid(near_view.thinned(COARSE_POINTS))
-        fine = near_view.thinned(FINAL_POINTS)
-        coarse = near_view.thinned(COARSE_POINTS)
-        poses, _ = select_distinct(poses, self.score(poses, coarse), REFINED_POSES)
-        for meters, turn in ((0.1, 1.0), (0.05, 0.5)):
-            poses = self._improve(poses, coarse, meters, np.radians(turn))
-        return select_distinct(poses, self.score(poses, fine), MAX_RESULTS)
+        return self._refine(poses, near_view, REFINED_POSES, ((0.1, 1.0), (0.05, 0.5)))
 
     def search_near(self, view: View, pose: Array) -> tuple[Array, Array]:
         """Return poses and scores as `search` does, but only for poses within NEARBY_STEPS of `pose` (3,)."""
-        near_view = _without_far_points(view)
-        coarse, fine = near_view.thinned(COARSE_POINTS), near_view.thinned(FINAL_POINTS)
         offsets, turn = (np.arange(-steps, steps + 1) * step for steps, step in NEARBY_STEPS)
         poses = pose + np.stack(np.meshgrid(offsets, offsets, turn, indexing="ij"), axis=-1).reshape(-1, 3)
-        poses, _ = select_distinct(poses, self.score(poses, coarse), REFINED_NEARBY_POSES)
-        for meters, degrees in ((0.1, 1.0), (0.05, 0.5), (0.05, 0.5)):
+        steps = ((0.1, 1.0), (0.05, 0.5), (0.05, 0.5))
+        return self._refine(poses, _without_far_points(view), REFINED_NEARBY_POSES, steps)
+
+    def _refine(
+        self, poses: Array, view: View, max_count: int, steps: tuple[tuple[float, float], ...]
+    ) -> tuple[Array, Array]:
+        """Refine the best `max_count` of the `poses` (n, 3) with each of `steps` (m, degrees). Return as `search`."""
+        coarse = view.thinned(COARSE_POINTS)
+        poses, _ = select_distinct(poses, self.score(poses, coarse), max_count)
+        for meters, degrees in steps:
             poses = self._improve(poses, coarse, meters, np.radians(degrees))
-        return select_distinct(poses, self.score(poses, fine), MAX_RESULTS)
+        return select_distinct(poses, self.score(poses, view.thinned(FINAL_POINTS)), MAX_RESULTS)
 
     def score(self, poses: Array, view: View) -> Array:
         """Return the scores (n,) in 0 … 1 of `poses` (n, 3) for a view."""
@@ -129,7 +132,7 @@ class GlobalSearch:
     def _field(self) -> DistanceField:
         if self._given_field is not None and self._given_field.limit >= MAX_DISTANCE_M:
             return self._given_field
-        return DistanceField(self._grid, surfaces(self._grid.cells == OCCUPIED), MAX_DISTANCE_M, walled=False)
+        return obstacle_field(self._grid, MAX_DISTANCE_M)
 
     @cached_property
     def _nearness_table(self) -> Levels:
@@ -143,25 +146,25 @@ class GlobalSearch:
         return levels
 
     @cached_property
-    def _coarse(self) -> tuple[int, Levels, Levels, npt.NDArray[np.bool_]]:
-        """Factor, nearness table, free table, and mask of the coarse cells that contain a free cell.
+    def _coarse(self) -> tuple[int, Levels, Levels]:
+        """Factor, nearness table, and free table of the coarse grid.
 
         A coarse cell consists of `factor` x `factor` map cells, and has the largest of their values.
         """
         factor = max(1, round(COARSE_CELL_M / self._grid.resolution))
         rows, columns = self._grid.shape
         shape = rows + 2, columns + 2
-        nearness = _pooled(self._nearness_table.reshape(shape)[1:-1, 1:-1], factor)
-        open_ = _pooled(self._free_table.reshape(shape)[1:-1, 1:-1], factor)
-        return factor, nearness, open_, open_ > 0
+        nearness = pool_blocks(self._nearness_table.reshape(shape)[1:-1, 1:-1], factor, np.maximum, 0)
+        free = pool_blocks(self._free_table.reshape(shape)[1:-1, 1:-1], factor, np.maximum, 0)
+        return factor, nearness, free
 
     def _search_coarse_grid(self, view: View) -> Array:
         """Return the best poses of the coarse grid, unordered."""
-        factor, nearness, open_, has_free = self._coarse
+        factor, nearness, free = self._coarse
         cell = factor * self._grid.resolution
         rows, columns = nearness.shape
         border = int(MAX_RANGE_M / cell) + 2
-        tables = [np.pad(nearness, border), np.pad(open_, border)]
+        tables = [np.pad(nearness, border), np.pad(free, border)]
         weights = [4, max(1, round(4 * FREE_WEIGHT * len(view.ends) / max(1, len(view.passed))))]
         scores = np.empty((HEADING_COUNT, rows, columns), dtype=np.uint16)
         turns = np.arange(HEADING_COUNT, dtype=np.float64) * (2 * np.pi / HEADING_COUNT)
@@ -175,7 +178,7 @@ class GlobalSearch:
                     part += table[up : up + rows, right : right + columns]
                 total += np.uint32(weight) * part
             heading_scores[:] = total >> 3
-        scores *= has_free
+        scores *= free > 0
         flat = scores.ravel()
         best = np.argpartition(flat, -min(COARSE_POSES, flat.size))[-COARSE_POSES:]
         heading, row, column = np.unravel_index(np.sort(best), scores.shape)
@@ -200,26 +203,18 @@ def _nearness(meters: Float32) -> Levels:
     return levels
 
 
-def _pooled(levels: Levels, factor: int) -> Levels:
-    """Return the maximum score in each block of `factor` x `factor` cells."""
-    rows, columns = (-(-size // factor) for size in levels.shape)
-    padded = np.pad(levels, ((0, rows * factor - levels.shape[0]), (0, columns * factor - levels.shape[1])))
-    pooled: Levels = padded.reshape(rows, factor, columns, factor).max(axis=(1, 3))
-    return pooled
-
-
 def select_distinct(poses: Array, scores: Array, max_count: int) -> tuple[Array, Array]:
-    """Return the best distinct poses (MIN_SEPARATION) of `poses` (n, 3), and their scores, best first."""
+    """Return the best distinct poses (see `are_distinct`) of `poses` (n, 3), and their scores, best first."""
     order = np.argsort(-scores, kind="stable")
-    remaining = poses[order]
-    chosen_indices: list[int] = []
-    while len(order) and len(chosen_indices) < max_count:
-        chosen_indices.append(int(order[0]))
-        difference = np.abs(remaining - remaining[0])
-        difference[:, 2] = np.abs(wrap_array(difference[:, 2]))
-        other = (np.hypot(difference[:, 0], difference[:, 1]) > MIN_SEPARATION[0]) | (
-            difference[:, 2] > MIN_SEPARATION[1]
-        )
-        order, remaining = order[other], remaining[other]
-    chosen = np.array(chosen_indices, dtype=np.int64)
+    chosen: list[int] = []
+    while len(order) and len(chosen) < max_count:
+        chosen.append(int(order[0]))
+        order = order[are_distinct(poses[order[0]], poses[order])]
     return poses[chosen], scores[chosen]
+
+
+def are_distinct(pose: Array, others: Array) -> npt.NDArray[np.bool_]:
+    """Return which of the poses `others` (n, 3) differ from `pose` (3,) by more than MIN_SEPARATION."""
+    x, y, turn = pose_errors(pose, others).T
+    distinct: npt.NDArray[np.bool_] = (np.hypot(x, y) > MIN_SEPARATION[0]) | (np.abs(turn) > MIN_SEPARATION[1])
+    return distinct

@@ -1,56 +1,44 @@
-"""Agreement of scans with the map: residuals of the endpoints, and lower weights of scans if the map is outdated.
+"""Agreement of scans with the map, and lower weights of scans if the map is outdated.
 
-The mapped area consists of all known cells and of the inside of walls (`particle_filter.unmapped_cells`).
+The mapped area consists of all known cells and of the inside of walls.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.geometry import Array, Pose2
+from simscen.core.environment.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
+from simscen.core.geometry import Array
+from simscen.stack.costmap.distance_transform import MAX_REACH_CELLS, squared_distances_within
 from simscen.stack.localizers.beams import Beams, ComplexPoints, TableIndices
 from simscen.stack.localizers.distance_field import BLOCK_POSES, DistanceField
 from simscen.stack.localizers.particles import Particles
 
+MAX_WALL_THICKNESS_M = 1.0
+"""Unknown cells farther than this from all known cells may be unmapped rooms, and not the inside of a wall."""
 
-class ScanResiduals(NamedTuple):
-    """Residuals of the beams of one scan that end on the mapped area.
 
-    explained:    share of these beams that the map explains
-    mean_square:  mean square of the distances of the endpoints from obstacles, in units of `sigma_hit`². Each distance
-                  is multiplied by the probability that the map explains the beam.
+def unmapped_cells(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
+    """Return the mask (rows + 2, columns + 2) of the cells outside the mapped area, with a border of one cell.
+
+    An unknown cell is outside the mapped area if its nearest known cell is free, or if all known cells are farther away
+    than MAX_WALL_THICKNESS_M. The other unknown cells are the inside of walls.
     """
-
-    explained: float
-    mean_square: float
-
-
-class MapResiduals:
-    """Computes how well the map explains scans.
-
-    The map explains a beam with the probability hit / (hit + random). Both are terms of AMCL's likelihood of a beam,
-    weighted by `z_hit` and `z_rand`. Residuals are multiplied by this probability, so that people, who are not on the
-    map, do not increase them.
-    """
-
-    def __init__(
-        self, field: DistanceField, unmapped: npt.NDArray[np.bool_], z_hit: float, z_rand: float, sigma_hit: float
-    ) -> None:
-        """Take the map and AMCL's parameters. `unmapped` marks cells of `field.table` outside the mapped area."""
-        self._field, self._unmapped = field, unmapped
-        self._z_hit, self._z_rand, self._sigma_hit = z_hit, z_rand, sigma_hit
-
-    def residuals(self, beams: Beams, pose: Pose2) -> ScanResiduals | None:
-        """Return the residuals of a scan taken at `pose`; None if the map explains none of its beams."""
-        cells = self._field.endpoint_cells(np.array([pose]), beams.ends)[0]
-        is_mapped = ~self._unmapped.take(cells, mode="clip")
-        distances = self._field.table.take(cells, mode="clip")[is_mapped] / self._sigma_hit
-        hit = self._z_hit * np.exp(-0.5 * np.square(distances, dtype=np.float64))
-        if not len(hit) or not hit.any():
-            return None
-        explained = hit / (hit + self._z_rand / beams.range_max)
-        return ScanResiduals(float(explained.mean()), float(np.mean(np.square(explained * distances))))
+    unknown = np.pad(grid.cells == UNKNOWN, 1, constant_values=True)
+    if unknown.all():
+        return unknown
+    border_only = np.count_nonzero(unknown) == unknown.size - grid.cells.size
+    if border_only and math.sqrt(2) * grid.resolution <= MAX_WALL_THICKNESS_M:
+        next_to_free: npt.NDArray[np.bool_] = np.pad(grid.cells == FREE, 1, mode="edge")
+        return unknown & next_to_free
+    reach = min(MAX_REACH_CELLS, math.ceil(MAX_WALL_THICKNESS_M / grid.resolution))
+    known = squared_distances_within(~unknown, reach)
+    beyond: npt.NDArray[np.bool_] = squared_distances_within(np.pad(grid.cells == FREE, 1), reach) == known
+    beyond |= known > (MAX_WALL_THICKNESS_M / grid.resolution) ** 2
+    beyond &= unknown
+    return beyond
 
 
 FIT_DISTANCE_M = 0.3

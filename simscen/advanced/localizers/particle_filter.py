@@ -1,19 +1,15 @@
 """Particle filter and sensor model of scan-matching AMCL."""
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 
 from simscen.advanced.localizers.map_trust import MapTrust
+from simscen.advanced.localizers.matched_motion import MatchedMotion, sample_motion
 from simscen.advanced.localizers.pose_prior import CERTAIN_STD
-from simscen.advanced.localizers.scan_matcher import MatchedMotion, sample_motion
 from simscen.advanced.localizers.scan_memory import step_length
 from simscen.advanced.spec import ScanMatchingAmcl
-from simscen.core.environment.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.messages.navigation import Estimate
-from simscen.stack.costmap.distance_transform import MAX_REACH_CELLS, squared_distances_within
 from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.distance_field import DistanceField, Float32
 from simscen.stack.localizers.motion_models import MotionModel
@@ -25,8 +21,6 @@ from simscen.stack.localizers.sensor_models import BeamSkipping, LikelihoodField
 UNMAPPED_LIKELIHOOD_RATIO = 0.4
 """Minimum likelihood of a beam that ends outside the mapped area, as a share of `z_hit`: about the mean likelihood of
 all beams of a well localized robot."""
-MAX_WALL_THICKNESS_M = 1.0
-"""Unknown cells farther than this from all known cells may be unmapped rooms, and not the inside of a wall."""
 
 
 class TemperedLikelihoodField(LikelihoodFieldProb):
@@ -46,27 +40,6 @@ class TemperedLikelihoodField(LikelihoodFieldProb):
             floor = np.float32(UNMAPPED_LIKELIHOOD_RATIO * self._z_hit)
             likelihoods[self._unmapped] = np.maximum(likelihoods[self._unmapped], floor)
         return likelihoods
-
-
-def unmapped_cells(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
-    """Return the mask (rows + 2, columns + 2) of the cells outside the mapped area, with a border of one cell.
-
-    An unknown cell is outside the mapped area if its nearest known cell is free, or if all known cells are farther away
-    than MAX_WALL_THICKNESS_M. The other unknown cells are the inside of walls.
-    """
-    unknown = np.pad(grid.cells == UNKNOWN, 1, constant_values=True)
-    if unknown.all():
-        return unknown
-    border_only = np.count_nonzero(unknown) == unknown.size - grid.cells.size
-    if border_only and math.sqrt(2) * grid.resolution <= MAX_WALL_THICKNESS_M:
-        next_to_free: npt.NDArray[np.bool_] = np.pad(grid.cells == FREE, 1, mode="edge")
-        return unknown & next_to_free
-    reach = min(MAX_REACH_CELLS, math.ceil(MAX_WALL_THICKNESS_M / grid.resolution))
-    known = squared_distances_within(~unknown, reach)
-    beyond: npt.NDArray[np.bool_] = squared_distances_within(np.pad(grid.cells == FREE, 1), reach) == known
-    beyond |= known > (MAX_WALL_THICKNESS_M / grid.resolution) ** 2
-    beyond &= unknown
-    return beyond
 
 
 ODOMETRY_SHARE = 0.2

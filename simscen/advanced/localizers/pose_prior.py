@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simscen.advanced.localizers.scan_matcher import MatchedMotion
+from simscen.advanced.localizers.matched_motion import MatchedMotion
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.dead_reckoning import (
     CovarianceTriangle,

@@ -9,7 +9,7 @@ from collections import deque
 
 import numpy as np
 
-from simscen.advanced.localizers.global_search import MIN_SEPARATION, GlobalSearch, View
+from simscen.advanced.localizers.global_search import GlobalSearch, View, are_distinct
 from simscen.advanced.localizers.map_trust import MapTrust
 from simscen.advanced.localizers.pose_prior import CERTAIN_STD, ObservedMotion, PosePrior
 from simscen.advanced.localizers.scan_memory import ScanMemory, distance_driven
@@ -17,7 +17,6 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import ComplexPoints
-from simscen.stack.localizers.particles import pose_errors
 
 RECENT_SCANS, MIN_FITTING_SHARE = 5, 0.6
 """The robot may be lost if the mean share of fitting beams in the last RECENT_SCANS is below MIN_FITTING_SHARE."""
@@ -68,11 +67,10 @@ class Relocalizer:
         self._initial: PosePrior | None = None
         self._certain: PosePrior | None = None
         self._fitting_shares: deque[float] = deque(maxlen=RECENT_SCANS)
-        self._driven, self._since_search, self._since_check, self._since_candidate = 0.0, 0.0, 0.0, 0.0
-        self._interval, self._was_in_doubt = 0.0, False
+        self._driven = self._searched_at = self._checked_at = self._mapped_at = 0.0  # distances driven
+        self._interval, self._was_in_doubt, self._knows_overlap = 0.0, False, False
         self._last: Pose2 | None = None
-        self._candidate: tuple[Pose2, Pose2] | None = None  # pose found by the last search, and the base there
-        self._mapped_at, self._knows_overlap = 0.0, False
+        self._candidate: tuple[Pose2, Pose2, float] | None = None  # pose of the last search, base, distance driven
 
     def update(
         self, scan: Scan, base: Pose2, estimated: Pose2, limits: tuple[float, float],
@@ -105,7 +103,7 @@ class Relocalizer:
             return found
         if self._has_pose and not (self._update_doubt() or self._is_unmapped):
             return None
-        if self._since_search < self._interval:
+        if self._driven - self._searched_at < self._interval:
             return None
         return self._search_map(self._memory.view_from(base), base, current)
 
@@ -124,10 +122,7 @@ class Relocalizer:
             return
         self._knows_overlap = motion.was_carried is not None
         distance = distance_driven(last, base)
-        self._since_search += distance
-        self._since_check += distance
         self._driven += distance
-        self._since_candidate += distance
         if motion.was_carried or motion.is_scene_moving:
             self._memory.forget(0)
         if motion.was_carried:
@@ -152,20 +147,18 @@ class Relocalizer:
         )
         likelihoods = scores / SCORE_SCALE - initial.negative_log_likelihood(poses, base)
         own = score[0] / SCORE_SCALE - initial.negative_log_likelihood(current, base)[0]
-        best = int(likelihoods.argmax())
-        difference = pose_errors(current[0], poses[best : best + 1])[0]
-        if likelihoods[best] - own < MIN_LOG_RATIO or (
-            math.hypot(difference[0], difference[1]) < MIN_SEPARATION[0] and abs(difference[2]) < MIN_SEPARATION[1]
-        ):
+        best = likelihoods.argmax()
+        found = poses[best : best + 1]
+        if likelihoods[best] - own < MIN_LOG_RATIO or not are_distinct(current[0], found)[0]:
             return None
         self._fitting_shares.clear()
-        return poses[best : best + 1], np.ones(1)
+        return found, np.ones(1)
 
     def _search_nearby(self, base: Pose2, current: Array) -> tuple[Array, Array] | None:
         """Return a better pose near the `current` one (1, 3), e.g. after drift; None if there is none."""
-        if min(self._since_check, self._memory.length) < CHECK_INTERVAL_M:
+        if min(self._driven - self._checked_at, self._memory.length) < CHECK_INTERVAL_M:
             return None
-        self._since_check, view = 0.0, self._memory.view_from(base)
+        self._checked_at, view = self._driven, self._memory.view_from(base)
         if not len(view.ends) or self._trust.fitting_share(current, view.ends, MIN_MAPPED_SHARE) is None:
             return None
         score = float(self._reduce_scores(self._search.score(current, view), current, base)[0])
@@ -225,7 +218,7 @@ class Relocalizer:
     def _search_map(self, view: View, base: Pose2, current: Array) -> tuple[Array, Array] | None:
         """Return the fitting poses and their shares. If the robot has a pose, two searches must agree on a new one."""
         poses, scores = self._search.search(view)
-        last_interval, self._interval, self._since_search = self._interval, SEARCH_INTERVAL_M, 0.0
+        last_interval, self._interval, self._searched_at = self._interval, SEARCH_INTERVAL_M, self._driven
         if not len(poses):
             return None
         if not self._has_pose:
@@ -239,11 +232,10 @@ class Relocalizer:
         own = self._reduce_scores(self._search.score(current, view), current, base)[0]
         if _leads(scores, lead) and scores[0] > min_score and scores[0] > own + MIN_GAIN:
             found = Pose2(*poses[0].tolist())
-            if self._candidate is None or not _agree(*self._candidate, found, base):
-                self._candidate, self._since_candidate = (found, base), 0.0
-            elif self._since_candidate >= AGREEMENT_LENGTH_M:
-                self._candidate = None
-                self._mapped_at = self._driven
+            if self._candidate is None or not _agree(*self._candidate[:2], found, base):
+                self._candidate = found, base, self._driven
+            elif self._driven - self._candidate[2] >= AGREEMENT_LENGTH_M:
+                self._candidate, self._mapped_at = None, self._driven
                 return self._accept(poses[:1], base)
         else:
             interval = MAX_SEARCH_INTERVAL_M if self._has_left_map else 2 * max(last_interval, SEARCH_INTERVAL_M)

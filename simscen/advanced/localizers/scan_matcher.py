@@ -12,10 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from simscen.advanced.localizers.matched_motion import MatchedMotion
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.messages.sensor_data import Scan
 from simscen.stack.localizers.beams import ComplexPoints, directions, evenly_spaced
-from simscen.stack.localizers.particles import empty_poses, wrap_headings
+from simscen.stack.localizers.dead_reckoning import CovarianceTriangle, rotate_covariance
 
 BASELINE_M = 0.15
 """Approximate length of the line between two neighbors of a point. The line determines the normal of the point."""
@@ -92,10 +93,6 @@ GUESS_STD_PER_RAD, GUESS_STD_RAD = 0.15, 0.03
 """Standard deviation of the rotation of the guess: a part per radian of rotation, and a constant."""
 MAX_BEAM_ANGLE_RAD = 0.04
 """Maximum angle between neighboring beams. Scans with larger angles are not matched."""
-AGREEMENT_PER_M, AGREEMENT_M = 0.1, 0.03
-"""Maximum difference between the translations by odometry and by an agreeing match: per meter, and a constant."""
-AGREEMENT_PER_RAD, AGREEMENT_RAD = 0.1, 0.03
-"""Maximum difference between the rotations by odometry and by an agreeing match: per radian, and a constant."""
 MIN_OVERLAP = 0.3
 """Minimum share of the points of a scan that match earlier scans. With less, the match fails."""
 MAX_OVERLAP_STEP = 0.75, 0.75
@@ -104,8 +101,6 @@ COVARIANCE_SCALE, COVARIANCE_FLOOR = 0.5, (0.004**2, 0.003**2, 0.0015**2)
 """Factor on the covariance of the least-squares solution, and variances (m², m², rad²) that are added to it."""
 
 
-Symmetric = tuple[float, float, float, float, float, float]
-"""Upper triangle of a symmetric matrix (3, 3) by rows."""
 Equations = tuple[tuple[float, float, float, float], ...]
 """Normal equations of x, y and yaw, right-hand side last, in units of 1 / POINT_STD_M²."""
 
@@ -159,38 +154,6 @@ class _ReferenceScans:
         return equations
 
 
-@dataclass(frozen=True, eq=False)
-class MatchedMotion:
-    """Motion between two scans by scan matching, in the base frame of the first scan, with its covariance (3, 3)."""
-
-    delta: Pose2
-    covariance: Array
-
-    def agrees(self, odometry: Pose2) -> bool:
-        """Return whether the motion by `odometry` is nearly the same."""
-        difference = odometry.between(self.delta)
-        distance, turned = math.hypot(odometry.x, odometry.y), abs(odometry.yaw)
-        return (
-            math.hypot(difference.x, difference.y) < AGREEMENT_M + AGREEMENT_PER_M * distance
-            and abs(difference.yaw) < AGREEMENT_RAD + AGREEMENT_PER_RAD * turned
-        )
-
-
-def sample_motion(poses: Array, step: MatchedMotion, rng: np.random.Generator) -> Array:
-    """Return `poses` (n, 3), each moved by its own random sample of a motion."""
-    ahead, left, turn = np.dot(_cholesky_factor(step.covariance), rng.standard_normal((3, len(poses))))
-    ahead += step.delta.x
-    left += step.delta.y
-    turn += step.delta.yaw
-    x, y, heading = poses.T
-    c, s = np.cos(heading), np.sin(heading)
-    after = empty_poses(len(poses))
-    after[:, 0] = x + c * ahead - s * left
-    after[:, 1] = y + s * ahead + c * left
-    after[:, 2] = wrap_headings(heading + turn)
-    return after
-
-
 class ScanMatcher:
     """Estimates the motion of the base by matching successive scans of one lidar.
 
@@ -226,7 +189,7 @@ class ScanMatcher:
         self._surfaces.append(seen.thinned(REFERENCE_POINTS).to_parent_frame(self.pose))
         return MatchedMotion(last.between(self.pose), _step_covariance(last.yaw, found[1])) if found else None
 
-    def _match(self, seen: Surface, guess: Pose2) -> tuple[Pose2, Symmetric] | None:
+    def _match(self, seen: Surface, guess: Pose2) -> tuple[Pose2, CovarianceTriangle] | None:
         """Return the new value of `pose`, and its covariance in units of POINT_STD_M²; None on failure."""
         guessed = pose = self.pose.compose(guess)
         reference, own = _ReferenceScans(self._surfaces, complex(pose.x, pose.y)), seen.thinned(SCAN_POINTS)
@@ -260,8 +223,8 @@ def _prior_information(guess: Pose2) -> tuple[float, float]:
     return (POINT_STD_M / position_std) ** 2, (POINT_STD_M / yaw_std) ** 2
 
 
-def _inverse(matrix: Symmetric) -> Symmetric:
-    """Return the inverse of a positive definite matrix."""
+def _inverse(matrix: CovarianceTriangle) -> CovarianceTriangle:
+    """Return the inverse of a positive definite matrix (3, 3)."""
     xx, xy, xa, yy, ya, aa = matrix
     of_xx, of_xy, of_xa = yy * aa - ya * ya, xa * ya - xy * aa, xy * ya - xa * yy
     each = 1 / (xx * of_xx + xy * of_xy + xa * of_xa)
@@ -269,27 +232,12 @@ def _inverse(matrix: Symmetric) -> Symmetric:
     return of_xx * each, of_xy * each, of_xa * each, *rest
 
 
-def _step_covariance(yaw: float, inverse: Symmetric) -> Array:
+def _step_covariance(yaw: float, inverse: CovarianceTriangle) -> Array:
     """Return the covariance (3, 3) of a motion in a base frame with heading `yaw`. `inverse` is from `_match`."""
-    c, s, scale = math.cos(yaw), math.sin(yaw), COVARIANCE_SCALE * POINT_STD_M**2
-    xx, xy, xa, yy, ya, aa = (scale * value for value in inverse)
-    crossed = c * s * (yy - xx) + (c * c - s * s) * xy
-    ahead, left = c * xa + s * ya, c * ya - s * xa
-    along, aside = c * c * xx + 2 * c * s * xy + s * s * yy, s * s * xx - 2 * c * s * xy + c * c * yy
-    floor_x, floor_y, floor_yaw = COVARIANCE_FLOOR
-    return np.array((
-        (along + floor_x, crossed, ahead), (crossed, aside + floor_y, left), (ahead, left, aa + floor_yaw),
-    ))  # fmt: skip
-
-
-def _cholesky_factor(covariance: Array) -> Array:
-    """Return the Cholesky factor (3, 3), lower triangle, of a covariance."""
-    (xx, _, _), (xy, yy, _), (xa, ya, aa) = covariance.tolist()
-    x = math.sqrt(xx)
-    y_x, a_x = xy / x, xa / x
-    y = math.sqrt(yy - y_x * y_x)
-    a_y = (ya - a_x * y_x) / y
-    return np.array(((x, 0.0, 0.0), (y_x, y, 0.0), (a_x, a_y, math.sqrt(aa - a_x * a_x - a_y * a_y))))
+    xx, xy, xa, yy, ya, aa = inverse
+    scaled = COVARIANCE_SCALE * POINT_STD_M**2 * np.array(((xx, xy, xa), (xy, yy, ya), (xa, ya, aa)))
+    xx, xy, xa, yy, ya, aa = rotate_covariance(scaled, -yaw)
+    return np.array(((xx, xy, xa), (xy, yy, ya), (xa, ya, aa))) + np.diag(COVARIANCE_FLOOR)
 
 
 def _is_within(step: tuple[float, float], limits: tuple[float, float]) -> bool:

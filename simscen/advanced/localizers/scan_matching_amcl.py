@@ -2,13 +2,14 @@
 
 from dataclasses import replace
 
-from simscen.advanced.localizers.covariance_estimator import CovarianceEstimator
+from simscen.advanced.localizers.covariance_estimator import CovarianceEstimator, MapResiduals
 from simscen.advanced.localizers.global_search import GlobalSearch
-from simscen.advanced.localizers.map_trust import MapResiduals, MapTrust
+from simscen.advanced.localizers.map_trust import MapTrust
+from simscen.advanced.localizers.matched_motion import MatchedMotion
 from simscen.advanced.localizers.particle_filter import ScanMatchingParticleFilter
 from simscen.advanced.localizers.pose_prior import ObservedMotion
 from simscen.advanced.localizers.relocalization import UNOBSERVED_MOTION, Relocalizer
-from simscen.advanced.localizers.scan_matcher import MatchedMotion, ScanMatcher
+from simscen.advanced.localizers.scan_matcher import ScanMatcher
 from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate

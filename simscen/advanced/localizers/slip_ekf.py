@@ -16,7 +16,6 @@ from simscen.advanced.localizers.slip_model import (
     SLIP_LEVER_M,
     SLIP_X,
     SlipDetector,
-    StepModel,
     WheelStep,
     pose_model,
     predict_state,
@@ -28,6 +27,8 @@ from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.stack.frames import OdometryHistory, is_plausible
 from simscen.stack.localizers.dead_reckoning import initial_pose
+from simscen.stack.localizers.ekf import MAX_YAW_RATE_RAD_S, MIN_YAW_RATE_STD_RAD_S
+from simscen.stack.localizers.kalman_filters import ExtendedKalmanFilter
 
 
 class ScanMatchingCorrection:
@@ -65,10 +66,6 @@ class ScanMatchingCorrection:
         return x, y
 
 
-MAX_TURN_RATE_RAD_S = 100.0
-"""Turn rate above which readings of the gyroscope are ignored as faulty."""
-MIN_RATE_STD_RAD_S = 0.002
-"""Minimum standard deviation of the turn rate of the wheels, because of the resolution of encoders."""
 _GYRO_MEASUREMENT = np.zeros((1, 7))
 """Measurement matrix of the gyroscope, which measures the sum of turn rate and bias."""
 _GYRO_MEASUREMENT[0, [RATE, BIAS]] = 1.0
@@ -87,8 +84,6 @@ class SlipEkfLocalizer:
 
     def reset(self, estimate: Estimate) -> None:
         """Restart at an estimate, with the initial uncertainty of the gyroscope's bias."""
-        from simscen.stack.localizers.kalman_filters import ExtendedKalmanFilter
-
         pose, covariance = initial_pose(estimate)
         bias = self._spec.gyro_noise if self._spec.gyro_bias is None else self._spec.gyro_bias
         self._filter = ExtendedKalmanFilter(dim_x=7, dim_z=1)
@@ -113,7 +108,7 @@ class SlipEkfLocalizer:
         if last is not None:
             step = self._step(last.pose.between(odometry.pose), (odometry.tick - last.tick) / self._tick_rate)
             self._measure(step)
-            self._predict(pose_model(self._spec, self._filter.x, step), predict_state(self._filter.x, step))
+            self._predict(predict_state(self._filter.x, step), *pose_model(self._spec, self._filter.x, step))
         self._readings.clear()
         if self._scan_correction is not None:
             self._scan_correction.add_pose(odometry.tick, self.pose)
@@ -131,7 +126,7 @@ class SlipEkfLocalizer:
     def on_imu(self, imu: Imu) -> None:
         """Store the turn rate until the next odometry reading."""
         rate = imu.angular_velocity[2]
-        if abs(rate) < MAX_TURN_RATE_RAD_S:
+        if abs(rate) < MAX_YAW_RATE_RAD_S:
             self._readings.append(rate)
 
     @property
@@ -164,10 +159,10 @@ class SlipEkfLocalizer:
 
     def _measure(self, step: WheelStep) -> None:
         """Update the turn rate with the wheels, unless they slip, and with the gyroscope."""
-        model = rate_model(self._spec, step, self._wheel_noise(step), self._slipped)
-        predicted = model.f @ self._filter.x
+        jacobian, noise = rate_model(self._spec, step, self._wheel_noise(step), self._slipped)
+        predicted = jacobian @ self._filter.x
         predicted[RATE] = step.pose.yaw / step.seconds
-        self._predict(model, predicted)
+        self._predict(predicted, jacobian, noise)
         if self._readings:
             self._filter.update(
                 np.array([self._turn_rate]),
@@ -182,7 +177,7 @@ class SlipEkfLocalizer:
     def _wheel_noise(self, step: WheelStep) -> float:
         """Return the variance of the turn rate of the wheels in (rad/s)²."""
         turned = step.length + abs(step.pose.yaw)
-        return self._spec.rotation_noise**2 * turned / step.seconds**2 + MIN_RATE_STD_RAD_S**2
+        return self._spec.rotation_noise**2 * turned / step.seconds**2 + MIN_YAW_RATE_STD_RAD_S**2
 
     @property
     def _turn_rate(self) -> float:
@@ -194,9 +189,9 @@ class SlipEkfLocalizer:
         """Variance of `_turn_rate` in (rad/s)²."""
         return self._spec.gyro_noise**2 / len(self._readings)
 
-    def _predict(self, model: StepModel, state: Array) -> None:
-        """Set the predicted `state` (7,), and predict its covariance with the model."""
-        self._filter.F, self._filter.Q = model.f, model.q
+    def _predict(self, state: Array, jacobian: Array, noise: Array) -> None:
+        """Set the predicted `state` (7,), and propagate the covariance with the process `noise` (7, 7)."""
+        self._filter.F, self._filter.Q = jacobian, noise
         self._filter.predict(state)
 
     def _advance(self, state: Array) -> None:

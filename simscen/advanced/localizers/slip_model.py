@@ -91,16 +91,8 @@ class WheelStep:
         return math.hypot(self.pose.x, self.pose.y)
 
 
-@dataclass(frozen=True)
-class StepModel:
-    """Linearized model of a step: Jacobian `f` (7, 7) of the state, and process noise `q` (7, 7)."""
-
-    f: Array
-    q: Array
-
-
-def rate_model(spec: SlipEkf, step: WheelStep, noise: float, slipped_before: bool) -> StepModel:
-    """Return the model of turn rate, bias and slip for a step.
+def rate_model(spec: SlipEkf, step: WheelStep, noise: float, slipped_before: bool) -> tuple[Array, Array]:
+    """Return the Jacobian (7, 7) and the process noise (7, 7) of turn rate, bias and slip for a step.
 
     `noise` is the variance of the turn rate of the wheels in (rad/s)². `slipped_before` states whether the wheels
     slipped in the previous step.
@@ -114,7 +106,7 @@ def rate_model(spec: SlipEkf, step: WheelStep, noise: float, slipped_before: boo
     elif not step.slips:
         f[SLIP_X, SLIP_X] = math.exp(-step.seconds / SLIP_TIME_S)
         q[SLIP_X, SLIP_X] = spec.wheel_slip**2 * (1.0 - f[SLIP_X, SLIP_X] ** 2)
-    return StepModel(f, q)
+    return f, q
 
 
 def predict_state(state: Array, step: WheelStep) -> Array:
@@ -125,8 +117,8 @@ def predict_state(state: Array, step: WheelStep) -> Array:
     return after
 
 
-def pose_model(spec: SlipEkf, state: Array, step: WheelStep) -> StepModel:
-    """Return the model of the pose for a step from `state` (7,): the linearized `predict_state`."""
+def pose_model(spec: SlipEkf, state: Array, step: WheelStep) -> tuple[Array, Array]:
+    """Return the Jacobian (7, 7) of `predict_state` for a step from `state` (7,), and the process noise (7, 7)."""
     dx, dy = _translation(state, step)
     c, s = _direction(state, step)
     f, q = np.eye(7), np.zeros((7, 7))
@@ -137,7 +129,7 @@ def pose_model(spec: SlipEkf, state: Array, step: WheelStep) -> StepModel:
     if step.length > 0:
         wheels = c * step.pose.x - s * step.pose.y, s * step.pose.x + c * step.pose.y
         q[:2, :2] = spec.translation_noise**2 / step.length * np.outer(wheels, wheels)
-    return StepModel(f, q)
+    return f, q
 
 
 def _direction(state: Array, step: WheelStep) -> tuple[float, float]:

@@ -19,11 +19,10 @@ from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.guards import Prediction
 from simscen.stack.costmap.obstacle_layer import ScanWithMovingHits
 from simscen.stack.frames import HISTORY_S
+from simscen.stack.localizers.ekf import MAX_YAW_RATE_RAD_S
 from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
 from simscen.stack.protocols import CostmapView, RobotModel
 
-MAX_TURN_RATE_RAD_S = 100.0
-"""Turn rate above which readings of the gyroscope are ignored as faulty."""
 MAX_PENDING = 10_000
 """Maximum number of readings that wait for integration."""
 
@@ -69,7 +68,7 @@ class GyroOdometry:
         for reading in self._pending:
             if isinstance(reading, Imu):
                 rate = reading.angular_velocity[2]
-                if -MAX_TURN_RATE_RAD_S < rate < MAX_TURN_RATE_RAD_S:
+                if -MAX_YAW_RATE_RAD_S < rate < MAX_YAW_RATE_RAD_S:
                     rate_sum += rate
                     rate_count += 1
                 continue

@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.covariance_estimator import WINDOW_SIZE, CovarianceEstimator
-from simscen.advanced.localizers.map_trust import ScanResiduals
+from simscen.advanced.localizers.covariance_estimator import WINDOW_SIZE, CovarianceEstimator, ScanResiduals
 from simscen.core.geometry import Array, Pose2
 
 STEP = Pose2(0.25, 0.0, 0.05)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.map_trust import MapTrust
-from simscen.advanced.localizers.particle_filter import unmapped_cells
+from simscen.advanced.localizers.map_trust import MapTrust, unmapped_cells
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.beams import Beams, ComplexPoints

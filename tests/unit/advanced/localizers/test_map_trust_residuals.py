@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.map_trust import MapResiduals, ScanResiduals
+from simscen.advanced.localizers.covariance_estimator import MapResiduals, ScanResiduals
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.stack.localizers.beams import Beams

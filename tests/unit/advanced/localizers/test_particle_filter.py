@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from simscen.advanced.localizers.build import map_models
+from simscen.advanced.localizers.matched_motion import MatchedMotion
 from simscen.advanced.localizers.particle_filter import ODOMETRY_SHARE, ScanMatchingParticleFilter
-from simscen.advanced.localizers.scan_matcher import MatchedMotion
 from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate

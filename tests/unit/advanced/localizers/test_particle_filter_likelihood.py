@@ -4,12 +4,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
-from simscen.advanced.localizers.particle_filter import (
-    MAX_WALL_THICKNESS_M,
-    UNMAPPED_LIKELIHOOD_RATIO,
-    TemperedLikelihoodField,
-    unmapped_cells,
-)
+from simscen.advanced.localizers.map_trust import MAX_WALL_THICKNESS_M, unmapped_cells
+from simscen.advanced.localizers.particle_filter import UNMAPPED_LIKELIHOOD_RATIO, TemperedLikelihoodField
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.stack.localizers.beams import select_beams

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from simscen.advanced.localizers.matched_motion import MatchedMotion, sample_motion
 from simscen.advanced.localizers.pose_prior import (
     CERTAIN_STD,
     KNOWN_STEP_STD_M,
@@ -10,7 +11,6 @@ from simscen.advanced.localizers.pose_prior import (
     ObservedMotion,
     PosePrior,
 )
-from simscen.advanced.localizers.scan_matcher import MatchedMotion, sample_motion
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.particles import pose_errors
 

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from simscen.advanced.localizers.global_search import GlobalSearch
-from simscen.advanced.localizers.map_trust import MapTrust
-from simscen.advanced.localizers.particle_filter import unmapped_cells
+from simscen.advanced.localizers.map_trust import MapTrust, unmapped_cells
+from simscen.advanced.localizers.matched_motion import MatchedMotion
 from simscen.advanced.localizers.pose_prior import ObservedMotion
 from simscen.advanced.localizers.relocalization import Relocalizer
-from simscen.advanced.localizers.scan_matcher import MatchedMotion
 from simscen.core.environment.occupancy_grid import UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate

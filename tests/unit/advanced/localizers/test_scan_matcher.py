@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.scan_matcher import MatchedMotion, ScanMatcher, sample_motion
+from simscen.advanced.localizers.matched_motion import MatchedMotion, sample_motion
+from simscen.advanced.localizers.scan_matcher import ScanMatcher
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.testing.synthetic_room import BEAMS, cast, scan
