@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Samples, Ticks, Trace
     from simscen.criteria.trace_signals.ground_truth import Flags
 
-_STARTS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED, EventKind.MARK)
+START_KINDS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED, EventKind.MARK)
+"""Kinds of events with which a fault, event, or mark starts."""
 _ENDS = (EventKind.FAULT_ENDED, EventKind.EVENT_ENDED)
 NEVER_ENABLED = "no event enabled the zone for longer than `grace`: leave `while_on` out to judge the whole run"
 """Reason of inconclusive findings with `while_on` if there is no interval in which the zone was enabled."""
@@ -38,7 +39,7 @@ def spans(trace: Trace, label: str) -> list[Span]:
 
     They are sorted by start. An interval without an end, or with an end at its start, lasts to the end of the run.
     """
-    starts = [event for event in trace.of_kind(*_STARTS) if event.name == label]
+    starts = [event for event in trace.of_kind(*START_KINDS) if event.name == label]
     ends = [event for event in trace.of_kind(*_ENDS) if event.name == label]
     found = []
     for entry in dict.fromkeys(start.data.get("entry") for start in starts):
@@ -54,7 +55,7 @@ def _span(trace: Trace, start: int, end: int | None) -> Span:
 
 def never_started(trace: Trace, label: str) -> tuple[str, list[str]]:
     """Return a message that the fault or event `label` never started, and detail lines with other labels."""
-    started = sorted({event.name for event in trace.of_kind(*_STARTS)})
+    started = sorted({event.name for event in trace.of_kind(*START_KINDS)})
     names = ", ".join(f"`{name}`" for name in started) or "nothing"
     return f"`{label}` never started; the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})", [
         f"started in this run: {names}"

@@ -15,10 +15,13 @@ from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResu
 from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Evidence, ExpectedFailure, LogCoverage
+from simscen.criteria.timeline import START_KINDS
 from simscen.judge.run_result import judge_run
 from simscen.judge.several_robots import combine_robots
 from simscen.loading.files.criteria_file import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
+from simscen.loading.yaml.parser import parse_yaml
+from simscen.loading.yaml.tree import MappingNode
 from simscen.model.scenario import expected_failure
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.raw_messages import is_simscen_log
@@ -115,7 +118,7 @@ class LogJudge:
             criteria = written.for_robot(robot)
         # The disturbances are in the scenario of the log, at lines that the criteria file does not have.
         case = replace(case, disturbances=tuple(replace(disturbance, line=0) for disturbance in case.disturbances))
-        case = replace(case, masks={**case.masks, **self._masks(criteria)})
+        case = replace(case, masks={**case.masks, **self._masks(criteria)}, labels=_labels(read))
         # `expected` of a file without `robots` applies to the run, not to each robot.
         expected = None if robot else expected_failure(criteria.spec)
         return self._judge_by_file(log, header.key, read.trace, case, read.coverage, criteria, expected)
@@ -179,6 +182,25 @@ class LogJudge:
         file, spec = str(self._scenario), criteria.spec
         result = judge_run(key, file, spec.pass_, trace, case, criteria.lines, coverage, spec.metrics, expected)
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=file)
+
+
+def _labels(log: Log) -> frozenset[str]:
+    """Return the names of all events, faults, and marks in a log and its scenario."""
+    tree, _ = parse_yaml(log.header.scenario, "scenario.yaml")
+    marks = _marks(tree.plain) if isinstance(tree, MappingNode) else ()
+    planned = (disturbance.name for disturbance in log.header.case.disturbances)
+    return frozenset((*planned, *marks, *(event.name for event in log.trace.of_kind(*START_KINDS))))
+
+
+def _marks(plain: object) -> Iterator[str]:
+    """Yield the names in all actions `mark` of a scenario."""
+    if isinstance(plain, Mapping):
+        mark = plain.get("mark")
+        if isinstance(mark, Mapping):
+            yield str(mark.get("name"))
+    parts = plain.values() if isinstance(plain, Mapping) else plain if isinstance(plain, list) else ()
+    for part in parts:
+        yield from _marks(part)
 
 
 def _not_judged(log: Path, failure: RunFailure) -> RunFinished:

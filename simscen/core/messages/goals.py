@@ -45,12 +45,15 @@ LOOP_GOAL_NAME = re.compile(r"(.+)#[0-9]+")
 """Pattern of the names that `loop_goal_name` returns for loops after the first."""
 
 
+def goal_without_loop(name: str) -> str:
+    """Return the name of a goal without the number of its loop: `shelf` for `shelf` and for `shelf#2`."""
+    loop = LOOP_GOAL_NAME.fullmatch(name)
+    return name if loop is None else loop[1]
+
+
 def matches_goal_name(name: str, requested: str | None) -> bool:
     """Return whether `requested` selects the goal `name`.
 
     `shelf` selects the goal in every loop, `shelf#2` only in the second loop, and None selects all goals.
     """
-    if requested is None or name == requested:
-        return True
-    loop = LOOP_GOAL_NAME.fullmatch(name)
-    return loop is not None and loop[1] == requested
+    return requested is None or requested in (name, goal_without_loop(name))

@@ -74,6 +74,8 @@ class Case:
         passages: Narrow passages on the shortest paths, in driving direction.
         masks: Filter masks that criteria refer to, by the path in the scenario.
         expected: Expected failure of goals, by goal name: "failed" for any failure, or the name of an error code.
+        labels: Names of all events, faults, and marks; None if the criteria were checked together with the scenario, so
+            that they name no others. Not written to logs.
     """
 
     start: Pose2
@@ -89,6 +91,7 @@ class Case:
     passages: tuple[Passage, ...] = ()
     masks: Mapping[str, MaskBlocks] = field(default_factory=dict)
     expected: Mapping[str, str] = field(default_factory=dict)
+    labels: frozenset[str] | None = None
 
     @property
     def every_goal(self) -> tuple[Goal, ...]:

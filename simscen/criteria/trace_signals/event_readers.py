@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.core.messages.goals import matches_goal_name
+from simscen.core.messages.goals import goal_without_loop, matches_goal_name
 from simscen.core.records.events import GOAL_END_KINDS, Event, EventKind
+from simscen.criteria.findings import MissingEvidence
 from simscen.criteria.timeline import spans
-from simscen.criteria.trace_signals.sampling import SignalArguments, SignalQuery, sample_ticks
+from simscen.criteria.trace_signals.sampling import SignalQuery, sample_ticks
 
 if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
@@ -27,9 +28,17 @@ def in_collision(query: SignalQuery) -> Array:
 
 
 def goal_active(query: SignalQuery) -> Array:
-    """Return whether the goal of the query, or any goal, is active: accepted, and not yet ended."""
+    """Return whether the goal of the query, or any goal, is active: accepted, and not yet ended.
+
+    Raises MissingEvidence if the scenario has no such goal.
+    """
+    name = query.arguments.get("goal")
+    accepted = query.trace.of_kind(EventKind.GOAL_ACCEPTED)
+    names = [*(goal.name for goal in query.case.every_goal), *(event.name for event in accepted)]
+    if name is not None and goal_without_loop(str(name)) not in map(goal_without_loop, names):
+        raise MissingEvidence(f"the scenario has no goal `{name}`")
     ends = (*GOAL_END_KINDS, EventKind.NAVIGATION_ENDED, EventKind.GOAL_ACCEPTED)
-    return _active_between_events(query.trace, EventKind.GOAL_ACCEPTED, ends, query.arguments.get("goal"))
+    return _active_between_events(query.trace, EventKind.GOAL_ACCEPTED, ends, name)
 
 
 def recovery_active(query: SignalQuery) -> Array:
@@ -39,14 +48,17 @@ def recovery_active(query: SignalQuery) -> Array:
 
 
 def is_active(query: SignalQuery) -> Array:
-    """Return whether the fault or event of the query is active."""
-    active = spans(query.trace, _label(query.arguments))
+    """Return whether the fault or event of the query is active. Raises MissingEvidence if there is no such one."""
+    active = spans(query.trace, _label(query))
     return _active_in_intervals(query.trace, [(span.start, span.end + (not span.has_end_event)) for span in active])
 
 
 def has_just_started(query: SignalQuery) -> Array:
-    """Return whether the fault or event of the query has started since the previous sample."""
-    starts = [(span.start, span.start) for span in spans(query.trace, _label(query.arguments))]
+    """Return whether the fault or event of the query has started since the previous sample.
+
+    Raises MissingEvidence if there is no such fault or event.
+    """
+    starts = [(span.start, span.start) for span in spans(query.trace, _label(query))]
     return _active_in_intervals(query.trace, starts)
 
 
@@ -66,9 +78,13 @@ def recovery_count(query: SignalQuery) -> Array:
     return _count_until_samples(query.trace, query.trace.of_kind(EventKind.RECOVERY_STARTED))
 
 
-def _label(arguments: SignalArguments) -> str:
-    """Return the name of the fault or event in the arguments."""
-    return str(arguments.get("fault") or arguments["event"])
+def _label(query: SignalQuery) -> str:
+    """Return the name of the fault or event in the arguments. Raises MissingEvidence if the scenario has none."""
+    kind = "fault" if query.arguments.get("fault") else "event"
+    label = str(query.arguments[kind])
+    if query.case.labels is not None and label not in query.case.labels:
+        raise MissingEvidence(f"the scenario has no {kind} `{label}`")
+    return label
 
 
 def _active_between_events(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: object) -> Array:

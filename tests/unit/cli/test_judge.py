@@ -17,6 +17,7 @@ simscen: 1
 world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
 robot: {pose: {x: 1, y: 1}}
 goals: [{name: "1e3", pose: {x: 1.5, y: 1}}]
+events: [{name: late, when: {time: 90 s}, do: [{mark: {name: spot}}], required: false}]
 time_limit: 20 s
 """
 GOOD = SCENARIO + "pass:\n  - goals_reached: {}\n"
@@ -117,6 +118,26 @@ def test_errors_in_criteria_have_file_and_line(simscen, out: Path) -> None:
     assert ended.err.startswith("base.yaml:3:5: error[SC012] unknown key `speeed`")
     (out.parent / "empty.yaml").write_text("name: nothing\n")
     assert "missing key `pass`" in simscen("judge", str(_log(out, "good")), "--scenario", "empty.yaml").err
+
+
+@pytest.mark.parametrize(
+    ("condition", "is_known"),
+    [
+        ("event_active, event: late", True),
+        ("event_active, event: spot", True),
+        ("started, event: lat", False),
+        ("fault_active, fault: slip", False),
+        ("goal_active, goal: dock", False),
+    ],
+)
+def test_nothing_is_shown_by_names_that_the_scenario_of_the_log_does_not_have(
+    simscen, out: Path, condition: str, is_known: bool
+) -> None:
+    (out.parent / "limits.yaml").write_text(f"pass: [{{always: {{not: {{signal: {condition}}}}}}}]\n")
+    ended = simscen("judge", str(_log(out, "good")), "--scenario", "limits.yaml")
+    kind, _, name = condition.partition(", ")[2].partition(": ")
+    assert (ended.code == 0) is is_known
+    assert (f"inconclusive: the scenario has no {kind} `{name}`" in ended.out) is not is_known
 
 
 def test_violated_criterion_names_the_line_of_the_criteria_file(simscen, out: Path) -> None:
