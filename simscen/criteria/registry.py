@@ -72,10 +72,14 @@ class AnyCriterion(Choice):
 
 def verdict_names(criteria: Sequence[AnyCriterion]) -> list[str]:
     """Return the verdict name of each criterion: its `id`, or its key. A repeated name gets a number: speed#2."""
-    seen: dict[str, int] = {}
-    names = []
-    for entry in criteria:
-        name = entry.id or entry.kind
-        seen[name] = seen.get(name, 0) + 1
-        names.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
-    return names
+    used: set[str] = set()
+    return [unique_verdict_name(entry.id or entry.kind, used) for entry in criteria]
+
+
+def unique_verdict_name(name: str, used: set[str]) -> str:
+    """Return `name`, with the first free number if it is in `used`, and add the result to `used`."""
+    candidate, number = name, 2
+    while candidate in used:
+        candidate, number = f"{name}#{number}", number + 1
+    used.add(candidate)
+    return candidate

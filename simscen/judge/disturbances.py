@@ -4,7 +4,6 @@ A disturbance does not happen if its trigger never fires or if it has no effect.
 to act on, or a fault ends before its sensor sends a message.
 """
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from simscen.core.records.case import Case
@@ -13,6 +12,7 @@ from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Finding, Verdict
 from simscen.criteria.findings import missed, undecided
+from simscen.criteria.registry import unique_verdict_name
 from simscen.criteria.timeline import end_reason, has_ended
 from simscen.judge.finding_text import DISTURBANCE
 
@@ -39,13 +39,11 @@ def missing_disturbances(
     verdict has the name of the disturbance as ID, with a number if another verdict (also one of `others`) has this ID.
     """
     missing = [one for one in outcomes if one.missing and not _is_reported_earlier(one, outcomes)]
-    seen = Counter(verdict.id for verdict in others)
+    used = {verdict.id for verdict in others}
     found = []
     for one in missing:
-        name = one.disturbance.name
-        seen[name] += 1
-        unique = name if seen[name] == 1 else f"{name}#{seen[name]}"
-        found.append((Verdict(DISTURBANCE, unique, "fail", (_finding(trace, one),)), one.disturbance.line))
+        name = unique_verdict_name(one.disturbance.name, used)
+        found.append((Verdict(DISTURBANCE, name, "fail", (_finding(trace, one),)), one.disturbance.line))
     return tuple(found)
 
 

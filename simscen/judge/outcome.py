@@ -1,10 +1,11 @@
 """Outcome of a run from its verdicts, including runs that are expected to fail."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.verdict import ExpectedFailure, Status, Verdict
 from simscen.criteria.findings import held, missed
+from simscen.criteria.registry import unique_verdict_name
 from simscen.judge.finding_text import DISTURBANCE
 
 
@@ -25,7 +26,11 @@ EXPECTED = "expected"
 
 
 def apply_expectation(
-    expected: ExpectedFailure | None, verdicts: Sequence[Verdict], outcome: Outcome, is_complete: bool
+    expected: ExpectedFailure | None,
+    verdicts: Sequence[Verdict],
+    outcome: Outcome,
+    is_complete: bool,
+    happened: Collection[str] = (),
 ) -> tuple[Outcome, Verdict | None]:
     """Return the outcome of a run that is `expected` to fail, and a verdict on this expectation.
 
@@ -34,7 +39,8 @@ def apply_expectation(
 
     As with pytest's `xfail(strict=True)`, the outcome is FAILED_AS_EXPECTED if a criterion fails, otherwise FAILED. If
     the expectation lists criteria, it is also FAILED if one of them passes or if another criterion does not pass. A
-    missing disturbance is only expected if its name is listed.
+    missing disturbance is only expected if its name is listed. The outcome is also FAILED if a listed disturbance has
+    `happened` (names of disturbances), unless there is a verdict on another one of the same name.
     """
     if expected is None or outcome is Outcome.ERROR or not is_complete:
         return outcome, None
@@ -42,11 +48,14 @@ def apply_expectation(
     covered = [verdict for verdict in decisive if _is_expected_to_fail(verdict, expected)]
     failed = [verdict for verdict in covered if verdict.status is Status.FAIL]
     excused = [verdict for verdict in covered if verdict.status is not Status.PASS]
-    unexpected = [verdict for verdict in covered if verdict.status is Status.PASS] if expected.criteria else []
+    ids = {verdict.id for verdict in verdicts}
+    unexpected = [f"{name} happened" for name in expected.criteria if name in happened and name not in ids]
+    if passed := [verdict for verdict in covered if verdict.status is Status.PASS and expected.criteria]:
+        unexpected.insert(0, f"{_names(passed)} passed")
     limit = f"a failure: {expected.reason}"
-    name = EXPECTED if all(verdict.id != EXPECTED for verdict in verdicts) else f"{EXPECTED}#2"
+    name = unique_verdict_name(EXPECTED, ids)
     if unexpected or not failed:
-        measured = f"{_names(unexpected)} passed" if unexpected else _describe_no_failure(covered)
+        measured = ", ".join(unexpected) or _describe_no_failure(covered)
         return Outcome.FAILED, Verdict(EXPECTED, name, "fail", (missed(EXPECTED, measured, limit),))
     others = [verdict for verdict in decisive if verdict.status is not Status.PASS and verdict not in excused]
     verdict = Verdict(EXPECTED, name, "fail", (held(EXPECTED, f"{_names(failed)} failed", limit),))

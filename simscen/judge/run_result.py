@@ -48,7 +48,10 @@ def judge_run(
     missing = missing_disturbances(trace, disturbances, verdicts)
     lines = (*(line for _, line in missing), *lines) if lines else ()
     verdicts = (*(verdict for verdict, _ in missing), *verdicts)
-    outcome, expectation = apply_expectation(expected, verdicts, outcome_of_verdicts(verdicts), has_ended(trace))
+    happened = {one.disturbance.name for one in disturbances if one.happened}
+    outcome, expectation = apply_expectation(
+        expected, verdicts, outcome_of_verdicts(verdicts), has_ended(trace), happened
+    )
     if expected is not None and expectation is not None:
         verdicts, lines = (*verdicts, expectation), (*lines, expected.line) if lines else ()
     failure = _judging_failure(verdicts) if outcome is Outcome.ERROR else None

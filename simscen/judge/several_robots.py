@@ -39,7 +39,13 @@ def combine_robots(
     verdicts = tuple(verdict for verdict, _ in judged)
     outcomes = [result.outcome for result in results.values()]
     worst = next((each for each in (Outcome.ERROR, Outcome.FAILED) if each in outcomes), Outcome.PASSED)
-    outcome, expectation = apply_expectation(expected, verdicts, worst, all(map(has_ended, traces.values())))
+    disturbances = (
+        *(one for one in first.disturbances if one.disturbance.kind == "event"),
+        *_faults_with_robot_names(results),
+    )
+    happened = {one.disturbance.name for one in disturbances if one.happened}
+    is_complete = all(map(has_ended, traces.values()))
+    outcome, expectation = apply_expectation(expected, verdicts, worst, is_complete, happened)
     if expected is not None and expectation is not None:
         judged.append((expectation, expected.line))
     errors = [
@@ -57,10 +63,7 @@ def combine_robots(
         metrics={SUCCESS: success, **_with_robot_names({name: result.metrics for name, result in results.items()})},
         undefined=_with_robot_names({name: result.undefined for name, result in results.items()}),
         events=_events(traces),
-        disturbances=(
-            *(one for one in first.disturbances if one.disturbance.kind == "event"),
-            *_faults_with_robot_names(results),
-        ),
+        disturbances=disturbances,
         error=errors[0] if errors else None,
         reason="" if expected is None else expected.reason,
     )

@@ -14,9 +14,11 @@ def verdict(name: str, status: Status, criterion: str = "", severity: str = "fai
     return Verdict(criterion or name, name, severity, (Finding(status, name, "1", "2"),))
 
 
-def judged(expected: ExpectedFailure | None, *verdicts: Verdict, whole: bool = True) -> tuple[Outcome, str]:
+def judged(
+    expected: ExpectedFailure | None, *verdicts: Verdict, whole: bool = True, happened: tuple[str, ...] = ()
+) -> tuple[Outcome, str]:
     """Return the outcome, and the measured text of the verdict on the expectation."""
-    outcome, verdict_on_it = apply_expectation(expected, verdicts, outcome_of_verdicts(verdicts), whole)
+    outcome, verdict_on_it = apply_expectation(expected, verdicts, outcome_of_verdicts(verdicts), whole, happened)
     return outcome, "" if verdict_on_it is None else verdict_on_it.findings[0].measured
 
 
@@ -62,6 +64,29 @@ def test_a_disturbance_that_did_not_happen_is_expected_only_by_its_name() -> Non
     assert judged(ExpectedFailure("NAV-1", ("door",)), missing)[0] is Outcome.FAILED_AS_EXPECTED
 
 
+@pytest.mark.parametrize(
+    ("happened", "statuses", "outcome", "text"),
+    [
+        ((), (FAIL, PASS), Outcome.FAILED_AS_EXPECTED, "speed failed"),
+        (("lift",), (FAIL, PASS), Outcome.FAILED_AS_EXPECTED, "speed failed"),
+        (("door",), (FAIL, PASS), Outcome.FAILED, "door happened"),
+        (("door",), (PASS, PASS), Outcome.FAILED, "speed passed, door happened"),
+    ],
+)
+def test_named_disturbance_must_not_happen(
+    happened: tuple[str, ...], statuses: tuple[Status, Status], outcome: Outcome, text: str
+) -> None:
+    expected = ExpectedFailure("NAV-1", ("speed", "door"))
+    verdicts = [verdict(name, status) for name, status in zip(("speed", "clearance"), statuses, strict=True)]
+    assert judged(expected, *verdicts, happened=happened) == (outcome, text)
+
+
+def test_named_disturbance_may_happen_if_another_of_the_same_name_does_not() -> None:
+    missing = verdict("lidar.off", FAIL, DISTURBANCE)
+    named = ExpectedFailure("NAV-1", ("lidar.off",))
+    assert judged(named, missing, happened=("lidar.off",))[0] is Outcome.FAILED_AS_EXPECTED
+
+
 def test_a_warning_is_no_failure_to_expect() -> None:
     verdicts = verdict("speed", FAIL, severity="warn"), verdict("clearance", PASS)
     assert judged(KNOWN, *verdicts) == (Outcome.FAILED, "everything passed")
@@ -72,7 +97,13 @@ def test_truncated_log_never_fails_as_expected() -> None:
 
 
 @pytest.mark.parametrize(
-    ("ids", "name"), [((), "expected"), (("speed",), "expected"), (("expected", "speed"), "expected#2")]
+    ("ids", "name"),
+    [
+        ((), "expected"),
+        (("speed",), "expected"),
+        (("expected", "speed"), "expected#2"),
+        (("expected", "expected#2"), "expected#3"),
+    ],
 )
 def test_verdict_on_the_expectation_has_a_unique_name(ids: tuple[str, ...], name: str) -> None:
     verdicts = [verdict(each, FAIL) for each in ids]

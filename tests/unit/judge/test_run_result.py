@@ -128,6 +128,17 @@ def test_verdict_on_an_expected_failure_is_last_and_has_its_line():
     assert (held.outcome, held.lines) == (Outcome.FAILED, (10, 30))
 
 
+@pytest.mark.parametrize(("happened", "outcome"), [(True, Outcome.FAILED), (False, Outcome.FAILED_AS_EXPECTED)])
+def test_event_that_is_expected_not_to_happen_must_not_happen(happened, outcome):
+    effects = [{"happened": happened, "what": "opened"}]
+    events = [[1, "event.started", "door", {"entry": 0}], [1, "event.ended", "door", {"entry": 0, "effects": effects}]]
+    case = synthetic_case({"disturbances": [{"name": "door", "kind": "event", "required": False}]})
+    criteria = [AnyCriterion.model_validate({"clearance": {"min": 0.6}})]
+    expected = ExpectedFailure("NAV-1", ("clearance", "door"))
+    trace = synthetic_trace({**TRACE, "events": events})
+    assert judge_run(RunKey("a", 7), "a", criteria, trace, case, expected=expected).outcome is outcome
+
+
 def test_expected_failure_has_no_line_without_lines_of_criteria():
     assert expecting(TRACE, {"clearance": {"min": 0.6}}, lines=()).lines == ()
 

@@ -126,6 +126,21 @@ def test_an_expected_failure_is_judged_over_all_robots() -> None:
     assert (held.verdicts[-1].criterion, held.lines[-1]) == ("expected", 12)
 
 
+@pytest.mark.parametrize(("name", "kind"), [("door", "event"), ("b/lidar.off", "fault")])
+def test_named_disturbance_of_any_robot_must_not_happen(name: str, kind: str) -> None:
+    def combined(happened: bool) -> RunResult:
+        disturbances = (disturbance(name.removeprefix("b/"), kind, happened),)
+        bad = result(Outcome.FAILED, verdicts=(verdict("clearance", Status.FAIL),), disturbances=disturbances)
+        first = result(disturbances=disturbances if kind == "event" else ())
+        expected = ExpectedFailure("NAV-7", ("b/clearance", name))
+        return combine_robots({"a": first, "b": bad}, TRACES, expected)
+
+    assert combined(happened=False).outcome is Outcome.FAILED_AS_EXPECTED
+    whole = combined(happened=True)
+    assert whole.outcome is Outcome.FAILED
+    assert whole.verdicts[-1].findings[0].measured == f"{name} happened"
+
+
 def test_failure_is_expected_only_if_all_logs_are_complete() -> None:
     bad = result(Outcome.FAILED, verdicts=(verdict("clearance", Status.FAIL),), lines=(4,))
     good = result(verdicts=(verdict("clearance"),), lines=(5,))

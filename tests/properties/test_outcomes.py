@@ -1,0 +1,111 @@
+"""Property tests of the outcome of a run: expected failures, and the names of verdicts."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
+from simscen.core.records.run_result import Outcome
+from simscen.core.records.verdict import ExpectedFailure, Finding, Status, Verdict
+from simscen.criteria.registry import AnyCriterion, verdict_names
+from simscen.judge.disturbances import missing_disturbances
+from simscen.judge.outcome import apply_expectation, outcome_of_verdicts
+from simscen.testing.synthetic_trace import synthetic_trace
+
+PASS, FAIL, INCONCLUSIVE, ERROR = Status.PASS, Status.FAIL, Status.INCONCLUSIVE, Status.ERROR
+TRACE = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0, 0]]})
+IDS = ["speed", "speed#2", "stuck", "expected", "expected#2", "door"]
+"""Names of criteria, which may look like the number of a repeated name."""
+DISTURBANCES = ["door", "lidar.off", "speed", "expected"]
+"""Names of disturbances, some of which are also names of criteria."""
+
+
+@st.composite
+def criteria(draw):
+    """Return the verdicts of criteria with random names, which can be equal, and random statuses."""
+    ids = draw(st.lists(st.sampled_from([None, *IDS]), min_size=1, max_size=5))
+    severities = [draw(st.sampled_from(["fail", "fail", "warn"])) for _ in ids]
+    entries = [
+        AnyCriterion.model_validate({"speed": {"max": 1}, "severity": severity} | ({"id": name} if name else {}))
+        for name, severity in zip(ids, severities, strict=True)
+    ]
+    statuses = [draw(st.sampled_from([PASS, FAIL, INCONCLUSIVE, PASS, FAIL, ERROR])) for _ in ids]
+    return [
+        Verdict(entry.kind, name, entry.severity, (Finding(status, name, "1", "2"),))
+        for entry, name, status in zip(entries, verdict_names(entries), statuses, strict=True)
+    ]
+
+
+@st.composite
+def disturbances(draw, names):
+    """Return the outcomes of disturbances with these names."""
+    outcomes = []
+    for name in draw(names):
+        happened = draw(st.booleans())
+        ordered = Disturbance(name, "event", "time: 1", required=draw(st.booleans()))
+        outcomes.append(DisturbanceOutcome(ordered, (240,) if happened else (), happened, "why"))
+    return outcomes
+
+
+def judged(verdicts, outcomes):
+    """Return all verdicts of a run, as judge_run orders them."""
+    return [*(verdict for verdict, _ in missing_disturbances(TRACE, outcomes, verdicts)), *verdicts]
+
+
+@settings(deadline=None)
+@given(criteria(), disturbances(st.lists(st.sampled_from(DISTURBANCES), max_size=3)), st.booleans())
+def test_each_verdict_of_a_run_has_its_own_name(verdicts, outcomes, is_expected):
+    found = judged(verdicts, outcomes)
+    expected = ExpectedFailure("NAV-1") if is_expected else None
+    _, expectation = apply_expectation(expected, found, outcome_of_verdicts(found), is_complete=True)
+    names = [verdict.id for verdict in [*found, *([expectation] if expectation else [])]]
+    assert len(set(names)) == len(names), names
+
+
+@settings(deadline=None)
+@given(criteria())
+def test_run_passes_only_if_all_decisive_criteria_pass(verdicts):
+    outcome = outcome_of_verdicts(verdicts)
+    decisive = {verdict.status for verdict in verdicts if verdict.severity == "fail"}
+    if any(verdict.status is ERROR for verdict in verdicts):
+        assert outcome is Outcome.ERROR
+    else:
+        assert outcome is (Outcome.PASSED if decisive <= {PASS} else Outcome.FAILED)
+
+
+UNIQUE = st.lists(st.sampled_from(["door", "lidar.off"]), unique=True, max_size=2)
+
+
+@settings(deadline=None, max_examples=300)
+@given(criteria(), disturbances(UNIQUE), st.sets(st.sampled_from(["speed", "stuck", "door", "lidar.off"])))
+def test_run_fails_as_expected_only_if_exactly_the_named_entries_fail(verdicts, outcomes, named):
+    """The table in docs/guides/variations.md, with the named events and faults, which must not happen."""
+    verdicts = [verdict for verdict in verdicts if verdict.id not in {one.disturbance.name for one in outcomes}]
+    found = judged(verdicts, outcomes)
+    before = outcome_of_verdicts(found)
+    outcome, expectation = apply_expectation(
+        ExpectedFailure("NAV-1", tuple(sorted(named))),
+        found,
+        before,
+        is_complete=True,
+        happened={one.disturbance.name for one in outcomes if one.happened},
+    )
+    criteria_by_status = {
+        status: {v.id for v in verdicts if v.status is status and v.severity == "fail"} for status in Status
+    }
+    absent = {one.disturbance.name for one in outcomes if one.missing}
+    present = {one.disturbance.name for one in outcomes if one.happened}
+    if before is Outcome.ERROR:
+        assert outcome is Outcome.ERROR and expectation is None
+    elif named:
+        failed, undecided = criteria_by_status[FAIL] | absent, criteria_by_status[INCONCLUSIVE]
+        is_as_expected = (
+            bool(named & failed)
+            and not named & (criteria_by_status[PASS] | present)
+            and not (failed | undecided) - named
+        )
+        assert (outcome is Outcome.FAILED_AS_EXPECTED) == is_as_expected
+    else:
+        assert (outcome is Outcome.FAILED_AS_EXPECTED) == (bool(criteria_by_status[FAIL]) and not absent)
+    if before is not Outcome.ERROR:
+        assert outcome in (Outcome.FAILED, Outcome.FAILED_AS_EXPECTED)
+        assert expectation is not None
