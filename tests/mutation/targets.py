@@ -105,7 +105,9 @@ TESTS_OF_MODULE = {
         [f"{_METRICS}/test_path.py", f"{_METRICS}/test_pose_error.py"],
         [f"{_METRICS}/test_compute.py"],
     ],
-    "judge/metrics/compute": [[_METRICS], ["tests/unit/judge"]],
+    "judge/metrics/compute": [
+        [f"{_METRICS}/test_{of}.py" for of in ("compute", "compute_edges", "people", "plugin_metrics")]
+    ],
     **{f"judge/metrics/{of}": [[f"{_METRICS}/test_{of}.py"]] for of in ("session_summary", "comparison")},
     **{
         f"judge/{of}": [DIAGNOSIS]
