@@ -10,9 +10,8 @@ import numpy.typing as npt
 from simscen.advanced.prediction.avoidance import MIN_DISTANCE_M
 from simscen.advanced.prediction.rollouts import HORIZON_S
 from simscen.core.geometry import Array, Pose2
-from simscen.stack.costmap.layers import MAX_NON_OBSTACLE
 from simscen.stack.moving_obstacles import MAX_INFLATION_M, MovingObstacles
-from simscen.stack.protocols import CostmapView
+from simscen.stack.protocols import MAX_NON_OBSTACLE, CostmapView
 
 DECAY_TIME_S = 2.0
 """Time constant of the exponential decay of costs with the time of arrival, because obstacles change their velocity."""

@@ -119,8 +119,8 @@ def supports_pose(localizer: object) -> TypeGuard[SupportsPose]:
     return hasattr(type(localizer), "pose")  # reading the property may compute the pose
 
 
-LETHAL = 254
-"""Cost of an obstacle in nav2_costmap_2d."""
+FREE, MAX_NON_OBSTACLE, INSCRIBED, LETHAL, NO_INFORMATION = 0, 252, 253, 254, 255
+"""Costs of nav2_costmap_2d (cost_values.hpp)."""
 
 
 @fast_dataclass(eq=False)

@@ -14,7 +14,7 @@ from simscen.core.records.trace import Decision
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import CommandPipeline
 from simscen.stack.costmap.costmaps import Costmaps
-from simscen.stack.costmap.layers import SpeedFilter
+from simscen.stack.costmap.speed_filter import SpeedFilter
 from simscen.stack.frames import Frames, OdometryHistory, is_plausible
 from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.localizers.ground_truth import TRUTH

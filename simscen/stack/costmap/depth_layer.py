@@ -17,8 +17,7 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Image
 from simscen.model.costmaps import Costmap as CostmapSpec
-from simscen.stack.costmap.grid_frame import Cells, GridFrame
-from simscen.stack.costmap.layers import Mask
+from simscen.stack.costmap.grid_frame import Cells, GridFrame, Mask
 
 Heights = npt.NDArray[np.float32]
 

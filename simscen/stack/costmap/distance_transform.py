@@ -1,4 +1,4 @@
-"""Exact squared Euclidean distance transforms of grids, complete or up to a maximum distance.
+"""Squared Euclidean distances of the cells of a grid to the nearest marked cell, exact up to a maximum distance.
 
 Up to a few meters, comparing neighbors in 16-bit integers is faster than scipy's transform (see docs/design/speed.md).
 """
@@ -8,102 +8,111 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-ROWS_PER_BLOCK = 64
-"""Number of rows of a block of `squared_distance_blocks`."""
-MAX_INT32_EDGE_CELLS = 30_000
-"""Longest edge of a grid for which squared distances fit into 32 bits."""
-
-MAX_REACH_CELLS = 180
-"""Largest supported `reach`, the maximum distance: the sum of two squares must fit into 16 bits."""
+Squared = npt.NDArray[np.uint16]
+"""Squared distances in cells."""
 OUT_OF_REACH = 65535
-"""Largest value in 16 bits. It stands for squared distances that are larger or not computed."""
+"""Largest value in 16 bits."""
+MAX_REACH_CELLS = 255
+"""Largest `reach`, the maximum distance, whose square fits into 16 bits."""
 MAX_COMPARED_CELLS = 60
 """Largest `reach` for which comparing neighbors is faster than scipy's transform."""
 BLOCK_SIZE = 150_000
 """Number of values that are compared at once, so that they fit into a processor cache."""
 
-Squares = npt.NDArray[np.uint16]
-_SQUARED_OFFSETS: Squares = (np.arange(1, MAX_REACH_CELLS + 1) ** 2).astype(np.uint16)[:, None, None]
 
-
-def squared_distances_within(marked: npt.NDArray[np.bool_], reach: int) -> Squares:
+def squared_distances_within(marked: npt.NDArray[np.bool_], reach: int) -> Squared:
     """Return the squared distance in cells from each cell to the nearest marked cell.
 
-    Exact up to `reach` cells (at most MAX_REACH_CELLS); farther cells have the value reach² + 1.
+    Exact up to `reach` cells, and at most up to MAX_REACH_CELLS; farther cells have the value reach² + 1 or, if this is
+    too large, OUT_OF_REACH.
     """
-    return SquaredDistanceTransform(marked.shape, reach, reuse=False).transform(marked)
+    has_marked_cells = bool(marked.any())
+    if has_marked_cells and reach <= MAX_COMPARED_CELLS:
+        return SquaredDistanceTransform(marked.shape, reach, reuse=False).transform(marked)
+    beyond = min(reach * reach + 1, OUT_OF_REACH)
+    result: Squared = np.full(marked.shape, beyond, np.uint16)
+    if has_marked_cells:
+        for rows, squared in squared_distance_blocks(marked):
+            result[rows] = np.minimum(squared, beyond)
+    return result
 
 
 class SquaredDistanceTransform:
     """Computes the same as `squared_distances_within` for several grids of one shape, with buffers allocated once.
 
-    The transform is separable: one pass along the rows, then one along the columns.
+    The transform is separable. The first pass finds the nearest marked cell in the same row, the second pass compares
+    the results of the rows within reach.
     """
 
     def __init__(self, shape: tuple[int, ...], reach: int, reuse: bool = True) -> None:
         """Allocate buffers for grids of a shape (rows, columns). With `reuse`, optimize for more than one grid."""
-        self._reach, self._beyond = reach, reach * reach + 1
+        self._reach = reach
         if reach > MAX_COMPARED_CELLS:
             return
-        height, width = shape
-        rows, columns = (
-            max(1, min(size, BLOCK_SIZE // (reach * other_size))) for size, other_size in (shape, shape[::-1])
+        rows, columns = shape
+        block_rows, block_columns = (
+            max(1, min(length, BLOCK_SIZE // (reach * other_length))) for length, other_length in (shape, shape[::-1])
         )
-        buffer = np.empty(reach * max(rows * width, columns * height), dtype=np.uint16)
-        self._along = _AxisPass(width, height, reach, buffer[: reach * columns * height], reuse)
-        self._across = _AxisPass(height, width, reach, buffer[: reach * rows * width], reuse)
-        self._squared: Squares = np.empty((height, width), dtype=np.uint16)
+        buffer = np.empty(reach * max(block_rows * columns, block_columns * rows), dtype=np.uint16)
+        # Both passes go along the first axis, so that the first one gets the transposed grid (columns, rows).
+        self._along_rows = _Pass((columns, rows), reach, buffer[: reach * block_columns * rows], reuse)
+        self._along_columns = _Pass((rows, columns), reach, buffer[: reach * block_rows * columns], reuse)
+        self._squared: Squared = np.empty((rows, columns), dtype=np.uint16)
 
-    def transform(self, marked: npt.NDArray[np.bool_]) -> Squares:
+    def transform(self, marked: npt.NDArray[np.bool_]) -> Squared:
         """Return the squared distances (rows, columns) of a grid; valid until the next call."""
         if self._reach > MAX_COMPARED_CELLS:
-            return self._by_scipy(marked)
-        cells = self._along.values
-        cells.fill(self._beyond)
-        np.copyto(cells, np.uint16(0), where=marked.T)
-        self._along.run(self._across.values.T)
-        self._across.run(self._squared)
+            return squared_distances_within(marked, self._reach)
+        transposed = self._along_rows.values
+        transposed.fill(self._reach * self._reach + 1)
+        np.copyto(transposed, np.uint16(0), where=marked.T)
+        self._along_rows.run(self._along_columns.values.T)
+        self._along_columns.run(self._squared)
         return self._squared
 
-    def _by_scipy(self, marked: npt.NDArray[np.bool_]) -> Squares:
-        """Return the same, computed with scipy's transform."""
-        result: Squares = np.full(marked.shape, self._beyond, np.uint16)
-        if marked.any():
-            for rows, squared in squared_distance_blocks(marked):
-                result[rows] = np.minimum(squared, self._beyond)
-        return result
 
+class _Pass:
+    """Pass along the first axis of a grid: each result is the minimum of (value + offset²) within `reach` cells.
 
-class _AxisPass:
-    """One pass along the first axis: each result is the minimum of (value + offset²) over offsets up to `reach`."""
+    values:  input (n, m) of the pass, to be written by the caller
+    """
 
-    def __init__(self, height: int, width: int, reach: int, buffer: Squares, reuse: bool) -> None:
-        padded = np.full((height + 2 * reach, width), reach * reach + 1, dtype=np.uint16)
-        self.values: Squares = padded[reach : reach + height]
-        """Input values (rows, columns)."""
+    def __init__(self, shape: tuple[int, int], reach: int, buffer: Squared, reuse: bool) -> None:
+        """Take the shape (n, m) of the grid, and a `buffer` for `reach` neighbors of each cell of a block of rows."""
+        length, width = shape
+        padded = np.full((length + 2 * reach, width), reach * reach + 1, dtype=np.uint16)
+        self.values: Squared = padded[reach : reach + length]
         self._buffer = buffer.reshape(reach, -1, width)
-        self._steps = np.broadcast_to(_SQUARED_OFFSETS[:reach], self._buffer.shape)
+        squared_offsets = (np.arange(1, reach + 1) ** 2).astype(np.uint16)[:, None, None]
+        self._squared_offsets = np.broadcast_to(squared_offsets, self._buffer.shape)
         if reuse:
-            self._steps = self._steps.copy()  # adding a contiguous array takes half the time
-        count, (row, column) = self._buffer.shape[1], padded.strides
-        self._blocks = list[tuple[slice, Squares, Squares]]()
-        for first in range(0, height, count):
-            offset, shape = (first + reach) * row, (reach, min(count, height - first), width)
-            below: Squares = np.ndarray(shape, np.uint16, padded, offset - row, (-row, row, column))
-            above: Squares = np.ndarray(shape, np.uint16, padded, offset + row, (row, row, column))
-            self._blocks.append((slice(first, first + shape[1]), below, above))
+            self._squared_offsets = self._squared_offsets.copy()  # adding a contiguous array takes half the time
+        block_length, (row, column) = self._buffer.shape[1], padded.strides
+        self._blocks = list[tuple[slice, Squared, Squared]]()
+        """Rows of each block, and views (reach, rows, m) of the values at offsets -1, -2, … and 1, 2, … from them."""
+        for first in range(0, length, block_length):
+            offset, view_shape = (first + reach) * row, (reach, min(block_length, length - first), width)
+            before: Squared = np.ndarray(view_shape, np.uint16, padded, offset - row, (-row, row, column))
+            after: Squared = np.ndarray(view_shape, np.uint16, padded, offset + row, (row, row, column))
+            self._blocks.append((slice(first, first + view_shape[1]), before, after))
 
-    def run(self, out: Squares) -> None:
-        """Write the result into `out` (rows, columns)."""
-        for rows, below, above in self._blocks:
-            candidates, steps = self._buffer[:, : below.shape[1]], self._steps[:, : below.shape[1]]
-            np.minimum(below, above, out=candidates)
-            candidates += steps
+    def run(self, out: Squared) -> None:
+        """Write the result into `out` (n, m)."""
+        for rows, before, after in self._blocks:
+            candidates, offsets = self._buffer[:, : before.shape[1]], self._squared_offsets[:, : before.shape[1]]
+            np.minimum(before, after, out=candidates)
+            candidates += offsets
             np.minimum(np.minimum.reduce(candidates, axis=0), self.values[rows], out=out[rows])
 
 
+ROWS_PER_BLOCK = 64
+"""Number of rows of a block of `squared_distance_blocks`."""
+MAX_INT32_EDGE_CELLS = 30_000
+"""Longest edge of a grid for which squared distances fit into 32 bits."""
+
+
 def squared_distance_blocks(marked: npt.NDArray[np.bool_]) -> Iterator[tuple[slice, npt.NDArray[np.signedinteger]]]:
-    """Yield blocks of rows with the exact squared distance in cells to the nearest marked cell.
+    """Yield blocks of rows with the exact squared distance in cells to the nearest marked cell, without a limit.
 
     At least one cell must be marked.
     """

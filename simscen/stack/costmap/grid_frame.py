@@ -15,6 +15,8 @@ Cells = npt.NDArray[np.int64]
 """Cells (n, 2) as (row, column)."""
 CellIndices = npt.NDArray[np.int64]
 """Flat indices (n,) of cells, row by row from cell (0, 0)."""
+Mask = npt.NDArray[np.bool_]
+"""Marked cells (rows, columns), or marked points (n,)."""
 _minimum, _maximum = np.minimum.reduce, np.maximum.reduce
 
 MAX_CACHED_CELLS = 10_000

@@ -7,34 +7,22 @@ from functools import cached_property
 
 import numpy as np
 
-from simscen.core.decorators import cached_on_instance
 from simscen.core.environment.costmap_filters import Zones
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
-from simscen.stack.costmap.distance_transform import MAX_REACH_CELLS, SquaredDistanceTransform
+from simscen.stack.costmap.distance_transform import SquaredDistanceTransform, squared_distances_within
 from simscen.stack.costmap.grid_frame import (
     CellIndices,
-    Cells,
     GridFrame,
+    Mask,
     clip_goal,
     shift_layer,
     should_roll,
     window_around,
 )
-from simscen.stack.costmap.layers import (
-    Costs,
-    Inflation,
-    Mask,
-    StaticLayer,
-    empty_layer,
-    layer_without_zones,
-    shared_inflation,
-    squared_distances,
-    static_distances,
-    static_layer,
-)
+from simscen.stack.costmap.inflation import DISTANCE_MARGIN_M, Costs, inflation_for
 from simscen.stack.costmap.obstacle_layer import (
     NO_CELLS,
     WHOLE_GRID,
@@ -43,16 +31,17 @@ from simscen.stack.costmap.obstacle_layer import (
     crossed_cells,
     remove_small_groups,
 )
+from simscen.stack.costmap.static_layer import StaticLayer, map_layer, static_layer
 from simscen.stack.localizers.beams import ComplexPoints
 from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES
 from simscen.stack.protocols import CostmapView, RobotModel, Surroundings
 
-DISTANCE_MARGIN_M = 0.5
-"""Distances are computed up to the circumscribed radius plus this margin, or to the inflation radius if larger."""
 SCANS_PER_UNKNOWN_UPDATE = 5
 """Unknown cells are updated with every n-th scan: once per second at the default rate."""
 MAX_REVISIONS = 16
 """Number of revisions for which the changed cells are stored."""
+Cell = tuple[int, int]
+"""(row, column)."""
 
 
 class LayeredCostmap:
@@ -72,34 +61,34 @@ class LayeredCostmap:
         size: tuple[float, float] | None = None,
         max_offset: float = math.inf,
     ) -> None:
-        self._spec, self._surroundings, self._tracks_unknown = spec, surroundings, spec.track_unknown_space
+        self._spec, self._surroundings = spec, surroundings
         self._rolling = surroundings.map is None
         self._size, self._max_offset = size or (spec.rolling_size, spec.rolling_size), max_offset
         self._inscribed = surroundings.robot.inscribed_radius
         resolution = spec.resolution if surroundings.map is None else surroundings.map.resolution
-        self._inflation = _inflation(spec, surroundings.robot, resolution)
-        self._margin_cells = _reach_cells(_reach(spec, surroundings.robot), resolution)
+        self._inflation = inflation_for(spec, surroundings.robot, resolution)
         self._min_group_size = spec.denoise_layer.minimal_group_size if spec.denoise_layer.enabled else 0
-        self._revision, self._keepout_change, self._scans = 0, 0, 0
+        self._margin_cells = self._inflation.reach_cells + self._min_group_size
+        """Distance in cells up to which a change of a cell affects other cells."""
+        self._static = self._static_layer_in(window_around(Pose2(0.0, 0.0), self._size, spec.resolution))
+        self._frame = self._static.frame
+        rows, columns = self._frame.shape
+        self._whole: tuple[Cell, Cell] = (0, 0), (rows - 1, columns - 1)
+        # In a small window, most cells are near any change, so that all are recomputed.
+        self._is_small = max(rows, columns) <= 4 * self._inflation.reach_cells
+        self._live = ObstacleLayer(spec, self._inscribed, self._frame)
+        self._unknown = None if self._static.unknown is None else self._static.unknown.copy()
+        self._scans = 0
         self._latest_readings: dict[str, tuple[Pose2, Scan | Image]] = {}
-        self._view: CostmapView | None = None
-        self._changed: tuple[tuple[int, int], tuple[int, int]] | None = None
+        self._revision, self._added_keepout_cells = 0, 0
         self._changes = deque[CellIndices | None](maxlen=MAX_REVISIONS)
+        """Cells with changed obstacles for each of the last revisions; None if obstacles changed in any cell."""
+        self._outdated: tuple[Cell, Cell] | None = None
+        """Lowest and highest cell of the window around all changes that `view` does not contain yet."""
+        self._view: CostmapView | None = None
         self.moving = NO_MOVING_OBSTACLES
         """Moving obstacles in the frame of the costmap, included in the view."""
-        layer = self._static_layer_in(window_around(Pose2(0.0, 0.0), self._size, spec.resolution))
-        self._frame: GridFrame = layer.frame
-        self._live = ObstacleLayer(spec, self._inscribed, layer.frame)
-        self._set_static_layer(layer)
-        self._unknown = layer.unknown.copy()
-        grid = None if self._has_keepout else surroundings.map
-        self._reset_to_static_layer(
-            None
-            if grid is None
-            else _map_costs(
-                grid, self._inflation, spec.lethal_cost_threshold, self._margin_cells, self._tracks_unknown
-            ).copy()
-        )
+        self._reset_to_static_layer(self._static.costs(self._inflation).copy())
 
     @property
     def publish_frequency(self) -> float:
@@ -112,8 +101,8 @@ class LayeredCostmap:
 
         Access computes costs and distances, once for all updates since the last access.
         """
-        if self._changed is not None:
-            self.refresh(*self._changed)
+        if self._outdated is not None:
+            self.refresh(*self._outdated)
         view, revision = self._view, self._revision
         if view is None or view.revision != revision or view.moving is not self.moving:
             frame, radius, moving = self._frame, self._spec.inflation_radius, self.moving
@@ -140,8 +129,8 @@ class LayeredCostmap:
 
     @property
     def obstacle_cell_count(self) -> int:
-        """Number of cells with live obstacles, plus the increase of lethal static cells by new keepout zones."""
-        return self._live.count + self._keepout_change
+        """Number of cells with live obstacles, plus the number of cells that new keepout zones have made lethal."""
+        return self._live.count + self._added_keepout_cells
 
     def update(self, base: Pose2, reading: Scan | Image) -> None:
         """Clear the cells that a sensor sees through, then mark its obstacles. `base` is the pose of the robot."""
@@ -150,13 +139,16 @@ class LayeredCostmap:
         self._latest_readings.pop(reading.sensor, None)  # so that the newest reading is the last one
         self._latest_readings[reading.sensor] = (base, reading)
         if isinstance(reading, Image):
-            self._mark_cells_changed(self._live.on_image(base, reading, self._static_squared))
+            cells = self._live.on_image(base, reading, self._static.squared)
+            if len(cells):
+                (top, left), (bottom, right) = cells.min(axis=0).tolist(), cells.max(axis=0).tolist()
+                self._mark_changed((top, left), (bottom, right), None)
             return
-        changed = self._live.on_scan(base, reading, self._static_squared if self._has_walls else None)
+        changed = self._live.on_scan(base, reading, self._static.squared if self._static.has_lethal else None)
         if len(changed):
             self._mark_changed(*(self._whole if self._is_small else self._frame.extent(changed)), changed)
-        if self._tracks_unknown:
-            self._update_unknown(base, reading)
+        if self._unknown is not None:
+            self._update_unknown(base, reading, self._unknown)
 
     def clear(self, clear_within: float = math.inf, unseen_margin: float = DISTANCE_MARGIN_M) -> None:
         """Clear the live obstacles within `clear_within` m along x and y, except those in the newest readings.
@@ -180,15 +172,11 @@ class LayeredCostmap:
 
     def set_zones(self, zones: Zones) -> None:
         """Replace all keepout zones and masks."""
-        before = self._static_lethal_count()
+        before = self._static.lethal_cell_count
         self._surroundings = replace(self._surroundings, keepout=zones.keepout, masks=zones.masks)
-        self._set_static_layer(self._static_layer_in(self._frame))
-        self._keepout_change += self._static_lethal_count() - before
+        self._static = self._static_layer_in(self._frame)
+        self._added_keepout_cells += self._static.lethal_cell_count - before
         self._reset_to_static_layer()
-
-    def _static_lethal_count(self) -> int:
-        """Return the number of lethal cells of the static layer."""
-        return int(np.count_nonzero(self._static_squared == 0))
 
     def fits_static(self, pose: Pose2, tolerance: float) -> bool:
         """Return whether the inscribed circle fits on the map within `tolerance` m of a pose that is not in a wall.
@@ -198,10 +186,10 @@ class LayeredCostmap:
         center = self._frame.cell(pose.x, pose.y)
         if not self._frame.covers(pose.x, pose.y):
             return True
-        if self._static_squared[center] == 0:
+        if self._static.squared[center] == 0:
             return False
         window = self._frame.window(center, center, math.ceil(tolerance / self._frame.resolution))
-        fits = self._inflation.meters.take(self._static_squared[window]) > self._inscribed
+        fits = self._inflation.meters.take(self._static.squared[window]) > self._inscribed
         points = self._frame.centers(np.argwhere(fits) + np.array((window[0].start, window[1].start)))
         return bool((np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y) <= tolerance).any())
 
@@ -211,163 +199,105 @@ class LayeredCostmap:
 
     def _roll(self, base: Pose2) -> None:
         """Move the window so that the robot is at its center. New cells are unknown if unknown space is tracked."""
-        before, window = self._frame, window_around(base, self._size, self._spec.resolution)
-        if self._has_keepout:
-            self._set_static_layer(self._static_layer_in(window))
-        self._frame = window  # without keepout zones, the static layer of all windows is the same
-        self._live.roll(window)
-        if self._tracks_unknown:
-            self._unknown = shift_layer(self._unknown, before, window, True)
-        self._mark_changed(*self._whole)
+        before, self._frame = self._frame, window_around(base, self._size, self._spec.resolution)
+        if self._surroundings.keepout or self._surroundings.masks.keepout is not None:
+            self._static = self._static_layer_in(self._frame)
+        self._live.roll(self._frame)
+        if self._unknown is not None:
+            self._unknown = shift_layer(self._unknown, before, self._frame, True)
+        self._mark_changed(*self._whole, None)
 
     def _static_layer_in(self, window: GridFrame) -> StaticLayer:
         """Return the static layer of the map, or of this window if there is no map."""
-        grid, keepout, mask = self._surroundings.map, self._surroundings.keepout, self._surroundings.masks.keepout
-        unknown, threshold = self._tracks_unknown, self._spec.lethal_cost_threshold
-        if grid is None:
-            return empty_layer(window, keepout, mask, unknown)
-        if not self._has_keepout:
-            return layer_without_zones(grid, threshold, unknown)
-        return static_layer(grid, threshold, keepout, mask, unknown)
-
-    @property
-    def _has_keepout(self) -> bool:
-        """Whether keepout zones or a keepout mask apply."""
-        return bool(self._surroundings.keepout) or self._surroundings.masks.keepout is not None
-
-    def _set_static_layer(self, layer: StaticLayer) -> None:
-        """Use this static layer, and compute its distances to obstacles."""
-        self._frame = layer.frame
-        rows, columns = layer.frame.shape
-        self._whole = (0, 0), (rows - 1, columns - 1)
-        # In a small window, most cells are near any change, so that all are recomputed.
-        self._is_small = max(rows, columns) <= 4 * self._margin_cells and self._margin_cells <= MAX_REACH_CELLS
-        grid = None if self._has_keepout else self._surroundings.map
-        if grid is None:
-            self._static_squared = squared_distances(layer.lethal, self._margin_cells)
-        else:
-            self._static_squared = static_distances(grid, self._spec.lethal_cost_threshold, self._margin_cells)
-        self._has_walls = bool(layer.lethal.any())
+        return static_layer(self._spec, self._surroundings, window, self._inflation.reach_cells)
 
     def _reset_to_static_layer(self, costs: Costs | None = None) -> None:
         """Reset costs and distances to the static layer. The next `view` adds live obstacles.
 
         `costs` are the costs of the static layer; None to compute them.
         """
-        if costs is None:
-            costs = self._inflation.costs(self._static_squared, self._unknown if self._tracks_unknown else None)
-        self._costs = costs
-        self._distance = self._inflation.meters.take(self._static_squared)
+        squared = self._static.squared
+        self._costs = self._inflation.costs(squared, self._unknown) if costs is None else costs
+        self._distance = self._inflation.meters.take(squared)
         self._add_revision(None)
-        self._changed = None
+        self._outdated = None
         if len(marked := self._live.cells):
-            self._mark_changed(*self._frame.extent(marked))
+            self._mark_changed(*self._frame.extent(marked), None)
 
     def _obstacles(self, window: Window) -> Mask:
         """Return which cells of a window are live obstacles, without small groups if the denoise layer is enabled."""
         marked = self._live.marked(window)
         if not self._min_group_size:
             return marked
-        return remove_small_groups(marked, self._static_squared[window] == 0, self._spec.denoise_layer)
+        return remove_small_groups(marked, self._static.squared[window] == 0, self._spec.denoise_layer)
 
-    def _update_unknown(self, base: Pose2, scan: Scan) -> None:
-        """With every n-th scan, mark the unknown cells that beams cross as known."""
+    def _update_unknown(self, base: Pose2, scan: Scan, unknown: Mask) -> None:
+        """With every n-th scan, mark the cells of `unknown` that beams cross as known."""
         self._scans += 1
         if self._scans % SCANS_PER_UNKNOWN_UPDATE != 1:
             return
         frame = self._frame
         window = self._live.window_around_robot(base, math.hypot(scan.mount.x, scan.mount.y))
-        cells = frame.from_window(window, np.flatnonzero(self._unknown[window]))
+        cells = frame.from_window(window, np.flatnonzero(unknown[window]))
         if not len(cells):
             return
         passed, _ = crossed_cells(frame.points(cells), frame.resolution, scan, base, self._spec)
         cells = cells[passed]
         if len(cells):
-            self._unknown[np.divmod(cells, frame.shape[1])] = False
+            unknown[np.divmod(cells, frame.shape[1])] = False
             self._mark_changed(*frame.extent(cells), NO_CELLS)
 
-    def _mark_cells_changed(self, cells: Cells) -> None:
-        """Mark these cells (n, 2) as changed."""
-        if len(cells):
-            (top, left), (bottom, right) = cells.min(axis=0).tolist(), cells.max(axis=0).tolist()
-            self._mark_changed((top, left), (bottom, right))
+    def _mark_changed(self, low: Cell, high: Cell, obstacles: CellIndices | None) -> None:
+        """Mark the window from cell `low` to `high` as outdated, and add a revision with changed `obstacles`."""
+        if self._outdated is not None:
+            outdated_low, outdated_high = self._outdated
+            low = min(low[0], outdated_low[0]), min(low[1], outdated_low[1])
+            high = max(high[0], outdated_high[0]), max(high[1], outdated_high[1])
+        self._outdated = low, high
+        self._add_revision(obstacles)
 
-    def _mark_changed(self, low: tuple[int, int], high: tuple[int, int], cells: CellIndices | None = None) -> None:
-        """Mark the window from cell `low` to `high` as changed, and add a revision with `cells`."""
-        if self._changed is not None:
-            before_low, before_high = self._changed
-            low = min(low[0], before_low[0]), min(low[1], before_low[1])
-            high = max(high[0], before_high[0]), max(high[1], before_high[1])
-        self._changed = low, high
-        self._add_revision(cells)
-
-    def _add_revision(self, cells: CellIndices | None) -> None:
-        """Add a revision in which obstacles changed in these cells; None means in any cell."""
+    def _add_revision(self, obstacles: CellIndices | None) -> None:
+        """Add a revision in which `obstacles` changed: flat indices of cells; None means any cells."""
         self._revision += 1
-        self._changes.append(cells)
+        self._changes.append(obstacles)
 
-    def refresh(self, low: tuple[int, int], high: tuple[int, int]) -> None:
-        """Recompute distances and costs of all cells near the window from cell `low` to `high`."""
-        self._changed = None
+    def refresh(self, low: Cell, high: Cell) -> None:
+        """Recompute distances and costs of all cells that changes in the window from cell `low` to `high` affect."""
+        self._outdated = None
         if (low, high) == self._whole:
             self._refresh_all()
             return
-        inner = self._frame.window(low, high, self._margin_cells + self._min_group_size)
-        outer = self._frame.window(low, high, 2 * (self._margin_cells + self._min_group_size))
+        affected = self._frame.window(low, high, self._margin_cells)
+        outer = self._frame.window(low, high, 2 * self._margin_cells)  # contains the obstacles that determine them
         part = (
-            slice(inner[0].start - outer[0].start, inner[0].stop - outer[0].start),
-            slice(inner[1].start - outer[1].start, inner[1].stop - outer[1].start),
+            slice(affected[0].start - outer[0].start, affected[0].stop - outer[0].start),
+            slice(affected[1].start - outer[1].start, affected[1].stop - outer[1].start),
         )
-        squared = squared_distances(self._obstacles(outer), self._margin_cells)[part]
-        if self._has_walls:
-            squared = np.minimum(self._static_squared[inner], squared)
-        self._distance[inner] = self._inflation.meters.take(squared)
-        self._costs[inner] = self._inflation.costs(squared, self._unknown[inner] if self._tracks_unknown else None)
+        squared = squared_distances_within(self._obstacles(outer), self._inflation.reach_cells)[part]
+        if self._static.has_lethal:
+            squared = np.minimum(self._static.squared[affected], squared)
+        self._distance[affected] = self._inflation.meters.take(squared)
+        self._costs[affected] = self._inflation.costs(
+            squared, None if self._unknown is None else self._unknown[affected]
+        )
 
     @cached_property
     def _transform(self) -> SquaredDistanceTransform:
-        """Distance transform for small windows."""
-        return SquaredDistanceTransform(self._frame.shape, self._margin_cells)
+        """Distance transform of the whole costmap."""
+        return SquaredDistanceTransform(self._frame.shape, self._inflation.reach_cells)
 
     def _refresh_all(self) -> None:
         """Recompute the distances and costs of all cells."""
-        obstacles = self._obstacles(WHOLE_GRID)
-        squared = (
-            self._transform.transform(obstacles) if self._is_small else squared_distances(obstacles, self._margin_cells)
-        )
-        if self._has_walls:
-            squared = np.minimum(self._static_squared, squared)
+        squared = self._transform.transform(self._obstacles(WHOLE_GRID))
+        if self._static.has_lethal:
+            squared = np.minimum(self._static.squared, squared)
         indices = squared.astype(np.intp)  # converted once for both lookups
         self._distance = self._inflation.meters.take(indices)
-        self._costs = self._inflation.costs(indices, self._unknown if self._tracks_unknown else None)
-
-
-def _reach(spec: CostmapSpec, robot: RobotModel) -> float:
-    """Return the distance in m up to which distances to obstacles are computed."""
-    return max(spec.inflation_radius, robot.circumscribed_radius + DISTANCE_MARGIN_M)
+        self._costs = self._inflation.costs(indices, self._unknown)
 
 
 def precompute(spec: CostmapSpec, robot: RobotModel, grid: OccupancyGrid) -> None:
     """Compute and cache the costs of a map without keepout zones, before worker processes are forked."""
-    inflation, margin = _inflation(spec, robot, grid.resolution), _reach_cells(_reach(spec, robot), grid.resolution)
-    _map_costs(grid, inflation, spec.lethal_cost_threshold, margin, spec.track_unknown_space)
-
-
-@cached_on_instance
-def _map_costs(
-    grid: OccupancyGrid, inflation: Inflation, threshold: int, reach_cells: int, tracks_unknown: bool
-) -> Costs:
-    """Return the costs of a map without zones and live obstacles, cached for all runs."""
-    unknown = layer_without_zones(grid, threshold, tracks_unknown).unknown if tracks_unknown else None
-    return inflation.costs(static_distances(grid, threshold, reach_cells), unknown)
-
-
-def _inflation(spec: CostmapSpec, robot: RobotModel, resolution: float) -> Inflation:
-    """Return the lookup tables of the costmap."""
-    inscribed, reach = robot.inscribed_radius, _reach(spec, robot)
-    return shared_inflation(resolution, inscribed, spec.inflation_radius, spec.cost_scaling_factor, reach)
-
-
-def _reach_cells(reach: float, resolution: float) -> int:
-    """Return the distance `reach` in cells, rounded up."""
-    return max(2, math.ceil(reach / resolution))  # at least the neighbors of a wall, if cells are coarse
+    inflation = inflation_for(spec, robot, grid.resolution)
+    layer = map_layer(grid, spec.lethal_cost_threshold, spec.track_unknown_space, inflation.reach_cells)
+    layer.costs(inflation)

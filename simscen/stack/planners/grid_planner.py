@@ -6,12 +6,11 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.grid_graph import EIGHT_NEIGHBORS, SIXTEEN_NEIGHBORS, GridGraph
 from simscen.model.planners import Navfn, Smac2d
-from simscen.stack.costmap.layers import MAX_NON_OBSTACLE
 from simscen.stack.planners.endpoints import Endpoints, find_endpoints
 from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, densify, smoothed, with_headings
 from simscen.stack.planners.planning_window import plan_in_windows
 from simscen.stack.planners.traversal_costs import TraversalCosts
-from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
+from simscen.stack.protocols import MAX_NON_OBSTACLE, CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.stack.setting import Setting
 
 COST_FACTOR, COST_NEUTRAL = 0.8, 50

@@ -11,7 +11,6 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.planners import OmplParameters, StateSpace
 from simscen.model.planners import OmplPlanner as PlannerSpec
-from simscen.stack.costmap.layers import NO_INFORMATION
 from simscen.stack.footprint import Footprint
 from simscen.stack.kinematics import cusps
 from simscen.stack.planners.endpoints import Endpoints, find_endpoints, free_points, reachable_bounds, reachable_cells
@@ -27,7 +26,7 @@ from simscen.stack.planners.pose_search import (
     search_poses,
 )
 from simscen.stack.planners.traversal_costs import TraversalCosts
-from simscen.stack.protocols import CostmapView, NavigationFailure, Planner, RobotModel
+from simscen.stack.protocols import NO_INFORMATION, CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.stack.setting import Setting
 
 POSITION_PLANNERS = ("bit_star", "aorrtc", "medial_axis")

@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.stack.costmap.distance_transform import squared_distances_within
-from simscen.stack.costmap.layers import MAX_NON_OBSTACLE, NO_INFORMATION
-from simscen.stack.protocols import CostmapView, RobotModel
+from simscen.stack.protocols import MAX_NON_OBSTACLE, NO_INFORMATION, CostmapView, RobotModel
 
 UNKNOWN_COST = 253
 """Cost of an unknown cell: just above the highest cost of a free cell (nav2_navfn_planner)."""

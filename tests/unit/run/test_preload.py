@@ -23,14 +23,14 @@ from pathlib import Path
 from simscen.cli.session import fork_server_main
 from simscen.loading.scenario import load_scenario
 from simscen.run.process.jobs import Job
-from simscen.stack.costmap import layers
+from simscen.stack.costmap import static_layer
 
 folder = Path(sys.argv[1])
 loaded = load_scenario(folder / "a.scenario.yaml", folder)
 job = Job(0, loaded, loaded.key(1), folder, 60.0)
 fork_server_main._warm_up(job)
 before = set(sys.modules)
-layers.squared_distances = None  # what a fork need not work out any more
+static_layer._unrotated_cells = None  # what a fork need not compute any more
 assert fork_server_main._execute(job, lambda seconds: None)["outcome"] == "passed"
 print("late:", *sorted(name for name in set(sys.modules) - before if name.split(".")[0] in ("simscen", "ompl", "PIL")))
 """

@@ -19,7 +19,7 @@ from simscen.model.stack import StackSpec
 from simscen.stack.behaviors import BehaviorSequence, Wait
 from simscen.stack.checkers import STANDSTILL_CHECKS, ProgressChecker, SimpleGoalChecker
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
-from simscen.stack.costmap.layers import SpeedFilter
+from simscen.stack.costmap.speed_filter import SpeedFilter
 from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel, Surroundings
 from simscen.stack.tasks import Task

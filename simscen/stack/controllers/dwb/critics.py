@@ -15,10 +15,9 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import DynamicWindow as DwbSpec
 from simscen.stack.controllers.collision_checker import APPROACH_TOLERANCE_M, UNCERTAINTY_SIGMAS
 from simscen.stack.controllers.dwb.trajectory_generator import Trajectories
-from simscen.stack.costmap.layers import NO_INFORMATION
 from simscen.stack.footprint import Footprint
 from simscen.stack.moving_obstacles import MovingObstacles
-from simscen.stack.protocols import CostmapView
+from simscen.stack.protocols import NO_INFORMATION, CostmapView
 
 Cells = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]

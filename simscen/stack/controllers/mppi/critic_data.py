@@ -10,11 +10,10 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.controllers.mppi.rollouts import Floats, Rollouts
 from simscen.stack.controllers.path_handler import UpcomingPath
-from simscen.stack.costmap.layers import INSCRIBED, NO_INFORMATION
 from simscen.stack.footprint import CoveringDiscs, Footprint
 from simscen.stack.kinematics import VelocityLimits
 from simscen.stack.moving_obstacles import MAX_INFLATION_M, MovingObstacles
-from simscen.stack.protocols import CostmapView
+from simscen.stack.protocols import INSCRIBED, NO_INFORMATION, CostmapView
 
 Mask = npt.NDArray[np.bool_]
 
