@@ -9,7 +9,7 @@ import numpy as np
 from simscen.assets.folders import AllowedFolders, UnusableFile
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose3
-from simscen.core.geometry.shapes import Solid
+from simscen.core.geometry.shapes import Cylinder, Solid, Sphere
 from simscen.model.robot import Mecanum, Omnidirectional, RobotSpec
 from simscen.sim.body.inertia import MassProperties, combine
 from simscen.sim.body.outline import hull_points
@@ -22,7 +22,11 @@ from simscen.sim.urdf.xacro.expand import UnknownArgument, expand
 from simscen.sim.urdf.xml_source import URDF_ERROR_CODE, RobotFiles, read_xml
 
 MAX_CASTER_SIZE_RATIO = 0.35
-"""Largest length and width of a caster, divided by the length and width of the hull."""
+"""Largest length and width of a caster that is not round, divided by the length and width of the hull."""
+MAX_CASTER_AXIS_Z = 0.1
+"""Largest z component of the axis of a cylinder that is a caster (6 degrees)."""
+ROUNDING_M = 1e-6
+"""Rounding error in m of a radius that a xacro file computes."""
 
 
 def read_spec_tree(
@@ -87,8 +91,8 @@ def body_from_tree(spec: RobotSpec, tree: LinkTree) -> RobotBody:
     hull = tuple(replace(solid, pose=base_from_root.compose(solid.pose)) for solid in solids)
     scale = _mass_scale(spec, tree)
     wheels = tuple(_build_wheel(tree, joint, base_from_root, scale, spec) for joint in joints)
-    if wheels:
-        hull = _without_casters(tree, hull)  # an omnidirectional base has no ground contact
+    if wheels:  # an omnidirectional base has no ground contact
+        hull = _without_casters(tree, hull, max(wheel.radius for wheel in wheels))
     return assemble_body(spec, hull, wheels, _combine_masses(tree, fixed, base_from_root, scale))
 
 
@@ -164,20 +168,36 @@ def _build_wheel(tree: LinkTree, wheel: WheelJoint, base_from_root: Pose3, scale
     )  # fmt: skip
 
 
-def _without_casters(tree: LinkTree, hull: tuple[Solid, ...]) -> tuple[Solid, ...]:
-    """Return the hull without casters: small parts that touch the ground.
+def _without_casters(tree: LinkTree, hull: tuple[Solid, ...], wheel_radius: float) -> tuple[Solid, ...]:
+    """Return the hull without casters: small or round parts that touch the ground.
 
-    Raises InvalidInput if a large part touches the ground.
+    `wheel_radius` is the radius of the largest wheel in m. Raises InvalidInput if any other part touches the ground.
     """
     points = [solid.pose.apply(hull_points(solid.shape)) for solid in hull]
     whole = np.ptp(np.concatenate(points)[:, :2], axis=0)
     kept = []
     for solid, corners in zip(hull, points, strict=True):
-        if corners[:, 2].min() >= MIN_GROUND_CLEARANCE_M:
+        height = corners[:, 2].min()
+        if height >= MIN_GROUND_CLEARANCE_M:
             kept.append(solid)
-        elif (np.ptp(corners[:, :2], axis=0) > MAX_CASTER_SIZE_RATIO * whole).any():
-            depth = MIN_GROUND_CLEARANCE_M - corners[:, 2].min()
-            message = f"link {solid.name!r} reaches {depth:.3f} m too low: it would drag over the ground"
-            hint = "its wheels' collision shapes must reach lower than everything else"
+        elif not (
+            (np.ptp(corners[:, :2], axis=0) <= MAX_CASTER_SIZE_RATIO * whole).all()
+            or _is_round_caster(solid, wheel_radius)
+        ):
+            place = f"is {1e3 * height:.1f} mm above" if height >= 0 else f"reaches {-1e3 * height:.1f} mm below"
+            message = f"link {solid.name!r} {place} the lowest point of the wheels: it would drag over the ground"
+            hint = f"its <collision> must be at least {1e3 * MIN_GROUND_CLEARANCE_M:g} mm above this point"
             raise InvalidInput([tree.links[solid.name].element.problem(message, hint)])
     return tuple(kept)
+
+
+def _is_round_caster(solid: Solid, wheel_radius: float) -> bool:
+    """Return whether a part is a ball, or a horizontal cylinder like a wheel, of at most `wheel_radius` m."""
+    match solid.shape:
+        case Sphere(radius):
+            return radius <= wheel_radius + ROUNDING_M
+        case Cylinder(radius, length):
+            axis = solid.pose._replace(x=0.0, y=0.0, z=0.0).compose(Pose3(0.0, 0.0, 1.0)).position
+            return radius <= wheel_radius + ROUNDING_M and length <= 2 * radius and abs(axis[2]) <= MAX_CASTER_AXIS_Z
+        case _:
+            return False

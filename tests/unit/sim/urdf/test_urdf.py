@@ -136,6 +136,35 @@ def test_casters_of_the_urdf_on_the_ground_are_replaced_by_generated_ones(load):
     assert len(body.casters) == 2
 
 
+ROUND_CASTER = """
+  <link name="caster"><collision><geometry>{geometry}</geometry></collision></link>
+  <joint name="c" type="fixed">
+    <parent link="base"/><child link="caster"/><origin xyz="-0.02 0 {z}" rpy="{rpy}"/>
+  </joint>"""
+BALL, ROLLER = '<sphere radius="{}"/>', '<cylinder radius="{}" length="{}"/>'
+
+
+@pytest.mark.parametrize("geometry", [BALL.format(0.05), ROLLER.format(0.05, 0.1)])
+def test_a_round_caster_as_large_as_the_wheels_may_be_wide_for_a_small_robot(load, geometry):
+    caster = ROUND_CASTER.format(geometry=geometry, z=0, rpy="1.57 0 0")
+    body = load(robot('<box size="0.2 0.2 0.2"/>', extra=caster))
+    assert [solid.name for solid in body.hull if isinstance(solid.shape, Box)] == ["base", "wheel", "wheel"]
+    assert not any(solid.name == "caster" and solid.shape.radius == 0.05 for solid in body.hull)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "z", "rpy"),
+    [
+        (BALL.format(0.06), 0.01, "0 0 0"),  # larger than the wheels
+        (ROLLER.format(0.05, 0.15), 0, "1.57 0 0"),  # longer than its diameter
+        (ROLLER.format(0.05, 0.1), 0, "0 0 0"),  # stands on its base
+    ],
+)
+def test_a_wide_part_that_does_not_roll_like_a_caster_is_refused_on_a_small_robot(refusal, geometry, z, rpy):
+    extra = ROUND_CASTER.format(geometry=geometry, z=z, rpy=rpy)
+    assert "link 'caster'" in refusal(robot('<box size="0.2 0.2 0.2"/>', extra=extra)).message
+
+
 def test_urdf_robot_drives(load):
     simulation = SingleRobotSimulation(load(robot()))
     simulation.drive(Twist(0.5, 0.0, 0.0))
@@ -287,7 +316,12 @@ def test_wheels_that_are_not_found_can_be_specified(load, refusal):
 
 
 def test_a_hull_that_drags_over_the_ground_is_refused(refusal):
-    assert "drag over the ground" in refusal(robot('<box size="0.5 0.36 0.4"/>')).message
+    problem = refusal(robot('<box size="0.5 0.36 0.4"/>'))
+    assert problem.message == (
+        "link 'base' reaches 50.0 mm below the lowest point of the wheels: it would drag over the ground"
+    )
+    assert problem.hint == "its <collision> must be at least 3 mm above this point"
+    assert "link 'base' is 2.0 mm above the lowest point" in refusal(robot('<box size="0.5 0.36 0.296"/>')).message
 
 
 def test_a_urdf_outside_the_root_is_refused(tmp_path):
