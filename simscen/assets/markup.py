@@ -16,8 +16,15 @@ MAX_DEPTH = 100
 MAX_ELEMENTS = 200_000
 """Maximum number of elements, to limit memory."""
 MAX_SHOWN_LINE_BYTES = 300
-_COMMENT = re.compile(rb"<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?(?:\?>|\Z)|<!--(?P<text>.*?)(?:-->|\Z)", re.DOTALL)
-"""Comment with the group `text`. CDATA sections and processing instructions match without this group."""
+_COMMENT = re.compile(
+    rb"<!\[CDATA\[.*?(?:\]\]>|\Z)|(?P<declaration><\?xml\s.*?\?>)|<\?.*?(?:\?>|\Z)|<!--(?P<text>.*?)(?:-->|\Z)",
+    re.DOTALL,
+)
+"""Comment with the group `text`, or XML declaration with the group `declaration`.
+
+CDATA sections and processing instructions match without these groups.
+"""
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
 class MalformedXml(Exception):
@@ -121,22 +128,26 @@ def parse(data: bytes, source: Source, kind: type[ElementT]) -> ElementT:
     parser.StartElementHandler = start
     parser.EndElementHandler = end
     parser.CharacterDataHandler = characters
-    _run(parser, blank_hyphens_in_comments(data), source)
+    _run(parser, blank_invalid_markup(data), source)
     return root[0]
 
 
-def blank_hyphens_in_comments(data: bytes) -> bytes:
-    """Return the XML text with hyphens in comments replaced by spaces; all positions stay the same.
+def blank_invalid_markup(data: bytes) -> bytes:
+    """Return the XML text with spaces in place of markup that XML forbids, but the parsers of Gazebo and ROS accept.
 
-    XML forbids `--` in comments, but the parser of Gazebo and ROS (tinyxml2) accepts it.
+    This markup is `--` in comments, and an XML declaration that is not at the start, such as below a comment or an
+    empty line. All positions stay the same.
     """
+    start = len(_BYTE_ORDER_MARK) if data.startswith(_BYTE_ORDER_MARK) else 0
 
     def blank(match: re.Match[bytes]) -> bytes:
+        if match["declaration"]:
+            return match[0] if match.start() == start else re.sub(rb"[^\n]", b" ", match[0])
         text = match["text"]
         if not text or b"-" not in text:
             return match[0]
-        start = match.start("text") - match.start()
-        return match[0][:start] + text.replace(b"-", b" ") + match[0][start + len(text) :]
+        begin = match.start("text") - match.start()
+        return match[0][:begin] + text.replace(b"-", b" ") + match[0][begin + len(text) :]
 
     return _COMMENT.sub(blank, data)
 

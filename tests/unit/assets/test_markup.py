@@ -58,6 +58,21 @@ def test_hyphens_outside_comments_stay() -> None:
     assert (root.attributes["x"], root.text) == ("--", "<!-- a--b -->")
 
 
-def test_unclosed_comments_are_refused_in_linear_time() -> None:
+@pytest.mark.parametrize(
+    "before", [b"\n\n", b"<!-- a comment -->\n", b"\xef\xbb\xbf\n<!-- -- -->\n<?xml version='1.0'?>"]
+)
+def test_xml_declarations_below_the_first_line_are_accepted_and_positions_kept(before: bytes) -> None:
+    text = before + b"<?xml version='1.0'\n encoding='utf-8' ?> <a/>"
+    for root in (parse_sdf(text, "x.sdf", ""), parse_urdf(text, "x.urdf")):
+        assert (root.tag, root.line, root.col) == ("a", 2 + before.count(b"\n"), 22)
+
+
+def test_an_xml_declaration_at_the_start_defines_the_encoding() -> None:
+    text = "<?xml version='1.0' encoding='iso-8859-1'?><a x='ä'/>".encode("iso-8859-1")
+    assert parse_sdf(text, "x.sdf", "").attributes["x"] == "ä"
+
+
+@pytest.mark.parametrize("piece", [b"<!--", b"<?xml "])
+def test_unclosed_markup_is_refused_in_linear_time(piece: bytes) -> None:
     with pytest.raises(UnusableElement, match="not well-formed"):
-        parse_sdf(b"<a>" + b"<!--" * 1_000_000, "x.sdf", "")
+        parse_sdf(b"<a>" + piece * 1_000_000, "x.sdf", "")
