@@ -52,7 +52,7 @@ ResumeOption = Annotated[
     ),
 ]
 OpenOption = Annotated[bool, typer.Option("--open", help="Open the report in a browser and update it as runs finish.")]
-WallLimitOption = Annotated[float, typer.Option(min=1, help="Wall-clock limit of one run in seconds.")]
+WallLimitOption = Annotated[float, typer.Option(min=1, max=1e6, help="Wall-clock limit of one run in seconds.")]
 StackOption = Annotated[
     str | None, typer.Option(metavar="NAME=VALUE", autocompletion=completions.stacks, help=STACK_HELP)
 ]

@@ -201,6 +201,8 @@ def _effect(values: Sequence[Any], margins: Sequence[float]) -> tuple[float, flo
 
     numbers = [si_number(value) for value in values]
     if all(map(_is_number, numbers)):
+        if len(set(numbers)) < 2:  # such as 1 m and 100 cm
+            return None
         found = stats.spearmanr(numbers, margins)
         return float(found.statistic), float(found.pvalue), True
     groups: dict[str, list[float]] = defaultdict(list)

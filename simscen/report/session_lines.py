@@ -51,8 +51,7 @@ class RunNaming:
         `columns` is the width of the terminal; None for no limit.
         """
         stacks = [text.partition("=")[0] for text in session.stacks] if len(session.stacks) > 1 else []
-        runs_per_seed = (len(session.ids) or session.scenarios) * max(1, len(stacks)) * (2 if session.twice else 1)
-        has_seeds = session.total != runs_per_seed
+        has_seeds = session.seeds > 1
         prefix = _common_folder(session.ids)
         longest = max((len(scenario_id) for scenario_id in session.ids), default=0) - len(prefix)
         stack = ".".join(

@@ -132,7 +132,8 @@ class Falsification:
             screen(event)
 
         workers = self._request.options.workers
-        screen(SessionStarted(__version__, self._request.runs, 1, workers, str(reports.folder)))
+        runs = self._request.runs
+        screen(SessionStarted(__version__, runs, 1, workers, str(reports.folder), seeds=runs))
         while stopped is None and not self._is_done() and empty_batches < MAX_EMPTY_BATCHES:
             points = self._search.ask(min(BATCH_SIZE, self._request.runs - len(self.finished_runs)))
             jobs = self._make_jobs(points, reports.folder)

@@ -1,10 +1,12 @@
 """Division of the planned runs of a session into runs to execute, and runs with reusable earlier results."""
 
 import json
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from simscen.cli.diagnostics import print_text
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished, SessionStarted, session_started
@@ -15,6 +17,7 @@ from simscen.report.display_text import number_with_noun
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun, read_journal
 from simscen.report.session_history import last_failed
+from simscen.report.violations import short_run_name
 from simscen.run.process.jobs import Job
 from simscen.run.reproducibility import ScenarioDigests, scenario_digests
 from simscen.run.sessions.output_folder import DEFAULT_FOLDER
@@ -55,6 +58,7 @@ def plan_session(journal: Journal, jobs: Sequence[Job], workers: int, shard: tup
     `shard` is the number of this shard (from 1) and the count of shards.
     """
     planned = plan_runs(jobs)
+    warn_of_dropped_runs(journal, previous_keys(journal), planned)
     remaining, reused = divide_runs(jobs, planned, previous_results(journal))
     journal.plan(planned, __version__, workers, shard)
     write_reused(journal, reused)
@@ -122,6 +126,24 @@ def previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:
         for run, finished in results.items()
         if finished.outcome is not Outcome.ERROR and _has_matching_log(finished)
     }
+
+
+def previous_keys(journal: Journal) -> Sequence[RunKey]:
+    """Return the keys of the planned runs of an earlier session in the folder of the journal."""
+    try:
+        return [run.key for run in read_journal(journal.folder).planned]
+    except InvalidInput:  # a new folder
+        return []
+
+
+def warn_of_dropped_runs(journal: Journal, earlier: Sequence[RunKey], planned: Sequence[PlannedRun]) -> None:
+    """Print a warning if runs of an earlier session in the folder are not planned again: reports will omit them."""
+    now = {run.key for run in planned}
+    dropped = [key for key in earlier if key not in now]
+    if dropped:
+        runs = f"{number_with_noun(len(dropped), 'run')} of {len(earlier)}"
+        text = f"{runs} of the session to resume, such as {short_run_name(dropped[0])}, will not be in its reports"
+        print_text(f"simscen: warning: {journal.folder}: {text}, because the selection has changed", sys.stderr)
 
 
 def _has_matching_log(finished: RunFinished) -> bool:

@@ -16,7 +16,14 @@ from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.exit_codes import exit_code
 from simscen.cli.session.live_page import LivePage
 from simscen.cli.session.output_files import OutputOptions, Reports
-from simscen.cli.session.pending_runs import divide_runs, plan_runs, previous_results, write_reused
+from simscen.cli.session.pending_runs import (
+    divide_runs,
+    plan_runs,
+    previous_keys,
+    previous_results,
+    warn_of_dropped_runs,
+    write_reused,
+)
 from simscen.cli.session.run_session import finish_session, plugins_and_stacks, start_session
 from simscen.cli.session.selection import Selection, load_selection, require_not_skipped
 from simscen.cli.session.terminal import open_screen
@@ -137,7 +144,7 @@ class _StudySession:
         """
         start, finished_runs, stopped = time.monotonic(), RunStore(), None
         invalid: InvalidInput | None = None
-        earlier = previous_results(journal)
+        earlier, earlier_keys = previous_results(journal), previous_keys(journal)
         title = next(iter(self._loaded.values())).id
 
         def show(event: SessionEvent) -> None:
@@ -149,7 +156,7 @@ class _StudySession:
             show(event)
 
         workers = self._request.options.workers
-        show(SessionStarted(__version__, self.total, 1, workers, str(reports.folder), (title,)))
+        show(SessionStarted(__version__, self.total, 1, workers, str(reports.folder), (title,), seeds=self.total))
         while self._batch and stopped is None:
             jobs = self._jobs(len(finished_runs), reports.folder)
             remaining, reused = self._plan(journal, jobs, earlier)
@@ -168,6 +175,8 @@ class _StudySession:
             except InvalidInput as error:  # the values of a later run are invalid: report the runs before it
                 invalid = error
                 break
+        if stopped is None:
+            warn_of_dropped_runs(journal, earlier_keys, self._planned)
         study = evaluate_study(self._study_plan(), (finished.result for finished in finished_runs))
         written = finish_session(reports, journal, listen, finished_runs, start, stopped is not None, study=study)
         if invalid is not None:

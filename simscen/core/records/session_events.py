@@ -1,5 +1,6 @@
 """Events that a session (one call of `simscen run`) emits. All reports are made from these events."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,6 +34,7 @@ class SessionStarted:
         ids: Titles of the scenarios and variations.
         stacks: Values of --stack.
         twice: Whether each run is repeated to check that both have the same result.
+        seeds: Largest number of different seeds of a scenario or variation.
     """
 
     version: str
@@ -43,16 +45,18 @@ class SessionStarted:
     ids: tuple[str, ...] = ()
     stacks: tuple[str, ...] = ()
     twice: bool = False
+    seeds: int = 1
 
 
 def session_started(
     version: str, runs: Sequence[RunKey], workers: int, folder: Path, stacks: tuple[str, ...]
 ) -> SessionStarted:
     """Return the first event of a session with these runs. `folder` is the output folder."""
-    ids = tuple(sorted({key.test for key in runs}))
+    tests = Counter(test for test, _ in {(key.test, key.seed) for key in runs})
     scenarios = len({key.scenario for key in runs})
     twice = any(key.is_repetition for key in runs)
-    return SessionStarted(version, len(runs), scenarios, workers, str(folder), ids, stacks, twice)
+    ids, seeds = tuple(sorted(tests)), max(tests.values(), default=1)
+    return SessionStarted(version, len(runs), scenarios, workers, str(folder), ids, stacks, twice, seeds)
 
 
 @dataclass(frozen=True)

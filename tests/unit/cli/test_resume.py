@@ -74,3 +74,13 @@ def test_run_with_missing_or_changed_log_is_repeated(session, damage):
     assert resume().count(", kept") == 1
     assert kept(folder) == ["b"]
     assert log.read_bytes() == whole
+
+
+def test_runs_that_are_not_selected_again_are_named(session):
+    """Otherwise, a session with a failure would pass if it is resumed with a smaller selection."""
+    folder, _ = session
+    command = [sys.executable, "-m", "simscen", "run", "b.scenario.yaml", "--resume", "out"]
+    ended = subprocess.run(command, cwd=folder.parent, check=True, capture_output=True, text=True)
+    warning = "1 run of 2 of the session to resume, such as a (seed 1), will not be in its reports"
+    assert ended.stderr == f"simscen: warning: out: {warning}, because the selection has changed\n"
+    assert json.loads((folder / "results.json").read_text())["total"] == 1

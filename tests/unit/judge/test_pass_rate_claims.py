@@ -164,6 +164,12 @@ def test_contradictory_claims_are_refused(fields: dict[str, object], message: st
         claim(**fields)
 
 
+@pytest.mark.parametrize(("rate", "confidence"), [(0.1, 0.9), (0.1, 0.9999), (0.3, 0.91), (0.95, 0.95)])
+def test_default_number_of_runs_proves_the_claim_if_all_pass(rate: float, confidence: float) -> None:
+    claimed = claim(min=rate, confidence=confidence)
+    assert evaluate_claim(claimed, results([True] * claimed.max_runs)).status is ClaimStatus.HELD
+
+
 def test_limit_equal_to_the_claimed_rate_holds_and_does_not_refute() -> None:
     low, high = clopper_pearson_limits(95, 100, 0.95)
     assert evaluate_claim(claim(min=low, runs=100), results([True] * 95 + [False] * 5)).status is ClaimStatus.HELD

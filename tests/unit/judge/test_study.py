@@ -218,10 +218,11 @@ def test_effects_are_corrected_for_their_number_and_the_strongest_is_first() -> 
     [
         (range(7), range(7)),
         ([1] * 8, range(8)),
+        (["1 m", "100 cm"] * 4, range(8)),
         (range(8), [1.0] * 8),
         (["a", "b", "c", "d", "a", "b", "c", "d"], range(8)),
     ],
-    ids=["seven runs", "one value", "one margin", "a value for every two runs"],
+    ids=["seven runs", "one value", "one value with two units", "one margin", "a value for every two runs"],
 )
 def test_effect_needs_enough_runs_and_differences(values: Sequence[Any], margins: Sequence[float]) -> None:
     assert study_of("x", list(values), [float(margin) for margin in margins]).effects == ()

@@ -126,7 +126,7 @@ def test_terminal_output_is_colored_and_user_text_is_not_markup(session):
 def test_runs_of_one_scenario_show_their_seeds(passed):
     out = io.StringIO()
     other = of(passed, key=RunKey("navigation/goal", 2))
-    told(text_reporter(utf8(out)), [SessionStarted("0.1.0", 2, 1, 1), passed, other])
+    told(text_reporter(utf8(out)), [SessionStarted("0.1.0", 2, 1, 1, seeds=2), passed, other])
     assert "1 scenario · 2 runs · 1 worker\n" in out.getvalue()
     assert "navigation/goal (seed 1) " in out.getvalue()
     assert "navigation/goal (seed 2) " in out.getvalue()
