@@ -50,10 +50,13 @@ def _inside(kind: Any, marks: tuple[Any, ...]) -> Iterator[tuple[Any, tuple[Any,
     found = next((mark for mark in marks if isinstance(mark, LazySpec | ExtensibleUnion)), None)
     if found is not None:
         rest = tuple(mark for mark in marks if mark is not found)
-        yield from _inside(found.load() if isinstance(found, LazySpec) else found.built_in_union, rest)
-        if isinstance(found, ExtensibleUnion):
-            for advanced in installed_specs(found.group, with_plugins=False).values():
-                yield from _inside(advanced, rest)
+        if isinstance(found, LazySpec):
+            yield from _inside(found.load(), rest)
+        else:
+            built_in = [member.load() for member in found.members().values()]
+            advanced = installed_specs(found.group, with_plugins=False).values()
+            for member in dict.fromkeys([*built_in, *advanced]):
+                yield from _inside(member, rest)
     elif get_origin(kind) is Annotated:
         inner, *more = get_args(kind)
         yield from _inside(inner, (*marks, *_flat(more)))

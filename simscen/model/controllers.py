@@ -5,11 +5,10 @@ The names and default values are the same as in Nav2, unless noted.
 
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
-from simscen.model.mppi import Deceleration, Mppi
-from simscen.model.stack_base import ControllerSpec, GoalTolerances, PathFollowerSpec, Weight
-from simscen.spec.base import Ranged, Spec, Typed, type_discriminator
+from simscen.model.stack_base import ControllerSpec, Deceleration, GoalTolerances, PathFollowerSpec, Weight
+from simscen.spec.base import Ranged, Spec, Typed
 from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.quantities import (
     Angle,
@@ -188,19 +187,13 @@ class DynamicWindow(PathFollowerSpec):
         return self.sim_time
 
 
-_Controllers = Annotated[
-    Annotated[RegulatedPurePursuit, Tag("regulated_pure_pursuit")]
-    | Annotated[DynamicWindow, Tag("dwb")]
-    | Annotated[Mppi, Tag("mppi")],
-    Discriminator(type_discriminator("regulated_pure_pursuit")),
-]
-Controller = Annotated[ControllerSpec, ExtensibleUnion("controller", _Controllers)]
 CONTROLLERS = {
     "regulated_pure_pursuit": "simscen.model.controllers:RegulatedPurePursuit",
     "dwb": "simscen.model.controllers:DynamicWindow",
     "mppi": "simscen.model.mppi:Mppi",
 }
 """Specifications of the shipped controllers as `module:Class`, by type."""
+Controller = Annotated[ControllerSpec, ExtensibleUnion("controller", default="regulated_pure_pursuit")]
 
 
 class GoalCheckerSpec(GoalTolerances, Typed):
@@ -218,7 +211,9 @@ class SimpleGoalChecker(GoalCheckerSpec):
     """Fraction of the tolerances that applies while the robot moves. At rest, the full tolerances apply. Nav2: 1."""
 
 
-GoalChecker = Annotated[GoalCheckerSpec, ExtensibleUnion("goal_checker", SimpleGoalChecker)]
+GOAL_CHECKERS = {"simple": "simscen.model.controllers:SimpleGoalChecker"}
+"""Specifications of the shipped goal checkers as `module:Class`, by type."""
+GoalChecker = Annotated[GoalCheckerSpec, ExtensibleUnion("goal_checker", default="simple")]
 
 
 class ProgressChecker(Spec):
@@ -230,7 +225,3 @@ class ProgressChecker(Spec):
     """Angle of a turn that counts as progress as well (PoseProgressChecker); default: turns are no progress."""
     movement_time_allowance: PositiveDuration = 10.0
     """Time without progress after which driving fails with FAILED_TO_MAKE_PROGRESS."""
-
-
-GOAL_CHECKERS = {"simple": "simscen.model.controllers:SimpleGoalChecker"}
-"""Specifications of the shipped goal checkers as `module:Class`, by type."""

@@ -4,9 +4,9 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
-from simscen.spec.base import Ranged, Spec, Typed, type_discriminator
+from simscen.spec.base import Ranged, Spec, Typed
 from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.quantities import (
     Frequency,
@@ -167,29 +167,14 @@ class OdometryOnly(LocalizerSpec):
     type: Literal["odometry"]
 
 
-DEFAULT_TYPE = "amcl"
-"""Type of a localizer for which no `type` is given."""
-_Localizers = Annotated[
-    Annotated[Amcl, Tag(DEFAULT_TYPE)]
-    | Annotated[Ekf, Tag("ekf")]
-    | Annotated[GroundTruth, Tag("ground_truth")]
-    | Annotated[OdometryOnly, Tag("odometry")],
-    Discriminator(type_discriminator(DEFAULT_TYPE)),
-]
-
-
-Localizer = Annotated[LocalizerSpec, ExtensibleUnion("localizer", _Localizers)]
-
-
-_MODULE = "simscen.model.localizers:"
-"""Beginning of the addresses of the classes in this module."""
 LOCALIZERS = {
-    "amcl": _MODULE + "Amcl",
-    "ekf": _MODULE + "Ekf",
-    "ground_truth": _MODULE + "GroundTruth",
-    "odometry": _MODULE + "OdometryOnly",
+    "amcl": "simscen.model.localizers:Amcl",
+    "ekf": "simscen.model.localizers:Ekf",
+    "ground_truth": "simscen.model.localizers:GroundTruth",
+    "odometry": "simscen.model.localizers:OdometryOnly",
 }
 """Specifications of the localizers of the reference stack as `module:Class`, by type."""
+Localizer = Annotated[LocalizerSpec, ExtensibleUnion("localizer", default="amcl")]
 
 
 Variance = Annotated[float, Field(ge=0, le=1e6)]

@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from simscen.model.stack_base import PathFollowerSpec, Weight
+from simscen.model.stack_base import Deceleration, PathFollowerSpec, Weight
 from simscen.spec.base import Spec, by_default
 from simscen.spec.quantities import (
     Duration,
@@ -25,7 +25,6 @@ from simscen.spec.quantities import (
 Exponent = Annotated[int, Field(ge=1, le=10)]
 PointCount = Annotated[int, Field(ge=0, le=1000)]
 PoseStep = Annotated[int, Field(ge=1, le=100)]
-Deceleration = Annotated[float, Field(ge=-1000, lt=0), Quantity("acceleration")]
 CriticName = Literal[
     "ConstraintCritic",
     "CostCritic",

@@ -1,8 +1,8 @@
 """Specifications of planners (`planner:`): OMPL planners, and two planners of Nav2."""
 
-from typing import Annotated, Any, ClassVar, Literal, get_args
+from typing import Annotated, ClassVar, Literal, get_args
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Field
 
 from simscen.spec.base import Typed
 from simscen.spec.extensible_union import ExtensibleUnion
@@ -111,26 +111,10 @@ class Smac2d(PlannerSpec):
     """Whether to smooth the path, which removes the corners of the cells."""
 
 
-def _planner_tag(value: Any) -> str | None:
-    """Return the union tag of a planner specification: its `type`, or "ompl" for all types of OmplPlanner."""
-    kind = value.get("type", "bit_star") if isinstance(value, dict) else getattr(value, "type", None)
-    return kind if kind in ("navfn", "smac_2d") else "ompl"
-
-
-_Planners = Annotated[
-    Annotated[OmplPlanner, Tag("ompl")] | Annotated[Navfn, Tag("navfn")] | Annotated[Smac2d, Tag("smac_2d")],
-    Discriminator(_planner_tag),
-]
-
-
-Planner = Annotated[PlannerSpec, ExtensibleUnion("planner", _Planners)]
-
-
-_MODULE = "simscen.model.planners:"
-"""Beginning of the addresses of the classes in this module."""
 PLANNERS = {
-    **dict.fromkeys(get_args(OmplPlanner.model_fields["type"].annotation), _MODULE + "OmplPlanner"),
-    "navfn": _MODULE + "Navfn",
-    "smac_2d": _MODULE + "Smac2d",
+    **dict.fromkeys(get_args(OmplPlanner.model_fields["type"].annotation), "simscen.model.planners:OmplPlanner"),
+    "navfn": "simscen.model.planners:Navfn",
+    "smac_2d": "simscen.model.planners:Smac2d",
 }
 """Specifications of the planners of the reference stack as `module:Class`, by type."""
+Planner = Annotated[PlannerSpec, ExtensibleUnion("planner", default="bit_star")]

@@ -2,9 +2,8 @@
 
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Field
 
-from simscen.core.messages.navigation import RecoveryBehavior
 from simscen.spec.base import Spec, Typed
 from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.quantities import (
@@ -93,22 +92,16 @@ class ClearCostmap(BehaviorSpec):
     """Whether to clear the entire global costmap, as in Nav2; otherwise only the area of the local costmap."""
 
 
-_Behaviors = Annotated[
-    Annotated[Spin, Tag("spin")]
-    | Annotated[Wait, Tag("wait")]
-    | Annotated[BackUp, Tag("backup")]
-    | Annotated[ClearCostmap, Tag("clear_costmap")],
-    Field(discriminator="type"),
-]
-
-
-_NameOrParameters = Annotated[
-    Annotated[RecoveryBehavior, Tag("a name")] | Annotated[_Behaviors, Tag("a behavior")],
-    Discriminator(lambda value: "a name" if isinstance(value, str) else "a behavior"),
-]
-
-
-Behavior = Annotated[str | BehaviorSpec, ExtensibleUnion("behavior", _NameOrParameters, allows_names=True)]
+_SHIPPED: dict[str, type[BehaviorSpec]] = {
+    "clear_costmap": ClearCostmap,
+    "spin": Spin,
+    "wait": Wait,
+    "backup": BackUp,
+}
+"""Specifications of the behaviors of the reference stack, by type."""
+BEHAVIORS = {name: f"{model.__module__}:{model.__name__}" for name, model in _SHIPPED.items()}
+"""Specifications of the behaviors of the reference stack as `module:Class`, by type."""
+Behavior = Annotated[str | BehaviorSpec, ExtensibleUnion("behavior", allows_names=True)]
 
 
 class Recovery(Spec):
@@ -175,16 +168,3 @@ class Recovery(Spec):
         shared = type(self).model_fields.keys() & model.model_fields.keys()
         own = {} if isinstance(entry, str) else {name: getattr(entry, name) for name in entry.model_fields_set}
         return model.model_validate({**{name: getattr(self, name) for name in sorted(shared)}, **own})
-
-
-_SHIPPED: dict[str, type[BehaviorSpec]] = {
-    "clear_costmap": ClearCostmap,
-    "spin": Spin,
-    "wait": Wait,
-    "backup": BackUp,
-}
-"""Specifications of the behaviors of the reference stack, by type."""
-
-
-BEHAVIORS = {name: f"{model.__module__}:{model.__name__}" for name, model in _SHIPPED.items()}
-"""Specifications of the behaviors of the reference stack as `module:Class`, by type."""

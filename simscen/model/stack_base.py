@@ -52,6 +52,8 @@ class StackBase(Spec):
 
 Weight = Annotated[float, Field(ge=0, le=1e7)]
 """Weight of a critic relative to other critics."""
+Deceleration = Annotated[float, Field(ge=-1000, lt=0), Quantity("acceleration")]
+"""Deceleration as a negative acceleration, as in Nav2."""
 
 
 class ControllerSpec(Typed):

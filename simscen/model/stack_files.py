@@ -1,19 +1,17 @@
 """Specifications of external stacks, of stack files (`--stack NAME=FILE`), and of the user configuration."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import AfterValidator, Discriminator, Field, StringConstraints, Tag
+from pydantic import AfterValidator, Field, StringConstraints
 
 from simscen.core.external_command import ANSWER_TIMEOUT_S, START_TIMEOUT_S, split_command
-from simscen.model.stack import InProcessStack, StackSpec
+from simscen.model.stack import InProcessStack
 from simscen.model.stack_base import StackBase
-from simscen.spec.base import LanguageVersion, Spec
+from simscen.spec.base import LanguageVersion, LazySpec, Spec
 from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveDuration
 
-_EXTERNAL_TAG = "an external stack"
-"""Union tag of external stacks. Validation errors contain it."""
 StackName = Annotated[str, StringConstraints(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$")]
 
 
@@ -37,17 +35,16 @@ class ExternalStackSpec(StackBase):
         return self.ground_truth
 
 
-def _stack_tag(value: Any) -> str:
-    """Return the union tag of a stack specification: its `type`, or _EXTERNAL_TAG for an external stack."""
-    if isinstance(value, dict):
-        return _EXTERNAL_TAG if "external" in value and "type" not in value else str(value.get("type", "reference"))
-    return _EXTERNAL_TAG if isinstance(value, ExternalStackSpec) else str(getattr(value, "type", "reference"))
-
-
-_Stacks = Annotated[
-    Annotated[StackSpec, Tag("reference")] | Annotated[ExternalStackSpec, Tag(_EXTERNAL_TAG)], Discriminator(_stack_tag)
+AnyStack = Annotated[
+    InProcessStack | ExternalStackSpec,
+    ExtensibleUnion(
+        "stack",
+        default="reference",
+        untyped_key="external",
+        untyped=LazySpec("simscen.model.stack_files", "ExternalStackSpec"),
+    ),
 ]
-AnyStack = Annotated[InProcessStack | ExternalStackSpec, ExtensibleUnion("stack", _Stacks)]
+"""Stack of simscen or of an installed package, which the key `type` selects, or an external stack."""
 
 
 class StackFileSpec(Spec):

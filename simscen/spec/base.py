@@ -4,7 +4,6 @@ import ast
 import inspect
 import re
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -92,20 +91,6 @@ def by_default() -> Any:
     """Return an optional pydantic field. Its default is the specification with default values."""
     # Creating the specification at import would cost every command 10 ms.
     return Field(default_factory=dict, validate_default=True)
-
-
-def type_discriminator(default: str) -> Callable[[Any], str | None]:
-    """Return a function for pydantic's Discriminator, which selects a member of a union by the key `type`.
-
-    `default` is the type of mappings without this key.
-    """
-
-    def tag(value: Any) -> str | None:
-        if isinstance(value, dict):
-            return str(value.get("type", default))
-        return getattr(value, "type", None)
-
-    return tag
 
 
 def field_docs(model: type) -> dict[str, str]:

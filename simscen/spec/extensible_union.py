@@ -4,6 +4,7 @@ A plug-in is an installed package that adds types.
 """
 
 import math
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -20,27 +21,53 @@ NAMES_ALLOWED_KEY = "simscen names"
 """Key in this metadata: the value is True if the name of a type alone is valid."""
 MAPPINGS_ALLOWED_KEY = "simscen mappings"
 """Key in this metadata: the value is True if a mapping with the key `type` is valid."""
+UNTYPED_TAG = "without type"
+"""Union tag of mappings without `type`. Locations of validation errors contain it, so it must not be a key in YAML."""
 
 
 @dataclass(frozen=True)
 class ExtensibleUnion:
     """Annotation of a field with a specification of a registry group, which the key `type` selects.
 
-    `built_in_union` is the union of the built-in specifications. With `allows_names`, the name of a type alone is also
-    valid.
+    The module of a specification is imported, and its validator is built, when a value has its type.
     """
 
     group: str
-    built_in_union: Any
+    default: str = ""
+    """Type of a mapping without the key `type`; "" if the key is required."""
     allows_names: bool = False
+    """Whether the name of a type alone is also valid."""
+    untyped_key: str = ""
+    """Key of the mappings that have this key instead of `type`; "" if there are none."""
+    untyped: LazySpec | None = None
+    """Specification of the mappings with `untyped_key`."""
+
+    def members(self) -> dict[str, LazySpec]:
+        """Return the specifications of the built-in types by type, and `untyped` under UNTYPED_TAG."""
+        members = {entry.name: LazySpec(*entry.value.split(":")) for entry in built_in_types(self.group)}
+        return members if self.untyped is None else {**members, UNTYPED_TAG: self.untyped}
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        inner = handler.generate_schema(self.built_in_union)
+        members: dict[Hashable, CoreSchema] = {
+            tag: handler.generate_schema(Annotated[BaseModel, member]) for tag, member in self.members().items()
+        }
+        union: CoreSchema = core_schema.tagged_union_schema(members, self._tag)
+        if self.allows_names:
+            names = core_schema.literal_schema([entry.name for entry in built_in_types(self.group)])
+            options: dict[Hashable, CoreSchema] = {"a name": names, "a mapping": union}
+            union = core_schema.tagged_union_schema(options, _name_or_mapping)
         metadata = {GROUP_KEY: self.group, NAMES_ALLOWED_KEY: self.allows_names, MAPPINGS_ALLOWED_KEY: True}
         serialization = core_schema.simple_ser_schema("any")  # specifications of plug-ins are no members of the union
         return core_schema.no_info_wrap_validator_function(
-            self._validate, inner, metadata=metadata, serialization=serialization
+            self._validate, union, metadata=metadata, serialization=serialization
         )
+
+    def _tag(self, value: Any) -> str | None:
+        """Return the key in `members` for a value; None if its type is missing."""
+        if isinstance(value, dict):
+            is_untyped = self.untyped is not None and self.untyped_key in value and "type" not in value
+            return UNTYPED_TAG if is_untyped else str(value.get("type", self.default)) or None
+        return getattr(value, "type", None) or (UNTYPED_TAG if isinstance(value, BaseModel) else None)
 
     def _validate(self, value: Any, validate_built_in: core_schema.ValidatorFunctionWrapHandler) -> Any:
         """Return the specification of a value, validated by the built-in union or by a plug-in."""
@@ -56,6 +83,10 @@ class ExtensibleUnion:
             return validate_plugin_spec(entry, value)
         details = InitErrorDetails(type=_unknown_type_error(self.group, name), loc=("type",), input=name)
         raise ValidationError.from_exception_data("type", [details])
+
+
+def _name_or_mapping(value: Any) -> str:
+    return "a name" if isinstance(value, str) else "a mapping"
 
 
 @dataclass(frozen=True)

@@ -124,6 +124,11 @@ def built_in_types(group: str) -> tuple[RegisteredType, ...]:
     return tuple(RegisteredType(group, name, value) for name, value in values.items())
 
 
+def built_in_specs(group: str) -> dict[str, type[BaseModel]]:
+    """Return the specification classes of the built-in types of a group, by name of the type."""
+    return {entry.name: entry.load() for entry in built_in_types(group)}
+
+
 def installed_types(group: str) -> tuple[RegisteredType, ...]:
     """Return the types that installed packages, including simscen, add to a group by entry points, sorted by name.
 

@@ -70,7 +70,7 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
     if mark := next((mark for mark in metadata if isinstance(mark, ExtensibleUnion | TypeName)), None):
         if isinstance(mark, TypeName):
             return _type_names(mark.group)
-        return f"{_type_names(mark.group)} or mapping" if mark.allows_names else kind_of(mark.built_in_union)
+        return f"{_type_names(mark.group)} or mapping" if mark.allows_names else "mapping"
     if get_origin(kind) is Annotated:
         return kind_of(get_args(kind)[0], (*get_args(kind)[1:], *metadata))
     if place := next((mark for mark in metadata if isinstance(mark, PlaceAllowed | PlaceShorthand)), None):

@@ -150,15 +150,14 @@ class _InstalledTypesGenerator(_Generator):
 def _with_options(union: Schema, names: list[str], mappings: list[Schema]) -> Schema:
     """Return the schema of a union with more options: texts `names`, and `mappings` as references to their schemas.
 
-    A union is an `enum` of names, a reference to a mapping or a `oneOf` of them, or a `oneOf` of both kinds.
+    A union is an `enum` of names, a `oneOf` of references to mappings, or a `oneOf` of both kinds.
     """
     if "enum" in union:
         return {**union, "enum": [*union["enum"], *names]}
-    options = union.get("oneOf", [union])
-    if all("$ref" in option for option in options):
-        rest = union if "oneOf" in union else {}
-        return {**rest, "oneOf": [*options, *mappings]} if mappings else union
-    return {**union, "oneOf": [_with_options(option, names, mappings) for option in options]}
+    if all("$ref" in option for option in union["oneOf"]):
+        options = [*union["oneOf"], *mappings]
+        return {"oneOf": options} if len(options) > 1 else options[0]
+    return {"oneOf": [_with_options(option, names, mappings) for option in union["oneOf"]]}
 
 
 def _require_one_key(model: type[Choice], keys: list[str]) -> Schema:

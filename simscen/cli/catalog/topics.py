@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import NoneType
-from typing import Annotated, Any, get_args, get_origin
+from typing import get_args
 
 from pydantic import BaseModel, RootModel
 
@@ -41,9 +41,8 @@ from simscen.model.disturbances import EventEntry, FaultEntry, StepEntry
 from simscen.model.stack_base import SpeedZone
 from simscen.model.world import RosMapSpec
 from simscen.spec import registry
-from simscen.spec.base import LazySpec, annotation_of, field_docs
+from simscen.spec.base import annotation_of, field_docs
 from simscen.spec.choice import Choice
-from simscen.spec.extensible_union import ExtensibleUnion
 from simscen.spec.places import PoseSpec, SpeedMask
 from simscen.triggers.base import AnyCondition, Trigger
 
@@ -104,19 +103,19 @@ def topics(installed: bool = False) -> list[Topic]:
         *_models("stack", _STACK),
         *installed_types("stack", installed),
         *_models("stack file", _STACK_FILES),
-        *_models("localizer", members_by_type(localizers.Localizer)),
+        *_models("localizer", registry.built_in_specs("localizer")),
         *installed_types("localizer", installed),
         *_models("planner", _PLANNERS),
         *installed_types("planner", installed),
-        *_models("controller", members_by_type(controllers.Controller)),
+        *_models("controller", registry.built_in_specs("controller")),
         *_models("controller", _MPPI_SECTIONS),
         *installed_types("controller", installed),
-        *_models("behavior", _BEHAVIORS),
+        *_models("behavior", registry.built_in_specs("behavior")),
         *installed_types("behavior", installed),
         *installed_types("goal_checker", installed),
         *_models("world", _WORLD),
         *_models("robot", _ROBOT),
-        *_models("drive", members_by_type(robot.Drive)),
+        *_models("drive", _DRIVES),
         *_choices(robot.Sensor, installed),
     ]
 
@@ -172,12 +171,6 @@ _MPPI_SECTIONS: dict[str, type[BaseModel]] = {
     name: annotation_of(field) for name, field in mppi.Mppi.model_fields.items() if name[0].isupper()
 }
 """Models of the keys of `mppi` that are mappings: its critics and its validator."""
-_BEHAVIORS: dict[str, type[BaseModel]] = {
-    "clear_costmap": recovery.ClearCostmap,
-    "spin": recovery.Spin,
-    "wait": recovery.Wait,
-    "backup": recovery.BackUp,
-}
 _STACK_FILES: dict[str, type[BaseModel]] = {
     "stack file": stack_files.StackFileSpec,
     "configuration": stack_files.UserConfigSpec,
@@ -199,19 +192,10 @@ _ROBOT: dict[str, type[BaseModel]] = {
     "limits": robot.Limits,
     "mount": robot.Mount,
 }
+_DRIVES: dict[str, type[BaseModel]] = {
+    get_args(model.model_fields["type"].annotation)[0]: model for model in get_args(get_args(robot.Drive)[0])
+}
 """Models of the topics of seven groups by name of the topic."""
-
-
-def members_by_type(union: Any) -> dict[str, type[BaseModel]]:
-    """Return the models of the shipped members of a union that `type` discriminates, by `type`."""
-    mark = next((mark for mark in get_args(union)[1:] if isinstance(mark, ExtensibleUnion)), None)
-    members = get_args(get_args(union if mark is None else mark.built_in_union)[0])
-    models = {}
-    for member in members:
-        lazy = next((mark for mark in get_args(member)[1:] if isinstance(mark, LazySpec)), None)
-        model = lazy.load() if lazy else get_args(member)[0] if get_origin(member) is Annotated else member
-        models[get_args(model.model_fields["type"].annotation)[0]] = model
-    return models
 
 
 def _models(group: str, models: Mapping[str, type[BaseModel]]) -> Iterator[Topic]:

@@ -70,10 +70,8 @@ def _field_type(model: type[BaseModel], key: str) -> Any:
 def _union_members(kind: Any) -> list[Any]:
     """Return the members of a union; for any other type, the type itself."""
     if mark := next((mark for mark in _metadata(kind) if isinstance(mark, ExtensibleUnion)), None):
-        return [
-            *_union_members(mark.built_in_union),
-            *(Annotated[model, Tag(name)] for name, model in installed_specs(mark.group).items()),
-        ]
+        built_in = {tag: member.load() for tag, member in mark.members().items()}
+        return [Annotated[model, Tag(tag)] for tag, model in {**built_in, **installed_specs(mark.group)}.items()]
     unwrapped = _unwrapped(kind)
     if get_origin(unwrapped) in (Union, UnionType):
         return [option for member in get_args(unwrapped) if member is not NoneType for option in _union_members(member)]

@@ -164,7 +164,9 @@ def _type_key_problem(model: type[BaseModel], tree: Node, loc: Keys, error: dict
     """Return the problem of a mapping whose `type` is missing or unknown."""
     node, types = node_at(tree, loc), type_values_at(model, loc)
     if not isinstance(node, MappingNode):
-        return Problem(*value_position(tree, loc), "SC011", f"expected a mapping, got {messages.describe_node(node)}")
+        hint = common_mistakes.hint_for_wrong_type("model_type", model, loc, node)
+        message = f"expected a mapping, got {messages.describe_node(node)}"
+        return Problem(*value_position(tree, loc), "SC011", message, hint)
     if error["type"] == "union_tag_not_found":
         message = f"missing key `type` in `{dotted_path(existing_keys(tree, loc))}`"
         return Problem(*key_position(tree, loc), "SC010", message, f"expected one of: {', '.join(types)}")
