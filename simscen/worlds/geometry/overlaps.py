@@ -51,6 +51,11 @@ def is_near(solid: Solid, point: tuple[float, float], radius: float) -> bool:
     return math.hypot(solid.pose.x - point[0], solid.pose.y - point[1]) <= radius + _bounding_radius(solid.shape)
 
 
+def bounding_radius(solids: Iterable[Solid]) -> float:
+    """Return an upper bound in m on the horizontal distance of the points of solids from the origin; 0 for none."""
+    return max((math.hypot(each.pose.x, each.pose.y) + _bounding_radius(each.shape) for each in solids), default=0.0)
+
+
 def _bounding_radius(shape: Shape) -> float:
     """Return the radius in m of a sphere around the shape's origin that contains the shape."""
     match shape:
