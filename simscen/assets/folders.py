@@ -94,16 +94,23 @@ class AllowedFolders:
     def package_folder(self, name: str, near: Path) -> Path:
         """Return the folder of the ROS package `name` for a file in the folder `near`; see `uris.candidate_paths`.
 
-        Raises UnusableFile, or NoSuchFile if there is no such package.
+        A folder with a package.xml comes before others with this name, such as those of headers (`include/name`), of
+        Python modules, and of builds. Raises UnusableFile, or NoSuchFile if there is no such package.
         """
         if name in self.packages:
             return self.packages[name]
         if not is_package_name(name):
             raise UnusableFile(f"{name[:60]!r} is not the name of a package")
+        first: Path | None = None
         for _, folder in candidate_paths(f"package://{name}", near, self.roots, self.packages):
             real = Path(os.path.realpath(folder))
             if self._contains(real) and real.is_dir():
-                return real
+                manifest = real / "package.xml"
+                if manifest.is_file() and not manifest.is_symlink():
+                    return real
+                first = first or real
+        if first is not None:
+            return first
         hint = f"put a folder {name} next to the robot's package, pass its parent folder with --world-path, or set "
         raise NoSuchFile(f"there is no package {name!r}", hint + f"`packages: {{{name}: path}}` in the *.robot.yaml")
 

@@ -32,6 +32,16 @@ def test_packages_are_searched_in_the_documented_order(folders: AllowedFolders, 
     assert found == [root / "vendor" / "ros", root / "shop", models]
 
 
+@pytest.mark.parametrize("other", ["include/cart", "cart", "build/cart", "install/cart"])
+def test_a_package_comes_before_other_folders_with_its_name(folders: AllowedFolders, other: str) -> None:
+    root, _ = folders.roots
+    put(root / "repository" / other / "cart.hpp")
+    put(root / other / "cart.hpp")
+    assert folders.package_folder("cart", root / "repository" / "urdf") != root / "repository"
+    (root / "repository" / "package.xml").write_text("<package><name>cart</name></package>")
+    assert folders.package_folder("cart", root / "repository" / "urdf") == root / "repository"
+
+
 def test_a_package_is_found_by_the_name_in_its_package_xml(folders: AllowedFolders) -> None:
     root, _ = folders.roots
     mesh = put(root / "src" / "cart_repository" / "base.stl")
