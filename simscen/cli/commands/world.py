@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from simscen.cli.diagnostics import as_text, escaped, paths_from_working_folder, print_text, relative_to_working_folder
 from simscen.cli.session.user_files import save
 from simscen.cli.shared_options import LenientOption, WorldPathOption
-from simscen.core.environment.world_model import World
+from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.builders import world_from_file
 from simscen.loading.checks.scene_runner import world_reader_notes
@@ -57,11 +57,13 @@ def inspect(
 
     Exit code 0: printed; 2: the file or something in it is unusable.
     """
-    from simscen.worlds.built_world import build_world_and_map, inspect_world
+    from simscen.worlds.built_world import inspect_world
+    from simscen.worlds.maps.map_size import MAP_RESOLUTION_M
 
     root_folder = root or default_root([path])
     source = load_world_file(path, root_folder, world_path or ())
-    built = build_world_and_map(_build(source, root_folder, world_path or [], lenient), height)
+    world = _build(source, root_folder, world_path or [], lenient)
+    built = _draw_map(world, path, height, MAP_RESOLUTION_M, "in scenarios, use `map: none`")
     summary = inspect_world(built)
     if as_json:
         print(json.dumps(asdict(summary), indent=2))
@@ -92,12 +94,12 @@ def export(
 
     Exit code 0: written; 2: the world is unusable, or the map cannot be written.
     """
-    from simscen.worlds.built_world import build_world_and_map
     from simscen.worlds.maps.ros_map import save_map
 
     root_folder = root or default_root([path])
     source = load_world_file(path, root_folder, world_path or ())
-    grid = build_world_and_map(_build(source, root_folder, world_path or [], lenient), height, resolution).map
+    world = _build(source, root_folder, world_path or [], lenient)
+    grid = _draw_map(world, path, height, resolution, "choose larger cells with --resolution").map
     save(map_, lambda file: save_map(grid, file), [path])
     rows, columns = grid.shape
     print_text(f"{escaped(str(map_))}: {columns} x {rows} cells of {grid.resolution:g} m")
@@ -158,6 +160,21 @@ def _convert(
 def _build(source: LoadedWorld, root_folder: Path, world_path: list[Path], lenient: bool) -> World:
     with paths_from_working_folder(root_folder):
         return world_from_file(source, root_folder, world_path, lenient)
+
+
+def _draw_map(world: World, path: Path, height: float, resolution: float, alternative: str) -> BuiltWorld:
+    """Return a world with its map. Raises InvalidInput for the file `path` if the map would be too large.
+
+    `alternative` is what users can do instead of changing the world.
+    """
+    from simscen.worlds.built_world import build_world_and_map
+
+    try:
+        return build_world_and_map(world, height, resolution)
+    except InvalidInput as error:
+        raise InvalidInput(
+            [replace(problem, path=str(path), hint=f"{problem.hint}, or {alternative}") for problem in error.problems]
+        ) from error
 
 
 MAX_SOLIDS = 20

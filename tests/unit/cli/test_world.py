@@ -133,3 +133,25 @@ def test_impossible_conversions_are_errors(simscen, room: Path, arguments, expec
     ended = simscen("world", *arguments)
     assert ended.code == 2
     assert expected_text in ended.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "alternative"),
+    [
+        (("inspect", "vast.world"), "in scenarios, use `map: none`"),
+        (("export", "vast.world", "--map", "vast.yaml"), "choose larger cells with --resolution"),
+    ],
+)
+def test_a_map_that_would_be_too_large_is_an_error_of_the_file(simscen, room: Path, arguments, alternative) -> None:
+    (room / "vast.world").write_text(SDF.format(more="").replace("<radius>1<", "<radius>300<"))
+    ended = simscen("world", *arguments)
+    assert ended.code == 2
+    assert ended.err.startswith("vast.world: error[SC330] map too large: 12")
+    assert " ".join(ended.err.split()).endswith(f'"m" makes it large; move or remove it, or {alternative}')
+
+
+def test_a_world_with_a_large_map_is_exported_with_larger_cells(simscen, room: Path) -> None:
+    (room / "vast.world").write_text(SDF.format(more="").replace("<radius>1<", "<radius>300<"))
+    ended = simscen("world", "export", "vast.world", "--map", "vast.yaml", "--resolution", "0.5")
+    assert ended.code == 0
+    assert "of 0.5 m" in ended.out
