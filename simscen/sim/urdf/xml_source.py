@@ -56,7 +56,8 @@ class Element(markup.Element):
         if len(values) != count:
             raise InvalidElement(self, f"{attribute} has {len(values)} numbers instead of {count}")
         if not all(abs(value) <= largest for value in values):
-            raise InvalidElement(self, f"{attribute}: must be a finite number of reasonable size")
+            outlier = next(word for word, value in zip(words, values, strict=True) if not abs(value) <= largest)
+            raise InvalidElement(self, f"{attribute}: must be from {-largest:g} to {largest:g}, got {outlier[:60]}")
         return values
 
     def positive(self, attribute: str, count: int = 1) -> tuple[float, ...]:

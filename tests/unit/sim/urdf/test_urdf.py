@@ -269,7 +269,7 @@ def test_44_three_thousand_links_are_too_many(refusal):
     [
         ('<box size="-1 1 1"/>', "size must be greater than 0"),
         ('<box size="1 1"/>', "size has 2 numbers instead of 3"),
-        ('<sphere radius="nan"/>', "finite"),
+        ('<sphere radius="nan"/>', "radius: must be from -1e+06 to 1e+06, got nan"),
         ('<cylinder radius="x" length="1"/>', "must consist of numbers"),
         ('<torus radius="1"/>', "unknown geometry <torus>"),
         ("", "<geometry> is empty"),
