@@ -35,8 +35,9 @@ def missing_disturbances(
 ) -> tuple[tuple[Verdict, int], ...]:
     """Return a verdict for each required disturbance that did not happen, with the line of the disturbance.
 
-    The verdict is inconclusive if the log is truncated. Only the first missing step of a sequence gets a verdict. The
-    verdict has the name of the disturbance as ID, with a number if another verdict (also one of `others`) has this ID.
+    The verdict is inconclusive if the log is truncated. A step of a sequence that was not due, because a required
+    earlier step never started, gets no verdict. The verdict has the name of the disturbance as ID, with a number if
+    another verdict (also one of `others`) has this ID.
     """
     missing = [one for one in outcomes if one.missing and not _is_reported_earlier(one, outcomes)]
     used = {verdict.id for verdict in others}

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.run.process import supervisor
+from simscen.run.process import fork_server_process
 
 SIMSCEN = Path(sys.executable).with_name("simscen")
 SCRIPTED_FORK_SERVER = str(Path(__file__).with_name("scripted_fork_server.py"))
@@ -119,8 +119,8 @@ def test_90_verdicts_are_equal_without_fused_multiply_add(reference, pair: Path,
         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F",
         "NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3 AVX512F AVX512CD AVX512_SKX",
     }
-    environment = supervisor.clean_environment()
-    monkeypatch.setattr(supervisor, "clean_environment", lambda: {**environment, **without_fma})
+    environment = fork_server_process.clean_environment()
+    monkeypatch.setattr(fork_server_process, "clean_environment", lambda: {**environment, **without_fma})
     assert simscen("run", ".", "--out", "out").code == 0
     assert simscen("run", ".", "--out", "again", "--check-against", "out").code == 0
     assert {"blas", "libm", "numpy", "numpy_dispatch"} == set(

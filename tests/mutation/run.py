@@ -9,6 +9,7 @@ import ast
 import importlib
 import sys
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import yaml
@@ -43,17 +44,21 @@ def check(file: Path, listed: dict[str, str]) -> Tally:
 
     Exits with a message if the tests fail without a mutant.
     """
-    name, stages, tally = module_name(file), [], Tally()
-    for tests in tests_of(file):
-        passed, limit = run_tests(name, file, ast.parse(file.read_text(encoding="utf-8")), tests)
+    name, stages, tally = module_name(file), tests_of(file), Tally()
+
+    @cache  # the tests of the last stages take long, and are not needed if earlier ones kill all mutants
+    def limit(stage: int) -> float:
+        """Return the time limit of a stage, after its tests have passed without a mutant."""
+        passed, seconds = run_tests(name, file, ast.parse(file.read_text(encoding="utf-8")), stages[stage])
         if not passed:
-            raise SystemExit(f"{name}: its tests fail without any mutant: {' '.join(tests)}")
-        stages.append((tests, limit))
+            raise SystemExit(f"{name}: its tests fail without any mutant: {' '.join(stages[stage])}")
+        return seconds
+
     unseen = dict(listed)
     for mutant in mutants(file):
         tally.total += 1
         expected = unseen.pop(mutant.change, None) is not None
-        if all(survives(name, file, mutant.tree, tests, limit) for tests, limit in stages):
+        if all(survives(name, file, mutant.tree, tests, limit(stage)) for stage, tests in enumerate(stages)):
             tally.equivalent += expected
             if not expected:
                 tally.alive.append(mutant)

@@ -96,7 +96,7 @@ TESTS_OF_MODULE = {
         [f"tests/unit/judge/test_{of}.py" for of in ("required_evidence", "required_evidence_of_signals", "evaluation")]
     ],
     "judge/study_json": [["tests/unit/judge/test_study.py"]],
-    "judge/outcome": [[f"tests/unit/judge/test_{of}.py" for of in ("evaluation", "expected_failure")]],
+    "judge/outcome": [[f"tests/unit/judge/test_{of}.py" for of in ("expected_failure", "evaluation")]],
     **{
         f"judge/{of}": [[f"tests/unit/judge/test_{of}.py"]]
         for of in ("disturbances", "finding_text", "pass_rate_claims", "several_robots", "significance", "study")

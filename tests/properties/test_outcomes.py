@@ -109,3 +109,30 @@ def test_run_fails_as_expected_only_if_exactly_the_named_entries_fail(verdicts, 
     if before is not Outcome.ERROR:
         assert outcome in (Outcome.FAILED, Outcome.FAILED_AS_EXPECTED)
         assert expectation is not None
+
+
+@st.composite
+def sequences(draw):
+    """Return the outcomes of the steps of several sequences. A step starts only if the step before has started."""
+    outcomes = []
+    for number, length in enumerate(draw(st.lists(st.integers(1, 4), max_size=3))):
+        started = draw(st.integers(0, length))
+        for step in range(length):
+            after = len(outcomes) - 1 if step else None
+            ordered = Disturbance(f"{number}.{step}", "event", "time: 1", required=draw(st.booleans()), after=after)
+            fired = (240,) if step < started else ()
+            outcomes.append(DisturbanceOutcome(ordered, fired, bool(fired) and draw(st.booleans()), "why"))
+    return outcomes
+
+
+@settings(deadline=None)
+@given(sequences())
+def test_missing_steps_are_reported_up_to_the_first_that_never_started(outcomes):
+    expected, blocked = [], set()
+    for one in outcomes:
+        sequence = one.disturbance.name[0]
+        if one.missing and (one.fired or sequence not in blocked):
+            expected.append(one.disturbance.name)
+        if one.missing and not one.fired:
+            blocked.add(sequence)
+    assert [verdict.id for verdict, _ in missing_disturbances(TRACE, outcomes)] == expected

@@ -78,7 +78,7 @@ def results(draw, keys=KEYS):
         path=f"scenarios/{key.scenario}.scenario.yaml",
         outcome=outcome,
         verdicts=verdicts,
-        lines=tuple(draw(st.integers(0, 99)) for _ in verdicts),
+        lines=tuple(draw(st.integers(1, 99)) for _ in verdicts),
         metrics=draw(st.dictionaries(st.sampled_from(["success", "path_length", "own"]), MAYBE)),
         undefined=draw(st.dictionaries(TEXTS, TEXTS, max_size=2)),
         events=draw(st.dictionaries(st.sampled_from(["goal.reached", "run.ended"]), st.integers(1, 9))),
