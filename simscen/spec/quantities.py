@@ -13,8 +13,12 @@ _METERS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
 _SECONDS = {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0}
 _RADIANS = {"rad": 1.0, "deg": math.pi / 180}
 """Factors to meters, seconds, and radians, by unit."""
-NUMBER_AND_UNIT_PATTERN = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([^\s\d].*?)\s*")
+NUMBER_AND_UNIT_PATTERN = re.compile(
+    r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([^\s\d](?:.*\S)?)\s*"
+)
 """Pattern of a quantity such as "1.5 m". Group 1 is the number, group 2 the unit."""
+MAX_TEXT_CHARS = 60
+"""Maximum length of a text of a file in a message."""
 
 
 def _units_per(top: dict[str, float], bottom: dict[str, float], power: Literal["", "^2"] = "") -> dict[str, float]:
@@ -92,10 +96,15 @@ class Quantity:
         elif match:
             problem = f"unknown unit `{match[2]}` for {with_article(self.dimension)}"
         else:
-            problem = f"expected {with_article(self.dimension)}, got the text `{value}`"
+            problem = f"expected {with_article(self.dimension)}, got {_text(value)}"
         raise PydanticCustomError(
             "quantity", "{problem}; units: {units}", {"problem": problem, "units": ", ".join(units)}
         )
+
+
+def _text(value: str) -> str:
+    """Return a text of a file for messages, shortened to MAX_TEXT_CHARS."""
+    return f"the text `{value if len(value) <= MAX_TEXT_CHARS else value[: MAX_TEXT_CHARS - 1] + '…'}`"
 
 
 def _json_schema_pattern(units: Iterable[str]) -> str:
@@ -201,7 +210,7 @@ def _parse_amount(value: Any) -> Amount:
     match = NUMBER_AND_UNIT_PATTERN.fullmatch(value) if isinstance(value, str) else None
     if match and any(match[2] in known for known in UNITS.values()) and math.isfinite(float(match[1])):
         return Amount(float(match[1]), match[2])
-    found = f"the text `{value}`" if isinstance(value, str) else "something else"
+    found = _text(value) if isinstance(value, str) else "something else"
     problem = f"expected a number with or without a unit, got {found}"
     raise PydanticCustomError("amount", "{problem}", {"problem": problem})
 

@@ -5,6 +5,7 @@ location of a validation error in pydantic: keys and list indices, with tags of 
 """
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
 from pydantic import BaseModel, ValidationError
 
@@ -13,6 +14,7 @@ from simscen.loading.schema.messages import did_you_mean
 from simscen.loading.yaml.tree import Key, Keys, MappingNode, Node, ScalarNode, SequenceNode, dotted_path, existing_keys
 from simscen.spec.choice import Choice
 from simscen.spec.places import PoseSpec
+from simscen.spec.quantities import MAX_TEXT_CHARS
 
 HINTS_FOR_BOUNDS: dict[Keys, str] = {
     ("physics", "truth_rate"): "criteria are judged at these samples; lower rates miss short violations",
@@ -20,6 +22,9 @@ HINTS_FOR_BOUNDS: dict[Keys, str] = {
 """Hints for values outside their bounds, by the keys of the value."""
 MAX_SEARCH_DEPTH = 3
 """Number of levels below a mapping that are searched for the right place of a misplaced key."""
+
+MappingKeys = tuple[tuple[str, ...], frozenset[str]]
+"""The keys that lead to a mapping, and its valid keys."""
 
 
 def hint_for_wrong_type(error_type: str, model: type[BaseModel], loc: Sequence[Key], node: Node) -> str:
@@ -78,7 +83,8 @@ def _list_hint(node: Node, in_list: bool) -> str:
         if list(node.entries) == ["x", "y"] and len(point) == 2:
             return f"write the point as a list: `[{point[0]}, {point[1]}]`"
         return "start each item of the list with `- `"
-    return f"write `[{node.value}]`" if isinstance(node, ScalarNode) and isinstance(node.value, str) else ""
+    is_word = isinstance(node, ScalarNode) and isinstance(node.value, str) and len(node.value) <= MAX_TEXT_CHARS
+    return f"write `[{node.value}]`" if is_word else ""
 
 
 def _sequence_for_mapping_hint(models: Iterable[type[BaseModel]], node: SequenceNode) -> str:
@@ -128,15 +134,21 @@ def _missing_colon_hint(models: Iterable[type[BaseModel]], word: str, in_list: b
     return ""
 
 
-def _find_key_below(models: Iterable[type[BaseModel]], key: str, depth: int = 1) -> list[Key] | None:
+def _find_key_below(models: Sequence[type[BaseModel]], key: str) -> tuple[str, ...] | None:
     """Return the keys of the nearest mapping below `models` in which `key` is valid; None if there is none."""
-    holders = [(name, models_at(model, [name])) for model in models if not issubclass(model, Choice)
+    return next((keys for keys, valid_keys in _mappings_below(tuple(models)) if key in valid_keys), None)
+
+
+@lru_cache(maxsize=64)  # a file of another kind has many unknown keys
+def _mappings_below(models: tuple[type[BaseModel], ...], depth: int = 1) -> tuple[MappingKeys, ...]:
+    """Return the mappings up to MAX_SEARCH_DEPTH levels below `models`, the nearest first in each branch."""
+    holders = [(name, tuple(models_at(model, [name]))) for model in models if not issubclass(model, Choice)
                for name in keys_of([model])]  # fmt: skip
-    for name, below in holders:
-        if any(not issubclass(model, Choice) and key in keys_of([model]) for model in below):
-            return [name]
+    found: list[MappingKeys] = [
+        ((name,), frozenset(keys_of(model for model in below if not issubclass(model, Choice))))
+        for name, below in holders
+    ]
     if depth < MAX_SEARCH_DEPTH:
         for name, below in holders:
-            if (found := _find_key_below(below, key, depth + 1)) is not None:
-                return [name, *found]
-    return None
+            found += [((name, *keys), valid_keys) for keys, valid_keys in _mappings_below(below, depth + 1)]
+    return tuple(found)

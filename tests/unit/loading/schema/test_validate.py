@@ -1,8 +1,10 @@
 """Positions and hints of single mistakes; whole files are in tests/diagnostics."""
 
+import pytest
 from pydantic import BaseModel
 
 from simscen.core.errors import Problem
+from simscen.loading.schema import common_mistakes
 from simscen.loading.schema.validate import check
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.model.robot import RobotSpec
@@ -23,6 +25,25 @@ def _problems(model: type[BaseModel], text: str) -> list[Problem]:
 
 def _told(model: type[BaseModel], text: str) -> list[tuple[int, int, str]]:
     return [(p.line, p.col, p.message) for p in _problems(model, text)]
+
+
+def test_a_file_of_another_kind_does_not_take_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search for the right place of each key once took 40 ms, minutes for a large file."""
+    calls = []
+    found = common_mistakes.models_at
+    common_mistakes._mappings_below.cache_clear()
+    monkeypatch.setattr(common_mistakes, "models_at", lambda *where: (calls.append(where), found(*where))[1])
+    one = _problems(ScenarioSpec, SCENARIO + "zzz: 1\n")
+    first = len(calls)
+    many = _problems(ScenarioSpec, SCENARIO + "".join(f"zzz{number}: 1\n" for number in range(200)))
+    assert (len(one), len(many)) == (1, 200)
+    assert len(calls) - first < first + 200 * 4
+
+
+@pytest.mark.parametrize("place", ["robot: {pose: {x: TEXT}}", "pass: TEXT", "time_limit: TEXT"])
+def test_a_long_text_is_shortened_in_messages(place: str) -> None:
+    text = "simscen: 1\nworld: w\n" + place.replace("TEXT", "x" * 10_000) + "\n"
+    assert all(len(problem.message) < 200 and len(problem.hint) < 400 for problem in _problems(ScenarioSpec, text))
 
 
 def test_a_valid_scenario_becomes_its_model() -> None:
