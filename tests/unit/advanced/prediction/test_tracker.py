@@ -9,9 +9,8 @@ import pytest
 
 from simscen.advanced.prediction.clusters import (
     CONVERGED_STEP_M,
-    divide_into_segments,
     find_clusters,
-    find_valid_hits,
+    find_segments,
     fit_circle,
 )
 from simscen.advanced.prediction.tracker import Tracker
@@ -246,51 +245,24 @@ def test_no_motion_of_posts_is_reported_when_the_robot_skids() -> None:
 
 def test_last_segment_of_a_scan_has_the_range_of_its_last_hit() -> None:
     ranges, step = np.array([50.0] * 10 + [2.0, 1.95, 1.9]), 0.01
-    found = divide_into_segments(find_valid_hits(ranges, ranges * np.exp(1j * step * np.arange(13)), step, 0.1, 10.0))
+    found = find_segments(ranges, ranges * np.exp(1j * step * np.arange(13)), step, 0.1, 10.0)
     (cluster,) = find_clusters(found, ranges, 0.0, step, 1.0)
     sine = math.sin(1.5 * step)
     assert cluster.radius == pytest.approx(1.9 * sine / (1.0 - sine))
     assert abs(cluster.center) == pytest.approx(1.9 + cluster.radius)
 
 
-def test_quick_check_never_separates_hits_of_one_segment() -> None:
-    rng, step, reported = np.random.default_rng(4), math.radians(1.0), list[tuple[bool, bool]]()
+def test_enough_marked_hits_must_be_in_one_segment() -> None:
+    rng, step, reported = np.random.default_rng(4), math.radians(1.0), list[bool]()
     for _ in range(400):
         ranges = np.repeat(rng.uniform(1.0, 6.0, 18), 4) + rng.normal(0.0, 0.04, 72)
         ranges[rng.random(72) < 0.1] = np.inf
-        hits = find_valid_hits(ranges, np.fmin(ranges, 1e5) * np.exp(1j * step * np.arange(72)), step, 0.1, 10.0)
-        which = rng.random(len(hits.beams)) < 0.15
-        reported.append(
-            (divide_into_segments(hits).share_segment(which, 3), hits.may_share_segment(which.nonzero()[0].tolist(), 3))
-        )
-        first, last = divide_into_segments(hits).first, divide_into_segments(hits).last
-        assert reported[-1][0] == any(which[one : other + 1].sum() >= 3 for one, other in zip(first, last, strict=True))
-    assert (True, False) not in reported
-    assert min(reported.count((True, True)), reported.count((False, False))) > 50
-
-
-def test_sparse_and_full_beam_tests_give_the_same_tracks() -> None:
-    """All beams are tested after a scan with a new object."""
-    rng = np.random.default_rng(2)
-    wires = Flatland(discs=[(6 * rng.random() + 1, 2.2 * (-1) ** k * (0.5 + rng.random()), 0.002) for k in range(30)])
-
-    def flickering(t: float) -> list[Disc]:
-        """Return a disc of four beams, of which the sparse test of every sixth beam can miss all."""
-        return [(0.4 * t + 2.5 * math.cos(3 * t), 2.5 * math.sin(3 * t), 0.03)] if round(10 * t) % 12 == 0 else []
-
-    def tracks(tests_all_beams: bool) -> list[list[complex]]:
-        found = list[list[complex]]()
-
-        def record(watch: Watch) -> None:
-            found.append([track.position for track in watch.tracker._tracks])
-            watch.tracker._had_new_hits &= not tests_all_beams
-
-        Watch(flickering, base=lambda t: Pose2(0.4 * t, 0.0), walls=wires).run(12.0, record)
-        return found
-
-    found = tracks(False)
-    assert found == tracks(True)
-    assert 10 < sum(map(bool, found)) < 100
+        segments = find_segments(ranges, np.fmin(ranges, 1e5) * np.exp(1j * step * np.arange(72)), step, 0.1, 10.0)
+        which = rng.random(len(segments.beams)) < 0.15
+        reported.append(segments.has_segment_with(3, which))
+        ends = zip(segments.first, segments.last, strict=True)
+        assert reported[-1] == any(which[one : other + 1].sum() >= 3 for one, other in ends)
+    assert min(reported.count(True), reported.count(False)) > 50
 
 
 def test_garbage_scan_creates_no_tracks() -> None:
