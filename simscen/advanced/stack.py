@@ -67,8 +67,7 @@ class AdvancedStack(ReferenceStack):
         self._costmaps.global_costmap.moving = self._prediction.moving_obstacles_in_frame(tick, frames.pose)
 
     def _on_drive(self) -> None:
-        if self._prediction.is_standing:
-            self._prediction.on_drive()
+        self._prediction.on_drive()
 
     def _adjust_controller_command(self, tick: int, frames: Frames, command: Twist) -> Twist:
         if self._prediction.is_idle:

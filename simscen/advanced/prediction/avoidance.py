@@ -1,4 +1,4 @@
-"""Avoidance of moving obstacles by trajectory rollouts, and return of a standing robot to its position.
+"""Avoidance of moving obstacles by trajectory rollouts.
 
 While the controller's trajectory is safe, the controller's command is kept. Otherwise, a few hundred trajectories are
 compared: the controller's trajectory at lower speeds, and sequences of two velocities. Their main cost is the risk of
@@ -13,15 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from simscen.advanced.prediction.rollouts import (
-    HORIZON_S,
-    TIMES,
-    FollowedPath,
-    Rollouts,
-    TrajectorySampler,
-    arc_rollouts,
-)
-from simscen.core.geometry import Array, Pose2, wrap
+from simscen.advanced.prediction.followed_path import FollowedPath
+from simscen.advanced.prediction.rollouts import HORIZON_S, TIMES, Rollouts, TrajectorySampler, arc_rollouts
+from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.guards import Prediction
 from simscen.stack.footprint import CoveringDiscs
@@ -87,35 +81,29 @@ class Avoidance:
         All arguments are in one frame. A robot without a path stays near `home`, or near `pose` if `home` is None.
         """
         near = moving.near(pose.x, pose.y, self._robot.circumscribed_radius + MAX_INFLATION_M, self._speed, HORIZON_S)
-        if not near.obstacles:
+        followed = path if path is not None and len(path) >= 2 and command.vx != 0.0 else None
+        if self._is_safe(command, pose, twist, near, followed):
             self._last = None
             return command
-        if self._is_surely_safe(command, pose, twist, near, path):
-            self._last = None
-            return command
-        own = self._controller_rollouts(command, pose, twist, path, SPEED_FRACTIONS[:1])
-        if self._risk(own, near)[0] <= (SAFE_RISK if self._last is None else RESUME_RISK):
-            self._last = None
-            return command
-        self._last = self._best_command(
-            self._controller_rollouts(command, pose, twist, path, SPEED_FRACTIONS),
-            pose,
-            twist,
-            near,
-            costmap,
-            path,
-            home,
-        )
+        own = self._controller_rollouts(command, pose, twist, followed, SPEED_FRACTIONS)
+        self._last = self._best_command(own, pose, twist, near, costmap, self._goal(pose, path, home))
         return self._last
 
-    def _is_surely_safe(
-        self, command: Twist, pose: Pose2, twist: Twist, moving: MovingObstacles, path: FollowedPath | None
+    def _is_safe(
+        self, command: Twist, pose: Pose2, twist: Twist, moving: MovingObstacles, followed: FollowedPath | None
     ) -> bool:
-        """Return whether a quick check shows that the controller's trajectory stays away from all moving obstacles."""
-        if path is None or len(path) < 2 or command.vx == 0.0:
-            return False
-        position, speed, deviation = path.position_over_time(pose, twist, command, self._robot)
-        return moving.is_surely_clear(position, speed, self._discs.reach + deviation, MIN_DISTANCE_M, HORIZON_S)
+        """Return whether the controller's trajectory has a low risk, by a quick check if possible.
+
+        `followed` is the path if the command follows it.
+        """
+        if not moving.obstacles:
+            return True
+        if followed is not None:
+            position, speed, deviation = followed.position_over_time(pose, twist, command, self._robot)
+            if moving.is_surely_clear(position, speed, self._discs.reach + deviation, MIN_DISTANCE_M, HORIZON_S):
+                return True
+        own = self._controller_rollouts(command, pose, twist, followed, SPEED_FRACTIONS[:1])
+        return bool(self._risk(own, moving)[0] <= (SAFE_RISK if self._last is None else RESUME_RISK))
 
     def _best_command(
         self,
@@ -124,15 +112,14 @@ class Avoidance:
         twist: Twist,
         moving: MovingObstacles,
         costmap: CostmapView,
-        path: FollowedPath | None,
-        home: Pose2 | None,
+        goal: tuple[float, float],
     ) -> Twist:
         """Return the first command of the cheapest trajectory, among the controller's (`own`) and the sampled ones.
 
         Risk and static costs take long to compute. Sampled trajectories are therefore evaluated in the order of their
         other costs, until these alone exceed the lowest total cost. At equal costs, `own` comes first.
         """
-        fan, goal = self._sampler.sample(pose, twist), self._goal(pose, path, home)
+        fan = self._sampler.sample(pose, twist)
         all_indices = np.arange(len(fan.commands))
         second_step = np.s_[:, 1]
         clearance = max(
@@ -178,12 +165,12 @@ class Avoidance:
         return cost
 
     def _controller_rollouts(
-        self, command: Twist, pose: Pose2, twist: Twist, path: FollowedPath | None, fractions: tuple[float, ...]
+        self, command: Twist, pose: Pose2, twist: Twist, followed: FollowedPath | None, fractions: tuple[float, ...]
     ) -> Rollouts:
         """Return the controller's trajectory at fractions of its speed."""
-        if path is None or len(path) < 2 or command.vx == 0.0:
+        if followed is None:
             return arc_rollouts(pose, command, fractions if command != STOP else (1.0,))
-        return path.rollouts(pose, twist, command, fractions, self._robot, not self._discs.centered)
+        return followed.rollouts(pose, twist, command, fractions, self._robot, not self._discs.centered)
 
     def _risk(self, rollouts: Rollouts, moving: MovingObstacles) -> Array:
         """Return the risk (n,) of trajectories: weighted nearness to moving obstacles and collisions with them."""
@@ -230,62 +217,3 @@ class Avoidance:
             return np.zeros(len(commands))
         change = np.abs(commands[:, 0] - self._last.vx) / self._speed
         return np.asarray(CHANGE_WEIGHT * (change + np.abs(commands[:, 1] - self._last.wz) / 3.0))
-
-
-ARRIVED_M, ARRIVED_RAD = 0.08, 0.15
-"""Distance and angle within which the robot has returned to its stand position."""
-RETURN_DISTANCE_M = 0.15
-"""Distance from its stand position at which the robot starts to return."""
-RETURN_SPEED_RATIO, RETURN_GAIN_PER_S = 0.3, 1.0
-"""Maximum speed of returning relative to full speed, and ratio of the speed in m/s to the distance in m."""
-RETURN_TURN_RATE_RAD_S = 1.0
-"""Maximum turn rate of returning."""
-MAX_BEARING_RAD = 0.4
-"""Angle between the heading and the direction of return above which the robot turns in place first."""
-
-
-class StandPosition:
-    """Pose to which a standing robot returns after it has stepped aside.
-
-    The robot drives there in a straight line and then turns to the heading of the pose.
-    """
-
-    def __init__(self, robot: RobotModel, full_speed: float) -> None:
-        """Take the robot and its full speed in m/s."""
-        self._speed, self._max_turn_rate = (
-            RETURN_SPEED_RATIO * full_speed,
-            min(RETURN_TURN_RATE_RAD_S, robot.max_angular),
-        )
-        self._can_reverse, self._can_turn_in_place = robot.max_reverse > 0.0, robot.turning_radius == 0.0
-        self._home: Pose2 | None = None
-        self._is_away = False
-
-    def clear(self) -> None:
-        """Forget the pose."""
-        self._home, self._is_away = None, False
-
-    def remember(self, pose: Pose2, has_moving_obstacles: bool) -> Pose2 | None:
-        """Return the stand position. It is None until an obstacle moves, and is then set to `pose`."""
-        if self._home is None and has_moving_obstacles:
-            self._home = pose
-        return self._home
-
-    def return_command(self, pose: Pose2) -> Twist:
-        """Return the command that drives back. STOP at the stand position, or if the robot cannot turn in place."""
-        home = self._home
-        if home is None or not self._can_turn_in_place:
-            return STOP
-        distance = home.distance(pose)
-        self._is_away = distance > (ARRIVED_M if self._is_away else RETURN_DISTANCE_M)
-        if not self._is_away:
-            turn = wrap(home.yaw - pose.yaw)
-            return Twist(0.0, 0.0, self._turn_rate(turn)) if abs(turn) > ARRIVED_RAD else STOP
-        bearing = wrap(math.atan2(home.y - pose.y, home.x - pose.x) - pose.yaw)
-        sign = -1.0 if abs(bearing) > math.pi / 2 and self._can_reverse else 1.0
-        deviation = wrap(bearing + math.pi) if sign < 0 else bearing
-        speed = min(self._speed, RETURN_GAIN_PER_S * distance) if abs(deviation) < MAX_BEARING_RAD else 0.0
-        return Twist(sign * speed, 0.0, self._turn_rate(deviation))
-
-    def _turn_rate(self, angle: float) -> float:
-        """Return the turn rate in rad/s for turning by an angle in rad."""
-        return math.copysign(min(self._max_turn_rate, 2.0 * abs(angle)), angle)

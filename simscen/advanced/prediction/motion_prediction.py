@@ -1,100 +1,20 @@
-"""Motion prediction: tracks moving obstacles in the scans of each lidar, and avoids them.
-
-Scans are compared in an odom frame that combines the distance of the wheels with the heading of the gyroscope. With the
-heading of skidding wheels, everything would seem to rotate around the robot.
-"""
+"""Motion prediction: tracks moving obstacles in the scans of each lidar, and avoids them."""
 
 import math
-from collections import deque
-from collections.abc import Callable
-from math import cos, remainder, sin, tau
 
-from simscen.advanced.prediction.avoidance import Avoidance, StandPosition
-from simscen.advanced.prediction.rollouts import FollowedPath
+from simscen.advanced.prediction.avoidance import Avoidance
+from simscen.advanced.prediction.followed_path import FollowedPath
+from simscen.advanced.prediction.gyro_odometry import GyroOdometry
+from simscen.advanced.prediction.stand_position import StandPosition
 from simscen.advanced.prediction.tracker import Tracker
-from simscen.core.geometry import Pose2, wrap
+from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import Path
-from simscen.core.messages.sensor_data import Imu, Odometry, Scan
+from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import Prediction
 from simscen.stack.costmap.obstacle_layer import ScanWithMovingHits
-from simscen.stack.frames import HISTORY_S
-from simscen.stack.localizers.ekf import MAX_YAW_RATE_RAD_S
 from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
 from simscen.stack.protocols import CostmapView, RobotModel
-
-MAX_PENDING = 10_000
-"""Maximum number of readings that wait for integration."""
-
-
-class GyroOdometry:
-    """Odometry with the distance of the wheels and, if possible, the heading of the gyroscope.
-
-    Readings are integrated when a pose is requested, to save time.
-    """
-
-    def __init__(self, tick_rate: int) -> None:
-        """Take the tick rate in Hz."""
-        self._rate = tick_rate
-        self._last: Odometry | None = None
-        self._rate_sum, self._rate_count = 0.0, 0
-        self._pending: deque[Odometry | Imu] = deque(maxlen=MAX_PENDING)
-        self._poses = deque([(-1, 0.0, 0.0, 0.0)])
-        self._now = _pose(self._poses[-1])
-        self.add: Callable[[Odometry | Imu], None] = self._pending.append
-        """Add a reading."""
-
-    @property
-    def now(self) -> Pose2:
-        """The latest pose; the same object until it changes."""
-        self._integrate()
-        return self._now
-
-    def at(self, tick: int) -> Pose2:
-        """Return the latest pose up to a tick; the oldest stored pose if all are later."""
-        self._integrate()
-        poses = self._poses
-        if poses[-1][0] <= tick:
-            return self._now
-        return _pose(next((each for each in reversed(poses) if each[0] <= tick), poses[0]))
-
-    def _integrate(self) -> None:
-        """Integrate the pending readings."""
-        if not self._pending:
-            return
-        poses = self._poses
-        newest, x, y, yaw = poses[-1]
-        last, rate_sum, rate_count = self._last, self._rate_sum, self._rate_count
-        for reading in self._pending:
-            if isinstance(reading, Imu):
-                rate = reading.angular_velocity[2]
-                if -MAX_YAW_RATE_RAD_S < rate < MAX_YAW_RATE_RAD_S:
-                    rate_sum += rate
-                    rate_count += 1
-                continue
-            tick = reading.tick
-            if last is not None and newest < tick > last.tick:
-                (new_x, new_y, new_heading), (old_x, old_y, old_heading) = reading.pose, last.pose
-                step = remainder(new_heading - old_heading, tau)
-                turn = rate_sum / rate_count * (tick - last.tick) / self._rate if rate_count else step
-                # Rotate the step of the wheels into this frame, with half of the additional turn of the gyroscope.
-                rotation = yaw - old_heading + (turn - step) / 2
-                c, s, dx, dy = cos(rotation), sin(rotation), new_x - old_x, new_y - old_y
-                x, y, yaw, newest = x + c * dx - s * dy, y + s * dx + c * dy, yaw + turn, tick
-                poses.append((tick, x, y, yaw))
-            last, rate_sum, rate_count = reading, 0.0, 0
-        self._last, self._rate_sum, self._rate_count = last, rate_sum, rate_count
-        self._pending.clear()
-        self._now = _pose(poses[-1])
-        oldest = newest - HISTORY_S * self._rate
-        while poses[0][0] < oldest:
-            poses.popleft()
-
-
-def _pose(entry: tuple[int, float, float, float]) -> Pose2:
-    """Return the pose in an entry (tick, x, y, yaw)."""
-    return Pose2(entry[1], entry[2], wrap(entry[3]))
-
 
 WARM_UP_S, WARM_UP_SPEED_M_S = 0.7, 0.5
 """Time after the first scan in which obstacles cannot be tracked yet, and the speed limit during this time."""
@@ -116,8 +36,6 @@ class MotionPrediction:
         self._avoidance = Avoidance(spec, robot, full_speed)
         self._stand_position = StandPosition(robot, full_speed)
         self._warm_up_ticks, self._must_stay = WARM_UP_S * tick_rate, False
-        self.is_standing = False
-        """Whether `stand` or `hold` was called since the last call of `on_drive`."""
         self._odometry = GyroOdometry(tick_rate)
         self._no_obstacles = no_moving_obstacles(spec.acceleration)
         self._active: list[Tracker] = []  # trackers with moving obstacles
@@ -154,24 +72,19 @@ class MotionPrediction:
             return scan
         return ScanWithMovingHits(**vars(scan), moving=tracker.moving_hits)
 
-    def moving_obstacles(self, tick: int) -> MovingObstacles:
+    def _moving_obstacles(self, tick: int) -> MovingObstacles:
         """Return the moving obstacles at a tick in the frame of GyroOdometry, from all lidars."""
         if not self._active:
             return self._no_obstacles
         if self._predicted is None or self._predicted[0] != tick:
-            self._predicted = tick, self._predict(tick)
+            predicted = [tracker.moving.after((tick - tracker.tick) / self._rate) for tracker in self._active]
+            obstacles = [obstacle for each in predicted for obstacle in each.obstacles]
+            self._predicted = tick, MovingObstacles.of(obstacles, self._spec.acceleration)
         return self._predicted[1]
-
-    def _predict(self, tick: int) -> MovingObstacles:
-        """Return the tracked obstacles of all lidars, predicted for a tick."""
-        predicted = [tracker.moving.after((tick - tracker.tick) / self._rate) for tracker in self._active]
-        return MovingObstacles.of(
-            [obstacle for each in predicted for obstacle in each.obstacles], self._spec.acceleration
-        )
 
     def moving_obstacles_in_frame(self, tick: int, pose: Pose2) -> MovingObstacles:
         """Return the moving obstacles at a tick in a frame in which the robot is at `pose` now."""
-        moving = self.moving_obstacles(tick)
+        moving = self._moving_obstacles(tick)
         if not moving.obstacles:
             return moving
         now, cached = self._odometry.now, self._transformed
@@ -194,15 +107,14 @@ class MotionPrediction:
     def on_drive(self) -> None:
         """Forget the position to which a standing robot returns, because the robot drives now."""
         self._stand_position.clear()
-        self._must_stay = self.is_standing = False
+        self._must_stay = False
 
     def hold(self) -> None:
         """Stay in place until the robot drives again, even if an obstacle approaches."""
-        self._must_stay = self.is_standing = True
+        self._must_stay = True
 
     def stand(self, tick: int, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
         """Return the command for a standing robot: step aside for moving obstacles, or drive back, or stop."""
-        self.is_standing = True
         if self._must_stay:
             return STOP
         home = self._stand_position.remember(pose, bool(self._active))

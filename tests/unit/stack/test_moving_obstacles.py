@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.prediction.rollouts import HORIZON_S, TIMES, FollowedPath
+from simscen.advanced.prediction.followed_path import FollowedPath
+from simscen.advanced.prediction.rollouts import HORIZON_S, TIMES
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles

@@ -8,7 +8,7 @@ import pytest
 
 from simscen.advanced.prediction import avoidance
 from simscen.advanced.prediction.avoidance import Avoidance
-from simscen.advanced.prediction.rollouts import FollowedPath
+from simscen.advanced.prediction.followed_path import FollowedPath
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.goals import Goal

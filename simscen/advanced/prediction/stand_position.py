@@ -1,0 +1,65 @@
+"""Return of a standing robot to its position after it has stepped aside for a moving obstacle."""
+
+import math
+
+from simscen.core.geometry import Pose2, wrap
+from simscen.core.geometry.kinematics import STOP, Twist
+from simscen.stack.protocols import RobotModel
+
+ARRIVED_M, ARRIVED_RAD = 0.08, 0.15
+"""Distance and angle within which the robot has returned to its stand position."""
+RETURN_DISTANCE_M = 0.15
+"""Distance from its stand position at which the robot starts to return."""
+RETURN_SPEED_RATIO, RETURN_GAIN_PER_S = 0.3, 1.0
+"""Maximum speed of returning relative to full speed, and ratio of the speed in m/s to the distance in m."""
+RETURN_TURN_RATE_RAD_S = 1.0
+"""Maximum turn rate of returning."""
+MAX_BEARING_RAD = 0.4
+"""Angle between the heading and the direction of return above which the robot turns in place first."""
+
+
+class StandPosition:
+    """Pose to which a standing robot returns after it has stepped aside.
+
+    The robot drives there in a straight line and then turns to the heading of the pose.
+    """
+
+    def __init__(self, robot: RobotModel, full_speed: float) -> None:
+        """Take the robot and its full speed in m/s."""
+        self._speed, self._max_turn_rate = (
+            RETURN_SPEED_RATIO * full_speed,
+            min(RETURN_TURN_RATE_RAD_S, robot.max_angular),
+        )
+        self._can_reverse, self._can_turn_in_place = robot.max_reverse > 0.0, robot.turning_radius == 0.0
+        self._home: Pose2 | None = None
+        self._is_away = False
+
+    def clear(self) -> None:
+        """Forget the pose."""
+        self._home, self._is_away = None, False
+
+    def remember(self, pose: Pose2, has_moving_obstacles: bool) -> Pose2 | None:
+        """Return the stand position. It is None until an obstacle moves, and is then set to `pose`."""
+        if self._home is None and has_moving_obstacles:
+            self._home = pose
+        return self._home
+
+    def return_command(self, pose: Pose2) -> Twist:
+        """Return the command that drives back. STOP at the stand position, or if the robot cannot turn in place."""
+        home = self._home
+        if home is None or not self._can_turn_in_place:
+            return STOP
+        distance = home.distance(pose)
+        self._is_away = distance > (ARRIVED_M if self._is_away else RETURN_DISTANCE_M)
+        if not self._is_away:
+            turn = wrap(home.yaw - pose.yaw)
+            return Twist(0.0, 0.0, self._turn_rate(turn)) if abs(turn) > ARRIVED_RAD else STOP
+        bearing = wrap(math.atan2(home.y - pose.y, home.x - pose.x) - pose.yaw)
+        sign = -1.0 if abs(bearing) > math.pi / 2 and self._can_reverse else 1.0
+        deviation = wrap(bearing + math.pi) if sign < 0 else bearing
+        speed = min(self._speed, RETURN_GAIN_PER_S * distance) if abs(deviation) < MAX_BEARING_RAD else 0.0
+        return Twist(sign * speed, 0.0, self._turn_rate(deviation))
+
+    def _turn_rate(self, angle: float) -> float:
+        """Return the turn rate in rad/s for turning by an angle in rad."""
+        return math.copysign(min(self._max_turn_rate, 2.0 * abs(angle)), angle)
