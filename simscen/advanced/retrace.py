@@ -7,86 +7,14 @@ from itertools import product
 import numpy as np
 
 from simscen.advanced.spec import Retrace as RetraceSpec
-from simscen.core.geometry import Array, Pose2, wrap_array
+from simscen.advanced.trail import Trail
+from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
 from simscen.stack.footprint import Mask, distance_at, lethal_near
 from simscen.stack.kinematics import poses_along
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 from simscen.stack.setting import Setting
-
-SPACING_M = 0.01
-"""Distance between two poses of a trail, by `Trail.footprint_distance`."""
-LOOP_CLOSURE_M, MIN_LOOP_M = 0.12, 0.3
-"""Maximum distance between the ends of a loop, and minimum length of a loop, both by `Trail.footprint_distance`."""
-MIN_LATERAL_SHARE = 0.1
-"""Share of lateral motion above which the base has strafed. Slipping wheels cause less."""
-
-
-class Trail:
-    """The robot's path in reverse: evenly spaced poses from the current one to the oldest one, without loops.
-
-    Beyond the oldest pose, the trail continues straight backward. `poses` (n, 3) are x, y, and yaw. `driven` (n,) are
-    the distances in m along the trail; `along` (n,) are the same distances by `footprint_distance`.
-    """
-
-    def __init__(self, earlier: Sequence[Pose2], current: Pose2, radius: float, extension: float) -> None:
-        """Take the poses (oldest first), the circumscribed radius in m, and the length in m of the straight part."""
-        self._radius = radius
-        passed = self._thinned(np.array([current, *reversed(earlier)], dtype=np.float64))
-        self.has_strafed = _has_strafed(passed)
-        trail = self._without_loops(passed)
-        x, y, yaw = trail[-1].tolist()
-        end = (x - extension * math.cos(yaw), y - extension * math.sin(yaw), yaw)
-        self.known_count = len(self._resampled(trail))
-        """Number of poses without the straight part."""
-        self.poses = self._resampled(np.concatenate((trail, [end])))
-        self.along = np.concatenate(([0.0], np.cumsum(self.footprint_distance(self.poses[1:], self.poses[:-1]))))
-        steps = np.hypot(np.diff(self.poses[:, 0]), np.diff(self.poses[:, 1]))
-        self.driven = np.concatenate(([0.0], np.cumsum(steps)))
-
-    def footprint_distance(self, poses: Array, others: Array) -> Array:
-        """Return how far (…,) in m the footprint moves between poses (…, 3).
-
-        This is the distance between the poses, plus the turn in rad times the circumscribed radius.
-        """
-        turned = np.abs(wrap_array(poses[..., 2] - others[..., 2]))
-        return np.asarray(
-            np.hypot(poses[..., 0] - others[..., 0], poses[..., 1] - others[..., 1]) + self._radius * turned
-        )
-
-    def _thinned(self, trail: Array) -> Array:
-        """Return the poses without those closer than SPACING_M to the previous one."""
-        indices = [0]
-        for k in range(1, len(trail)):
-            if self.footprint_distance(trail[k], trail[indices[-1]]) >= SPACING_M:
-                indices.append(k)
-        return trail[indices]
-
-    def _without_loops(self, trail: Array) -> Array:
-        """Return the poses without the poses on loops."""
-        moved = np.concatenate(([0.0], np.cumsum(self.footprint_distance(trail[1:], trail[:-1]))))
-        indices, k = [0], 0
-        while k < len(trail) - 1:
-            is_return = (self.footprint_distance(trail, trail[k]) <= LOOP_CLOSURE_M) & (moved >= moved[k] + MIN_LOOP_M)
-            k = int(is_return.nonzero()[0][-1]) if is_return.any() else k + 1
-            indices.append(k)
-        return trail[indices]
-
-    def _resampled(self, trail: Array) -> Array:
-        """Return poses interpolated at equal distances."""
-        moved = np.concatenate(([0.0], np.cumsum(self.footprint_distance(trail[1:], trail[:-1]))))
-        stations = np.arange(0.0, moved[-1], SPACING_M)
-        trail = np.column_stack((trail[:, :2], np.unwrap(trail[:, 2])))
-        return np.column_stack([np.interp(stations, moved, column) for column in trail.T])
-
-
-def _has_strafed(passed: Array) -> bool:
-    """Return whether the base drove sideways between poses (n, 3)."""
-    steps, yaw = np.diff(passed[:, :2], axis=0), passed[:-1, 2] + wrap_array(np.diff(passed[:, 2])) / 2
-    lateral = np.abs(np.cos(yaw) * steps[:, 1] - np.sin(yaw) * steps[:, 0])
-    return bool(lateral.sum() > MIN_LATERAL_SHARE * np.hypot(*steps.T).sum())
-
 
 HORIZON_S = 1.0
 """Duration for which each candidate command is simulated."""

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from simscen.advanced import spec as model
-from simscen.advanced.retrace import Retrace, Trail
+from simscen.advanced.retrace import Retrace
+from simscen.advanced.trail import Trail
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
