@@ -16,7 +16,7 @@ from simscen.advanced.cell_blocks import pool_blocks
 from simscen.core.environment.occupancy_grid import FREE, OccupancyGrid
 from simscen.core.geometry import Array, wrap_array
 from simscen.stack.localizers.beams import ComplexPoints, evenly_spaced
-from simscen.stack.localizers.distance_field import DistanceField, Float32
+from simscen.stack.localizers.distance_field import DistanceField, Float32, evaluate_in_blocks
 from simscen.stack.localizers.particles import pose_errors
 from simscen.stack.localizers.sensor_models import obstacle_field
 
@@ -37,6 +37,8 @@ NEARBY_STEPS = ((6, 0.2), (9, 0.035))
 """Grid of `search_near`: number of steps to each side and step size, for x and y in m, and for yaw in rad."""
 REFINED_NEARBY_POSES = 12
 """Maximum number of poses that `search_near` refines."""
+REFINEMENT_STEPS = ((0.1, 1.0), (0.05, 0.5))
+"""Step sizes (m, degrees) of successive refinements of a pose."""
 MIN_SEPARATION = (0.5, 0.2)
 """Two poses are distinct if they differ by more than either value (m, rad)."""
 PASSED_SHARES = (0.3, 0.55, 0.8)
@@ -79,8 +81,13 @@ class GlobalSearch:
     """Finds the poses on a map at which the points of a view fit the map best."""
 
     def __init__(self, grid: OccupancyGrid, field: DistanceField | None = None) -> None:
-        """Prepare searches on the map `grid`. `field` is its field of distances from obstacles, if already computed."""
-        self._grid, self._given_field = grid, field
+        """Prepare searches on the map `grid`. `field` is its field of distances from obstacles, if already computed.
+
+        The field is computed anew if its distances do not reach MAX_DISTANCE_M.
+        """
+        if field is None or field.limit < MAX_DISTANCE_M:
+            field = obstacle_field(grid, MAX_DISTANCE_M)
+        self._grid, self._field = grid, field
 
     def precompute(self) -> None:
         """Compute the lookup tables now instead of in the first search."""
@@ -92,13 +99,13 @@ class GlobalSearch:
         if not len(near_view.ends):
             return np.empty((0, 3)), np.empty(0)
         poses = self._search_coarse_grid(near_view.thinned(COARSE_POINTS))
-        return self._refine(poses, near_view, REFINED_POSES, ((0.1, 1.0), (0.05, 0.5)))
+        return self._refine(poses, near_view, REFINED_POSES, REFINEMENT_STEPS)
 
     def search_near(self, view: View, pose: Array) -> tuple[Array, Array]:
         """Return poses and scores as `search` does, but only for poses within NEARBY_STEPS of `pose` (3,)."""
         offsets, turn = (np.arange(-steps, steps + 1) * step for steps, step in NEARBY_STEPS)
         poses = pose + np.stack(np.meshgrid(offsets, offsets, turn, indexing="ij"), axis=-1).reshape(-1, 3)
-        steps = ((0.1, 1.0), (0.05, 0.5), (0.05, 0.5))
+        steps = (*REFINEMENT_STEPS, REFINEMENT_STEPS[-1])
         return self._refine(poses, _without_far_points(view), REFINED_NEARBY_POSES, steps)
 
     def _refine(
@@ -121,18 +128,9 @@ class GlobalSearch:
 
     def _mean(self, table: Levels, poses: Array, points: ComplexPoints) -> Array:
         """Return for each of `poses` (n, 3) the mean (n,), 0 … 1, of the table values at the `points` of a view."""
-        blocks = [
-            table.take(self._field.endpoint_cells(poses[begin : begin + 512], points)).mean(axis=1)
-            for begin in range(0, len(poses), 512)
-        ]
-        mean: Array = np.concatenate(blocks) / 255
-        return mean
-
-    @cached_property
-    def _field(self) -> DistanceField:
-        if self._given_field is not None and self._given_field.limit >= MAX_DISTANCE_M:
-            return self._given_field
-        return obstacle_field(self._grid, MAX_DISTANCE_M)
+        return evaluate_in_blocks(
+            lambda block: table.take(self._field.endpoint_cells(block, points)).mean(axis=1) / 255, poses
+        )
 
     @cached_property
     def _nearness_table(self) -> Levels:

@@ -50,6 +50,8 @@ SCORE_SCALE = 0.02
 """Difference of scores for which one pose is e times as likely as the other, and gets e times as many particles."""
 UNOBSERVED_MOTION = ObservedMotion()
 """Motion between two scans that were not matched."""
+PoseHypotheses = tuple[Array, Array]
+"""Poses (k, 3) where the robot may be, and their shares (k,) of the particles."""
 
 
 class Relocalizer:
@@ -75,10 +77,8 @@ class Relocalizer:
     def update(
         self, scan: Scan, base: Pose2, estimated: Pose2, limits: tuple[float, float],
         motion: ObservedMotion = UNOBSERVED_MOTION, fitting_share: float | None = None,
-    ) -> tuple[Array, Array] | None:  # fmt: skip
-        """Return poses (k, 3) where the robot may be, and their shares of the particles (k,).
-
-        None if the estimate should be kept.
+    ) -> PoseHypotheses | None:  # fmt: skip
+        """Return where the robot may be; None if the estimate should be kept.
 
         base:           pose of the robot at the time of the scan, in the drifting frame of scan matching or odometry
         estimated:      estimated pose of the robot in the map
@@ -130,7 +130,7 @@ class Relocalizer:
         self._initial = self._initial and self._initial.after(last, base, distance, motion)
         self._certain = self._certain and self._certain.after(last, base, distance, motion)
 
-    def _search_by_initial_pose(self, initial: PosePrior, base: Pose2, current: Array) -> tuple[Array, Array] | None:
+    def _search_by_initial_pose(self, initial: PosePrior, base: Pose2, current: Array) -> PoseHypotheses | None:
         """Return the most likely pose by initial pose and stored scans; None if `current` is nearly as good.
 
         If few beams end on the mapped area, many poses fit by chance, and only the pose that odometry and scan matching
@@ -154,7 +154,7 @@ class Relocalizer:
         self._fitting_shares.clear()
         return found, np.ones(1)
 
-    def _search_nearby(self, base: Pose2, current: Array) -> tuple[Array, Array] | None:
+    def _search_nearby(self, base: Pose2, current: Array) -> PoseHypotheses | None:
         """Return a better pose near the `current` one (1, 3), e.g. after drift; None if there is none."""
         if min(self._driven - self._checked_at, self._memory.length) < CHECK_INTERVAL_M:
             return None
@@ -183,7 +183,7 @@ class Relocalizer:
             return scores
         return scores - np.minimum(SCORE_SCALE * self._certain.negative_log_likelihood(poses, base), MAX_REDUCTION)
 
-    def _accept(self, poses: Array, base: Pose2) -> tuple[Array, Array]:
+    def _accept(self, poses: Array, base: Pose2) -> PoseHypotheses:
         """Return a pose (1, 3) with the share 1 of the particles, and make it the last certain pose."""
         self._fitting_shares.clear()
         self._certain = PosePrior.at(poses[0], base)
@@ -215,7 +215,7 @@ class Relocalizer:
         """Whether the robot drove out of the mapped area, and was not carried."""
         return self._is_unmapped and self._certain is not None
 
-    def _search_map(self, view: View, base: Pose2, current: Array) -> tuple[Array, Array] | None:
+    def _search_map(self, view: View, base: Pose2, current: Array) -> PoseHypotheses | None:
         """Return the fitting poses and their shares. If the robot has a pose, two searches must agree on a new one."""
         poses, scores = self._search.search(view)
         last_interval, self._interval, self._searched_at = self._interval, SEARCH_INTERVAL_M, self._driven

@@ -65,28 +65,20 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             self._relocalize(self._relocalizer, scan, odometry)
 
     def _update(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
-        """Move the particles, by scan matching if possible. Weight them, unless `sure_update_interval` skips the scan.
+        """Move the particles, and weight them by a scan, unless `sure_update_interval` skips the scan.
 
         `delta` is the motion by odometry since the last update; None at the first one.
         """
         matched = None if self._matcher is None else self._match(self._matcher, scan, odometry)
         was_carried = None if self._matcher is None else self._matcher.was_carried
         self._motion_observed = ObservedMotion(step=matched, was_carried=was_carried)
-        agreed = False
-        if delta is not None and matched is not None:
-            self._filter.move_by_scan_matching(matched, delta)
-            if not (agreed := matched.agrees(delta)):
-                self._motion_observed = replace(self._motion_observed, disagreement=delta.between(matched.delta))
-            if self._covariance_estimator is not None:
-                self._covariance_estimator.learn_odometry_error(matched.delta, delta)
-        elif delta is not None:
-            self._filter.move(delta)
-        if self._covariance_estimator is not None:
-            step_covariance = None if matched is None else matched.covariance
-            self._covariance_estimator.propagate_poses(self._base(odometry), step_covariance)
+        agreed = matched is not None and delta is not None and matched.agrees(delta)
+        if matched is not None and delta is not None and not agreed:
+            self._motion_observed = replace(self._motion_observed, disagreement=delta.between(matched.delta))
+        self._move(matched, odometry, delta)
         self._mark_updated(scan, odometry)
-        certain = agreed and not was_carried and self._consistent_updates >= CERTAIN_AFTER_UPDATES
-        self._skipped = self._skipped + 1 if certain and self._skipped + 1 < self._update_interval else 0
+        is_certain = agreed and not was_carried and self._consistent_updates >= CERTAIN_AFTER_UPDATES
+        self._skipped = self._skipped + 1 if is_certain and self._skipped + 1 < self._update_interval else 0
         estimate = None if self._skipped else self._filter.correct(scan)
         if estimate is not None:
             pose, covariance = estimate
@@ -100,8 +92,23 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             tick = scan.tick if self._skipped else last.tick
             self._correction = Correction(pose, covariance_about(self._filter.particles, pose), odometry, tick)
         if not self._skipped:
-            consistent = agreed and estimate is not None and self._filter.is_certain
-            self._consistent_updates = self._consistent_updates + 1 if consistent else 0
+            is_consistent = agreed and estimate is not None and self._filter.is_certain
+            self._consistent_updates = self._consistent_updates + 1 if is_consistent else 0
+
+    def _move(self, matched: MatchedMotion | None, odometry: Pose2, delta: Pose2 | None) -> None:
+        """Move the particles by `matched`, the motion by scan matching, or else by `delta`. Arguments as in `_update`.
+
+        The covariance estimator, if any, learns from both motions.
+        """
+        estimator = self._covariance_estimator
+        if delta is not None and matched is not None:
+            self._filter.move_by_scan_matching(matched, delta)
+            if estimator is not None:
+                estimator.learn_odometry_error(matched.delta, delta)
+        elif delta is not None:
+            self._filter.move(delta)
+        if estimator is not None:
+            estimator.propagate_poses(self._base(odometry), None if matched is None else matched.covariance)
 
     def _match(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> MatchedMotion | None:
         """Return the motion since the last update, from scans of the first lidar only; None if it cannot be matched."""
