@@ -83,8 +83,8 @@ def _list_hint(node: Node, in_list: bool) -> str:
         if list(node.entries) == ["x", "y"] and len(point) == 2:
             return f"write the point as a list: `[{point[0]}, {point[1]}]`"
         return "start each item of the list with `- `"
-    is_word = isinstance(node, ScalarNode) and isinstance(node.value, str) and len(node.value) <= MAX_TEXT_CHARS
-    return f"write `[{node.value}]`" if is_word else ""
+    word = node.value if isinstance(node, ScalarNode) and isinstance(node.value, str) else ""
+    return f"write `[{word}]`" if 0 < len(word) <= MAX_TEXT_CHARS else ""
 
 
 def _sequence_for_mapping_hint(models: Iterable[type[BaseModel]], node: SequenceNode) -> str:
