@@ -28,6 +28,10 @@ DWB_CRITICS = {
 """Parameters in simscen for the weights of DWB's critics, by critic in Nav2."""
 DWB_CRITICS_WITHOUT_WEIGHT = ("Oscillation", "ObstacleFootprint")
 """DWB critics that only reject trajectories. They are always active in simscen."""
+DWB_OPTIONAL_LIMITS = ("min_speed_xy", "max_speed_xy", "min_speed_theta")
+"""Limits of DWB that are off if they are negative."""
+MPPI_OMNI_PARAMETERS = ("vy_std", "ay_max", "ay_min")
+"""Parameters of MPPI that only the motion model Omni uses. Files for other models often set them to 0."""
 MPPI_CRITICS = (
     "ConstraintCritic", "CostCritic", "ObstaclesCritic", "GoalCritic", "GoalAngleCritic", "PathAlignCritic",
     "PathFollowCritic", "PathAngleCritic", "PreferForwardCritic", "TwirlingCritic", "VelocityDeadbandCritic",

@@ -13,12 +13,14 @@ from simscen.loading.stacks.nav2_mapping import (
     CONTROLLERS,
     DWB_CRITICS,
     DWB_CRITICS_WITHOUT_WEIGHT,
+    DWB_OPTIONAL_LIMITS,
     EQUIVALENT_VALUES,
     IGNORED_NAME_PARTS,
     IGNORED_NODES,
     IGNORED_PARAMETERS,
     MOTION_MODELS,
     MPPI_CRITICS,
+    MPPI_OMNI_PARAMETERS,
     OLD_NODE_NAMES,
     PLANNERS,
     RENAMED_PARAMETERS,
@@ -96,7 +98,22 @@ def _translate_plugin(
         elif key == "critics" and kind in ("mppi", "dwb"):
             yield from _translate_critics(f"{prefix}.{key}", written, kind)
             continue
+        elif _has_no_effect(kind, model, key, written):
+            yield Translation(f"{prefix}.{key}", (), written)
+            continue
         yield from translate_same_name(f"{prefix}.{key}", value, (section,), kind, own)
+
+
+def _has_no_effect(kind: str, model: str, name: str, value: Any) -> bool:
+    """Return whether Nav2 ignores a parameter with this value, which simscen does not accept.
+
+    `kind` is the type of controller or planner in simscen, and `model` is the motion model of an "mppi" controller.
+    """
+    if not isinstance(value, float | int):
+        return False
+    if kind == "dwb":
+        return name in DWB_OPTIONAL_LIMITS and value < 0
+    return kind == "mppi" and model != "Omni" and name in MPPI_OMNI_PARAMETERS and value == 0
 
 
 def _motion_model(parameters: Parameters, prefix: str) -> str:

@@ -344,6 +344,40 @@ def test_values_with_a_special_meaning_in_nav2_are_accepted(tmp_path: Path) -> N
     assert (stack.recovery.simulate_ahead_time, stack.recovery.min_rotational_vel) == (0.0, 0.0)
 
 
+CONTROLLER = """\
+controller_server:
+  ros__parameters:
+    controller_plugins: [FollowPath]
+    FollowPath: {{plugin: "{plugin}", {parameters}}}
+"""
+DWB, MPPI = "dwb_core::DWBLocalPlanner", "nav2_mppi_controller::MPPIController"
+
+
+def test_negative_speed_limits_of_dwb_are_off(tmp_path: Path) -> None:
+    limits = "min_speed_xy: -0.26, max_speed_xy: -1, min_speed_theta: -1.0"
+    found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", CONTROLLER.format(plugin=DWB, parameters=limits))
+    dwb = found.spec.stack.controller
+    assert (dwb.min_speed_xy, dwb.max_speed_xy, dwb.min_speed_theta) == (0.0, None, 0.0)
+    assert not found.notes
+
+
+@pytest.mark.parametrize("model", ["", "motion_model: DiffDrive, ", "motion_model: Ackermann, "])
+def test_zeros_of_mppi_for_sideways_motion_are_ignored_without_sideways_motion(tmp_path: Path, model: str) -> None:
+    parameters = f"{model}vy_std: 0.0, ay_max: 0.0, ay_min: 0"
+    found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", CONTROLLER.format(plugin=MPPI, parameters=parameters))
+    mppi = found.spec.stack.controller
+    assert (mppi.vy_std, mppi.ay_max, mppi.ay_min) == (0.2, 3.0, -3.0)  # defaults of Nav2
+    assert not found.notes
+
+
+@pytest.mark.parametrize("parameter", ["vy_std: 0.0", "ay_max: 0.0", "ay_min: 0"])
+def test_zeros_of_mppi_for_sideways_motion_are_refused_for_the_omni_model(tmp_path: Path, parameter: str) -> None:
+    parameters = f"motion_model: Omni, {parameter}"
+    with pytest.raises(InvalidInput) as wrong:
+        loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", CONTROLLER.format(plugin=MPPI, parameters=parameters))
+    assert [(problem.path, problem.line) for problem in wrong.value.problems] == [("nav2.yaml", 4)]
+
+
 @pytest.mark.parametrize(("physics", "rate"), [("", 48.0), ("physics: {tick_rate: 200 Hz}", 50.0)])
 def test_controller_frequency_is_the_nearest_possible_one(tmp_path: Path, physics: str, rate: float) -> None:
     found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", ACCEPTED, rest=physics)
