@@ -11,6 +11,10 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from simscen.core.messages.navigation import ErrorCode
+from simscen.model.controllers import Controller, GoalChecker
+from simscen.model.localizers import Localizer
+from simscen.model.planners import Planner
+from simscen.model.stack_files import AnyStack
 from simscen.spec.base import Typed, field_docs
 from simscen.spec.choice import Choice
 from simscen.spec.extensible_union import ExtensibleUnion, TypeName
@@ -28,7 +32,12 @@ _KIND_NAMES: dict[Any, str] = {
     Amount: "quantity",
     ErrorCode: "error code",
 }
-_DEFAULT_TYPES = frozenset({"reference", "amcl", "bit_star", "regulated_pure_pursuit", "simple"})
+_DEFAULT_TYPES = frozenset(
+    mark.default
+    for union in (AnyStack, Localizer, Planner, Controller, GoalChecker)
+    for mark in get_args(union)[1:]
+    if isinstance(mark, ExtensibleUnion)
+)
 """Types that components have without the key `type`. All other types require this key."""
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
