@@ -11,8 +11,9 @@ from simscen.advanced.trail import Trail
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
-from simscen.stack.footprint import Mask, distance_at, lethal_near
+from simscen.stack.footprint import distance_at, lethal_near
 from simscen.stack.kinematics import poses_along
+from simscen.stack.moving_obstacles import Mask
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
 from simscen.stack.setting import Setting
 

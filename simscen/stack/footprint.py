@@ -7,11 +7,8 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.core.geometry.polygons import points_in_polygon
-from simscen.stack.moving_obstacles import MovingObstacles
+from simscen.stack.moving_obstacles import Mask, MovingObstacles, Reals
 from simscen.stack.protocols import CostmapView, RobotModel
-
-Mask = npt.NDArray[np.bool_]
-Reals = npt.NDArray[np.floating]
 
 
 def distances(costmap: CostmapView, points: Reals) -> npt.NDArray[np.float32]:

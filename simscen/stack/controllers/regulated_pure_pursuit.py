@@ -9,8 +9,10 @@ from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.controllers import RegulatedPurePursuit as RppSpec
 from simscen.stack.controllers.collision_checker import CollisionChecker, RotationClearance
-from simscen.stack.controllers.path_follower import BRAKING_FACTOR, GoalRotation, PathFollower
+from simscen.stack.controllers.goal_rotation import BRAKING_FACTOR, GoalRotation
+from simscen.stack.controllers.path_follower import PathFollower
 from simscen.stack.controllers.path_handler import CUSP_REACHED_M, PathTracker
+from simscen.stack.controllers.speed_regulation import SpeedRegulation
 from simscen.stack.footprint import distance_at
 from simscen.stack.kinematics import LOCAL_PLAN_TIMES_S, arc_poses
 from simscen.stack.protocols import CostmapView, NavigationFailure
@@ -95,6 +97,10 @@ class RegulatedPurePursuit(PathFollower):
     def _follow(self, tracker: PathTracker, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
         """Return the command for the farthest carrot whose arc is free; if no arc is free, slow down or rotate."""
         spec, lookahead_distance = self._spec, self._lookahead_distance(twist.vx)
+        fixed_carrot: Carrot | None = None
+        if spec.use_fixed_curvature_lookahead:
+            beyond = spec.interpolate_curvature_after_goal
+            fixed_carrot = _carrot(tracker, pose, spec.curvature_lookahead_dist, beyond)
         arcs: list[CheckedArc] = []
         rotation: float | None = None
         escape_rotation: float | None = None
@@ -102,10 +108,7 @@ class RegulatedPurePursuit(PathFollower):
             if ratio < 1.0 and ratio * lookahead_distance < spec.min_lookahead_dist:
                 break
             carrot = _carrot(tracker, pose, ratio * lookahead_distance, self._is_car)
-            curvature_carrot = carrot
-            if spec.use_fixed_curvature_lookahead:
-                beyond = spec.interpolate_curvature_after_goal
-                curvature_carrot = _carrot(tracker, pose, spec.curvature_lookahead_dist, beyond)
+            curvature_carrot = carrot if fixed_carrot is None else fixed_carrot
             backward = not tracker.is_forward or (spec.allow_reversing and carrot.x < 0.0)
             if self._should_rotate(curvature_carrot, backward):
                 rotation = curvature_carrot.bearing(backward)
@@ -232,53 +235,3 @@ def _to_robot_frame(pose: Pose2, x: float, y: float) -> Carrot:
     """Return a point in the base frame of the robot at `pose`."""
     cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
     return Carrot(cosine * (x - pose.x) + sine * (y - pose.y), cosine * (y - pose.y) - sine * (x - pose.x))
-
-
-DECELERATION_RATIO, REACTION_TIME_S = 0.9, 0.1
-"""Assumptions about braking: fraction of the maximum deceleration, and delay before braking starts."""
-SAMPLE_SPACING_M = 0.1
-"""Distance between the points of the path ahead for which a speed is determined."""
-SPEED_PER_CLEARANCE_1_S = 10.0
-"""Speed in m/s that each meter of clearance adds to the minimum speed in a narrow passage."""
-
-
-class SpeedRegulation:
-    """Regulates the speed (m/s) by curvature and nearby obstacles, also before bends and narrow passages ahead."""
-
-    def __init__(self, spec: RppSpec, setting: Setting) -> None:
-        self._spec, self._inscribed_radius = spec, setting.footprint.inscribed
-        self._doubled_deceleration = 2.0 * DECELERATION_RATIO * setting.robot.linear_deceleration
-
-    def for_distance(self, speed: float, distance: float) -> float:
-        """Return the speed if an obstacle is `distance` m from the base. With `slow_down_ahead`, lower than in Nav2."""
-        spec = self._spec
-        if not spec.use_cost_regulated_linear_velocity_scaling or distance >= spec.cost_scaling_dist:
-            return speed
-        scaled = speed * spec.cost_scaling_gain * distance / spec.cost_scaling_dist
-        if not spec.slow_down_ahead:
-            return scaled
-        clearance = max(0.0, distance - self._inscribed_radius)
-        return min(scaled, spec.regulated_linear_scaling_min_speed + SPEED_PER_CLEARANCE_1_S * clearance)
-
-    def for_curvature(self, speed: float, curvature: float) -> float:
-        """Return the speed for a bend with this curvature in 1/m."""
-        ratio = abs(curvature) * self._spec.regulated_linear_scaling_min_radius
-        return speed / ratio if self._spec.use_regulated_linear_velocity_scaling and ratio > 1.0 else speed
-
-    def for_path_ahead(self, speed: float, regulated: float, tracker: PathTracker, costmap: CostmapView) -> float:
-        """Return `regulated`, reduced so that the robot can brake in time for bends and narrow passages ahead.
-
-        `speed` is the speed without regulation.
-        """
-        if not self._spec.slow_down_ahead:
-            return regulated
-        stopping_distance = regulated * (regulated / self._doubled_deceleration + REACTION_TIME_S)
-        for distance, point, curvature in tracker.samples_ahead(SAMPLE_SPACING_M, stopping_distance):
-            speed_there = self.for_curvature(speed, curvature)
-            obstacle_distance = distance_at(costmap, point.real, point.imag)
-            if obstacle_distance > 0.0:  # the collision check handles obstacles on the path
-                speed_there = min(speed_there, self.for_distance(speed, obstacle_distance))
-            if speed_there < regulated:
-                braking = self._doubled_deceleration * max(0.0, distance - REACTION_TIME_S * regulated)
-                regulated = min(regulated, math.sqrt(speed_there * speed_there + braking))
-        return regulated

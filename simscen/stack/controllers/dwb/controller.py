@@ -18,7 +18,8 @@ from simscen.stack.controllers.dwb.trajectory_generator import (
     kinematic_parameters,
     velocity_window,
 )
-from simscen.stack.controllers.path_follower import GoalRotation, PathFollower
+from simscen.stack.controllers.goal_rotation import GoalRotation
+from simscen.stack.controllers.path_follower import PathFollower
 from simscen.stack.controllers.path_handler import upcoming_path
 from simscen.stack.protocols import CostmapView, NavigationFailure
 from simscen.stack.setting import Setting

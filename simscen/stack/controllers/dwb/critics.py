@@ -15,12 +15,10 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import DynamicWindow as DwbSpec
 from simscen.stack.controllers.collision_checker import APPROACH_TOLERANCE_M, UNCERTAINTY_SIGMAS
 from simscen.stack.controllers.dwb.trajectory_generator import Trajectories
+from simscen.stack.costmap.grid_frame import Cells
 from simscen.stack.footprint import Footprint
-from simscen.stack.moving_obstacles import MovingObstacles
+from simscen.stack.moving_obstacles import Mask, MovingObstacles
 from simscen.stack.protocols import NO_INFORMATION, CostmapView
-
-Cells = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 
 BATCH_TRAJECTORIES = 50
 """Number of trajectories that are checked for collisions at once."""

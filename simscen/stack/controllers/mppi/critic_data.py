@@ -8,14 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
+from simscen.model.mppi import MppiCostCritic, MppiObstaclesCritic, MppiTrajectoryValidator
 from simscen.stack.controllers.mppi.rollouts import Floats, Rollouts
 from simscen.stack.controllers.path_handler import UpcomingPath
 from simscen.stack.footprint import CoveringDiscs, Footprint
 from simscen.stack.kinematics import VelocityLimits
-from simscen.stack.moving_obstacles import MAX_INFLATION_M, MovingObstacles
+from simscen.stack.moving_obstacles import MAX_INFLATION_M, Mask, MovingObstacles
 from simscen.stack.protocols import INSCRIBED, NO_INFORMATION, CostmapView
-
-Mask = npt.NDArray[np.bool_]
 
 MOVING_CLEARANCE_M = 0.25
 """Preferred clearance from moving obstacles, in addition to one standard deviation of their predicted position."""
@@ -188,6 +187,11 @@ class CriticData:
     def _distance(self, points: CellLookup) -> Floats:
         distance = self._flat_distances.take(points.cell)
         return distance if points.on_map is None else np.where(points.on_map, distance, np.float32(np.inf))
+
+
+def considers_footprint(spec: MppiCostCritic | MppiObstaclesCritic | MppiTrajectoryValidator) -> bool:
+    """Return the parameter `consider_footprint`. Its default None stands for true, unlike in Nav2."""
+    return spec.consider_footprint is not False
 
 
 def hypot_in_place(dx: Floats, dy: Floats) -> Floats:

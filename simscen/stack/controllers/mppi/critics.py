@@ -10,9 +10,10 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.model import mppi as model
-from simscen.stack.controllers.mppi.critic_data import CriticData, Mask, hypot_in_place
+from simscen.stack.controllers.mppi.critic_data import CriticData, considers_footprint, hypot_in_place
 from simscen.stack.controllers.mppi.rollouts import VX, VY, WZ, Floats
 from simscen.stack.kinematics import accumulate_rows
+from simscen.stack.moving_obstacles import Mask
 
 MIN_TURN_RATE_RAD_S = np.float32(1e-6)
 """Minimum turn rate in the computation of turning radii, so that these stay finite."""
@@ -104,7 +105,7 @@ def cost_critic(spec: model.MppiCostCritic, data: CriticData) -> tuple[Floats, M
     """
     steps = slice(None, None, spec.trajectory_point_step)
     x, y, yaw = data.rollouts.x[steps], data.rollouts.y[steps], data.rollouts.yaw[steps]
-    points, consider_footprint = data.lookup(x, y), spec.consider_footprint is not False
+    points, consider_footprint = data.lookup(x, y), considers_footprint(spec)
     collides = data.collides(data.clearance(points, yaw, consider_footprint), consider_footprint)
     score = np.arange(256, dtype=np.float32) * np.float32(data.plan.length >= spec.near_goal_distance)
     score[spec.near_collision_cost :] = spec.critical_cost
@@ -123,8 +124,7 @@ def obstacles_critic(spec: model.MppiObstaclesCritic, data: CriticData) -> tuple
     cost is added, from which its minimum over all rollouts is subtracted.
     """
     x, y, yaw = data.rollouts.x, data.rollouts.y, data.rollouts.yaw
-    consider_footprint = spec.consider_footprint is not False
-    points = data.lookup(x, y)
+    points, consider_footprint = data.lookup(x, y), considers_footprint(spec)
     clearance = data.clearance(points, yaw, consider_footprint)
     collides = data.collides(clearance, consider_footprint)
     near = np.maximum(np.float32(spec.collision_margin_distance) - clearance, 0).sum(axis=0)

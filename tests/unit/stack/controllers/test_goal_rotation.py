@@ -7,7 +7,7 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.goals import Goal
-from simscen.stack.controllers.path_follower import GoalRotation
+from simscen.stack.controllers.goal_rotation import GoalRotation
 from simscen.testing.flatland import round_robot
 
 PERIOD = 0.05

@@ -10,7 +10,7 @@ import yaml
 
 from simscen.core.geometry import Pose2
 from simscen.model.mppi import Mppi
-from simscen.stack.controllers.mppi.controller import apply_limits, sample_weights, smooth_sequence
+from simscen.stack.controllers.mppi.control_sequence import apply_limits, sample_weights, smooth_sequence
 from simscen.stack.controllers.mppi.critic_data import CriticData
 from simscen.stack.controllers.mppi.critics import CriticManager
 from simscen.stack.controllers.mppi.rollouts import integrate_velocities, predict_velocities

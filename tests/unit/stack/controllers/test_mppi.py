@@ -14,7 +14,8 @@ from simscen.core.messages.navigation import Path
 from simscen.model import mppi as model
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.controllers.mppi import critics
-from simscen.stack.controllers.mppi.controller import MppiController, apply_limits, shift_sequence, smooth_sequence
+from simscen.stack.controllers.mppi.control_sequence import apply_limits, shift_sequence, smooth_sequence
+from simscen.stack.controllers.mppi.controller import MppiController
 from simscen.stack.controllers.mppi.critic_data import CriticData
 from simscen.stack.controllers.mppi.rollouts import (
     Rollouts,
