@@ -14,7 +14,7 @@ from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import CollisionMonitor as MonitorSpec
 from simscen.stack.costmap.obstacle_layer import ScanWithMovingHits
 from simscen.stack.kinematics import poses_along
-from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
+from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles
 from simscen.stack.protocols import RobotModel
 
 DEFAULT_STEPS = 8
@@ -55,7 +55,7 @@ class CollisionMonitor:
         """Time in ticks for which the monitor may stop the robot before that counts as a failure."""
         self._scan_ticks, self._oldest, self._start_tick = dict.fromkeys(lidars, -math.inf), -math.inf, 0
         self._scans: dict[str, RecordedScan] = {}
-        self._moving, self._has_moving = no_moving_obstacles(), False
+        self._moving, self._has_moving = NO_MOVING_OBSTACLES, False
         corners = np.array(robot.footprint, dtype=np.float64)
         ends = np.roll(corners, -1, axis=0)
         normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))

@@ -68,27 +68,8 @@ class MovingObstacles:
 
     __slots__ = ("acceleration", "obstacles")
 
-    def __init__(
-        self, centers: Array, velocities: Array, radii: Array, covariances: Array, acceleration: float
-    ) -> None:
-        """Create obstacles from `centers` (n, 2) in m, `velocities` (n, 2) in m/s, and `radii` (n,) in m.
-
-        `covariances` (n, 4, 4) are those of (x, y, vx, vy). The larger value of the two axes is used for both.
-        """
-        spreads = np.maximum(covariances[:, (0, 0, 2), (0, 2, 2)], covariances[:, (1, 1, 3), (1, 3, 3)])
-        rows = zip(centers.tolist(), velocities.tolist(), radii.tolist(), spreads.tolist(), strict=True)
-        self.obstacles = tuple(
-            MovingObstacle(complex(*center), complex(*velocity), radius, *spread)
-            for center, velocity, radius, spread in rows
-        )
-        self.acceleration = acceleration
-
-    @classmethod
-    def of(cls, obstacles: Iterable[MovingObstacle], acceleration: float) -> "MovingObstacles":
-        """Create MovingObstacles from single obstacles."""
-        moving = object.__new__(cls)
-        moving.obstacles, moving.acceleration = tuple(obstacles), acceleration
-        return moving
+    def __init__(self, obstacles: Iterable[MovingObstacle], acceleration: float) -> None:
+        self.obstacles, self.acceleration = tuple(obstacles), acceleration
 
     def __len__(self) -> int:
         return len(self.obstacles)
@@ -194,12 +175,12 @@ class MovingObstacles:
         """
         start = complex(x, y)
         close = [each for each in self.obstacles if each.min_distance(start, speed, seconds) < reach]
-        return self if len(close) == len(self.obstacles) else MovingObstacles.of(close, self.acceleration)
+        return self if len(close) == len(self.obstacles) else MovingObstacles(close, self.acceleration)
 
     def in_frame(self, frame: Pose2) -> "MovingObstacles":
         """Return the obstacles expressed in another frame; `frame` is its pose in the current one."""
         origin, turn = complex(frame.x, frame.y), cmath.rect(1.0, -frame.yaw)
-        return MovingObstacles.of(
+        return MovingObstacles(
             [
                 MovingObstacle((position - origin) * turn, velocity * turn, *rest)
                 for position, velocity, *rest in self.obstacles
@@ -220,12 +201,7 @@ class MovingObstacles:
             )
             for position, velocity, radius, variance, covariance, velocity_variance in self.obstacles
         ]
-        return MovingObstacles.of(predicted, self.acceleration)
+        return MovingObstacles(predicted, self.acceleration)
 
 
-def no_moving_obstacles(acceleration: float = 0.0) -> MovingObstacles:
-    """Return an empty set of obstacles."""
-    return MovingObstacles.of((), acceleration)
-
-
-NO_MOVING_OBSTACLES = no_moving_obstacles()
+NO_MOVING_OBSTACLES = MovingObstacles((), 0.0)

@@ -13,7 +13,7 @@ from simscen.core.messages.navigation import Path
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import Prediction
 from simscen.stack.costmap.obstacle_layer import ScanWithMovingHits
-from simscen.stack.moving_obstacles import MovingObstacles, no_moving_obstacles
+from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import CostmapView, RobotModel
 
 WARM_UP_S, WARM_UP_SPEED_M_S = 0.7, 0.5
@@ -37,7 +37,7 @@ class MotionPrediction:
         self._stand_position = StandPosition(robot, full_speed)
         self._warm_up_ticks, self._must_stay = WARM_UP_S * tick_rate, False
         self._odometry = GyroOdometry(tick_rate)
-        self._no_obstacles = no_moving_obstacles(spec.acceleration)
+        self._no_obstacles = MovingObstacles((), spec.acceleration)
         self._active: list[Tracker] = []  # trackers with moving obstacles
         self._predicted: tuple[int, MovingObstacles] | None = None
         self._transformed: tuple[MovingObstacles, Pose2, Pose2, MovingObstacles] | None = None
@@ -79,7 +79,7 @@ class MotionPrediction:
         if self._predicted is None or self._predicted[0] != tick:
             predicted = [tracker.moving.after((tick - tracker.tick) / self._rate) for tracker in self._active]
             obstacles = [obstacle for each in predicted for obstacle in each.obstacles]
-            self._predicted = tick, MovingObstacles.of(obstacles, self._spec.acceleration)
+            self._predicted = tick, MovingObstacles(obstacles, self._spec.acceleration)
         return self._predicted[1]
 
     def moving_obstacles_in_frame(self, tick: int, pose: Pose2) -> MovingObstacles:

@@ -15,7 +15,7 @@ from simscen.advanced.prediction.tracks import Track, TrackLifecycle
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import Prediction
-from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles, no_moving_obstacles
+from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles
 
 CHECKED_BEAMS = 120
 """Approximate number of beams that are checked while there are no tracks. All beams are processed if one of these beams
@@ -44,7 +44,7 @@ class Tracker:
         """Tick of the first scan."""
         self.moving_hits: Mask | None = None
         """Mask of the beams of the latest scan that hit moving obstacles; None if there are none."""
-        self.moving = no_moving_obstacles(spec.acceleration)
+        self.moving = MovingObstacles((), spec.acceleration)
         """Moving obstacles at the tick of the latest scan."""
 
     @property
@@ -63,7 +63,7 @@ class Tracker:
         if seconds > 0:
             for track in self._tracks:
                 track.predict(seconds, self._spec.acceleration)
-        self.moving_hits, self.moving = None, no_moving_obstacles(self._spec.acceleration)
+        self.moving_hits, self.moving = None, MovingObstacles((), self._spec.acceleration)
         earlier = self._memory.scan_before(scan.tick)
         if self._tracks or (earlier is not None and self._has_new_hit(scan, lidar, earlier)):
             self._update_tracks(CurrentScan(scan, _ends(scan.ranges, self._directions), lidar, earlier))
@@ -133,7 +133,7 @@ class Tracker:
             )
             for each in moving
         ]
-        self.moving = MovingObstacles.of(obstacles, self._spec.acceleration)
+        self.moving = MovingObstacles(obstacles, self._spec.acceleration)
         hits = np.zeros(len(ends), dtype=np.bool_)
         for obstacle in obstacles:
             hits |= np.abs(ends - lidar.to_lidar(obstacle.position)) <= self._spec.margin + obstacle.radius

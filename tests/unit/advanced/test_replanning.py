@@ -13,7 +13,7 @@ from simscen.core.records.events import Event
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.planners import OmplPlanner as PlannerSpec
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
-from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles
+from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacle, MovingObstacles
 from simscen.stack.protocols import CostmapView, NavigationFailure, Surroundings
 from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot
 
@@ -220,8 +220,7 @@ def test_tight_path_is_retried_if_there_is_no_wider_one() -> None:
 
 def obstacle_at(y: float, vy: float) -> MovingObstacles:
     """Return an obstacle at (2, y) that moves along y."""
-    center, velocity = np.array([[2.0, y]]), np.array([[0.0, vy]])
-    return MovingObstacles(center, velocity, np.array([0.3]), np.diag((1e-4,) * 4)[None], 0.3)
+    return MovingObstacles([MovingObstacle(complex(2.0, y), complex(0.0, vy), 0.3, 1e-4, 0.0, 1e-4)], 0.3)
 
 
 def test_plan_that_meets_a_moving_obstacle_is_renewed_twice_a_second() -> None:

@@ -10,7 +10,7 @@ from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import CollisionMonitor as MonitorSpec
 from simscen.stack.collision_monitor import CollisionMonitor
-from simscen.stack.moving_obstacles import MovingObstacles
+from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles
 from simscen.stack.protocols import RobotModel
 from simscen.testing.flatland import TICK_RATE_HZ, box_robot, round_robot
 
@@ -112,7 +112,10 @@ def test_quick_check_brakes_for_moving_obstacles_like_the_full_check(
     rng, braked, spared = np.random.default_rng(4), 0, 0
     for _ in range(400):
         places, speeds = rng.normal(0.0, 1.2, (2, 2)), rng.normal(0.0, 0.7, (2, 2))
-        moving = MovingObstacles(places, speeds, np.array((0.3, 0.1)), np.zeros((2, 4, 4)), 0.0)
+        states = zip(places, speeds, (0.3, 0.1), strict=True)
+        moving = MovingObstacles(
+            (MovingObstacle(complex(*xy), complex(*v), radius, 0.0, 0.0, 0.0) for xy, v, radius in states), 0.0
+        )
         wanted = Twist(*rng.normal(0.0, (0.5, 0.1, 0.8)).tolist())
         hasty.set_moving_obstacles(moving)
         thorough.set_moving_obstacles(moving)

@@ -7,7 +7,7 @@ from simscen.advanced.prediction.followed_path import FollowedPath
 from simscen.advanced.prediction.rollouts import HORIZON_S, TIMES
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles
+from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacle, MovingObstacles
 from simscen.testing.flatland import round_robot
 
 
@@ -25,18 +25,15 @@ def test_minimum_distance_bound_holds_for_every_path() -> None:
 
 def test_arrays_are_unchanged_and_rotate_with_the_frame() -> None:
     spread = np.kron([[[0.1, 0.02], [0.02, 0.4]]], np.eye(2))
-    one = MovingObstacles(np.array([[3.0, 1.0]]), np.array([[1.0, 0.0]]), np.array([0.3]), spread, 1.0)
+    one = MovingObstacles((MovingObstacle(3 + 1j, 1 + 0j, 0.3, 0.1, 0.02, 0.4),), 1.0)
     assert one.covariances == pytest.approx(spread)
     seen = one.in_frame(Pose2(1.0, 1.0, np.pi / 2)).after(2.0)
     assert seen.centers == pytest.approx(np.array([[0.0, -4.0]]))
     assert seen.velocities == pytest.approx(np.array([[0.0, -1.0]]))
     step = np.eye(4) + 2.0 * np.eye(4, k=2)
     assert seen.covariances == pytest.approx(step @ spread @ step.T)
-    assert MovingObstacles.of((), 1.0).centers.shape == (0, 2) and MovingObstacles.of((), 1.0).covariances.shape == (
-        0,
-        4,
-        4,
-    )
+    assert NO_MOVING_OBSTACLES.centers.shape == (0, 2)
+    assert NO_MOVING_OBSTACLES.covariances.shape == (0, 4, 4)
 
 
 def test_quick_check_agrees_with_a_check_of_each_prediction() -> None:
@@ -48,7 +45,7 @@ def test_quick_check_agrees_with_a_check_of_each_prediction() -> None:
         here = Pose2(float(rng.uniform(-0.3, 3.0)), float(rng.uniform(-0.4, 0.4)), float(rng.uniform(-3.0, 3.0)))
         twist, wanted = (Twist(float(rng.uniform(-0.5, 0.5)), 0.0, 0.0) for _ in range(2))
         thing = MovingObstacle(complex(*rng.uniform(-4, 4, 2)), complex(*rng.uniform(-1, 1, 2)), 0.3, 0.01, 0.0, 0.02)
-        moving = MovingObstacles.of((thing,), 1.5)
+        moving = MovingObstacles((thing,), 1.5)
         place, speed, apart = path.position_over_time(here, twist, wanted, robot)
         way = path.rollouts(here, twist, wanted, (1.0,), robot, with_headings=False)
         assert np.abs(way.x[0] + 1j * way.y[0] - [place(time) for time in TIMES]).max() <= apart + 1e-9

@@ -21,7 +21,7 @@ from simscen.model.mppi import Mppi
 from simscen.model.stack import StackSpec
 from simscen.model.stack_base import ControllerSpec
 from simscen.stack.collision_monitor import CollisionMonitor
-from simscen.stack.moving_obstacles import MovingObstacles
+from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles
 from simscen.stack.protocols import CostmapView, RobotModel
 from simscen.testing.flatland import TICK_RATE_HZ, Drive, Flatland, box_robot, drive
 
@@ -137,7 +137,10 @@ def test_pruned_search_finds_the_cheapest_candidate(robot: RobotModel, monkeypat
         monkeypatch.setattr(avoidance, "BATCH_SIZE", batch_size)
         subject, commands = Avoidance(Prediction(), robot, 1.0), list[Twist]()
         for centers, velocities, (x, vx, wz) in samples:
-            moving = MovingObstacles(centers, velocities, np.full(3, 0.3), np.tile(0.01 * np.eye(4), (3, 1, 1)), 1.0)
+            states = zip(centers, velocities, strict=True)
+            moving = MovingObstacles(
+                (MovingObstacle(complex(*xy), complex(*v), 0.3, 0.01, 0.0, 0.01) for xy, v in states), 1.0
+            )
             wanted, twist = Twist(1.0, 0.0, 0.1), Twist(float(vx), 0.0, float(wz))
             commands.append(subject.steer(wanted, Pose2(float(x), 0.1, 0.2), twist, moving, costmap, path))
         results.append(commands)
@@ -148,11 +151,10 @@ def test_pruned_search_finds_the_cheapest_candidate(robot: RobotModel, monkeypat
 def test_the_collision_monitor_brakes_by_the_relative_velocity_and_only_where_braking_helps() -> None:
     robot = box_robot()
     monitor = CollisionMonitor(CollisionMonitorSpec(), robot, (), TICK_RATE_HZ)
-    certain = np.zeros((1, 4, 4))
 
     def allowed_speed(x: float, y: float, vx: float, vy: float) -> float:
         monitor.set_moving_obstacles(
-            MovingObstacles(np.array([[x, y]]), np.array([[vx, vy]]), np.array([0.5]), certain, 1.0)
+            MovingObstacles([MovingObstacle(complex(x, y), complex(vx, vy), 0.5, 0.0, 0.0, 0.0)], 1.0)
         )
         return monitor.limit_command(Twist(1.0, 0.0, 0.0), Pose2(0.0, 0.0)).vx
 

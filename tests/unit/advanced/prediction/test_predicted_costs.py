@@ -4,18 +4,17 @@ import pytest
 from simscen.advanced.predicted_costs import add_predicted_costs, meets_moving_obstacle
 from simscen.core.geometry import Pose2
 from simscen.model.planners import OmplPlanner as Spec
-from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles
+from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacle, MovingObstacles
 from simscen.stack.planners.ompl_planner import OmplPlanner
 from simscen.stack.protocols import CostmapView
 from simscen.testing.flatland import round_robot
 
 ROBOT = Pose2(0.0, 0.0)
 SPEED, RADIUS = 1.0, 0.22
-COVARIANCE = np.diag((1e-4, 1e-4, 1e-4, 1e-4))[None]
 
 
 def crossing(x: float, y: float, vy: float) -> MovingObstacles:
-    return MovingObstacles(np.array([[x, y]]), np.array([[0.0, vy]]), np.array([0.3]), COVARIANCE, 0.3)
+    return MovingObstacles([MovingObstacle(complex(x, y), complex(0.0, vy), 0.3, 1e-4, 0.0, 1e-4)], 0.3)
 
 
 def costmap_with(moving: MovingObstacles, resolution: float = 0.05) -> CostmapView:

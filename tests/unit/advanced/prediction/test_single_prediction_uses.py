@@ -8,7 +8,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.goals import Goal
 from simscen.model.stack import StackSpec
 from simscen.stack.frames import Frames
-from simscen.stack.moving_obstacles import no_moving_obstacles
+from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES
 from simscen.testing.flatland import TICK_RATE_HZ, Flatland, drive, round_robot
 
 CONTROLLERS: dict[str, dict[str, Any]] = {
@@ -32,9 +32,9 @@ def min_clearance(user: str, controller: str = "regulated_pure_pursuit") -> floa
     def update(tick: int, frames: Frames) -> None:
         original(tick, frames)
         if user != "monitor":
-            stack._monitor.set_moving_obstacles(no_moving_obstacles())
+            stack._monitor.set_moving_obstacles(NO_MOVING_OBSTACLES)
         if user != "controller":
-            stack._costmaps.local_costmap.moving = no_moving_obstacles()
+            stack._costmaps.local_costmap.moving = NO_MOVING_OBSTACLES
 
     stack._on_costmaps_updated = update
     world.discs.append((4.5, 0.5, 0.3))

@@ -23,7 +23,7 @@ from simscen.stack.controllers.path_handler import UpcomingPath
 from simscen.stack.controllers.regulated_pure_pursuit import RegulatedPurePursuit as Rpp
 from simscen.stack.footprint import Footprint
 from simscen.stack.kinematics import VelocityLimits
-from simscen.stack.moving_obstacles import MovingObstacles
+from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles
 from simscen.stack.protocols import Controller, CostmapView
 from simscen.testing.flatland import box_robot, round_robot, setting
 
@@ -39,9 +39,8 @@ there when the robot is; and one that stands."""
 
 def among(*discs: tuple[float, float, float, float], deviation: float = 0.0) -> CostmapView:
     """A costmap with these on it and nothing else, all of whose places are known to so many meters."""
-    known = np.array(discs)
-    sure = np.tile(np.diag((deviation**2, deviation**2, 0.0, 0.0)), (len(discs), 1, 1))
-    return replace(OPEN, moving=MovingObstacles(known[:, :2], known[:, 2:], np.full(len(discs), 0.2), sure, 0.0))
+    obstacles = [MovingObstacle(complex(x, y), complex(vx, vy), 0.2, deviation**2, 0.0, 0.0) for x, y, vx, vy in discs]
+    return replace(OPEN, moving=MovingObstacles(obstacles, 0.0))
 
 
 def met(disc: tuple[float, float, float, float], speed: float, seconds: float = 1.0) -> bool:
