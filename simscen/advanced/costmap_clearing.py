@@ -1,12 +1,14 @@
 """Policy of the advanced stack for clearing the global costmap after planner errors."""
 
+from simscen.stack.navigator import ClearingPolicy
+
 INITIAL_WAIT_S = 10.0
 """Time after clearing the entire costmap until this may happen again; doubled each time."""
 PROGRESS_M = 1.0
 """Decrease of the distance to the goal that resets the time between two clearings to INITIAL_WAIT_S."""
 
 
-class ClearingBackoff:
+class ClearingBackoff(ClearingPolicy):
     """Policy that clears the entire global costmap at increasing intervals, and otherwise only around the robot."""
 
     def __init__(self) -> None:

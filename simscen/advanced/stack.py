@@ -12,7 +12,7 @@ from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.stack.build import StackBuilder
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames
-from simscen.stack.navigator import ClearingPolicy, FullClearing
+from simscen.stack.navigator import ClearingPolicy
 from simscen.stack.plan_manager import PlanManager
 from simscen.stack.protocols import Controller, Planner
 from simscen.stack.reference import ReferenceStack
@@ -106,8 +106,8 @@ class AdvancedStackBuilder(StackBuilder):
         )
 
     def make_clearing_policy(self) -> ClearingPolicy:
-        """Make the policy for clearing the global costmap: FullClearing if `recovery.clear_entirely`."""
-        return FullClearing() if self.spec.recovery.clear_entirely else ClearingBackoff()
+        """Make the policy for clearing the global costmap: all of it if `recovery.clear_entirely`."""
+        return ClearingPolicy() if self.spec.recovery.clear_entirely else ClearingBackoff()
 
     def make_stack(self, *parts: Any) -> AdvancedStack:
         """Make the stack from `parts`, the components of the reference stack."""

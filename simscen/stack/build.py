@@ -12,7 +12,18 @@ from simscen.model.recovery import Recovery
 from simscen.model.stack import InProcessStack, StackSpec
 from simscen.model.stack_base import Latency
 from simscen.stack.behaviors import BehaviorSequence
-from simscen.stack.checked_components import (
+from simscen.stack.checkers import ProgressChecker
+from simscen.stack.collision_monitor import CollisionMonitor
+from simscen.stack.commands import CommandPipeline, VelocitySmoother
+from simscen.stack.costmap.costmaps import Costmaps
+from simscen.stack.navigator import ClearingPolicy, Navigator
+from simscen.stack.odometry_history import TRAIL_S, OdometryHistory
+from simscen.stack.plan_manager import PlanManager
+from simscen.stack.protocols import Behavior, Controller, Localizer, Planner, Surroundings
+from simscen.stack.reference import ReferenceStack
+from simscen.stack.setting import Setting
+from simscen.stack.tasks import Task
+from simscen.stack.validation.components import (
     CheckedBehavior,
     CheckedController,
     CheckedGoalChecker,
@@ -20,18 +31,7 @@ from simscen.stack.checked_components import (
     CheckedPlanner,
     build_component,
 )
-from simscen.stack.checked_stack import CheckedStack
-from simscen.stack.checkers import ProgressChecker
-from simscen.stack.collision_monitor import CollisionMonitor
-from simscen.stack.commands import CommandPipeline, VelocitySmoother
-from simscen.stack.costmap.costmaps import Costmaps
-from simscen.stack.frames import TRAIL_S, OdometryHistory
-from simscen.stack.navigator import ClearingPolicy, FullClearing, Navigator
-from simscen.stack.plan_manager import PlanManager
-from simscen.stack.protocols import Behavior, Controller, Localizer, Planner, Surroundings
-from simscen.stack.reference import ReferenceStack
-from simscen.stack.setting import Setting
-from simscen.stack.tasks import Task
+from simscen.stack.validation.stack import CheckedStack
 
 if TYPE_CHECKING:
     from simscen.stack.localizers.odometry_filter import OdometryFilter
@@ -172,7 +172,7 @@ class StackBuilder:
 
     def make_clearing_policy(self) -> ClearingPolicy:
         """Make the policy that decides how much of the global costmap is cleared when planning has failed."""
-        return FullClearing()
+        return ClearingPolicy()
 
     def make_stack(self, *arguments: Any) -> ReferenceStack:
         """Call the constructor of the stack with these arguments."""

@@ -123,12 +123,12 @@ class LocalPathSender:
 
     def update(self, plan: FollowedPlan, goal: Goal, frames: Frames) -> Goal:
         """Update the controller's path. `plan` and `goal` are in the map frame. Return the goal in the odom frame."""
-        is_unchanged = frames.shift_since(self._odom_from_map, COMPARISON_DISTANCE_M) <= ROUNDING_M
+        is_unchanged = frames.map_shift(self._odom_from_map, COMPARISON_DISTANCE_M) <= ROUNDING_M
         if not is_unchanged:
             self._odom_from_map = frames.odom_from_map
         if plan is not self._plan:
             self._send(plan, plan.path.points)
-        elif not is_unchanged and frames.shift_since(self._sent_odom_from_map, COMPARISON_DISTANCE_M) > MIN_SHIFT_M:
+        elif not is_unchanged and frames.map_shift(self._sent_odom_from_map, COMPARISON_DISTANCE_M) > MIN_SHIFT_M:
             plan.locate(frames.pose)
             self._send(plan, plan.ahead)
         local = self._local_goal

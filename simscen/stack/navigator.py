@@ -8,7 +8,7 @@ The goal fails at once after a planner error that is not in `planner_codes`, and
 not fit there on the map.
 """
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.goals import Goal
@@ -23,29 +23,20 @@ from simscen.stack.plan_manager import PlanManager
 from simscen.stack.protocols import Behavior, Controller, GoalChecker, NavigationFailure
 
 
-class ClearingPolicy(Protocol):
-    """Decides how much of the global costmap is cleared when planning has failed."""
+class ClearingPolicy:
+    """Decides how much of the global costmap is cleared when planning has failed: all of it, as in Nav2's default tree.
+
+    Subclasses may clear less.
+    """
 
     def reset(self) -> None:
         """Prepare for a new goal."""
-        ...
 
     def clears_entirely(self, now: float, goal_distance: float) -> bool:
         """Return True to clear the entire global costmap, False to clear only the area around the robot.
 
         `now` is the navigator's time in s, `goal_distance` the straight distance to the goal in m.
         """
-        ...
-
-
-class FullClearing:
-    """Clears the entire costmap each time, as Nav2's default tree does."""
-
-    def reset(self) -> None:
-        """Prepare for a new goal."""
-
-    def clears_entirely(self, now: float, goal_distance: float) -> bool:
-        """Return True."""
         return True
 
 

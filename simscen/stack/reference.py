@@ -15,10 +15,11 @@ from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.commands import CommandPipeline
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.costmap.speed_filter import SpeedFilter
-from simscen.stack.frames import Frames, OdometryHistory, is_plausible
+from simscen.stack.frames import Frames
 from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.localizers.ground_truth import TRUTH
 from simscen.stack.navigator import Navigator
+from simscen.stack.odometry_history import OdometryHistory, is_plausible
 from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings, supports_pose
 from simscen.stack.publishing import NO_UPDATES, Publisher, StandstillReporter, Updates
 from simscen.stack.tasks import Task

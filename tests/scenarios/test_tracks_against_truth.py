@@ -11,8 +11,8 @@ from simscen.loading.scenario import load_scenario
 from simscen.run.lockstep import RobotUnderTest
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
-from simscen.stack.checked_stack import CheckedStack
 from simscen.stack.reference import ReferenceStack
+from simscen.stack.validation.stack import CheckedStack
 
 WORLDS = Path(__file__).parents[2] / "worlds"
 HOUSE = """\

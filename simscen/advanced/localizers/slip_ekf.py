@@ -25,10 +25,10 @@ from simscen.advanced.spec import SlipEkf
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
-from simscen.stack.frames import OdometryHistory, is_plausible
 from simscen.stack.localizers.dead_reckoning import initial_pose
 from simscen.stack.localizers.ekf import MAX_YAW_RATE_RAD_S, MIN_YAW_RATE_STD_RAD_S
 from simscen.stack.localizers.kalman_filters import ExtendedKalmanFilter
+from simscen.stack.odometry_history import OdometryHistory, is_plausible
 
 
 class ScanMatchingCorrection:

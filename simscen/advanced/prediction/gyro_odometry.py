@@ -9,8 +9,8 @@ from math import cos, remainder, sin, tau
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.messages.sensor_data import Imu, Odometry
-from simscen.stack.frames import OdometryHistory
 from simscen.stack.localizers.ekf import MAX_YAW_RATE_RAD_S
+from simscen.stack.odometry_history import OdometryHistory
 
 MAX_PENDING = 10_000
 """Maximum number of readings that wait for integration."""

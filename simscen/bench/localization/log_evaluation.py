@@ -15,9 +15,9 @@ from simscen.core.random_streams import Streams
 from simscen.model.stack import StackSpec
 from simscen.record.localization_logs.read import LocalizationLog
 from simscen.record.localization_logs.rows import TICK_RATE_HZ
-from simscen.stack.checked_components import CheckedLocalizer
 from simscen.stack.protocols import Surroundings
 from simscen.stack.setting import Setting
+from simscen.stack.validation.components import CheckedLocalizer
 
 MAX_GAP_S = 1.0
 """Time between two consecutive reference poses up to which all beliefs between them are compared."""

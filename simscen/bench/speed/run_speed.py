@@ -22,8 +22,8 @@ from simscen.run.preparation import PreparedScenario, lidar_height, prepare
 from simscen.run.run_files import GC_THRESHOLD
 from simscen.run.simulate import simulate
 from simscen.sim.bullet.baseline import PyBulletBaseline
-from simscen.stack.checked_stack import CheckedStack
 from simscen.stack.reference import ReferenceStack
+from simscen.stack.validation.stack import CheckedStack
 from simscen.worlds.geometry.triangulation import merge_solids, triangulate
 from simscen.worlds.raycasting.ray_scene import RayScene
 

@@ -23,8 +23,8 @@ from simscen.run.live_world.event_data import body_data, path_data, pose_data
 from simscen.run.live_world.pedestrians import PedestrianSimulation
 from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
-from simscen.stack.checked_stack import CheckedStack
 from simscen.stack.protocols import Stack
+from simscen.stack.validation.stack import CheckedStack
 
 
 class LiveStage:

@@ -10,8 +10,9 @@ from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.stack import StackSpec
 from simscen.stack.costmap.grid_frame import MAX_ROLL_OFFSET_M
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
-from simscen.stack.frames import Frames, OdometryHistory, transform_polygon
+from simscen.stack.frames import Frames, transform_polygon
 from simscen.stack.latency_queue import LatencyQueue
+from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Surroundings
 
 MIN_LOCAL_SIZE_M = 3.0
@@ -102,7 +103,7 @@ class Costmaps:
         mask, previous = self._zones.masks.keepout, self._odom_from_map
         if not self._zones.keepout and mask is None and not self._has_zones:
             return
-        if previous is not None and frames.shift_since(previous, self._local_range) <= ZONE_TOLERANCE_M:
+        if previous is not None and frames.map_shift(previous, self._local_range) <= ZONE_TOLERANCE_M:
             return
         odom_from_map, self._has_zones = frames.odom_from_map, True
         self._odom_from_map = odom_from_map

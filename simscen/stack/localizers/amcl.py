@@ -10,10 +10,10 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import AmclParameters
-from simscen.stack.frames import OdometryHistory
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.particles import covariance_about, summarize
+from simscen.stack.odometry_history import OdometryHistory
 
 
 @dataclass(frozen=True, eq=False)

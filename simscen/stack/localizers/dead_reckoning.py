@@ -11,7 +11,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
-from simscen.stack.frames import is_plausible
+from simscen.stack.odometry_history import is_plausible
 
 CovarianceTriangle = tuple[float, float, float, float, float, float]
 """Upper triangle of a covariance of x, y, and heading a, row by row: xx, xy, xa, yy, ya, aa."""

@@ -11,9 +11,9 @@ from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.localizers import Ekf
-from simscen.stack.frames import is_plausible
 from simscen.stack.kinematics import mean_velocity
 from simscen.stack.localizers.dead_reckoning import initial_pose
+from simscen.stack.odometry_history import is_plausible
 
 X, Y, YAW, VX, VY, VYAW, BIAS = range(7)
 """Indices of the state: the pose in the map frame, the velocity in the base frame, and the bias of the gyroscope."""

@@ -5,8 +5,8 @@ import numpy as np
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
-from simscen.stack.frames import is_plausible
 from simscen.stack.localizers.dead_reckoning import initial_pose
+from simscen.stack.odometry_history import is_plausible
 
 TRUTH = "ground_truth"
 """Name of the sensor whose odometry readings are true poses in the map frame."""

@@ -13,10 +13,10 @@ from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.model import localizers as model
-from simscen.stack.frames import is_plausible
 from simscen.stack.kinematics import mean_velocity
 from simscen.stack.localizers.ekf import MAX_YAW_RATE_RAD_S
 from simscen.stack.localizers.kalman_filters import KalmanFilter
+from simscen.stack.odometry_history import is_plausible
 
 VX, VY, VYAW, BIAS = range(4)
 """Indices of the state: velocity in the base frame (m/s, m/s, rad/s), and bias of the gyroscope (rad/s)."""

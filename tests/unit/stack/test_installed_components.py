@@ -218,7 +218,7 @@ def driven_setting():
 
 def test_failure_without_a_nav2_code_is_a_contract_violation(odd) -> None:
     from simscen.model.planners import OmplPlanner
-    from simscen.stack.checked_components import CheckedPlanner
+    from simscen.stack.validation.components import CheckedPlanner
     from simscen.testing.flatland import setting
 
     class Own(OmplPlanner):

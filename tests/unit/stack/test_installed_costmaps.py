@@ -9,7 +9,7 @@ import pytest
 from simscen.core.errors import RunError
 from simscen.core.random_streams import Streams
 from simscen.plugin import STOP, CostGrid, Decision, InProcessStack, OccupancyGrid, Setting, Surroundings
-from simscen.stack.checked_stack import CheckedStack
+from simscen.stack.validation.stack import CheckedStack
 from simscen.testing.flatland import round_robot
 
 GRID = OccupancyGrid(np.zeros((3, 4), dtype=np.int8), 0.1)

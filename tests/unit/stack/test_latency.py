@@ -14,8 +14,9 @@ from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec
 from simscen.model.stack_base import Latency
 from simscen.stack.costmap.costmaps import Costmaps
-from simscen.stack.frames import Frames, OdometryHistory
+from simscen.stack.frames import Frames
 from simscen.stack.latency_queue import LatencyQueue
+from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Surroundings
 from simscen.stack.reference import ReferenceStack
 from simscen.testing.flatland import (

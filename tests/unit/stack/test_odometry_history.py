@@ -1,7 +1,7 @@
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.stack.frames import HISTORY_S, OdometryHistory
+from simscen.stack.odometry_history import HISTORY_S, OdometryHistory
 
 RATE = 10
 

@@ -19,9 +19,9 @@ from simscen.loading.builders import world_from_file
 from simscen.loading.files.single_files import load_world_file
 from simscen.model.localizers import Amcl
 from simscen.model.world import WorldSpec
-from simscen.stack.checked_components import CheckedLocalizer
 from simscen.stack.protocols import Localizer, Surroundings
 from simscen.stack.setting import Setting
+from simscen.stack.validation.components import CheckedLocalizer
 from simscen.testing.synthetic_room import ROBOT, TICK_RATE_HZ
 from simscen.worlds.built_world import build_world_and_map
 from simscen.worlds.geometry.triangulation import merge_solids

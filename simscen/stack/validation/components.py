@@ -1,18 +1,16 @@
 """Wrappers that check the return values of planners, controllers, and other components of a stack."""
 
 import math
-import traceback
-from collections.abc import Callable, Iterable
-from typing import Any, ClassVar, NoReturn, ParamSpec, TypeVar
+from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.errors import BROKEN_COMPONENT, RunError
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.goals import Goal
-from simscen.core.messages.navigation import Belief, ErrorCode, Estimate, Path
+from simscen.core.messages.navigation import Belief, Estimate, Path
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.model.controllers import GoalCheckerSpec
 from simscen.model.localizers import LocalizerSpec
@@ -20,19 +18,10 @@ from simscen.model.planners import PlannerSpec
 from simscen.model.recovery import BehaviorSpec
 from simscen.model.stack_base import ControllerSpec
 from simscen.spec.base import Component
-from simscen.stack.protocols import (
-    LETHAL,
-    Behavior,
-    Controller,
-    CostmapView,
-    GoalChecker,
-    Localizer,
-    NavigationFailure,
-    Planner,
-)
+from simscen.stack.protocols import LETHAL, Behavior, Controller, CostmapView, GoalChecker, Localizer, Planner
 from simscen.stack.setting import Setting
+from simscen.stack.validation.plugin import CheckedPlugin
 
-P = ParamSpec("P")
 T = TypeVar("T")
 S = TypeVar("S", bound=Component)
 
@@ -41,110 +30,6 @@ def build_component(wrapper: Callable[[S, Setting], T], spec: S, setting: Settin
     """Build a component from its specification. If it comes from another package, return it inside `wrapper`."""
     component: T = (spec.implementation() if spec.component.startswith("simscen.") else wrapper)(spec, setting)
     return component
-
-
-class CheckedPlugin:
-    """Base class of the wrappers. An invalid return value or an unexpected exception raises RunError.
-
-    The parameter `prefix` of methods is the start of an error message, such as "returned".
-    """
-
-    may_fail: ClassVar[bool] = True
-    """Whether a component of this role may raise NavigationFailure."""
-
-    def __init__(self, role: str, spec: Component, setting: Setting, protocol: type) -> None:
-        """Build the component. Raises RunError if it lacks a method of `protocol`. `role` is for example "planner"."""
-        self.role, self._spec = role, spec
-        self.inner: Any = self.call(lambda: spec.implementation()(spec, setting))
-        for name in method_names(protocol):
-            if not callable(getattr(self.inner, name, None)):
-                self.raise_invalid(f"{type(self.inner).__name__} has no method `{name}`, which every {role} needs")
-
-    @property
-    def label(self) -> str:
-        """Name in messages, e.g. "planner `theta_star` (theta_star.planner:ThetaStar)"."""
-        kind = getattr(self._spec, "type", "")
-        return f"{self.role} `{kind}` ({self._spec.component})" if kind else f"{self.role} ({self._spec.component})"
-
-    def call(self, method: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Call a method of the component, and return its result. Exceptions go through `raise_as_run_error`."""
-        try:
-            return method(*args, **kwargs)
-        except Exception as error:  # code of other packages can raise anything
-            self.raise_as_run_error(error)
-
-    def raise_as_run_error(self, error: Exception) -> NoReturn:
-        """Raise a RunError that names the component.
-
-        RunError, MemoryError, and, if `may_fail`, NavigationFailure are raised unchanged.
-        """
-        if isinstance(error, RunError | MemoryError):
-            raise error
-        if isinstance(error, NavigationFailure) and self.may_fail:
-            if not isinstance(error.code, ErrorCode):
-                self.raise_invalid(f"failed with {error.code!r}, which is not an ErrorCode")
-            raise error
-        message = f"{self.label}: {type(error).__name__}: {error} ({self._location(error)})"
-        raise RunError("crashed", message, by_stack=True) from error
-
-    def raise_invalid(self, problem: str) -> NoReturn:
-        """Raise a RunError with the message "<label> <problem>"."""
-        raise RunError(BROKEN_COMPONENT, f"{self.label} {problem}", by_stack=True)
-
-    def checked_path(self, path: object, prefix: str) -> Path:
-        """Return the path if it consists of finite poses (n, 3); otherwise raise RunError."""
-        if not isinstance(path, Path):
-            self.raise_invalid(f"{prefix} {type(path).__name__} instead of a Path")
-        points = path.points
-        if not isinstance(points, np.ndarray) or points.ndim != 2 or points.shape[1] != 3:
-            self.raise_invalid(f"{prefix} a path whose points are {_shape_text(points)} instead of (n, 3): x, y, yaw")
-        if points.dtype.kind != "f" or not all_finite(points):
-            self.raise_invalid(f"{prefix} a path with points that are not finite numbers")
-        return path
-
-    def checked_twist(self, command: object) -> Twist:
-        """Return the velocity if it consists of three finite numbers; otherwise raise RunError."""
-        if not isinstance(command, Twist):
-            self.raise_invalid(f"commanded {type(command).__name__} instead of a Twist")
-        if not are_numbers(command):
-            self.raise_invalid(f"commanded {tuple(command)}, which is not a finite velocity")
-        return command
-
-    def checked_pose(self, pose: object, prefix: str) -> Pose2:
-        """Return the pose if it consists of three finite numbers; otherwise raise RunError."""
-        if not isinstance(pose, Pose2) or not are_numbers(pose):
-            self.raise_invalid(f"{prefix} {pose!r}, which is not a finite pose")
-        return pose
-
-    def _location(self, error: Exception) -> str:
-        """Return "file:line" of the traceback: if possible, of the innermost entry in the component's package."""
-        package = self._spec.component.partition(":")[0].partition(".")[0]
-        frames = list(traceback.walk_tb(error.__traceback__))
-        own = [entry for entry in frames if str(entry[0].f_globals.get("__name__", "")).partition(".")[0] == package]
-        frame, line = (own or frames)[-1]
-        return f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"
-
-
-def method_names(protocol: type) -> list[str]:
-    """Return the names of the public methods of a protocol."""
-    return [name for name, value in vars(protocol).items() if callable(value) and not name.startswith("_")]
-
-
-def are_numbers(values: Iterable[object]) -> bool:
-    """Return whether all values are real numbers and finite."""
-    try:
-        return math.isfinite(math.hypot(*values))  # type: ignore[arg-type]  # other types raise
-    except TypeError:
-        return False
-
-
-def all_finite(values: Array) -> bool:
-    """Return whether all numbers of an array are finite."""
-    return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())  # the sum of squares is faster
-
-
-def _shape_text(points: object) -> str:
-    return str(points.shape) if isinstance(points, np.ndarray) else type(points).__name__
 
 
 START_TOLERANCE_M = 0.05
@@ -290,30 +175,8 @@ class CheckedLocalizer(CheckedPlugin):
         """Belief of the localizer. Raises RunError when it is invalid."""
         try:
             belief = self.inner.belief
-        except Exception as error:  # as in `call`, without its overhead at every beat
+        except Exception as error:  # as in `call`, without its overhead in every control period
             self.raise_as_run_error(error)
         if self._last is None or belief is not self._last:
-            self._last = checked_belief(self, belief, self._last)
+            self._last = self.checked_belief(belief, self._last)
         return self._last
-
-
-def checked_belief(plugin: CheckedPlugin, belief: object, before: Belief | None = None) -> Belief:
-    """Return the belief if it is finite and has the right shapes; otherwise raise RunError, which names the plugin.
-
-    `before` is the previous valid belief: shared `map_from_odom` and read-only particles are not checked again.
-    """
-    if not isinstance(belief, Belief):
-        plugin.raise_invalid(f"returned {type(belief).__name__} instead of a Belief")
-    plugin.checked_pose(belief.pose, "returned a Belief with the pose")
-    if before is None or belief.map_from_odom is not before.map_from_odom:
-        plugin.checked_pose(belief.map_from_odom, "returned a Belief with `map_from_odom`")
-    if not _is_finite_table(belief.covariance, 3) or len(belief.covariance) != 3:
-        plugin.raise_invalid("returned a Belief whose covariance is not a finite array (3, 3)")
-    is_checked = before is not None and belief.particles is before.particles and not belief.particles.flags.writeable
-    if not is_checked and not _is_finite_table(belief.particles, 4):
-        plugin.raise_invalid("returned a Belief whose particles are not a finite array (n, 4)")
-    return belief
-
-
-def _is_finite_table(value: object, columns: int) -> bool:
-    return isinstance(value, np.ndarray) and value.shape[1:] == (columns,) and all_finite(value)

@@ -11,9 +11,9 @@ from simscen.core.messages.sensor_data import Odometry, Readings
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import CostGrid, Decision
 from simscen.model.stack import InProcessStack
-from simscen.stack.checked_components import CheckedPlugin, checked_belief
 from simscen.stack.protocols import Stack
 from simscen.stack.setting import Setting
+from simscen.stack.validation.plugin import CheckedPlugin
 
 
 class CheckedStack(CheckedPlugin):
@@ -53,7 +53,7 @@ class CheckedStack(CheckedPlugin):
         """Return the stack's decision. Raises RunError when it is invalid."""
         try:
             decision = self.inner.decide(tick, readings)
-        except Exception as error:  # as in `call`, without its overhead at every beat
+        except Exception as error:  # as in `call`, without its overhead in every call
             self.raise_as_run_error(error)
         if self._last is None or decision is not self._last:  # an unchanged decision is the same object
             self._last = self._checked_decision(decision, tick)
@@ -79,7 +79,7 @@ class CheckedStack(CheckedPlugin):
         if decision.command is not self._command:
             self._command = self.checked_twist(decision.command)
         if decision.belief is not None:
-            self._belief = checked_belief(self, decision.belief, self._belief)
+            self._belief = self.checked_belief(decision.belief, self._belief)
         if decision.plan is not None:
             self.checked_path(decision.plan, "returned in `Decision.plan`")
         if decision.local_plan is not None:
