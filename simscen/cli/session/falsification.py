@@ -31,6 +31,7 @@ from simscen.loading.variations.conditions import ConditionError
 from simscen.loading.variations.expand import Variation
 from simscen.loading.variations.search_space import SearchSpace, search_space
 from simscen.loading.yaml.rewriting import changed_text
+from simscen.report.display_text import number_with_noun
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
 from simscen.run.process.jobs import Backend, Job
@@ -262,7 +263,7 @@ def signature(result: RunResult) -> Signature:
 
 def summary_lines(falsification: Falsification) -> list[str]:
     """Return the last lines of the output: the failures, or a statement that there was no failure."""
-    runs = len(falsification.finished_runs)
+    runs = number_with_noun(sum(is_counted(finished.result) for finished in falsification.finished_runs), "run")
     lines = []
     for failure in falsification.found:
         values = ", ".join(f"{path} = {value_text(value)}" for path, value in failure.values.items())
@@ -271,9 +272,9 @@ def summary_lines(falsification: Falsification) -> list[str]:
         lines += [f"smaller: simscen shrink {display_path(failure.file)}", ""]
     number = len(falsification.found)
     if number:
-        lines.append(f"found {number} {'failure' if number == 1 else 'different failures'} in {runs} runs")
+        lines.append(f"found {number} {'failure' if number == 1 else 'different failures'} in {runs}")
         return lines
-    lines.append(f"found no failure in {runs} runs")
+    lines.append(f"found no failure in {runs}")
     largest = falsification.max_failure_rate()
     if largest is not None:
         lines.append(f"with {CONFIDENCE:.0%} confidence, at most {100 * largest:.3g} % of random values fail")

@@ -24,7 +24,7 @@ from simscen.judge.metrics.comparison import compare_stacks
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.report.journal import Journal, require_unlocked
-from simscen.report.journal_reader import read_journal
+from simscen.report.journal_reader import JOURNAL_FILE, read_journal
 from simscen.run.reproducibility import plugin_packages
 from simscen.run.sessions.output_folder import RUNS_FOLDER, create_output_folder
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session, scenario_seeds
@@ -165,7 +165,7 @@ def open_output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Jou
     """
     if resume is not None and out is not None:
         raise UsageError("--out and --resume exclude each other")
-    if resume is not None:
+    if resume is not None and not _has_empty_journal(resume):
         read_journal(resume)
     elif out is not None:
         require_unlocked(out)
@@ -174,3 +174,9 @@ def open_output_folder(out: Path | None, resume: Path | None) -> tuple[Path, Jou
         return folder, Journal(folder, resume=resume is not None)
     except OSError as error:
         raise UsageError(f"cannot use the output folder {folder}: {error.strerror}") from error
+
+
+def _has_empty_journal(folder: Path) -> bool:
+    """Return whether the session in the folder was killed before it planned its runs."""
+    journal = folder / JOURNAL_FILE
+    return journal.is_file() and not journal.stat().st_size

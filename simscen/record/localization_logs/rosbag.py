@@ -29,7 +29,7 @@ INITIAL_POSE_TOPIC = "/initialpose"
 
 
 LoggedMessage = tuple[int, int, Any]
-"""Time of logging in ns, index in the log, and decoded message."""
+"""Time of logging in ns, index in the order of logging, and decoded message."""
 
 
 @dataclass
@@ -48,6 +48,18 @@ class _Messages:
     transforms: TransformTree = field(default_factory=TransformTree)
     tf_indices: dict[int, int] = field(default_factory=dict)
     topics: dict[str, str] = field(default_factory=dict)
+
+    def sort_by_time(self) -> None:
+        """Sort all messages by the time of logging, and number them again: an MCAP file may have any order.
+
+        Messages of the same time keep their order.
+        """
+        by_topic = (self.odometry, self.scans, self.truth, self.initial)
+        times = [*self.tf_indices.items(), *((logged, index) for logs in by_topic for logged, index, _ in logs)]
+        numbers = {index: number for number, (_, index) in enumerate(sorted(times))}
+        for logs in by_topic:
+            logs[:] = sorted((logged, numbers[index], message) for logged, index, message in logs)
+        self.tf_indices = {logged: numbers[index] for logged, index in self.tf_indices.items()}
 
     def between(self, outer: str, inner: str) -> list[LoggedMessage]:
         """Return the poses of the frame `inner` in `outer` as messages. Raises UnusableLog if the poses are unknown."""
@@ -114,6 +126,7 @@ def _collect_messages(path: Path, odometry: str, scan: str, truth: str) -> _Mess
             messages.odometry += [pose] if raw.topic == odometry else []
             messages.truth += [pose] if raw.topic == truth else []
     messages.topics = stream.topics
+    messages.sort_by_time()
     return messages
 
 

@@ -101,10 +101,11 @@ def test_all_kinds_of_ros_logs_give_the_same_errors(simscen, tmp_path: Path) -> 
     write_map(tmp_path)
     messages = drive_log()
     write_mcap(tmp_path / "drive.mcap", messages)
+    write_mcap(tmp_path / "unordered.mcap", [*messages[::2], *messages[1::2]])
     write_bag(tmp_path / "sqlite", messages)
     write_bag(tmp_path / "mcap", messages, StoragePlugin.MCAP)
     write_bag(tmp_path / "compressed", messages, compress="message")
-    found = [localized(simscen, log) for log in ("drive.mcap", "sqlite", "mcap", "compressed")]
+    found = [localized(simscen, log) for log in ("drive.mcap", "unordered.mcap", "sqlite", "mcap", "compressed")]
     assert found[0]["scans"] == 150
     assert found[0]["error"]["max"] < 0.2
     assert found[0]["lost"] == []

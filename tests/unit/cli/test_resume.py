@@ -84,3 +84,11 @@ def test_runs_that_are_not_selected_again_are_named(session):
     warning = "1 run of 2 of the session to resume, such as a (seed 1), will not be in its reports"
     assert ended.stderr == f"simscen: warning: out: {warning}, because the selection has changed\n"
     assert json.loads((folder / "results.json").read_text())["total"] == 1
+
+
+def test_session_that_was_killed_before_it_planned_its_runs_starts_again(session):
+    folder, resume = session
+    shutil.rmtree(folder)
+    folder.mkdir()
+    (folder / "events.jsonl").touch()
+    assert "2 passed" in resume()

@@ -15,6 +15,9 @@ import pytest
 import yaml
 
 from simscen.cli.commands import shrink
+from simscen.cli.session.falsification import summary_lines
+from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
+from simscen.core.records.session_events import RunFinished
 
 SCENARIO = """\
 # Many irrelevant parts, and one cause of failure.
@@ -178,6 +181,20 @@ def test_a_found_failure_is_written_as_a_scenario_that_fails(tmp_path: Path, met
     if method == "tpe":  # the method that depends on the order of the results
         simscen(tmp_path, "falsify", "a.scenario.yaml", "--method", method, "--out", "out1", "-j", 1)
         assert (tmp_path / "out/results.json").read_bytes() == (tmp_path / "out1/results.json").read_bytes()
+
+
+def test_interrupted_runs_do_not_count_as_searched() -> None:
+    failures = [None, RunFailure("interrupted", "x"), RunFailure("not-run", "x")]
+    outcomes = [Outcome.PASSED, Outcome.ERROR, Outcome.ERROR]
+    search = SimpleNamespace(
+        finished_runs=[
+            RunFinished(RunResult(RunKey("a", 1), "a", outcome, error=failure))
+            for outcome, failure in zip(outcomes, failures, strict=True)
+        ],
+        found=[],
+        max_failure_rate=lambda: None,
+    )
+    assert summary_lines(search) == ["found no failure in 1 run"]  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
