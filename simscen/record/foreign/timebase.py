@@ -23,12 +23,18 @@ change is more than this ratio times the change at the message, the recorder cau
 MAX_STAMP_DIFFERENCE_NS = 10 * NS_PER_SECOND
 """Maximum difference between stamps of two topics at the same time. A larger difference means different clocks."""
 
+MIN_MESSAGES_OF_CLOCK = 5
+"""Minimum number of messages of a topic from which it is checked that its clock advances."""
+MIN_CLOCK_RATE = 0.01
+"""Minimum duration by the stamps of a topic, relative to the duration by the times of logging."""
+
 
 @dataclass(frozen=True, eq=False)
 class StampedMessages:
     """Times of logging and stamps of the messages of a topic in ns, in the order of logging.
 
-    The constructor raises UnusableLog if the stamps jump back or if their clock was set during the recording.
+    The constructor raises UnusableLog if the stamps stand still or jump back, or if their clock was set during the
+    recording.
     """
 
     topic: str
@@ -36,6 +42,9 @@ class StampedMessages:
     stamps: Ticks
 
     def __post_init__(self) -> None:
+        if len(self.stamps) >= MIN_MESSAGES_OF_CLOCK and np.ptp(self.stamps) < MIN_CLOCK_RATE * np.ptp(self.logged):
+            text = f"the stamps of the {len(self.stamps)} messages of {self.topic} do not advance"
+            raise UnusableLog(text, "judge it with --time log")
         newest = np.maximum.accumulate(self.stamps)
         jumps = newest - self.stamps
         if len(jumps) and jumps.max() > MAX_BACKWARD_JUMP_NS:

@@ -177,7 +177,10 @@ class ForeignTraceReader:
         if twists is None:
             twists = velocity_from_poses(ticks, planar, self.time.rate)
         self.rows.truth.extend(ticks, np.column_stack((poses, twists)))
-        if gap := self._gap(ticks):
+        if len(ticks) < 2:
+            reason = f"{track.source} has messages of only one time"
+            self.missing |= dict.fromkeys((Evidence.TRUTH, Evidence.VELOCITY), reason)
+        elif gap := self._gap(ticks):
             self.partial |= dict.fromkeys((Evidence.TRUTH, Evidence.VELOCITY), f"{track.source} has no message {gap}")
 
     def _gap(self, ticks: Ticks) -> str:

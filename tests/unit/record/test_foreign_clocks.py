@@ -18,6 +18,7 @@ from foreign_logs import (
     stamped_pose,
 )  # fmt: skip
 
+from simscen.core.records.verdict import Evidence
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.read import ForeignLog
 from simscen.record.foreign.timebase import find_clock_step
@@ -55,6 +56,20 @@ def test_repeated_and_late_stamps_are_sorted_and_noted(read: Callable[..., Forei
     assert (np.diff(log.trace.truth.ticks) > 0).all()
     assert (np.diff(log.trace.truth.values[:, 0]) > 0).all()
     assert log.notes == ["/mocap: 1 messages out of order, 1 repeated stamps, of which the last message is used"]
+
+
+def test_stamps_that_do_not_advance_are_refused(refused: Callable[..., str]) -> None:
+    """The whole drive would be judged as one moment."""
+    messages = [one for one in drive() if one.topic == "/mocap"]
+    frozen = [replace(one, message=replace(one.message, header=header(BEGIN, "map"))) for one in messages]
+    assert "the stamps of the 201 messages of /mocap do not advance" in refused(frozen)
+
+
+def test_a_single_true_pose_shows_neither_path_nor_velocity(read: Callable[..., ForeignLog]) -> None:
+    (first, *_) = (one for one in drive() if one.topic == "/mocap")
+    missing = read([first]).coverage.missing
+    reason = "/mocap has messages of only one time"
+    assert (missing[Evidence.TRUTH], missing[Evidence.VELOCITY]) == (reason, reason)
 
 
 def test_a_clock_that_jumps_back_is_refused(refused: Callable[..., str]) -> None:
