@@ -4,6 +4,10 @@ The supervisor starts it as `python -I -m simscen.cli.session.fork_server_main [
 descriptor for replies. PLUGIN_PATH extends sys.path, so that plug-ins are found.
 """
 
+import gc
+
+gc.disable()  # until the modules are imported, to start fast (docs/design/startup.md)
+
 import os
 import resource
 import sys
@@ -39,6 +43,8 @@ from simscen.sim.bullet.client_pool import CLIENT_POOL
 from simscen.sim.scene import walls
 from simscen.spec.base import Component
 from simscen.worlds.raycasting.mesh_scene import cached_mesh_scene
+
+gc.enable()
 
 
 def import_components(prepared: PreparedScenario) -> None:
