@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from simscen.model.localizers import LocalizerSpec
     from simscen.model.planners import PlannerSpec
     from simscen.model.recovery import BehaviorSpec
-    from simscen.model.robot import Mount, SensorSpec
+    from simscen.model.sensors import Mount, SensorSpec
     from simscen.model.stack import InProcessStack
     from simscen.model.stack_base import ControllerSpec
     from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
@@ -131,7 +131,7 @@ _NAMES_BY_MODULE = {
     "simscen.model.localizers": ("LocalizerSpec",),
     "simscen.model.planners": ("PlannerSpec",),
     "simscen.model.stack_base": ("ControllerSpec",),
-    "simscen.model.robot": ("Mount", "SensorSpec"),
+    "simscen.model.sensors": ("Mount", "SensorSpec"),
     "simscen.criteria.base": ("Criterion", "Measure"),
     "simscen.faults.base": ("FaultEffect", "Fault", "FaultSetting", "FaultTarget", "SensorSimulator"),
     "simscen.triggers.base": ("Condition",),

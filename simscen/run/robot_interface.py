@@ -11,7 +11,8 @@ from typing import TypeVar
 from simscen.core.clock import Clock
 from simscen.core.geometry import Pose3
 from simscen.core.messages.sensor_data import Odometry, Reading, Readings
-from simscen.model.robot import Ackermann, Holonomic, Mount, RobotSpec, SensorSpec
+from simscen.model.robot import Ackermann, Holonomic, RobotSpec
+from simscen.model.sensors import Mount, SensorSpec
 from simscen.model.stack import StackSpec
 from simscen.model.stack_base import Latency, StackBase
 from simscen.run.preparation import PreparedScenario

@@ -1,7 +1,7 @@
 """Camera and bumper sensors, both without noise."""
 
 from simscen.core.messages.sensor_data import Bump, Image
-from simscen.model.robot import Bumper, Camera
+from simscen.model.sensors import Bumper, Camera
 from simscen.sensors.sensor import SensorSetting
 
 

@@ -14,7 +14,8 @@ from simscen.core.geometry.ray_fans import RayCaster
 from simscen.core.messages import sensor_data
 from simscen.core.messages.sensor_data import Reading
 from simscen.core.random_streams import Streams
-from simscen.model.robot import RobotSpec, SensorSpec
+from simscen.model.robot import RobotSpec
+from simscen.model.sensors import SensorSpec
 from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
 
 T = TypeVar("T")

@@ -3,7 +3,7 @@
 from simscen.core.environment.world_model import GRAVITY_M_S2
 from simscen.core.geometry import Pose3, Vector, rotated
 from simscen.core.messages.sensor_data import Imu
-from simscen.model.robot import InertialUnit
+from simscen.model.sensors import InertialUnit
 from simscen.sensors.sensor import NormalStream, SensorSetting
 
 

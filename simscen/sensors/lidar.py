@@ -7,7 +7,7 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2, Pose3, rotated
 from simscen.core.geometry.ray_fans import Float32Array, RayFan
 from simscen.core.messages.sensor_data import Scan
-from simscen.model.robot import Lidar
+from simscen.model.sensors import Lidar
 from simscen.sensors.sensor import SensorSetting
 
 MAX_NOISE_STDS = 10.0

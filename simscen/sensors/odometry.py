@@ -7,7 +7,8 @@ from operator import sub
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import UNKNOWN_POSE_COVARIANCE, Odometry
-from simscen.model.robot import Drive, Mecanum, Omnidirectional, SkidSteer, WheelOdometry
+from simscen.model.robot import Drive, Mecanum, Omnidirectional, SkidSteer
+from simscen.model.sensors import WheelOdometry
 from simscen.sensors.sensor import NormalStream, SensorSetting
 
 EncoderIncrement = tuple[float, ...]

@@ -68,7 +68,7 @@ GROUPS: dict[str, Group] = {
         ("for", "robot", "edge", "delay", "times", "probability", "all", "any", "not"),
     ),
     "action": Group("simscen.actions.base:Action", "simscen.actions.base:AnyAction", ("robot",)),
-    "sensor": Group("simscen.model.robot:SensorSpec", "simscen.model.robot:Sensor"),
+    "sensor": Group("simscen.model.sensors:SensorSpec", "simscen.model.sensors:Sensor"),
     "metric": Group("simscen.criteria.base:Measure", "simscen.judge.metrics.catalog:ADDRESSES", ("metrics",)),
 }
 """All groups by name."""

@@ -44,7 +44,17 @@ def round_robot(radius: float = 0.22, speed: float = 0.5, **limits: float) -> Ro
 def box_robot(length: float = 0.42, width: float = 0.31, speed: float = 2.0) -> RobotModel:
     """Return a rectangular robot like a Jackal. `length` and `width` are in m, `speed` in m/s."""
     a, b = length / 2, width / 2
-    return RobotModel(((a, b), (-a, b), (-a, -b), (a, -b)), None, speed, speed, 0.0, 2.0, 5.0, 5.0, 10.0)
+    return RobotModel(
+        footprint=((a, b), (-a, b), (-a, -b), (a, -b)),
+        radius=None,
+        max_linear=speed,
+        max_reverse=speed,
+        max_lateral=0.0,
+        max_angular=2.0,
+        linear_acceleration=5.0,
+        linear_deceleration=5.0,
+        angular_acceleration=10.0,
+    )
 
 
 def setting(robot: RobotModel, *, name: str = "test", seed: int = 1, grid: OccupancyGrid | None = None) -> Setting:

@@ -30,7 +30,17 @@ BOXES = np.array([
 WAYPOINTS = ((-2.5, -1.8), (0.8, -2.9), (0.9, -0.4), (3.9, -0.2), (2.6, 1.7), (0.3, 2.4), (0.1, 0.6), (-2.2, 1.0),
          (-2.0, 3.2), (-4.2, 3.0), (-4.1, 0.8), (-2.4, 0.2))  # fmt: skip
 """Waypoints (x, y) in m of a drive, which returns from the last to the first one."""
-ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), 0.2, 0.5, 0.2, 0.0, 1.5, 1, 1, 3)
+ROBOT = RobotModel(
+    footprint=((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)),
+    radius=0.2,
+    max_linear=0.5,
+    max_reverse=0.2,
+    max_lateral=0.0,
+    max_angular=1.5,
+    linear_acceleration=1,
+    linear_deceleration=1,
+    angular_acceleration=3,
+)
 """Robot that drives through the room."""
 
 

@@ -20,7 +20,7 @@ from simscen.model.controllers import GoalCheckerSpec
 from simscen.model.localizers import LocalizerSpec
 from simscen.model.planners import PlannerSpec
 from simscen.model.recovery import BehaviorSpec
-from simscen.model.robot import SensorSpec
+from simscen.model.sensors import SensorSpec
 from simscen.model.stack_base import ControllerSpec, StackBase
 from simscen.spec.registry import GROUPS, BrokenPlugin, find_type
 from simscen.stack.protocols import RobotModel

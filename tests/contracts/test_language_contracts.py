@@ -9,7 +9,7 @@ import yaml
 from simscen.actions.base import AnyAction
 from simscen.criteria.registry import AnyCriterion
 from simscen.faults.base import AnyFault
-from simscen.model.robot import Bumper, Camera, InertialUnit, Lidar, WheelOdometry
+from simscen.model.sensors import Bumper, Camera, InertialUnit, Lidar, WheelOdometry
 from simscen.spec.base import annotation_of
 from simscen.spec.choice import Choice
 from simscen.testing import Promise, promises_of

@@ -24,7 +24,7 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.faults.base import AnyFault
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.model.mppi import Mppi
-from simscen.model.robot import Sensor
+from simscen.model.sensors import Sensor
 from simscen.spec.choice import Choice
 from simscen.spec.registry import GROUPS, all_types
 from simscen.triggers.base import AnyCondition as Condition

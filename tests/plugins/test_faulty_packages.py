@@ -42,7 +42,7 @@ from simscen.core.records.verdict import Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.criteria.base import Measure
 from simscen.faults.base import FaultEffect, Fault
-from simscen.model.robot import SensorSpec
+from simscen.model.sensors import SensorSpec
 from simscen.spec.base import Spec
 from simscen.triggers.base import Condition
 """

@@ -48,7 +48,17 @@ LOST_M, FOUND_M = 1.0, 0.5
 """Position error above which the robot counts as lost, and below which it counts as found again."""
 CHECK_TIMES_S = (15.0, 30.0, 45.0, 60.0, 75.0)
 """Times in a log at which the NEES is computed."""
-ROBOT = RobotModel(((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)), None, 0.6, 0.3, 0.0, 1.0, 1.0, 1.0, 2.0)
+ROBOT = RobotModel(
+    footprint=((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)),
+    radius=None,
+    max_linear=0.6,
+    max_reverse=0.3,
+    max_lateral=0.0,
+    max_angular=1.0,
+    linear_acceleration=1.0,
+    linear_deceleration=1.0,
+    angular_acceleration=2.0,
+)
 """Robot model that AMCL requires. The logs do not depend on the robot model."""
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from simscen.bench.localization.buildings import HEIGHT_M, Building, extruded_mesh
 from simscen.core.geometry import Array, Pose2
-from simscen.model.robot import Lidar, WheelOdometry
+from simscen.model.sensors import Lidar, WheelOdometry
 from simscen.worlds.raycasting.ray_scene import RayScene
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 

@@ -27,7 +27,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.random_streams import Streams
-from simscen.model.robot import Lidar
+from simscen.model.sensors import Lidar
 from simscen.record.localization_logs.read import LocalizationLog
 from simscen.record.localization_logs.rows import TICK_RATE_HZ
 

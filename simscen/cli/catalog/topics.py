@@ -31,6 +31,7 @@ from simscen.model import (
     recovery,
     robot,
     scenario,
+    sensors,
     stack,
     stack_base,
     stack_files,
@@ -116,7 +117,7 @@ def topics(installed: bool = False) -> list[Topic]:
         *_models("world", _WORLD),
         *_models("robot", _ROBOT),
         *_models("drive", _DRIVES),
-        *_choices(robot.Sensor, installed),
+        *_choices(sensors.Sensor, installed),
     ]
 
 
@@ -190,7 +191,7 @@ _ROBOT: dict[str, type[BaseModel]] = {
     "robot": robot.RobotSpec,
     "body": robot.Part,
     "limits": robot.Limits,
-    "mount": robot.Mount,
+    "mount": sensors.Mount,
 }
 _DRIVES: dict[str, type[BaseModel]] = {
     get_args(model.model_fields["type"].annotation)[0]: model for model in get_args(get_args(robot.Drive)[0])

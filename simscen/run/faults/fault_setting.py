@@ -13,7 +13,8 @@ from simscen.core.messages.sensor_data import Image, Scan
 from simscen.core.records.disturbances import KIND_BY_TARGET_NAME
 from simscen.faults.base import FaultSetting
 from simscen.model.disturbances import FaultEntry
-from simscen.model.robot import Camera, Mount, RobotSpec
+from simscen.model.robot import RobotSpec
+from simscen.model.sensors import Camera, Mount
 from simscen.run.live_world.ray_caster import LiveRayCaster
 from simscen.sensors.lidar import floor_distances
 from simscen.sim.robots.robot import Robot

@@ -9,19 +9,8 @@ import numpy as np
 
 from simscen.assets.folders import AllowedFolders
 from simscen.core.errors import InvalidInput
-from simscen.model.robot import (
-    Ackermann,
-    Differential,
-    Drive,
-    InertialUnit,
-    Lidar,
-    Limits,
-    Mount,
-    RobotSpec,
-    Sensor,
-    SkidSteer,
-    WheelOdometry,
-)
+from simscen.model.robot import Ackermann, Differential, Drive, Limits, RobotSpec, SkidSteer
+from simscen.model.sensors import InertialUnit, Lidar, Mount, Sensor, WheelOdometry
 from simscen.sim.body.robot_body import hull_height
 from simscen.sim.urdf.body import body_from_tree, read_tree
 from simscen.sim.urdf.elements import MeshReader

@@ -7,7 +7,7 @@ from dataclasses import replace
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Odometry
-from simscen.model.robot import Bumper, Lidar
+from simscen.model.sensors import Bumper, Lidar
 from tests.contracts.broken.cases import Wrapper, breaks
 
 SENSOR = Bumper()

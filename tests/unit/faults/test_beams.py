@@ -7,7 +7,7 @@ import pytest
 from fault_effects import image, scan, start, unsuitable_key
 
 from simscen.faults.lidar_environment import MM_PER_HOUR
-from simscen.model.robot import Lidar
+from simscen.model.sensors import Lidar
 
 DEG = math.pi / 180
 

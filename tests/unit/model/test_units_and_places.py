@@ -15,8 +15,9 @@ from everyfield import Written, every_value
 
 from simscen.model.controllers import DynamicWindow
 from simscen.model.localizers import Amcl
-from simscen.model.robot import InertialUnit, SkidSteer
+from simscen.model.robot import SkidSteer
 from simscen.model.scenario import Physics, ScenarioSpec
+from simscen.model.sensors import InertialUnit
 from simscen.spec.places import PlaceAllowed, PoseSpec
 from simscen.spec.quantities import AnyQuantity, Quantity
 

@@ -5,7 +5,7 @@ import pytest
 from puppet import Puppet
 
 from simscen.core.geometry import Pose3
-from simscen.model.robot import InertialUnit
+from simscen.model.sensors import InertialUnit
 from simscen.sensors.imu import ImuSensor
 from simscen.sensors.sensor import SensorSetting
 

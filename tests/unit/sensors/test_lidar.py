@@ -7,7 +7,7 @@ from puppet import Nothing, Puppet, SquareRoom, at
 
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.ray_fans import RayCaster
-from simscen.model.robot import Lidar, Mount
+from simscen.model.sensors import Lidar, Mount
 from simscen.sensors.lidar import LidarSensor
 from simscen.sensors.sensor import SensorSetting
 

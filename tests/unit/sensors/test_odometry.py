@@ -8,7 +8,8 @@ from puppet import Puppet
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
-from simscen.model.robot import Ackermann, Differential, Omnidirectional, SkidSteer, WheelOdometry
+from simscen.model.robot import Ackermann, Differential, Omnidirectional, SkidSteer
+from simscen.model.sensors import WheelOdometry
 from simscen.sensors.odometry import WheelOdometrySensor, integrate_arc
 from simscen.sensors.sensor import SensorSetting
 

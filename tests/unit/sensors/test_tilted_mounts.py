@@ -8,7 +8,7 @@ from puppet import Nothing, Puppet, SquareRoom, at
 
 from simscen.core.geometry import Pose3
 from simscen.core.messages.sensor_data import imu_in_base_frame, level_scan
-from simscen.model.robot import InertialUnit, Lidar, Mount
+from simscen.model.sensors import InertialUnit, Lidar, Mount
 from simscen.sensors.imu import ImuSensor
 from simscen.sensors.lidar import LidarSensor
 from simscen.sensors.sensor import SensorSetting

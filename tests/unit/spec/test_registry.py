@@ -7,7 +7,7 @@ from pydantic import TypeAdapter, ValidationError
 import simscen.plugin
 from simscen.advanced.spec import MedialAxisPlanner
 from simscen.model.disturbances import FaultEntry
-from simscen.model.robot import Sensor
+from simscen.model.sensors import Sensor
 from simscen.spec.choice import Choice
 from simscen.spec.extensible_union import BehaviorName
 from simscen.spec.registry import (
