@@ -1,3 +1,5 @@
+"""Tests of straight paths with a detour around costly cells."""
+
 import math
 
 import numpy as np
@@ -18,32 +20,32 @@ def view_of(costs: Array) -> CostmapView:
     return CostmapView(costs.astype(np.uint8), np.where(costs > 0, 0.1, 1.0).astype(np.float32), SIZE, CORNER, 1, 0.5)
 
 
-def left_at(costs: Array, start: Pose2, goal: Pose2) -> float:
-    """The share of the straight way at which it leaves the last dear cell: each is cut with it by Liang and Barsky."""
+def share_at_last_costly_cell(costs: Array, start: Pose2, goal: Pose2) -> float:
+    """Return the share of the straight line at which it leaves the last costly cell, by clipping (Liang, Barsky)."""
     last = 0.0
     for row, column in np.argwhere(costs > 0).tolist():
         low = CORNER[0] + column * SIZE, CORNER[1] + row * SIZE
         enter, leave = 0.0, 1.0
-        for here, there, edge in ((start.x, goal.x, low[0]), (start.y, goal.y, low[1])):
-            step = there - here
+        for begin, end, edge in ((start.x, goal.x, low[0]), (start.y, goal.y, low[1])):
+            step = end - begin
             if step == 0.0:
-                enter, leave = (enter, leave) if edge < here < edge + SIZE else (1.0, 0.0)
+                enter, leave = (enter, leave) if edge < begin < edge + SIZE else (1.0, 0.0)
                 continue
-            one, other = sorted(((edge - here) / step, (edge + SIZE - here) / step))
+            one, other = sorted(((edge - begin) / step, (edge + SIZE - begin) / step))
             enter, leave = max(enter, one), min(leave, other)
         if leave > enter:
             last = max(last, leave)
     return last
 
 
-def test_costly_distance_is_the_length_in_expensive_cells() -> None:
-    rng, told = np.random.default_rng(5), []
+def test_costly_distance_ends_with_the_last_costly_cell() -> None:
+    rng, distances = np.random.default_rng(5), []
     for _ in range(300):
         costs = (rng.random((30, 40)) < 0.02) * rng.integers(1, 253, (30, 40))
         start, goal = (Pose2(*(rng.uniform((0, 0), (40, 30)) * SIZE + CORNER).tolist()) for _ in range(2))
-        told.append(costly_distance(view_of(costs), start, goal, RADIUS))
-        assert told[-1] == pytest.approx(left_at(costs, start, goal) * start.distance(goal))
-    assert 60 < told.count(0.0) < 240
+        distances.append(costly_distance(view_of(costs), start, goal, RADIUS))
+        assert distances[-1] == pytest.approx(share_at_last_costly_cell(costs, start, goal) * start.distance(goal))
+    assert 60 < distances.count(0.0) < 240
 
 
 @pytest.mark.parametrize("turn", range(8))
@@ -59,7 +61,7 @@ def test_cells_along_axis_and_diagonal_are_exact(turn: int) -> None:
     assert costly_distance(view_of(costs), middle, goal, RADIUS) == pytest.approx(until)
 
 
-def test_path_outside_the_costmap_or_near_an_obstacle_is_expensive() -> None:
+def test_path_outside_the_costmap_or_near_an_obstacle_is_costly() -> None:
     view = view_of(np.zeros((20, 20)))
     inside = Pose2(CORNER[0] + 0.5, CORNER[1] + 0.5)
     assert costly_distance(view, inside, inside, RADIUS) == 0.0
@@ -83,23 +85,23 @@ def test_default_planner_plans_straight_lines_in_free_space() -> None:
     assert steps.sum() == pytest.approx(math.hypot(4.9, 0.4))
 
 
-@pytest.mark.parametrize(("more", "aside", "taken"), [(0.09, 0.0, True), (0.11, 0.0, False), (0.09, 0.1, False)])
-def test_detour_around_expensive_cells_is_taken_only_if_cheap(more: float, aside: float, taken: bool) -> None:
+@pytest.mark.parametrize(("more", "aside", "is_taken"), [(0.09, 0.0, True), (0.11, 0.0, False), (0.09, 0.1, False)])
+def test_detour_around_costly_cells_is_taken_only_if_cheap(more: float, aside: float, is_taken: bool) -> None:
     costs = np.zeros((40, 220))
     costs[18:22, 10:30] = 90
-    (x, y), asked = CORNER, list[Pose2]()
+    (x, y), goals = CORNER, list[Pose2]()
     start, goal = Pose2(x + 0.2, y + 1.0), Pose2(x + 10.2, y + 1.0)
 
-    def past(part: CostmapView, there: Pose2) -> tuple[Array, float]:
-        asked.append(there)
+    def plan_detour(part: CostmapView, part_goal: Pose2) -> tuple[Array, float]:
+        goals.append(part_goal)
         assert part.costs.max() == 90
-        return np.array((start[:2], (there.x, there.y + aside))), start.distance(there) + more
+        return np.array((start[:2], (part_goal.x, part_goal.y + aside))), start.distance(part_goal) + more
 
-    points = straight_path(view_of(costs), start, goal, RADIUS, past)
-    assert asked[0][:2] == pytest.approx((x + 1.5 + MARGIN_BEHIND_M, y + 1.0))
-    assert (points is not None) == taken
+    points = straight_path(view_of(costs), start, goal, RADIUS, plan_detour)
+    assert goals[0][:2] == pytest.approx((x + 1.5 + MARGIN_BEHIND_M, y + 1.0))
+    assert (points is not None) == is_taken
     if points is not None:
-        assert points.tolist() == [list(start[:2]), list(asked[0][:2]), list(goal[:2])]
+        assert points.tolist() == [list(start[:2]), list(goals[0][:2]), list(goal[:2])]
 
 
 def test_no_straight_plan_without_a_cheap_detour() -> None:
@@ -107,11 +109,11 @@ def test_no_straight_plan_without_a_cheap_detour() -> None:
     costs[18:22, 10:30] = 90
     (x, y), start = CORNER, Pose2(CORNER[0] + 0.2, CORNER[1] + 1.0)
 
-    def shut(part: CostmapView, there: Pose2) -> tuple[Array, float]:
-        raise NavigationFailure(ErrorCode.NO_VALID_PATH, "shut")
+    def find_no_path(part: CostmapView, part_goal: Pose2) -> tuple[Array, float]:
+        raise NavigationFailure(ErrorCode.NO_VALID_PATH, "blocked")
 
-    def unasked(part: CostmapView, there: Pose2) -> tuple[Array, float]:
+    def must_not_plan(part: CostmapView, part_goal: Pose2) -> tuple[Array, float]:
         raise AssertionError
 
-    assert straight_path(view_of(costs), start, Pose2(x + 10.2, y + 1.0), RADIUS, shut) is None
-    assert straight_path(view_of(costs), start, Pose2(x + 5.2, y + 1.0), RADIUS, unasked) is None
+    assert straight_path(view_of(costs), start, Pose2(x + 10.2, y + 1.0), RADIUS, find_no_path) is None
+    assert straight_path(view_of(costs), start, Pose2(x + 5.2, y + 1.0), RADIUS, must_not_plan) is None
