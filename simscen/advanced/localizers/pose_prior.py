@@ -5,6 +5,7 @@ The prior is the last certain pose, propagated by the motion that scans and whee
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -36,23 +37,35 @@ NO_NOISE: CovarianceTriangle = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 class ObservedMotion:
     """Motion between two successive scans.
 
-    disagreement:  motion by scan matching relative to the motion by odometry, if they disagree; otherwise zero
-    step:          motion by scan matching; None if scan matching failed
-    was_carried:   whether the scans hardly overlap, because the robot was carried elsewhere; None if unknown
+    odometry:     motion by odometry; None if unknown
+    step:         motion by scan matching; None if scan matching failed
+    was_carried:  whether the scans hardly overlap, because the robot was carried elsewhere; None if unknown
     """
 
-    disagreement: Pose2 = Pose2(0.0, 0.0, 0.0)
+    odometry: Pose2 | None = None
     step: MatchedMotion | None = None
     was_carried: bool | None = None
+
+    @cached_property
+    def agrees(self) -> bool:
+        """Whether scan matching and odometry measured nearly the same motion."""
+        return self.step is not None and self.odometry is not None and self.step.agrees(self.odometry)
+
+    @property
+    def disagreement(self) -> Pose2:
+        """Motion by scan matching relative to the motion by odometry, if both are known and disagree; otherwise 0."""
+        if self.step is None or self.odometry is None or self.agrees:
+            return Pose2(0.0, 0.0, 0.0)
+        return self.odometry.between(self.step.delta)
 
     @property
     def is_scene_moving(self) -> bool:
         """Whether scans and wheels differ by more than MAX_SLIP_DIFFERENCE, because the scans show moving objects."""
-        apart = math.hypot(self.disagreement.x, self.disagreement.y)
-        if self.step is None or apart < MAX_SLIP_DIFFERENCE[0]:
+        if self.odometry is None:
             return False
-        wheels = self.step.delta.compose(self.disagreement.inverse())
-        return apart > MAX_SLIP_DIFFERENCE[1] * math.hypot(wheels.x, wheels.y)
+        apart = math.hypot(self.disagreement.x, self.disagreement.y)
+        driven = math.hypot(self.odometry.x, self.odometry.y)
+        return apart >= MAX_SLIP_DIFFERENCE[0] and apart > MAX_SLIP_DIFFERENCE[1] * driven
 
     def systematic_error(self, meters: float) -> tuple[float, float]:
         """Return the systematic errors of this motion in m and rad, which can add up over many motions.

@@ -1,7 +1,5 @@
 """AMCL that matches each scan with earlier ones, and searches the whole map when the robot is lost."""
 
-from dataclasses import replace
-
 from simscen.advanced.localizers.covariance_estimator import CovarianceEstimator, MapResiduals
 from simscen.advanced.localizers.global_search import GlobalSearch
 from simscen.advanced.localizers.map_trust import MapTrust
@@ -54,7 +52,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         estimates_covariance = self._residuals is not None and self._matcher is not None
         self._covariance_estimator = CovarianceEstimator() if estimates_covariance else None
         self._matched: tuple[str, Pose2] | None = None  # lidar and odometry of the last matched scan
-        self._motion_observed = UNOBSERVED_MOTION  # the motion since the last update
+        self._observed_motion = UNOBSERVED_MOTION  # the motion since the last update
         self._consistent_updates = 0  # consecutive updates in which map, scans and wheels agreed
         self._skipped = 0  # consecutive scans that were not compared with the map
 
@@ -71,13 +69,10 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         """
         matched = None if self._matcher is None else self._match(self._matcher, scan, odometry)
         was_carried = None if self._matcher is None else self._matcher.was_carried
-        self._motion_observed = ObservedMotion(step=matched, was_carried=was_carried)
-        agreed = matched is not None and delta is not None and matched.agrees(delta)
-        if matched is not None and delta is not None and not agreed:
-            self._motion_observed = replace(self._motion_observed, disagreement=delta.between(matched.delta))
+        self._observed_motion = observed = ObservedMotion(delta, matched, was_carried)
         self._move(matched, odometry, delta)
         self._mark_updated(scan, odometry)
-        is_certain = agreed and not was_carried and self._consistent_updates >= CERTAIN_AFTER_UPDATES
+        is_certain = observed.agrees and not was_carried and self._consistent_updates >= CERTAIN_AFTER_UPDATES
         self._skipped = self._skipped + 1 if is_certain and self._skipped + 1 < self._update_interval else 0
         estimate = None if self._skipped else self._filter.correct(scan)
         if estimate is not None:
@@ -92,7 +87,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             tick = scan.tick if self._skipped else last.tick
             self._correction = Correction(pose, covariance_about(self._filter.particles, pose), odometry, tick)
         if not self._skipped:
-            is_consistent = agreed and estimate is not None and self._filter.is_certain
+            is_consistent = observed.agrees and estimate is not None and self._filter.is_certain
             self._consistent_updates = self._consistent_updates + 1 if is_consistent else 0
 
     def _move(self, matched: MatchedMotion | None, odometry: Pose2, delta: Pose2 | None) -> None:
@@ -124,11 +119,11 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         range_limits = self._spec.laser_min_range, self._spec.max_used_range
         base = self._base(odometry)
         if self._skipped:
-            relocalizer.add_scan(scan, base, range_limits, self._motion_observed)
+            relocalizer.add_scan(scan, base, range_limits, self._observed_motion)
             return
         believed = self._correction.map_from_odom.compose(odometry)
         fitting_share = self._filter.fitting_share if self._consistent_updates else None
-        found = relocalizer.update(scan, base, believed, range_limits, self._motion_observed, fitting_share)
+        found = relocalizer.update(scan, base, believed, range_limits, self._observed_motion, fitting_share)
         if found is not None:
             self._correction = Correction(*self._filter.redistribute(*found), odometry, scan.tick)
             self._last_update, self._belief, self._consistent_updates = odometry, None, 0
