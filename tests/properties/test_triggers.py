@@ -1,5 +1,6 @@
 """Property tests of the order in which events and faults start and end, against an evaluation of the whole history."""
 
+from collections import defaultdict
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
@@ -10,12 +11,19 @@ from hypothesis import strategies as st
 from simscen.core.clock import Clock
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.random_streams import Streams
+from simscen.core.records.disturbances import Disturbance
 from simscen.core.records.events import Event
+from simscen.judge.disturbances import disturbance_outcomes
 from simscen.model.disturbances import EventEntry, FaultEntry, steps_of
 from simscen.run.live_world.director import Director
 from simscen.testing.fakes import FakeStage
+from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
-BEAT_TICKS, CLOCK = 24, Clock(240)
+BEAT_TICKS = 24
+Scenario = tuple[list[dict[str, Any]], list[dict[str, Any]]]
+"""Events and faults as in a scenario file."""
+Drive = tuple[list[bool], list[float]]
+"""For each beat, whether the robot is fast, and the driven distance in m."""
 HALF_BEATS = st.integers(1, 8).map(lambda n: n / 20)
 """Durations in s, in steps of half a beat."""
 
@@ -55,7 +63,7 @@ def triggers(draw: Any, names: list[str], may_repeat: bool) -> dict[str, Any]:
 
 
 @st.composite
-def scenarios(draw: Any) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+def scenarios(draw: Any) -> Scenario:
     """Events with sequences, and faults, that may wait for each other."""
     lengths = draw(st.lists(st.integers(0, 3), min_size=1, max_size=3))
     names = [f"event-{k + 1}" for k in range(len(lengths))]
@@ -80,8 +88,7 @@ def scenarios(draw: Any) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
 
 
 @st.composite
-def drives(draw: Any) -> tuple[list[bool], list[float]]:
-    """For each beat, whether the robot is fast, and the driven distance in m."""
+def drives(draw: Any) -> Drive:
     fast = draw(st.lists(st.booleans(), min_size=1, max_size=25))
     steps = draw(st.lists(st.integers(0, 2), min_size=len(fast), max_size=len(fast)))
     return fast, [sum(steps[:k]) / 4 for k in range(len(fast))]
@@ -98,9 +105,9 @@ class RecordingStage(FakeStage):
 
 @dataclass
 class Entry:
-    """An event, a step, or a fault of the oracle, with what it has seen at each beat since it is due.
+    """An event, a step, or a fault of the oracle.
 
-    `first_beat` and `first_line` are the beat from which it is due, and the length of the log then.
+    `first_beat` and `first_line` are the beat from which it is due (None: not due yet), and the length of the log then.
     """
 
     name: str
@@ -112,7 +119,8 @@ class Entry:
 class Oracle:
     """Computes the log of a scenario from the definitions in docs/guides/disturbances.md.
 
-    It looks for all edges since the start at each beat, instead of tracking a state.
+    It searches all beats for edges, instead of tracking a state. `visible` is the length of the log when an entry was
+    evaluated at a beat.
     """
 
     def __init__(self, fast: list[bool], travelled: list[float]) -> None:
@@ -196,14 +204,10 @@ class Oracle:
         raise AssertionError(condition)
 
 
-@settings(deadline=None, max_examples=300)
-@given(scenarios(), drives())
-def test_events_and_faults_start_and_end_as_the_guide_defines(
-    scenario: tuple[list[dict[str, Any]], list[dict[str, Any]]], drive: tuple[list[bool], list[float]]
-) -> None:
+def play(scenario: Scenario, drive: Drive) -> RecordingStage:
+    """Return the stage after the drive."""
     events, faults = scenario
-    fast, travelled = drive
-    stage = RecordingStage(clock=CLOCK)
+    stage = RecordingStage(clock=Clock(240))
     injector: Any = SimpleNamespace(begin=lambda index: "Scan", end=lambda index: 1)
     director = Director(
         steps_of([EventEntry.model_validate(event) for event in events]),
@@ -212,8 +216,30 @@ def test_events_and_faults_start_and_end_as_the_guide_defines(
         stage,  # type: ignore[arg-type]
         injector,
     )
-    for beat, is_fast in enumerate(fast):
-        stage.tick, stage.twist, stage.travelled = beat * BEAT_TICKS, Twist(float(is_fast)), travelled[beat]
+    for beat, (is_fast, travelled) in enumerate(zip(*drive, strict=True)):
+        stage.tick, stage.twist, stage.travelled = beat * BEAT_TICKS, Twist(float(is_fast)), travelled
         director.process_beat()
-    log = [(event.tick, str(event.kind), event.name) for event in stage.events]
-    assert log == Oracle(fast, travelled).run(events, faults)
+    return stage
+
+
+@settings(deadline=None, max_examples=300)
+@given(scenarios(), drives())
+def test_events_and_faults_start_and_end_as_the_guide_defines(scenario: Scenario, drive: Drive) -> None:
+    log = [(event.tick, str(event.kind), event.name) for event in play(scenario, drive).events]
+    assert log == Oracle(*drive).run(*scenario)
+
+
+@settings(deadline=None)
+@given(scenarios(), drives())
+def test_event_has_happened_if_it_started_before_the_end(scenario: Scenario, drive: Drive) -> None:
+    stage, starts = play(scenario, drive), defaultdict(list)
+    for tick, kind, name in Oracle(*drive).run(*scenario):
+        if kind == "event.started":
+            starts[name].append(tick)
+    steps = steps_of([EventEntry.model_validate(event) for event in scenario[0]])
+    trace = replace(synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]}), events=stage.events, end=stage.tick)
+    disturbances = tuple(Disturbance(step.name, "event", "time: 1", after=step.after) for step in steps)
+    for outcome in disturbance_outcomes(trace, replace(synthetic_case({}), disturbances=disturbances)):
+        ticks = starts[outcome.disturbance.name]
+        assert list(outcome.fired) == ticks
+        assert outcome.happened == any(tick < stage.tick for tick in ticks)
