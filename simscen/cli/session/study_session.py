@@ -29,6 +29,7 @@ from simscen.cli.session.selection import Selection, load_selection, require_not
 from simscen.cli.session.terminal import open_screen
 from simscen.core.errors import Exit, InvalidInput, Problem, UsageError
 from simscen.core.random_streams import MAX_SEED
+from simscen.core.records.run_result import scenario_title
 from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import Listener, RunFinished, SessionEvent, SessionStarted
 from simscen.core.records.study import ClaimStatus
@@ -145,7 +146,8 @@ class _StudySession:
         start, finished_runs, stopped = time.monotonic(), RunStore(), None
         invalid: InvalidInput | None = None
         earlier, earlier_keys = previous_results(journal), previous_keys(journal)
-        title = next(iter(self._loaded.values())).id
+        scenario_id = next(iter(self._loaded.values())).id
+        longest_title = scenario_id if self._space is None else scenario_title(scenario_id, f"variation-{self.total}")
 
         def show(event: SessionEvent) -> None:
             for each in listeners:
@@ -156,7 +158,8 @@ class _StudySession:
             show(event)
 
         workers = self._request.options.workers
-        show(SessionStarted(__version__, self.total, 1, workers, str(reports.folder), (title,), seeds=self.total))
+        titles = (longest_title,)
+        show(SessionStarted(__version__, self.total, 1, workers, str(reports.folder), titles, seeds=self.total))
         while self._batch and stopped is None:
             jobs = self._jobs(len(finished_runs), reports.folder)
             remaining, reused = self._plan(journal, jobs, earlier)

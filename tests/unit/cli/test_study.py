@@ -52,6 +52,9 @@ def case(folder: Path) -> ET.Element:
 def test_study_finds_the_parameter_that_lowers_the_margin(tmp_path: Path) -> None:
     done = study(tmp_path, SCENARIO + RANDOM, "--out", "out")
     assert done.returncode == 1, done.stderr
+    runs = [line for line in done.stdout.splitlines() if line.startswith("  ") and " s simulated" in line]
+    columns = {line.index(" s simulated") for line in runs}
+    assert len(columns) == 1
     found = results(tmp_path)["study"]
     xs = [float(each["values"]["robot.pose.x"].removesuffix(" m")) for each in found["values"]]
     radius = 0.22 + 0.05  # of the robot, and half of the wall
