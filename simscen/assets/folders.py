@@ -3,7 +3,7 @@
 import errno
 import os
 import stat
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath, PurePosixPath
 
@@ -56,11 +56,19 @@ class AllowedFolders:
         """Return a path for messages: relative to the first root if the file is in it, otherwise absolute."""
         return path.relative_to(self.roots[0]).as_posix() if path.is_relative_to(self.roots[0]) else str(path)
 
-    def find(self, uri: str, base: Path, *, allow_absolute: bool = False) -> Path:
+    def find(
+        self,
+        uri: str,
+        base: Path,
+        *,
+        allow_absolute: bool = False,
+        is_preferred: Callable[[Path], bool] = lambda _: True,
+    ) -> Path:
         """Return the real path of the file or folder that a URI or path refers to, see `uris.candidate_paths`.
 
         base:            folder of the file that contains the URI
         allow_absolute:  whether absolute paths are accepted (xacro and Gazebo write them)
+        is_preferred:    whether a path is returned even if the URI also fits paths before it, for which this is False
 
         Raises UnusableFile, or NoSuchFile if the file does not exist.
         """
@@ -76,14 +84,20 @@ class AllowedFolders:
         if not allow_absolute and PurePosixPath(uri.removeprefix("file://")).is_absolute():
             raise UnusableFile("absolute paths are not read", "write it relative to this file")
         real_base, tried = Path(os.path.realpath(base)), []
+        first: Path | None = None
         for folder, candidate in candidate_paths(uri, real_base, self.roots, self.packages):
             # Other folders could be links, and hints must not reveal their content.
             if folder in (real_base, *self.search_folders):
                 tried.append((folder, candidate))
             try:
-                return self.resolve(candidate)
+                path = self.resolve(candidate)
             except NoSuchFile:
                 continue
+            if is_preferred(path):
+                return path
+            first = first or path
+        if first is not None:
+            return first
         raise NoSuchFile(_NOT_FOUND, self._hint(uri, tried))
 
     @staticmethod

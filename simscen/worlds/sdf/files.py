@@ -1,7 +1,7 @@
 """Find and read the files that an SDF world refers to by URI, and parse included models."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -10,6 +10,8 @@ from simscen.assets.uris import parse_fuel_uri
 from simscen.worlds.sdf.elements import Element, parse
 from simscen.worlds.sdf.report import ImportReport, MissingAsset, SourceLocation, UnusableElement
 
+MODEL_FILES = ("model.config", "model.sdf")
+"""Names of the files of which the folder of a model has at least one."""
 MAX_WORLD_BYTES = 20 * 2**20
 MAX_MESH_BYTES = 64 * 2**20
 MAX_SHOWN_URI_LENGTH = 1000
@@ -28,14 +30,14 @@ BUILT_IN_MODELS = {
 class WorldFiles(AllowedFolders):
     """Allowed folders of an SDF world, with methods that raise UnusableElement with the position of the element."""
 
-    def locate(self, element: Element) -> Path:
-        """Return the real path of the file or folder that a `<uri>` refers to.
+    def locate(self, element: Element, is_preferred: Callable[[Path], bool] = lambda _: True) -> Path:
+        """Return the real path of the file or folder that a `<uri>` refers to; for `is_preferred`, see `find`.
 
         Raises MissingAsset if it does not exist, or UnusableElement.
         """
         uri = element.text
         try:
-            return self.find(uri, Path(element.source.folder), allow_absolute=True)
+            return self.find(uri, Path(element.source.folder), allow_absolute=True, is_preferred=is_preferred)
         except NoSuchFile as error:
             raise MissingAsset(element.location, f"{uri}: {error}", error.hint) from error
         except UnusableFile as error:
@@ -108,7 +110,7 @@ class IncludedFiles:
     def _path_or_builtin_name(self, uri: Element) -> str:
         """Return the path of the SDF file that a `<uri>` refers to, or a key of BUILT_IN_MODELS if it is not found."""
         try:
-            found = self._files.locate(uri)
+            found = self._files.locate(uri, _is_model)
         except UnusableElement:
             builtin = _model_name(uri.text)
             if builtin not in BUILT_IN_MODELS:
@@ -118,7 +120,7 @@ class IncludedFiles:
 
     def _model_in_folder(self, folder: Path, uri: Element) -> Path:
         """Return the SDF file named in model.config, or model.sdf if model.config is missing or unusable."""
-        config, model = folder / "model.config", folder / "model.sdf"
+        config, model = (folder / name for name in MODEL_FILES)
         if not os.path.lexists(config):
             if os.path.lexists(model):
                 return model
@@ -131,6 +133,11 @@ class IncludedFiles:
                 raise
             self._report.note(error.location, f"{error.message}; model.sdf in the same folder is used")
             return model
+
+
+def _is_model(path: Path) -> bool:
+    """Return whether a path is a file, or the folder of a model instead of another folder with the same name."""
+    return not path.is_dir() or any(os.path.lexists(path / name) for name in MODEL_FILES)
 
 
 def _model_name(uri: str) -> str:

@@ -45,7 +45,10 @@ class LinkContent:
 
 
 def read_link(link: PlacedLink, reader: ShapeReader, report: ImportReport) -> LinkContent:
-    """Return the collisions and the mass of a link. Unusable collisions are added to the report and left out."""
+    """Return the collisions and the mass of a link. Unusable collisions are added to the report and left out.
+
+    The mass in a static model is not read, because it has no effect: the building editor of Gazebo writes 0.
+    """
     element = link.frame.element
     collisions: list[tuple[Element, list[Solid]]] = []
     for child in element.children:
@@ -57,8 +60,9 @@ def read_link(link: PlacedLink, reader: ShapeReader, report: ImportReport) -> Li
     if element.child("collision") is None and element.child("visual"):
         report.note(element.location, "has only visuals: robots cannot collide with it, and lidars do not see it")
     mass = DEFAULT_MASS_KG
-    with report.skip_unusable():
-        mass = _link_mass(element.child("inertial"), collisions)
+    if not link.model.is_static:
+        with report.skip_unusable():
+            mass = _link_mass(element.child("inertial"), collisions)
     return LinkContent(link, tuple(solid for _, solids in collisions for solid in solids), mass)
 
 

@@ -104,6 +104,12 @@ def test_invalid_mass_is_refused(refuse, mass):
     assert "/inertial/mass: " in problem.message
 
 
+@pytest.mark.parametrize("mass", ["0", "-1", "nan"])
+def test_the_mass_of_a_static_model_is_not_read(load, mass):
+    world = load(f"<model name='wall'><static>1</static>{link('a', 0, mass)}</model>")
+    assert (len(world.solids), world.bodies) == (1, ())
+
+
 def test_joints_to_missing_links_are_refused(refuse):
     assert "unknown link or frame 'b'" in refuse(model(link("a") + joint("a", "b")))[0].message
     assert "<parent> is missing" in refuse(model(link("a") + "<joint name='j'><child>a</child></joint>"))[0].message

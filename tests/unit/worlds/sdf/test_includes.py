@@ -112,6 +112,13 @@ def test_model_config_names_the_newest_version_that_is_read(load, tmp_path):
     assert load(include("m/crate")).solids[0].shape == Sphere(0.5)
 
 
+@pytest.mark.parametrize(("file", "config"), [("model.sdf", None), ("crate.sdf", "<sdf version='1.6'>crate.sdf</sdf>")])
+def test_a_folder_with_a_model_comes_before_other_folders_with_its_name(load, tmp_path, file, config):
+    (tmp_path / "crate" / "launch").mkdir(parents=True)
+    write(tmp_path / "models", files=(file,), config=config)
+    assert len(load(include("model://crate"), search=[tmp_path]).solids) == 1
+
+
 def test_a_folder_without_a_model_is_refused(refuse, tmp_path):
     (tmp_path / "m").mkdir()
     assert "neither model.config nor model.sdf" in refuse(include("m"))[0].message
