@@ -51,7 +51,7 @@ def from_json(text: str) -> RunResult:
     """Parse the text that `to_json` returned. Raises ValueError for other content or another format."""
     try:
         return from_data(json.loads(text))
-    except (KeyError, TypeError) as error:
+    except (AttributeError, KeyError, TypeError) as error:
         raise ValueError(f"not a result of a run: {error!r}") from error
 
 
@@ -67,6 +67,9 @@ def from_data(data: dict[str, Any]) -> RunResult:
     """
     if data["format"] != FORMAT:
         raise ValueError(f"a result of format {data['format']}; this version reads {FORMAT}")
+    for name, kind in _TYPES.items():
+        if not isinstance(data.get(name, kind()), kind) or isinstance(data.get(name), bool):
+            raise TypeError(f"{name} is {data[name]!r}")
     lines = tuple(verdict["line"] for verdict in data["verdicts"])
     return RunResult(
         key=read_key(data),
@@ -79,12 +82,28 @@ def from_data(data: dict[str, Any]) -> RunResult:
         events=data["events"],
         disturbances=tuple(_read_disturbance(one) for one in data["disturbances"]),
         ended=data["ended"],
-        simulated=data["simulated_seconds"],
+        simulated=float(data["simulated_seconds"]),
         tick_rate=data["tick_rate"],
         error=None if data["error"] is None else RunFailure(**data["error"]),
         stack=data.get("stack", ""),  # missing in older files
         reason=data.get("reason", ""),
     )
+
+
+_TYPES: dict[str, type] = {
+    "path": str,
+    "ended": str,
+    "stack": str,
+    "reason": str,
+    "scenario": str,
+    "seed": int,
+    "variation": str,
+    "tick_rate": int,
+    "metrics": dict,
+    "undefined": dict,
+    "events": dict,
+}
+"""Types of the values that the reports use without a check."""
 
 
 def read_key(data: dict[str, Any]) -> RunKey:

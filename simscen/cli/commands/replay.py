@@ -26,6 +26,7 @@ from simscen.cli.shared_options import (
     foreign_log_options,
 )
 from simscen.core.errors import UsageError
+from simscen.record.log_reader import invalid_log
 
 
 def command(
@@ -73,7 +74,10 @@ def command(
         prefix = "" if file.name in (COMPLETE_LOG, PARTIAL_LOG) else f"{file.stem}."
         page = out or file.with_name(f"{prefix}replay.html")
         shown = [judging.judge_for_replay(one) for one in (file, *others)]
-        save(page, partial(write_replay, runs=shown), [file, *others])
+        try:
+            save(page, partial(write_replay, runs=shown), [file, *others])
+        except ValueError as error:  # the sensor data and the scenery are not read before
+            raise invalid_log(file, "SC802", f"the log is damaged: {error}") from error
         print_text(escaped(str(page)))
         if open_:
             webbrowser.open(page.resolve().as_uri())

@@ -15,7 +15,7 @@ from simscen.loading.scenario_text import criteria_of_text
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
 from simscen.model.scenario import CriteriaSpec, expected_failure
-from simscen.record.log_reader import Log
+from simscen.record.log_reader import Log, invalid_log
 
 COMPLETE_LOG, PARTIAL_LOG = "run.mcap", "run.partial.mcap"
 """Names of the log in the folder of a run: of a completed run, and of an aborted run."""
@@ -76,8 +76,16 @@ def log_file(run: Path) -> Path:
 
 
 def recorded_result(log: Log, file: Path) -> RunResult:
-    """Return the result in a log. If the log has none because it is incomplete, evaluate its criteria instead."""
-    return from_json(log.result) if log.result else evaluate_recorded_criteria(log, file, log.header.name)
+    """Return the result in a log. If the log has none because it is incomplete, evaluate its criteria instead.
+
+    Raises InvalidInput for an invalid result.
+    """
+    if not log.result:
+        return evaluate_recorded_criteria(log, file, log.header.name)
+    try:
+        return from_json(log.result)
+    except ValueError as error:
+        raise invalid_log(file, "SC802", f"its result cannot be read: {error}") from error
 
 
 def evaluate_recorded_criteria(log: Log, file: Path, path: str) -> RunResult:

@@ -9,6 +9,7 @@ import pytest
 
 import simscen as package
 from simscen.cli.session.logs import recorded_result
+from simscen.core.errors import InvalidInput
 from simscen.record.log_reader import read_run
 
 TEXT = """\
@@ -67,6 +68,8 @@ def test_reports_distinguish_expected_failures_and_skipped_runs(simscen, project
     log = project / "out/runs/a/seed-1-known/run.mcap"
     read = read_run(log)
     assert recorded_result(replace(read, result=""), log).outcome is recorded_result(read, log).outcome
+    with pytest.raises(InvalidInput, match="its result cannot be read: a result of format 1"):
+        recorded_result(replace(read, result='{"format": 1}'), log)
     judged = simscen("judge", "out")
     assert judged.code == 1
     assert "0 passed, 2 failed, 2 failed as expected, 1 skipped" in judged.out

@@ -52,6 +52,15 @@ def test_lines_of_verdicts_are_unchanged_after_writing_and_reading(lines):
     assert from_json(to_json(result)) == result
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("reason", None), ("stack", True), ("path", -1), ("simulated_seconds", []), ("disturbances", 1), ("seed", "x")],
+)
+def test_value_of_another_type_is_refused(name, value):
+    with pytest.raises(ValueError, match="not a result of a run"):
+        from_json(json.dumps({**result_data(FAILED), name: value}))
+
+
 def test_run_failure_is_unchanged_after_writing_and_reading():
     crashed = RunResult(RunKey("a", 7), "a", Outcome.ERROR, error=RunFailure("crashed", "SIGSEGV", "last words"))
     assert result_data(FAILED)["error"] is None
