@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from simscen.core.environment.scenery import Scenery
+from simscen.record.log_header import LogHeader
 from simscen.record.log_reader import read_run
 
 SCENARIO = """\
@@ -48,6 +50,16 @@ def test_replay_of_a_run_equals_that_of_the_command(simscen, out: Path, tmp_path
     ended = simscen("replay", str(run), "--out", "page.html")
     assert (ended.code, ended.out) == (0, "page.html\n")
     assert (tmp_path / "page.html").read_bytes() == (run / "replay.html").read_bytes()
+
+
+def test_log_with_damaged_scenery_is_an_error(simscen, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def damaged(header: LogHeader) -> Scenery:
+        raise ValueError("not a scenery")
+
+    monkeypatch.setattr("simscen.report.replay.page.scenery_from_header", damaged)
+    ended = simscen("replay", str(out / "runs" / "bad" / "seed-1"), "--out", "page.html")
+    assert ended.code == 2
+    assert "error[SC802] the log is damaged: not a scenery" in ended.err
 
 
 def test_every_log_in_a_folder_gets_a_replay(simscen, out: Path) -> None:
