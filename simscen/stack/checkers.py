@@ -7,10 +7,9 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.goals import Goal
 from simscen.model.controllers import ProgressChecker as ProgressSpec
 from simscen.model.controllers import SimpleGoalChecker as GoalSpec
+from simscen.stack.kinematics import is_standstill
 from simscen.stack.setting import Setting
 
-STANDSTILL_SPEED_M_S, STANDSTILL_YAW_RATE_RAD_S = 0.02, 0.1
-"""The robot counts as stationary below these speeds."""
 STANDSTILL_CHECKS = 10
 """Number of consecutive checks with a stationary robot after which the full tolerances apply: 0.5 s by default."""
 
@@ -33,9 +32,7 @@ class SimpleGoalChecker:
 
     def reached(self, goal: Goal, pose: Pose2, twist: Twist) -> bool:
         """Return whether the robot has reached the goal, given its estimated pose in the map frame and its velocity."""
-        speed, yaw_rate = abs(twist.vx) + abs(twist.vy), abs(twist.wz)
-        is_standing = speed < STANDSTILL_SPEED_M_S and yaw_rate < STANDSTILL_YAW_RATE_RAD_S
-        self._standstill_checks = self._standstill_checks + 1 if is_standing else 0
+        self._standstill_checks = self._standstill_checks + 1 if is_standstill(twist) else 0
         factor = 1.0 if self._standstill_checks >= STANDSTILL_CHECKS else self._well_inside
         distance = math.hypot(pose.x - goal.pose.x, pose.y - goal.pose.y)
         is_close = distance <= factor * goal.xy_tolerance

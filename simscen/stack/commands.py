@@ -6,11 +6,9 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.guards import VelocitySmoother as SmootherSpec
 from simscen.stack.collision_monitor import CollisionMonitor
+from simscen.stack.kinematics import is_standstill
 from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.protocols import RobotModel
-
-STOPPED_SPEED_M_S, STOPPED_YAW_RATE_RAD_S = 0.02, 0.1
-"""The collision monitor counts as stopping the robot if the command that it returns is below these speeds."""
 
 
 class VelocitySmoother:
@@ -82,6 +80,7 @@ class CommandPipeline:
         self._smoother, self._monitor, self._period = smoother, monitor, period
         self._requested, self._allowed = LatencyQueue[tuple[Twist, int]](latency[0]), LatencyQueue[Twist](latency[1])
         self._immediate: tuple[Twist, int] | None = None
+        """Requested command and its periods; without latency, used instead of the queues, which are slower."""
         self._last_request_tick, self._last_free_tick = 0, 0
         self.latency = latency[0]
         """Latency of the controller in ticks."""
@@ -138,8 +137,6 @@ class CommandPipeline:
         allowed = self._monitor.limit_command(smoothed, odometry)
         if allowed is not smoothed:
             self._smoother.reset(allowed)
-        speed, yaw_rate = abs(allowed.vx) + abs(allowed.vy), abs(allowed.wz)
-        is_stopped = speed < STOPPED_SPEED_M_S and yaw_rate < STOPPED_YAW_RATE_RAD_S
-        if not is_stopped or command == STOP:
+        if command == STOP or not is_standstill(allowed):
             self._last_free_tick = tick
         return allowed

@@ -37,8 +37,10 @@ class FollowedPlan:
         """Take a path, the inscribed `radius` of the robot in m, and the costmap that shows which points are free."""
         self.path, self._radius = path, radius
         self._tracker = PathTracker(path)
-        self._pose: Pose2 | None = None
+        self._pending_pose: Pose2 | None = None
+        """Latest pose of the robot, if its position on the plan has not been computed yet."""
         self._located_pose = Pose2(*path.points[0].tolist())
+        """Latest pose for which the position on the plan has been computed."""
         self._complex_points: ComplexPoints = path.points[:, 0] + 1j * path.points[:, 1]
         self._watch_distance = max(radius, WATCH_DISTANCE_M) + WATCH_EVERY_POINTS * self._tracker.longest_step
         self._revision = costmap.revision
@@ -57,20 +59,20 @@ class FollowedPlan:
 
     def locate(self, pose: Pose2) -> None:
         """Set the pose of the robot in the map frame. Its position on the plan is computed when needed."""
-        self._pose, (x, y, _) = pose, self._located_pose
+        self._pending_pose, (x, y, _) = pose, self._located_pose
         if self._tracker.has_cusps or abs(pose.x - x) + abs(pose.y - y) > MAX_DEFERRED_MOTION_M:
             self._update_tracker(pose)
 
     def _update_tracker(self, pose: Pose2) -> None:
         """Compute the position on the plan for this pose."""
         self._tracker.locate(pose)
-        self._located_pose, self._pose = pose, None
+        self._located_pose, self._pending_pose = pose, None
 
     @property
     def _updated_tracker(self) -> PathTracker:
         """The tracker, updated to the last pose."""
-        if self._pose is not None:
-            self._update_tracker(self._pose)
+        if self._pending_pose is not None:
+            self._update_tracker(self._pending_pose)
         return self._tracker
 
     @property
@@ -117,7 +119,10 @@ class LocalPathSender:
         """Take the controller that follows the path."""
         self._controller = controller
         self._plan: FollowedPlan | None = None
-        self._sent_odom_from_map = self._odom_from_map = Pose2(0.0, 0.0)
+        self._odom_from_map = Pose2(0.0, 0.0)
+        """The current transform from map to odom frame."""
+        self._sent_odom_from_map = self._odom_from_map
+        """The transform with which the path was passed to the controller."""
         self._goal: Goal | None = None
         self._local_goal: Goal | None = None
 

@@ -81,7 +81,7 @@ class Footprint:
             return free
         undecided = np.flatnonzero(free & (distance <= self.circumscribed + costmap.resolution))
         if len(undecided):
-            free[undecided] = self._hull_free(costmap, poses[undecided])
+            free[undecided] = (distances(costmap, self._points_at(poses[undecided])) > 0.0).all(axis=1)
         return free
 
     def clearance(self, costmap: CostmapView, poses: Array) -> Array:
@@ -108,10 +108,6 @@ class Footprint:
         """
         x, y, yaw = poses[..., 0], poses[..., 1], poses[..., 2]
         return np.asarray(self.discs.gap(moving, x, y, yaw, times, sigmas), dtype=np.float64)
-
-    def _hull_free(self, costmap: CostmapView, poses: Array) -> Mask:
-        """Return at which of the poses (n, 3) no checked point of the footprint is in a lethal cell."""
-        return np.asarray((distances(costmap, self._points_at(poses)) > 0).all(axis=1))
 
     def _points_at(self, poses: Array) -> Array:
         """Return the points (n, k, 2) of the footprint that are checked for lethal cells, at poses (n, 3)."""

@@ -16,8 +16,16 @@ from simscen.stack.protocols import RobotModel
 
 MIN_YAW_RATE_RAD_S = 1e-6
 """Yaw rate below which an arc is taken for a straight line."""
+STANDSTILL_SPEED_M_S, STANDSTILL_YAW_RATE_RAD_S = 0.02, 0.1
+"""The robot counts as standing still below these speeds."""
 LOCAL_PLAN_TIMES_S = tuple(0.25 * step for step in range(7))
 """Times of the poses in a local plan that is logged as an arc."""
+
+
+def is_standstill(twist: Twist) -> bool:
+    """Return whether the robot counts as standing still at this velocity."""
+    vx, vy, wz = twist
+    return abs(vx) + abs(vy) < STANDSTILL_SPEED_M_S and abs(wz) < STANDSTILL_YAW_RATE_RAD_S
 
 
 def poses_along(pose: Pose2, twist: Twist, times: Array) -> Array:

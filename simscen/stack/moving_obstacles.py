@@ -1,4 +1,7 @@
-"""Moving obstacles with uncertain position and velocity, and predictions of their motion."""
+"""Moving obstacles with uncertain position and velocity, and predictions of their motion.
+
+Vectors in the plane are complex numbers x + iy.
+"""
 
 import cmath
 import math
@@ -22,9 +25,9 @@ Reals = npt.NDArray[np.floating]
 
 
 class MovingObstacle(NamedTuple):
-    """A moving upright cylinder: center in m and velocity in m/s as x + iy, and radius in m.
+    """A moving upright cylinder: `position` of its axis in m, velocity in m/s, and radius in m.
 
-    The uncertainty is the same along both axes. `covariance` is the covariance of position and velocity.
+    The uncertainty is the same along x and y. `covariance` is the covariance of position and velocity along one axis.
     """
 
     position: complex

@@ -10,7 +10,7 @@ checks them for every implementation. These contracts apply to all protocols:
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Protocol, TypeGuard, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -102,6 +102,7 @@ class Localizer(Protocol):
         ...
 
 
+@runtime_checkable
 class SupportsPose(Protocol):
     """Optional extension of a localizer: the estimated pose alone, which is faster to compute than the belief.
 
@@ -112,11 +113,6 @@ class SupportsPose(Protocol):
     def pose(self) -> Pose2:
         """The same pose as in `belief`."""
         ...
-
-
-def supports_pose(localizer: object) -> TypeGuard[SupportsPose]:
-    """Return whether the class of a localizer has the property `pose`."""
-    return hasattr(type(localizer), "pose")  # reading the property may compute the pose
 
 
 FREE, MAX_NON_OBSTACLE, INSCRIBED, LETHAL, NO_INFORMATION = 0, 252, 253, 254, 255
@@ -254,7 +250,7 @@ class SupportsZones(Protocol):
 
 
 class Stack(Protocol):
-    """A complete navigation stack: takes the readings of each beat, and returns a velocity command.
+    """A complete navigation stack: takes the readings of each tick, and returns a velocity command.
 
     *Given* no goal or an ended task *then* it commands a stop. Exception: if the task was not canceled, the robot may
     move out of the way of an obstacle and return.
@@ -273,7 +269,7 @@ class Stack(Protocol):
         ...
 
     def decide(self, tick: int, readings: Readings) -> Decision:
-        """Process the readings of this beat, and return the command and other output."""
+        """Process the readings that arrive at this tick, and return the command and other output."""
         ...
 
     @property

@@ -20,7 +20,7 @@ from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.localizers.ground_truth import TRUTH
 from simscen.stack.navigator import Navigator
 from simscen.stack.odometry_history import OdometryHistory, is_plausible
-from simscen.stack.protocols import Controller, Localizer, NavigationFailure, Surroundings, supports_pose
+from simscen.stack.protocols import Controller, Localizer, NavigationFailure, SupportsPose, Surroundings
 from simscen.stack.publishing import NO_UPDATES, Publisher, StandstillReporter, Updates
 from simscen.stack.tasks import Task
 
@@ -61,7 +61,7 @@ class ReferenceStack:
         """
         self._speed_filter = SpeedFilter(surroundings)
         self._localizer, self._costmaps, self._controller = localizer, costmaps, controller
-        self._pose_source = localizer if supports_pose(localizer) else None
+        self._pose_source = localizer if isinstance(localizer, SupportsPose) else None
         self._navigator, self._task, self._commands, self._monitor = navigator, task, commands, monitor
         self._tick_rate, self._lidars = surroundings.tick_rate, frozenset(surroundings.lidars)
         self._control_period = control_period

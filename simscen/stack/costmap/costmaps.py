@@ -8,8 +8,8 @@ from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.stack import StackSpec
-from simscen.stack.costmap.grid_frame import MAX_ROLL_OFFSET_M
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
+from simscen.stack.costmap.rolling_window import MAX_ROLL_OFFSET_M
 from simscen.stack.frames import Frames, transform_polygon
 from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.odometry_history import OdometryHistory
@@ -48,7 +48,9 @@ class Costmaps:
         self._local_schedule = _UpdateSchedule(math.ceil(tick_rate / local_spec.update_frequency), latency)
         self._zones = Zones(surroundings.keepout, (), surroundings.masks)
         self._odom_from_map: Pose2 | None = None
-        self._has_zones = False
+        """Transform with which the keepout zones were put into the local costmap; None if the zones have changed."""
+        self._has_local_zones = False
+        """Whether the local costmap has or had keepout zones."""
         self.next: float = 0
         """The tick from which `update` has something to do."""
 
@@ -82,12 +84,12 @@ class Costmaps:
 
         Obstacles in the newest readings remain, and nearby ones outside the view of all lidars.
         """
-        self.global_costmap.clear()
+        self.clear_global(entirely=True)
         self.clear_local()
 
     def clear_around(self) -> None:
         """Clear both costmaps in the area of the local costmap (Nav2's ClearCostmapAroundRobot)."""
-        self.global_costmap.clear(self._local_range)
+        self.clear_global(entirely=False)
         self.clear_local()
 
     def clear_local(self) -> None:
@@ -101,11 +103,11 @@ class Costmaps:
     def _update_local_zones(self, frames: Frames) -> None:
         """Move the keepout zones of the local costmap to their current position in the odom frame."""
         mask, previous = self._zones.masks.keepout, self._odom_from_map
-        if not self._zones.keepout and mask is None and not self._has_zones:
+        if not self._zones.keepout and mask is None and not self._has_local_zones:
             return
         if previous is not None and frames.map_shift(previous, self._local_range) <= ZONE_TOLERANCE_M:
             return
-        odom_from_map, self._has_zones = frames.odom_from_map, True
+        odom_from_map, self._has_local_zones = frames.odom_from_map, True
         self._odom_from_map = odom_from_map
         polygons = tuple(transform_polygon(odom_from_map, polygon) for polygon in self._zones.keepout)
         local_mask = None if mask is None else replace(mask, origin=odom_from_map.compose(mask.origin))

@@ -17,7 +17,8 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.costmaps import DenoiseLayer
 from simscen.stack.costmap.depth_layer import Heights, is_seen_through, project_depth_image
 from simscen.stack.costmap.distance_transform import Squared
-from simscen.stack.costmap.grid_frame import CellIndices, Cells, GridFrame, Mask, ValueType, shift_layer
+from simscen.stack.costmap.grid_frame import CellIndices, Cells, GridFrame, Mask
+from simscen.stack.costmap.rolling_window import ValueType, shift_layer
 from simscen.stack.localizers.beams import ComplexPoints, directions
 
 RANGE_TOLERANCE_M = 1e-9

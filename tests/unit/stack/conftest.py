@@ -1,4 +1,4 @@
-"""Lets the tests of this folder share `othervalues.py` and `scenes.py`."""
+"""Lets the tests of this folder share modules such as `scenes.py`."""
 
 import sys
 from pathlib import Path

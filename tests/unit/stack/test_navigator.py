@@ -3,44 +3,16 @@
 import math
 
 import pytest
+from two_rooms import ADVANCED, BOUNDS, DOOR, FAR, START, TRUTH, reasons, rooms, start
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.goals import Goal
-from simscen.core.messages.navigation import ErrorCode, Path
-from simscen.model.controllers import ProgressChecker
 from simscen.model.costmaps import Costmap
-from simscen.model.localizers import GroundTruth
 from simscen.model.planners import OmplPlanner
-from simscen.model.recovery import Recovery
 from simscen.model.stack import StackSpec
-from simscen.stack.protocols import NavigationFailure, RobotModel
-from simscen.testing.flatland import Drive, Flatland, box_robot, drive, round_robot
-
-TRUTH = GroundTruth(type="ground_truth")
-ADVANCED = StackSpec(profile="advanced", localizer=TRUTH)
-BOUNDS = (-0.5, -0.5, 10.5, 6.5)
-START, FAR = Pose2(1.0, 1.0), Goal("far", Pose2(9.0, 1.0, math.pi / 2), timeout=90.0)
-DOOR = (4.9, 2.5, 5.0, 3.5)
-
-
-def rooms(*more: tuple[float, float, float, float]) -> Flatland:
-    """Two rooms and a door of one meter between them."""
-    world = Flatland().room(10, 6)
-    world.boxes += [(4.9, 0.0, 5.0, 2.5), (4.9, 3.5, 5.0, 6.0), *more]
-    return world
-
-
-def start(world: Flatland, *goals: Goal, grid: Flatland | None = None, **options: object) -> Drive:
-    return drive(world, START, *(goals or (FAR,)), grid=(grid or world).grid(BOUNDS), **options)
-
-
-def codes(drive: Drive, kind: str = "goal.failed") -> list[object]:
-    return [event.data["error_name"] for event in drive.events_of_kind(kind)]
-
-
-def reasons(drive: Drive) -> list[object]:
-    return [event.data["reason"] for event in drive.events_of_kind("plan.made")]
+from simscen.stack.protocols import RobotModel
+from simscen.testing.flatland import Flatland, box_robot, drive, round_robot
 
 
 def test_navigator_drives_through_a_door_and_stops_at_the_goal() -> None:
@@ -59,27 +31,6 @@ def test_navigator_visits_goals_in_order() -> None:
     assert [e.name for e in d.events_of_kind("goal.reached")] == ["a", "b", "c"]
     assert [e.data["index"] for e in d.events_of_kind("goal.accepted")] == [0, 1, 2]
     assert len(d.events_of_kind("navigation.ended")) == 1
-
-
-def test_robot_waits_at_a_closed_door_with_recoveries_and_passes_when_it_opens() -> None:
-    world = rooms()
-    d = start(world).run(2.0)
-    world.boxes.append(DOOR)
-    d.run(8.0)
-    assert d.events_of_kind("recovery.started")
-    world.boxes.remove(DOOR)
-    d.run(60.0)
-    assert d.result == "SUCCEEDED"
-    assert d.min_clearance > 0.02
-
-
-def test_recoveries_alternate_and_end_after_the_retries() -> None:
-    d = start(rooms(DOOR), grid=rooms()).run(90)
-    assert [e.name for e in d.events_of_kind("recovery.started")] == [
-        "clear_costmap", "spin", "wait", "backup", "clear_costmap", "spin",
-    ]  # fmt: skip
-    assert codes(d) == ["NO_VALID_PATH"]
-    assert d.result == "FAILED"
 
 
 def test_an_unmapped_obstacle_on_the_plan_is_driven_around_without_recovery() -> None:
@@ -104,145 +55,6 @@ def test_opened_path_is_taken_if_clearly_shorter() -> None:
     d.run(60)
     assert d.result == "SUCCEEDED"
     assert "better" in reasons(d)
-
-
-@pytest.mark.parametrize(
-    ("goal", "code"), [(Pose2(30.0, 1.0), "GOAL_OUTSIDE_MAP"), (Pose2(4.95, 1.0), "GOAL_OCCUPIED")]
-)
-def test_a_goal_that_can_never_be_reached_fails_at_once(goal: Pose2, code: str) -> None:
-    d = start(rooms(), Goal("bad", goal)).run(10)
-    assert codes(d) == [code]
-    assert d.tick < 240
-    assert not d.events_of_kind("recovery.started")
-
-
-@pytest.mark.slow
-def test_goal_occupied_by_an_unmapped_object_fails() -> None:
-    world = rooms()
-    world.discs.append((9.0, 1.0, 0.1))
-    d = start(world, grid=rooms()).run(90)
-    assert codes(d) == ["GOAL_OCCUPIED"]
-    assert not d.events_of_kind("recovery.started")  # GOAL_OCCUPIED is none of Nav2's codes that help
-    assert d.min_clearance > 0.02
-    d = start(world, grid=rooms(), spec=ADVANCED).run(90)
-    # Which of them depends on how much of the thing it has seen when the retries end.
-    assert codes(d)[0] in ("GOAL_OCCUPIED", "NO_VALID_PATH", "PATIENCE_EXCEEDED")
-    assert d.events_of_kind("recovery.started")
-    assert d.min_clearance > 0.02
-
-
-def test_a_start_outside_the_map_fails_with_its_code() -> None:
-    world = rooms()
-    d = drive(world, Pose2(-3.0, 1.0), FAR, grid=world.grid(BOUNDS)).run(60)
-    assert codes(d) == ["START_OUTSIDE_MAP"]
-
-
-def test_a_goal_takes_no_longer_than_its_timeout() -> None:
-    d = start(rooms(), Goal("soon", FAR.pose, timeout=5.0)).run(60)
-    assert codes(d) == ["NAVIGATE_TIMEOUT"]
-    assert d.tick / 240 == pytest.approx(5.0, abs=0.1)
-
-
-def test_robot_without_progress_fails() -> None:
-    spec = StackSpec(
-        localizer=TRUTH, progress_checker=ProgressChecker(movement_time_allowance=1.0),
-        recovery=Recovery(number_of_retries=2, wait_duration=0.5),
-    )  # fmt: skip
-    d = start(rooms(), spec=spec)
-    d._move = lambda *_: None
-    d.run(60)
-    assert codes(d) == ["FAILED_TO_MAKE_PROGRESS"]
-
-
-def test_sporadic_planning_failures_cause_no_recovery() -> None:
-    """Nav2's RecoveryNode counts its retries from the last success on."""
-    d = start(rooms(), spec=StackSpec(localizer=TRUTH, planner=OmplPlanner(replanning="rate", replanning_rate=1.0)))
-    planner, calls = d.stack.inner._navigator.plans.planner, []
-    plan = planner.plan
-
-    def flaky(*asked: object) -> Path:
-        calls.append(asked)
-        if len(calls) in (1, 3, 6):
-            raise NavigationFailure(ErrorCode.NO_VALID_PATH, "for once")
-        return plan(*asked)
-
-    planner.plan = flaky
-    d.run(60)
-    assert codes(d, "plan.failed") == ["NO_VALID_PATH"] * 3
-    assert not d.events_of_kind("recovery.started")
-    assert d.result == "SUCCEEDED"
-
-
-def test_a_plan_that_fails_twice_in_a_row_leads_to_a_recovery() -> None:
-    d = start(rooms())
-    planner, calls = d.stack.inner._navigator.plans.planner, []
-    plan = planner.plan
-
-    def flaky(*asked: object) -> Path:
-        calls.append(asked)
-        if len(calls) <= 2:
-            raise NavigationFailure(ErrorCode.NO_VALID_PATH, "twice")
-        return plan(*asked)
-
-    planner.plan = flaky
-    d.run(60)
-    assert [e.name for e in d.events_of_kind("recovery.started")] == ["clear_costmap"]
-    assert d.result == "SUCCEEDED"
-
-
-@pytest.mark.parametrize(
-    ("tolerance", "code", "seconds"),
-    [(0.3, "PATIENCE_EXCEEDED", 0.6), (1.0, "PATIENCE_EXCEEDED", 2.0), (0.0, "NO_VALID_CONTROL", 0.0)],
-)
-def test_a_controller_that_finds_no_command_fails_as_in_nav2s_controller_server(
-    tolerance: float, code: str, seconds: float
-) -> None:
-    spec = StackSpec(localizer=TRUTH, failure_tolerance=tolerance, recovery=Recovery(number_of_retries=0))
-    d = start(rooms(), spec=spec)
-    d.stack.inner._navigator._controller.command = no_command
-    d.run(10)
-    assert codes(d) == [code]
-    assert d.tick / 240 == pytest.approx(seconds, abs=0.3)  # its patience twice: once more after clearing
-
-
-def test_a_patience_of_minus_one_never_ends() -> None:
-    d = start(rooms(), spec=StackSpec(localizer=TRUTH, failure_tolerance=-1.0, recovery=Recovery(number_of_retries=0)))
-    d.stack.inner._navigator._controller.command = no_command
-    d.run(5)
-    assert not codes(d)
-    assert set(d.commands) == {STOP}
-
-
-def no_command(*_: object) -> Twist:
-    raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "nothing is free")
-
-
-def test_on_goal_failure_stops_or_continues() -> None:
-    goals = Goal("bad", Pose2(30, 1)), Goal("good", Pose2(2.5, 1.0))
-    stopped = start(rooms(), *goals).run(30)
-    assert [e.name for e in stopped.events_of_kind("goal.accepted")] == ["bad"]
-    went_on = start(rooms(), *goals, stop_on_failure=False).run(30)
-    assert [e.name for e in went_on.events_of_kind("goal.reached")] == ["good"]
-    assert went_on.result == "FAILED"
-
-
-def test_robot_stops_within_half_a_second_without_scans_and_continues_with_them() -> None:
-    d = start(rooms()).run(5.0)
-    d.is_blind = True
-    d.run(0.5)
-    assert d.twist.vx < 0.06
-    d.run(14.5)
-    assert d.commands[-1] == STOP
-    assert not d.events_of_kind("recovery.started")  # the progress checker's clock stood still
-    (held,) = d.events_of_kind("robot.held")
-    assert held.name == "collision_monitor"
-    assert held.tick < 6.6 * 240
-    assert "`lidar` has been silent" in held.data["message"]
-    d.is_blind = False
-    d.run(60)
-    assert d.result == "SUCCEEDED"
-    assert not d.events_of_kind("recovery.started")
-    assert [event.name for event in d.events_of_kind("robot.released")] == ["collision_monitor"]
 
 
 def test_cancel_stops_at_once_and_ends_the_task() -> None:
@@ -338,17 +150,6 @@ def test_a_car_drives_to_a_goal_behind_it() -> None:
     assert all(abs(c.wz) <= abs(c.vx) / 0.6 * 1.5 + 0.05 for c in d.commands)
 
 
-def test_obstacle_seen_only_by_the_collision_monitor_fails_soon() -> None:
-    """The costmap marks nothing beyond 5 cm: the monitor alone stops the robot before the wall that is not mapped."""
-    spec = StackSpec(localizer=TRUTH, costmap=Costmap(obstacle_max_range=0.05))
-    d = start(rooms(DOOR), grid=rooms(), spec=spec).run(14)
-    held = [e for e in d.events_of_kind("recovery.started") if "monitor holds" in str(e.data["message"])]
-    standing = next(k for k, pose in enumerate(d.track) if pose.distance(d.track[min(k + 40, len(d.track) - 1)]) < 0.01)
-    assert held
-    assert held[0].tick / 240 - standing * 14 / len(d.track) < 4.0
-    assert d.min_clearance > 0.0
-
-
 def test_late_scans_mark_obstacles_at_their_true_position() -> None:
     world = Flatland(discs=[(3.0, 0.0, 0.3)])
     d = drive(world, Pose2(0, 0), Goal("g", Pose2(2.5, 0.0)), grid=None, robot=round_robot(speed=0.5))
@@ -362,33 +163,6 @@ def test_late_scans_mark_obstacles_at_their_true_position() -> None:
     assert len(x)
     assert x.min() > 2.6  # the disc begins at 2.7; 0.3 s at 0.5 m/s would have put it at 2.85 and later
     assert x.min() < 2.75
-
-
-@pytest.mark.parametrize("seconds", [0.4, 0.8])
-def test_seen_dead_end_is_kept_after_a_control_failure_out_of_sight(seconds: float) -> None:
-    """Control fails for so long that it is tried again after clearing; then that a recovery clears, too."""
-    mapped = Flatland().room(8, 8)
-    mapped.boxes += [(3.9, 0.0, 4.0, 1.0), (3.9, 2.0, 4.0, 7.0)]  # a door, and a long way round by the top
-    world = Flatland([*mapped.boxes, (3.9, 1.0, 4.0, 2.0)])
-    goal, grid = Goal("g", Pose2(6.0, 2.5), timeout=90.0), mapped.grid((-0.5, -0.5, 8.5, 8.5))
-    d = drive(world, Pose2(2.0, 1.5), goal, grid=grid, spec=ADVANCED)
-    while d.pose.y < 4.8:
-        d.run(0.1)
-    controller, shut = d.stack.inner._navigator._controller, len(d.events_of_kind("plan.made"))
-    command, steps = controller.command, round(seconds * 20)
-
-    def failing(*asked: object) -> Twist:
-        nonlocal steps
-        steps -= 1
-        return command(*asked) if steps < 0 else no_command()
-
-    controller.command = failing
-    before = len(d.track)
-    d.run(60)
-    assert d.result == "SUCCEEDED"
-    assert len(d.events_of_kind("plan.made")) > shut
-    assert len(d.events_of_kind("recovery.started")) == (seconds > 0.6)
-    assert min(pose.y for pose in d.track[before:] if pose.x < 3.5) > 4.3
 
 
 @pytest.mark.parametrize("off", [0.04, -0.04])

@@ -1,8 +1,10 @@
+"""Tests of costs, distances, zones, and revisions of a costmap."""
+
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from room_costmaps import BOUNDS, ROBOT, at, costmap, scan_of
 from scipy.ndimage import distance_transform_edt
 
 from simscen.core.environment.costmap_filters import Zones
@@ -14,29 +16,7 @@ from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import Surroundings
 from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot
 
-ROBOT = round_robot()
-BOUNDS = (-0.5, -0.5, 8.5, 6.5)
 REACH = 0.72  # circumscribed radius + 0.5 m
-
-
-def scan_of(world: Flatland, pose: Pose2, beams: int = 360, range_max: float = 12.0, noise: float = 0.0) -> Scan:
-    step = 2 * math.pi / beams
-    angles = -math.pi + step * np.arange(beams)
-    ranges = world.cast((pose.x, pose.y), angles + pose.yaw)
-    ranges = ranges + np.random.default_rng(3).normal(0, noise, beams)
-    return Scan("lidar", 0, np.where(ranges > range_max, np.inf, ranges), -math.pi, step, 0.05, range_max)
-
-
-def costmap(world: Flatland | None, spec: Spec | None = None, **options: object) -> LayeredCostmap:
-    grid = world.grid(BOUNDS) if world else None
-    return LayeredCostmap(spec or Spec(), Surroundings(ROBOT, grid, TICK_RATE_HZ, **options))
-
-
-def at(costmap: LayeredCostmap, x: float, y: float) -> tuple[int, float]:
-    """Cost and distance under a point."""
-    view = costmap.view
-    row, column = int((y - view.origin[1]) / view.resolution), int((x - view.origin[0]) / view.resolution)
-    return int(view.costs[row, column]), float(view.distance[row, column])
 
 
 def full(lethal: np.ndarray) -> np.ndarray:
@@ -88,68 +68,6 @@ def test_a_turned_map_is_sampled_into_an_unturned_costmap() -> None:
     x, y = grid.center_of(np.array([[10, 50]]))[0]
     assert view.origin[0] + (column + 0.5) * 0.05 == pytest.approx(x, abs=0.051)
     assert view.origin[1] + (row + 0.5) * 0.05 == pytest.approx(y, abs=0.051)
-
-
-def test_a_hit_is_marked_up_to_the_obstacle_range_and_not_beyond() -> None:
-    world = Flatland().room(8, 6)
-    map_ = costmap(world)
-    world.discs += [(4.0, 3.0, 0.1), (7.0, 3.0, 0.1)]
-    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
-    assert at(map_, 3.92, 3.0)[0] == 254
-    assert at(map_, 6.92, 3.0)[0] == 0
-
-
-def test_removed_obstacle_is_cleared_and_the_map_restored() -> None:
-    world = Flatland().room(8, 6)
-    map_ = costmap(world)
-    before = map_.view.costs.copy(), map_.view.distance.copy()
-    world.discs.append((4.0, 3.0, 0.3))
-    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
-    assert not np.array_equal(map_.view.costs, before[0])
-    world.discs.pop()
-    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
-    assert np.array_equal(map_.view.costs, before[0])
-    assert np.array_equal(map_.view.distance, before[1])
-
-
-def test_walls_of_the_map_are_never_cleared() -> None:
-    map_ = costmap(Flatland().room(8, 6))
-    before = map_.view.costs.copy()
-    map_.update(Pose2(1.0, 1.0), scan_of(Flatland(), Pose2(1.0, 1.0)))
-    assert np.array_equal(map_.view.costs, before)
-
-
-@pytest.mark.parametrize(
-    ("ranges", "inf_is_valid", "cleared"),
-    [
-        (np.inf, True, True),
-        (np.inf, False, False),
-        (np.nan, True, False),
-        (0.01, True, False),
-        (13.0, True, True),
-        (13.0, False, False),
-        (4.0, False, True),
-    ],
-)
-def test_only_valid_beams_clear_cells(ranges: float, inf_is_valid: bool, cleared: bool) -> None:
-    world = Flatland().room(8, 6)
-    map_ = costmap(world, Spec(inf_is_valid=inf_is_valid))
-    world.discs.append((4.0, 3.0, 0.1))
-    seen = scan_of(world, Pose2(2.0, 3.0))
-    map_.update(Pose2(2.0, 3.0), seen)
-    blind = Scan("lidar", 1, np.full(360, ranges), seen.angle_min, seen.angle_increment, 0.05, 12.0)
-    map_.update(Pose2(2.0, 3.0), blind)
-    assert (at(map_, 3.92, 3.0)[0] != 254) == cleared
-
-
-def test_an_obstacle_beyond_the_ray_tracing_range_persists() -> None:
-    world = Flatland().room(8, 6)
-    map_ = costmap(world)
-    world.discs.append((4.0, 3.0, 0.1))
-    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
-    world.discs.pop()
-    map_.update(Pose2(0.6, 3.0), scan_of(world, Pose2(0.6, 3.0)))
-    assert at(map_, 3.92, 3.0)[0] == 254
 
 
 def test_incrementally_updated_distances_equal_a_full_computation() -> None:
@@ -214,80 +132,6 @@ def test_keepout_zones_are_walls() -> None:
     map_ = costmap(Flatland().room(8, 6), keepout=(((3, 2), (5, 2), (5, 4), (3, 4)),))
     assert at(map_, 4.0, 3.0) == (254, 0.0)
     assert at(map_, 2.87, 3.0)[0] == 253
-
-
-def test_clearing_removes_unseen_obstacles_and_keeps_visible_ones() -> None:
-    world = Flatland().room(8, 6)
-    map_ = costmap(world)
-    world.discs.append((4.0, 3.0, 0.1))
-    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
-    world.discs = [(1.5, 3.0, 0.1)]
-    map_.update(Pose2(0.6, 3.0), scan_of(world, Pose2(0.6, 3.0)))
-    map_.clear()
-    assert at(map_, 3.92, 3.0)[0] != 254
-    assert at(map_, 1.42, 3.0)[0] == 254
-
-
-@pytest.mark.parametrize("within", [math.inf, 3.0])
-def test_clearing_keeps_near_obstacles_outside_the_field_of_view(within: float) -> None:
-    world = Flatland([], [(3.3, 3.0, 0.1), (1.4, 3.0, 0.1), (3.0, 3.6, 0.1)]).room(8, 6)
-    map_ = costmap(Flatland().room(8, 6))
-    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
-    full = scan_of(Flatland().room(8, 6), Pose2(3.9, 3.0))
-    ahead = replace(full, ranges=full.ranges[45:-45], angle_min=full.angle_min + 45 * full.angle_increment)
-    map_.update(Pose2(3.9, 3.0), ahead)
-    assert at(map_, 3.22, 3.0)[0] == at(map_, 1.48, 3.0)[0] == 254
-    map_.clear(within)
-    assert at(map_, 3.22, 3.0)[0] == 254
-    assert at(map_, 1.48, 3.0)[0] != 254
-    map_.update(Pose2(3.9, 3.0), full)
-    assert at(map_, 3.22, 3.0)[0] != 254
-
-
-def test_clearing_keeps_unseen_obstacles_within_the_given_distance() -> None:
-    world = Flatland([], [(1.4, 3.0, 0.1)]).room(8, 6)
-    map_ = costmap(Flatland().room(8, 6))
-    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
-    full = scan_of(Flatland().room(8, 6), Pose2(3.9, 3.0))
-    ahead = replace(full, ranges=full.ranges[45:-45], angle_min=full.angle_min + 45 * full.angle_increment)
-    map_.update(Pose2(3.9, 3.0), ahead)
-    map_.clear(unseen_margin=3.0)
-    assert at(map_, 1.48, 3.0)[0] == 254
-
-
-def test_clearing_around_the_robot_keeps_distant_obstacles() -> None:
-    world = Flatland([], [(4.0, 3.0, 0.1), (2.0, 4.2, 0.1)]).room(8, 6)
-    map_ = costmap(Flatland().room(8, 6))
-    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
-    blind = scan_of(world, Pose2(2.0, 3.0))
-    map_.update(Pose2(2.0, 3.0), replace(blind, ranges=np.full_like(blind.ranges, np.nan)))
-    assert (at(map_, 3.92, 3.0)[0], at(map_, 2.0, 4.12)[0]) == (254, 254)
-    map_.clear(1.5)
-    assert at(map_, 3.92, 3.0)[0] == 254
-    assert at(map_, 2.0, 4.12)[0] != 254
-
-
-def test_costmap_is_cleared_around_the_robot_although_one_of_its_lidars_is_silent() -> None:
-    world = Flatland([], [(2.0, 4.2, 0.1), (6.0, 4.2, 0.1)]).room(8, 6)
-    map_ = costmap(Flatland().room(8, 6))
-    blind = replace(scan_of(world, Pose2(2.0, 3.0)), ranges=np.full(360, np.nan))
-    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
-    map_.update(Pose2(2.0, 3.0), replace(blind, sensor="rear"))  # its last scan
-    map_.update(Pose2(6.0, 3.0), scan_of(world, Pose2(6.0, 3.0)))
-    map_.update(Pose2(6.0, 3.0), blind)
-    assert (at(map_, 2.0, 4.12)[0], at(map_, 6.0, 4.12)[0]) == (254, 254)
-    map_.clear(1.5)
-    assert at(map_, 2.0, 4.12)[0] == 254
-    assert at(map_, 6.0, 4.12)[0] != 254
-
-
-def test_cells_under_the_robot_are_free() -> None:
-    world = Flatland().room(8, 6)
-    map_ = costmap(world)
-    world.discs.append((2.3, 3.0, 0.1))
-    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
-    map_.update(Pose2(2.2, 3.0), scan_of(Flatland(), Pose2(2.2, 3.0), range_max=0.06))
-    assert at(map_, 2.2, 3.0)[0] != 254
 
 
 def test_pose_fits_on_the_map_unless_it_is_in_a_wall() -> None:
