@@ -10,12 +10,12 @@ from simscen.advanced.localizers.scan_memory import step_length
 from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.messages.navigation import Estimate
+from simscen.stack.localizers.augmented_mcl import AugmentedMcl
 from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.distance_field import DistanceField, Float32
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particle_filter import ParticleFilter
 from simscen.stack.localizers.particles import FreeSpace, Particles, are_compact, summarize
-from simscen.stack.localizers.resampling import AugmentedMcl
 from simscen.stack.localizers.sensor_models import BeamSkipping, LikelihoodFieldProb, SensorModel
 
 UNMAPPED_LIKELIHOOD_RATIO = 0.4

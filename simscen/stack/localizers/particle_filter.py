@@ -12,6 +12,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.localizers import AmclParameters
+from simscen.stack.localizers.augmented_mcl import PROBE_COUNT, AugmentedMcl
 from simscen.stack.localizers.beams import Beams, select_beams
 from simscen.stack.localizers.motion_models import MotionModel
 from simscen.stack.localizers.particles import (
@@ -22,7 +23,7 @@ from simscen.stack.localizers.particles import (
     equal_weights,
     summarize,
 )
-from simscen.stack.localizers.resampling import PROBE_COUNT, AugmentedMcl, KldBound, kld_sampling, systematic_resampling
+from simscen.stack.localizers.resampling import KldBound, kld_sampling, systematic_resampling
 from simscen.stack.localizers.sensor_models import SensorModel
 
 CONVERGENCE_DISTANCE_M = 0.5

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from estimate_drives import BUILDINGS, Case, case
 
 from simscen.core.geometry import Array
-from simscen.stack.localizers import resampling
+from simscen.stack.localizers import augmented_mcl
 
 RECOVERING = {"max_particles": 5000, "recovery_alpha_slow": 0.001, "recovery_alpha_fast": 0.1}
 THRESHOLDS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.4)
@@ -45,7 +45,7 @@ def main() -> None:
     for model in ("likelihood_field", "likelihood_field_prob"):
         sets = {name: drives(name, model, range(11, 15)) for name in ("kidnapped", "unknown", "crowded")}
         for threshold in THRESHOLDS:
-            with mock.patch.object(resampling, "MIN_BETTER_SHARE", threshold):
+            with mock.patch.object(augmented_mcl, "MIN_BETTER_FRACTION", threshold):
                 found = {
                     name: sum(bool((position_errors(one)[-FINAL_ROWS:] < FOUND_M).all()) for one in sets[name])
                     for name in ("kidnapped", "unknown")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simscen.stack.localizers.resampling import AugmentedMcl, RunningAverage
+from simscen.stack.localizers.augmented_mcl import AugmentedMcl, RunningAverage
 
 
 @pytest.mark.parametrize("alpha", [0.0, 0.1, 0.9])
