@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import Path
@@ -186,7 +185,6 @@ def _on_circle(ax: float, ay: float, bx: float, by: float, radius: float, center
     return center.x + ax + t * dx, center.y + ay + t * dy
 
 
-Floats = npt.NDArray[np.float32]
 PATH_SPACING_M = 0.05
 """Default distance between the points of an upcoming path."""
 
@@ -198,11 +196,6 @@ class UpcomingPath:
     points: Array
     spacing: float
     length: float
-
-    def relative_to(self, pose: Pose2) -> tuple[Floats, Floats, Floats]:
-        """Return x and y (n,) relative to the position of `pose`, without rotation, and the headings (n,)."""
-        x, y, yaw = self.points.T
-        return (x - pose.x).astype(np.float32), (y - pose.y).astype(np.float32), yaw.astype(np.float32)
 
 
 def upcoming_path(tracker: PathTracker, max_length: float, spacing: float = PATH_SPACING_M) -> UpcomingPath:

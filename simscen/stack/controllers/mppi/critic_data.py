@@ -58,7 +58,8 @@ class CriticData:
     @cached_property
     def path(self) -> tuple[Floats, Floats, Floats]:
         """x, y, and yaw, each (m,), of the plan in the frame of the rollouts."""
-        return self.plan.relative_to(self.pose)
+        x, y, yaw = self.plan.points.T
+        return (x - self.pose.x).astype(np.float32), (y - self.pose.y).astype(np.float32), yaw.astype(np.float32)
 
     @cached_property
     def furthest_point(self) -> int:
