@@ -77,3 +77,13 @@ def test_list_items_are_validated_and_not_optional():
         Sites.model_validate({"walls": [None]})
     assert raised.value.errors()[0]["loc"] == ("walls", 0)
     assert Sites.model_json_schema()["properties"]["walls"]["items"] == {"$ref": "#/$defs/Wall"}
+
+
+def test_only_the_specification_of_the_named_controller_is_imported():
+    code = (
+        "import sys; from simscen.model.stack import StackSpec;"
+        "StackSpec.model_validate({}); print('simscen.model.mppi' in sys.modules);"
+        "StackSpec.model_validate({'controller': {'type': 'mppi'}}); print('simscen.model.mppi' in sys.modules)"
+    )
+    output = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert output.split() == ["False", "True"]
