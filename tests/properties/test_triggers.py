@@ -20,6 +20,8 @@ from simscen.testing.fakes import FakeStage
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 BEAT_TICKS = 24
+RARELY = st.sampled_from([False, False, False, True])
+"""Whether a trigger has a modifier. With many modifiers, most steps of a sequence would never start."""
 Scenario = tuple[list[dict[str, Any]], list[dict[str, Any]]]
 """Events and faults as in a scenario file."""
 Drive = tuple[list[bool], list[float]]
@@ -47,15 +49,15 @@ def conditions(draw: Any, names: list[str], depth: int = 1) -> dict[str, Any]:
             found = {kind: draw(conditions(names, depth - 1))}
         case _:
             found = {kind: draw(st.lists(conditions(names, depth - 1), min_size=1, max_size=2))}
-    return found | ({"for": draw(HALF_BEATS)} if draw(st.booleans()) else {})
+    return found | ({"for": draw(HALF_BEATS)} if draw(RARELY) else {})
 
 
 @st.composite
 def triggers(draw: Any, names: list[str], may_repeat: bool) -> dict[str, Any]:
     found = draw(conditions(names))
-    if draw(st.booleans()):
+    if draw(RARELY):
         found["edge"] = "falling"
-    if draw(st.booleans()):
+    if draw(RARELY):
         found["delay"] = draw(HALF_BEATS)
     if may_repeat and draw(st.booleans()):
         found["times"] = draw(st.integers(2, 3))
@@ -89,7 +91,7 @@ def scenarios(draw: Any) -> Scenario:
 
 @st.composite
 def drives(draw: Any) -> Drive:
-    fast = draw(st.lists(st.booleans(), min_size=1, max_size=25))
+    fast = draw(st.lists(st.booleans(), min_size=10, max_size=25))
     steps = draw(st.lists(st.integers(0, 2), min_size=len(fast), max_size=len(fast)))
     return fast, [sum(steps[:k]) / 4 for k in range(len(fast))]
 
