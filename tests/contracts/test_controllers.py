@@ -2,7 +2,8 @@
 
 import pytest
 
-from simscen.model.controllers import DynamicWindow, Mppi, RegulatedPurePursuit
+from simscen.model.controllers import DynamicWindow, RegulatedPurePursuit
+from simscen.model.mppi import Mppi
 from simscen.model.stack_base import ControllerSpec
 from simscen.testing import Promise, promises_of
 

@@ -4,8 +4,9 @@ import pytest
 
 from simscen.core.geometry import Pose2
 from simscen.core.messages.goals import Goal
-from simscen.model.controllers import DynamicWindow, Mppi, RegulatedPurePursuit
+from simscen.model.controllers import DynamicWindow, RegulatedPurePursuit
 from simscen.model.localizers import GroundTruth
+from simscen.model.mppi import Mppi
 from simscen.model.stack import StackSpec
 from simscen.testing import Promise, promises_of
 from simscen.testing.flatland import Drive, Flatland, drive
