@@ -2,7 +2,7 @@
 
 import ast
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from simscen.sim.urdf.xacro.functions import GLOBAL_FUNCTIONS, METHODS, NAMESPACES, PYTHON_TYPES, Function
@@ -29,22 +29,29 @@ PropertyLookup = Callable[[tuple[str, ...]], Value]
 """Returns the value of the property `a.b`, given as ("a", "b"); raises KeyError if it does not exist."""
 
 
-def evaluate(text: str, properties: PropertyLookup, budget: Budget) -> Value:
-    """Return the value of an expression, and count its steps in `budget`; raises ExpansionError."""
+Functions = Mapping[tuple[str, ...], Function]
+"""Functions by dotted name, such as ("xacro", "load_yaml")."""
+
+
+def evaluate(text: str, properties: PropertyLookup, budget: Budget, functions: Functions) -> Value:
+    """Return the value of an expression, and count its steps in `budget`; raises ExpansionError.
+
+    `functions` can be used in addition to the built-in ones.
+    """
     if len(text) > MAX_EXPRESSION_CHARACTERS:
         raise ExpansionError(f"an expression is longer than {MAX_EXPRESSION_CHARACTERS} characters")
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError):  # the last two: deeply nested brackets
         raise ExpansionError("not an expression", EXPRESSION_HINT) from None
-    return _Evaluation(properties, budget).value(tree.body)
+    return _Evaluation(properties, budget, functions).value(tree.body)
 
 
 class _Evaluation:
-    """Evaluation of one expression with the values of `properties`. Its steps are counted in `budget`."""
+    """Evaluation of one expression; see `evaluate` for the arguments."""
 
-    def __init__(self, properties: PropertyLookup, budget: Budget) -> None:
-        self._properties, self._budget = properties, budget
+    def __init__(self, properties: PropertyLookup, budget: Budget, functions: Functions) -> None:
+        self._properties, self._budget, self._functions = properties, budget, functions
 
     def value(self, node: ast.expr) -> Value:
         """Return the value of a node of the syntax tree; raises ExpansionError."""
@@ -62,6 +69,8 @@ class _Evaluation:
         match node:
             case ast.Constant(value):
                 return value
+            case ast.Attribute(whole, key) if not _is_dotted_name(whole):
+                return item(self.value(whole), key)
             case ast.Name() | ast.Attribute():
                 return self._name(node)
             case ast.List(elts) | ast.Tuple(elts):
@@ -128,7 +137,7 @@ class _Evaluation:
             return isinstance(self.value(arguments[0]), PYTHON_TYPES[kind])
         known: Function | float | None
         if path:
-            known, receiver = _find_builtin(path), []
+            known, receiver = self._functions.get(path) or _find_builtin(path), []
         elif isinstance(function, ast.Attribute):
             value = self.value(function.value)
             known, receiver = METHODS.get((type(value), function.attr)), [value]
@@ -164,6 +173,17 @@ def _path(node: ast.expr) -> tuple[str, ...]:
             return (*_path(value), name)
         case _:
             raise ExpansionError(f"{_describe(node)} is not a name", EXPRESSION_HINT)
+
+
+def _is_dotted_name(node: ast.expr) -> bool:
+    return isinstance(node, ast.Name) or (isinstance(node, ast.Attribute) and _is_dotted_name(node.value))
+
+
+def item(whole: Value, key: str) -> Value:
+    """Return the value `whole.key` of a dictionary; raises ExpansionError if there is none."""
+    if not isinstance(whole, dict) or key not in whole:
+        raise ExpansionError(f"there is no value {key[:60]!r}")
+    return whole[key]
 
 
 def _is_namespace(node: ast.expr) -> bool:

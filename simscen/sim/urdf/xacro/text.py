@@ -5,11 +5,13 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from simscen.assets.folders import AllowedFolders, UnusableFile
-from simscen.sim.urdf.xacro.expression import evaluate
+from simscen.sim.urdf.xacro.expression import Functions, evaluate, item
 from simscen.sim.urdf.xacro.limits import MAX_LENGTH, Budget, ExpansionError, MissingFile, Value, parse_literal
 from simscen.sim.urdf.xacro.scopes import Block, EvaluationMarker, LazyText, Scope
 from simscen.sim.urdf.xml_source import Element
 
+MAX_YAML_BYTES = 1 << 20
+"""Maximum size of a file that `xacro.load_yaml` reads."""
 TOKEN = re.compile(r"\$\$+[{(]|\$\{[^}]*\}|\$\([^)]*\)|[^$]+|\$[^{($]+|\$\Z")
 """Pattern of a part of a text: an escaped `$${` or `$$(`, an expression, a substitution, or plain text."""
 
@@ -21,6 +23,7 @@ class TextEvaluator:
         self.budget, self.file = budget, file
         self.arguments = dict(arguments)
         self._folders = folders
+        self._functions: Functions = {("xacro", "load_yaml"): self._load_yaml, ("load_yaml",): self._load_yaml}
 
     def value(self, text: str, scope: Scope) -> Value:
         """Return the value of a text: a value of any type for a single expression, else text. Raises ExpansionError."""
@@ -81,9 +84,7 @@ class TextEvaluator:
         """Return the property `a.b`, given as ("a", "b"); raises KeyError if it does not exist."""
         current: Value | Scope = scope
         for name in path:
-            if not isinstance(current, Scope):
-                raise KeyError(name)
-            current = self.property(current, name)
+            current = self.property(current, name) if isinstance(current, Scope) else item(current, name)
         if isinstance(current, Scope):
             raise KeyError(path[-1])
         return current
@@ -94,7 +95,7 @@ class TextEvaluator:
         if token.startswith("${"):
             expression = str(self.value(token[2:-1], scope))
             try:
-                return evaluate(expression, lambda path: self._property_at(path, scope), self.budget)
+                return self._evaluate(expression, scope)
             except ExpansionError as error:
                 if error.message.startswith("${"):
                     raise
@@ -102,6 +103,29 @@ class TextEvaluator:
         if token.startswith("$("):
             return self._substitute(str(self.value(token[2:-1], scope)))
         return token
+
+    def _evaluate(self, expression: str, scope: Scope) -> Value:
+        return evaluate(expression, lambda path: self._property_at(path, scope), self.budget, self._functions)
+
+    def _load_yaml(self, filename: object) -> object:
+        """Return the content of a YAML file, as `xacro.load_yaml` does; raises ExpansionError."""
+        from simscen.assets.yaml_values import parse_yaml_values
+
+        if not isinstance(filename, str):
+            raise ExpansionError("load_yaml() takes the path of a file")
+        try:
+            path = self._folders.find(filename, self.file.parent, allow_absolute=True)
+            _, content = self._folders.read_file(path, MAX_YAML_BYTES)
+            return parse_yaml_values(content, self._number)
+        except UnusableFile as trouble:
+            raise ExpansionError(f"{filename[:200]!r}: {trouble}", trouble.hint) from trouble
+
+    def _number(self, expression: str) -> float:
+        """Return the number of an expression without properties; raises ExpansionError."""
+        value = self._evaluate(expression, Scope())
+        if not isinstance(value, int | float):
+            raise ExpansionError(f"{expression[:60]!r} is not a number")
+        return value
 
     def _substitute(self, command: str) -> str:
         """Return the value of a substitution such as `arg NAME` or `find PACKAGE`; raises ExpansionError."""

@@ -11,7 +11,12 @@ from simscen.sim.urdf.xml_source import read_xml
 @pytest.fixture
 def expand(tmp_path):
     def expand(text, **files):
-        """Expand the content of a <robot>; `files` are written beside it, `pkg__name` into a folder pkg."""
+        """Expand the content of a <robot>; `files` are written beside it, `pkg__name` into a folder pkg.
+
+        `name__yaml` becomes the YAML file name.yaml.
+        """
+        for name in [name for name in files if name.endswith("__yaml")]:
+            (tmp_path / name.replace("__", ".")).write_text(files.pop(name))
         for name, content in {"main": text, **files}.items():
             path = tmp_path / f"{name.replace('__', '/')}.xacro"
             path.parent.mkdir(parents=True, exist_ok=True)

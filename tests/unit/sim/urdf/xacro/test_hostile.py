@@ -112,6 +112,32 @@ def test_symbolic_link_out_of_the_root_is_no_package(refusal, tmp_path):
     assert "there is no package 'pkg'" in refusal('<xacro:include filename="$(find pkg)/x.xacro"/>').message
 
 
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("a: &x [1]\nb: *x\n", "aliases (`*name`) are not supported in YAML files"),
+        ("[" * 30 + "]" * 30, "lists and mappings are nested deeper than 20"),
+        ("[" * 100_000, "lists and mappings are nested deeper than 20"),
+        ("a: [1\n", "not valid YAML in line 2: expected ',' or ']', but got '<stream end>'"),
+        (
+            "a: !!python/object/apply:os.system [ls]\n",
+            "not valid YAML in line 1: could not determine a constructor for the",
+        ),
+        ("a: !degrees __import__('os')\n", "__import__() is not supported"),
+        ("a: 2001-99-99\n", "not valid YAML"),
+        ("a: \x01\n", "not valid YAML"),
+    ],
+)
+def test_hostile_yaml_file_is_refused(refusal, content, message):
+    problem = refusal("<a v=\"${xacro.load_yaml('x.yaml')}\"/>", x__yaml=content)
+    assert message in problem.message
+
+
+def test_long_yaml_file_is_refused(refusal):
+    problem = refusal("<a v=\"${xacro.load_yaml('x.yaml')}\"/>", x__yaml="- 1\n" * 70_000)
+    assert problem.message == "${xacro.load_yaml('x.yaml')}: the value is longer than 65536"
+
+
 BOMBS = {
     "a macro that calls itself": '<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>',
     "macros that double": "".join(

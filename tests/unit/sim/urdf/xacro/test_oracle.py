@@ -55,12 +55,18 @@ CASES = {
     "includes": '<xacro:include filename="part.xacro"/><xacro:include filename="pkg/deep.xacro"/><a v="${from_part}"/><xacro:pm/>'
     '<xacro:include filename="none.xacro" optional="true"/>',
     "namespaces": '<xacro:include filename="part.xacro" ns="n"/><a v="${n.from_part + 1}"/><xacro:n.pm/>',
+    "YAML files": "<xacro:property name=\"p\" value=\"${xacro.load_yaml('base.yaml')}\"/>"
+    "<a v=\"${p['wheel']['radius'] * 2} ${p.wheel.radius} ${p['wheel'].radius} ${p.axles[1].x} ${len(p.axles)}\"/>"
+    "<b v=\"${p.wheel.get('width', 3)} ${'wheel' in p} ${p.angle} ${p.turn} ${p.size} ${p.name} ${p.flag} ${p.none}\"/>"
+    "<xacro:if value=\"${p.flag}\"><c/></xacro:if><d v=\"${xacro.load_yaml('base.yaml').wheel.radius}\"/>",
     "messages": '<a v="${xacro.message(\'hello\')}${xacro.warning(\'hm\')}"/><b v="${xacro.tokenize(\'1, 2;3\')}"/>',
 }  # fmt: skip
 FILES = {
     "part": '<xacro:property name="from_part" value="4"/><xacro:macro name="pm"><k v="${from_part}"/></xacro:macro><p/>',
     "pkg__deep": '<xacro:include filename="deeper.xacro"/>',
     "pkg__deeper": "<deeper/>",
+    "base__yaml": "wheel: {radius: 0.0725, mass: 1e-1}\naxles: [{x: -1}, {x: 0.5}]\nangle: !degrees 90\n"
+    "turn: !radians pi/2\nsize: !inches 2\nname: front\nflag: yes\nnone: ~\n",
 }
 
 
@@ -104,13 +110,15 @@ BROKEN = {
     "not a name": '<xacro:property name="a b" value="1"/>',
     "nothing to forward": '<xacro:macro name="m" params="x:=^"/><xacro:m/>',
     "value and default": '<xacro:property name="p" value="1" default="2"/>',
+    "missing YAML file": "<a v=\"${xacro.load_yaml('none.yaml')}\"/>",
+    "missing key": "<a v=\"${xacro.load_yaml('base.yaml').none}\"/>",
     "fatal": "<a v=\"${xacro.fatal('no such wheel')}\"/>",
 }
 
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_errors_of_xacro_have_positions(refusal, tmp_path, name):
-    problem = refusal(BROKEN[name])
+    problem = refusal(BROKEN[name], base__yaml="a: 1\n")
 
     assert problem.message
     assert problem.line == 1
