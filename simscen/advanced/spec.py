@@ -42,11 +42,11 @@ class ScanMatchingAmcl(AmclParameters):
     """A scan is ignored if at most this share of its beams fits the map. This applies only while the particles are one
     narrow cluster. The pose is then probably right, and the surroundings have changed."""
     map_trust_full: Probability = 0.8
-    """A scan has its full weight if at least this share of its beams on the mapped area fits, and 80 % of its beams end
-    there. 0 = full weight of all scans, as in Nav2; `sure_update_interval` then has no effect."""
+    """A scan has its full weight if at least 80 % of its beams end on the mapped area, and at least this share of those
+    fits the map. 0 = full weight of all scans, as in Nav2; `sure_update_interval` then has no effect."""
     settling_distance: NonNegativeLength = 4.0
     """The weight of scans after a given initial pose starts at a fifth, and grows by 1 / `settling_distance` per meter
-    up to its full value. Over this distance, the pose is also searched near the initial one. Early scans count less
+    up to its full value. Meanwhile, the pose is also searched near the initial one. Early scans count less
     because one room alone fits many poses. A turn of 2 rad counts as 1 m. 0 = full weight at once, as in Nav2."""
     relocalization: Literal["scan_matching", "random"] = "scan_matching"
     """How a lost robot is found. `scan_matching`: by matching the scans of the last meters with the whole map.

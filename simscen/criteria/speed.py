@@ -34,8 +34,8 @@ class Speed(Spec, Criterion):
     Why this: on slopes, by slip, or by overshoot, a robot can exceed the limits that its controller is given.
     Source: ScenarioRunner's MaxVelocityTest.
 
-    Inconclusive if the robot was never in the region, or never in limited cells of the mask for longer than twice the
-    `grace`. With `while_on`, also inconclusive if no event switched the zone.
+    Inconclusive if the robot was never in the region, or if no stay in limited cells of the mask was longer than twice
+    the `grace`. With `while_on`, also inconclusive if no event switched the zone.
 
     Example: `speed: {max: 0.5 m/s}`
     """
@@ -59,8 +59,8 @@ class Speed(Spec, Criterion):
     """Maximum speed above a limit of the mask."""
     grace: Duration = 1.0
     """Time that the robot may take to slow down after it enters cells of the mask with a lower limit, or after a zone
-    is enabled. It may also accelerate this long before it leaves such cells. After the robot enters the region `in`, it
-    has no such time."""
+    is enabled. It may also accelerate this long before it leaves such cells. `grace` does not apply when the robot
+    enters the region `in`."""
 
     @model_validator(mode="after")
     def _check_keys(self) -> Speed:

@@ -47,7 +47,7 @@ class Garbage(Spec, Fault):
     """Probability that a message is garbage."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return (`value`, reason) if it is empty or short, but messages of the target have a fixed size."""
+        """Return the key "value" and a reason if its value is `empty` or `short`, but messages have a fixed size."""
         if self.value not in WRONG_SIZES or target.kind in ("Scan", "Image"):
             return None
         return "value", f"its messages cannot be {self.value}: they have a fixed number of values"

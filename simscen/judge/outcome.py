@@ -38,9 +38,11 @@ def apply_expectation(
     there is no verdict.
 
     As with pytest's `xfail(strict=True)`, the outcome is FAILED_AS_EXPECTED if a criterion fails, otherwise FAILED. If
-    the expectation lists criteria, it is also FAILED if one of them passes or if another criterion does not pass. A
-    missing disturbance is only expected if its name is listed. The outcome is also FAILED if a listed disturbance has
-    `happened` (names of disturbances), unless there is a verdict on another one of the same name.
+    the expectation lists criteria, it is also FAILED if one of them passes or if another criterion does not pass.
+
+    The list can also name disturbances that must not happen. `happened` are the names of all disturbances that did. If
+    a listed one happened, the outcome is FAILED, unless another disturbance of the same name is missing. A missing
+    disturbance that is not listed is an unexpected failure.
     """
     if expected is None or outcome is Outcome.ERROR or not is_complete:
         return outcome, None

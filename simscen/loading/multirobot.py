@@ -21,8 +21,8 @@ def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
     return {name: _single_robot_tree(tree, robots[name]) for name in sorted(robots)}
 
 
-def has_multiple_robots(tree: MappingNode) -> bool:
-    """Return whether a scenario has the key `robots` with a mapping of mappings, as it must be."""
+def has_valid_robots(tree: MappingNode) -> bool:
+    """Return whether a scenario has the key `robots`, and its value is a mapping from names to mappings."""
     robots = child(tree, ROBOTS)
     return isinstance(robots, MappingNode) and all(
         isinstance(entry.value, MappingNode) for entry in robots.entries.values()
@@ -53,7 +53,7 @@ def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
     """
     if ROBOTS not in tree.entries:
         return replace_stack(tree, choice)
-    if not has_multiple_robots(tree):
+    if not has_valid_robots(tree):
         return tree  # validation reports the wrong type
     parts = split_by_robot(tree)
     if choice.external_command is not None and choice.name in map(external_stack_name, parts.values()):
@@ -76,7 +76,7 @@ def external_stack_name(tree: MappingNode) -> str | None:
 
 
 def scenario_robot_problems(tree: MappingNode) -> list[Problem]:
-    """Return problems of a scenario: missing `robot` or criteria, and keys that exclude `robots`."""
+    """Return problems of a scenario: no `robot`, no criteria, and keys that cannot be used together with `robots`."""
     problems = criteria_robot_problems(tree)
     if ROBOTS not in tree.entries and ROBOT not in tree.entries:
         problems.append(Problem(*tree.position, "SC010", f"missing key `{ROBOT}`"))
@@ -84,7 +84,7 @@ def scenario_robot_problems(tree: MappingNode) -> list[Problem]:
 
 
 def criteria_robot_problems(tree: MappingNode) -> list[Problem]:
-    """Return problems of a criteria file: missing criteria, and keys that exclude `robots`."""
+    """Return problems of a criteria file: missing criteria, and keys that cannot be used together with `robots`."""
     problems: list[Problem] = []
     criteria, robots = child(tree, PASS), child(tree, ROBOTS)
     if isinstance(criteria, SequenceNode) and not criteria.items:

@@ -201,7 +201,7 @@ def _load_variation(
 
 def _ineffective_variation_problems(variation: Variation, tree: MappingNode, choice: StackChoice) -> Iterator[Problem]:
     """Yield a problem for each value of a variation that has no effect, because `choice` replaces the stack."""
-    each = [tree, *multirobot.split_by_robot(tree).values()] if multirobot.has_multiple_robots(tree) else [tree]
+    each = [tree, *multirobot.split_by_robot(tree).values()] if multirobot.has_valid_robots(tree) else [tree]
     for change in variation.changes:
         if all(node_at(part, change.target.keys) is not change.value for part in each):
             message = f"{quoted(change.target.path)} changes nothing with --stack {choice.written}"

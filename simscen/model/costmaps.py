@@ -49,8 +49,8 @@ class Costmap(Ranged):
     min_obstacle_height: NonNegativeLength = 0.05
     """Minimum height of obstacles in camera data; lower points are ground. Lidar data is not filtered."""
     max_ground_slope: Annotated[NonNegativeAngle, Field(le=1)] = 0.2
-    """Maximum slope, seen from the robot's base, of camera points that count as ground. With 0, as in Nav2, a ramp is
-    an obstacle."""
+    """Maximum slope of the ground in camera data between two successive points, going outward from the robot. Steeper
+    rises are obstacles. With 0, as in Nav2, a ramp is an obstacle."""
     max_obstacle_height: NonNegativeLength = 2.0
     """Maximum height of obstacles in camera data; higher points are ignored."""
     inf_is_valid: bool = True
@@ -95,7 +95,7 @@ class LocalCostmap(Spec):
     min_obstacle_height: NonNegativeLength | None = None
     """Minimum height of obstacles in camera data; lower points are ground."""
     max_ground_slope: Annotated[NonNegativeAngle, Field(le=1)] | None = None
-    """Maximum slope, seen from the robot's base, of camera points that count as ground."""
+    """Maximum slope of the ground in camera data between two successive points, going outward from the robot."""
     max_obstacle_height: NonNegativeLength | None = None
     """Maximum height of obstacles in camera data; higher points are ignored."""
     inf_is_valid: bool | None = None

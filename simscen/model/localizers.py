@@ -104,7 +104,7 @@ class AmclParameters(Ranged, LocalizerSpec):
     beam_skip_threshold: Probability = 0.3
     """Minimum fraction of the particles that a beam must fit. Other beams are skipped."""
     beam_skip_error_threshold: Probability = 0.9
-    """Fraction of skipped beams at which the pose must be wrong, so that no beam is skipped."""
+    """If at least this fraction of the beams would be skipped, the pose counts as wrong, and no beam is skipped."""
 
     @property
     def max_used_range(self) -> float:

@@ -1,4 +1,4 @@
-"""Reasons for parts of a reconstructed scenario, faults found in a log, and time windows in which a condition holds."""
+"""Results of estimators: reasons for parts of the scenario, faults, and time windows in which a condition holds."""
 
 from __future__ import annotations
 

@@ -21,8 +21,12 @@ FORMAT_VERSION = "1"
 STACK_RECORD = "simscen.stack"
 """Name of the metadata record at the end of the log with facts about the external stacks."""
 _FACT_PREFIX = "fact."
-STACK_FACT, STACK_NAME_FACT, VARIATION_FACT = "stack", "variation", "varied"
-"""Keys of `LogHeader.facts`: value of the option --stack, name of the stack if stacks are compared, and variation."""
+STACK_FACT = "stack"
+"""Key of `LogHeader.facts`: value of the option --stack."""
+STACK_NAME_FACT = "variation"
+"""Key of `LogHeader.facts`: name of the stack if stacks are compared. The key must stay as in older logs."""
+VARIATION_FACT = "varied"
+"""Key of `LogHeader.facts`: variation of the scenario."""
 ROBOTS_KEY, RESOLUTION_KEY, ORIGIN_KEY = "robots", "map.resolution", "map.origin"
 """Keys of the metadata record "simscen": the names of several robots, and the resolution and origin of a map."""
 END_RECORD, COUNT_PREFIX = "simscen.end", "messages:"
@@ -54,7 +58,8 @@ class LogHeader:
         scenario: Resolved YAML text of the scenario.
         map: Map that the stack receives; None without a map.
         robot_description: URDF of the robot.
-        mounts: Poses of the sensors on the robot's base, by sensor name. The scans of other lidars contain their pose.
+        mounts: Poses of the sensors on the robot's base, by sensor name. A lidar that is missing here has its
+            pose in each scan.
         sensors: Class names of readings ("Scan", …) by sensor name. Empty if read from a log.
         files: Attachments by name.
         facts: Additional metadata as text by key.

@@ -1,4 +1,6 @@
-"""Program of the adapter, `python start.py OPTIONS`, for the user's ROS Python. OPTIONS are the Options in JSON.
+"""Starts the adapter, which connects a run with ROS 2 nodes, in the user's ROS Python: `python start.py OPTIONS`.
+
+OPTIONS is an `Options` (see options.py) as JSON.
 
 simscen is not installed in that Python. The program makes simscen's folder importable as the package `simscen`, without
 running its `__init__.py`.

@@ -133,7 +133,8 @@ class ClearCostmap:
 PLANNER_CODES = frozenset(get_args(PlannerCode))
 """Names of the error codes of planners."""
 MIN_PROGRESS_M = 1.0
-"""With `retries_since_progress`, retries are restored if the goal is nearer by this than at all earlier recoveries."""
+"""With `retries_since_progress`: how much nearer the goal must be than at every earlier recovery, so that all retries
+are restored and the behaviors start with the first one again."""
 
 
 class BehaviorSequence:

@@ -30,14 +30,15 @@ class Setting:
     streams:          random streams by name, derived from the seed of the run; use `rng` for your own stream
     control_period:   time in s between two calls of a controller, goal checker, or behavior
     resolution:       cell size in m of the costmaps that the component gets
-    estimate:         initial pose estimate; `reset` or `start` passes it again
+    estimate:         initial pose estimate; `reset` or `start` gets it, too
     stop_on_failure:  whether a failed goal ends the task (for a whole stack)
     mode:             Nav2 action that the task imitates (for a whole stack)
     clear_costmap:    clears both costmaps, as described in `Costmaps.clear` (for a behavior)
     clear_around:     like `clear_costmap`, but only the area of the local costmap (for a behavior)
     trail:            returns the poses of the last minute in the odom frame, the oldest first (for a behavior)
-    limit_command:    returns the command after the collision monitor, given command and pose in the odom frame
-    wrap_localizer:   returns the localizer that the other components use instead (for the reference stack)
+    limit_command:    returns a command as the collision monitor would limit it, given the pose in the odom frame
+    wrap_localizer:   takes the localizer, and returns a wrapper that the other components use, such as one that injects
+                      faults (for the reference stack)
     """
 
     surroundings: Surroundings

@@ -45,8 +45,8 @@ class TemperedLikelihoodField(LikelihoodFieldProb):
 ODOMETRY_SHARE = 0.2
 """Share of the particles that follow odometry if odometry and scan matching disagree."""
 FIRST_SCAN_WEIGHT = 0.2
-"""Weight (exponent of the likelihood) of the first scan after an initial pose. It grows to 1 over the parameter
-`settling_distance`, because early scans of a single room fit many poses."""
+"""Weight (exponent of the likelihood) of the first scan after an initial pose. It grows to 1 with the driven distance,
+because early scans of a single room fit many poses."""
 CERTAIN_FIT = 0.9
 """Minimum share of a scan's beams that fit the map for the filter to be certain."""
 
@@ -100,7 +100,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
         self.particles = Particles(poses, self.particles.weights)
 
     def _settle(self, delta: Pose2) -> None:
-        """Increase the weight of scans by the motion `delta`; it reaches 1 after `settling_distance`."""
+        """Increase the weight of scans by the motion `delta`: by 1 / `settling_distance` per meter, up to 1."""
         if self._scan_weight < 1.0:
             self._scan_weight = min(1.0, self._scan_weight + step_length(delta) / self._spec.settling_distance)
 

@@ -211,8 +211,8 @@ def _consistency(trials: Sequence[Trial]) -> Consistency:
         anees=float(np.mean(values)),
         bounds=grouped_anees_bounds(_means_by_building(trials, [float(np.mean(trial.nees)) for trial in trials])),
         inside=fraction_in_ellipsoid(values),
-        moments=np.mean([trial.nees for trial in trials], axis=0).tolist(),
-        moment_bounds=anees_bounds(len(trials)),
+        anees_by_time=np.mean([trial.nees for trial in trials], axis=0).tolist(),
+        bounds_by_time=anees_bounds(len(trials)),
     )
 
 

@@ -14,7 +14,7 @@ from simscen.core.statistics import chi2_quantile, nees_mean_bounds
 from simscen.criteria.trace_signals.estimation_errors import DIMENSIONS, nees_samples
 
 Interval = tuple[float, float] | None
-"""Lower and upper limit of a 95 % confidence interval; None with too few buildings."""
+"""Interval in which a value lies with 95 % probability; None if it is unknown."""
 MIN_GROUPS = 3
 """Minimum number of buildings for `grouped_anees_bounds`."""
 
@@ -23,18 +23,20 @@ MIN_GROUPS = 3
 class Consistency:
     """Average NEES (ANEES) of a localizer: 3 if its covariances match its errors.
 
-    anees:         ANEES over all logs and CHECK_TIMES_S
-    bounds:        95 % bounds of `anees` if the covariances are right on average, from `grouped_anees_bounds`
-    inside:        fraction of the errors within the 95 % ellipsoid of the covariance
-    moments:       ANEES over all logs at each of CHECK_TIMES_S
-    moment_bounds: 95 % bounds of each of `moments` if the localizer is consistent, from `anees_bounds`
+    anees:           ANEES over all logs and CHECK_TIMES_S
+    bounds:          interval of `anees` for a consistent localizer with correlated errors in each building, from
+                     `grouped_anees_bounds`
+    inside:          fraction of the errors within the 95 % ellipsoid of the covariance
+    anees_by_time:   ANEES over all logs at each of CHECK_TIMES_S
+    bounds_by_time:  interval of each of `anees_by_time` for a consistent localizer in independent runs, from
+                     `anees_bounds`
     """
 
     anees: float
     bounds: Interval
     inside: float
-    moments: Sequence[float]
-    moment_bounds: tuple[float, float]
+    anees_by_time: Sequence[float]
+    bounds_by_time: tuple[float, float]
 
 
 def nees_at(trace: Trace, seconds: float) -> float | None:
@@ -59,11 +61,11 @@ def anees_bounds(runs: int) -> tuple[float, float]:
 
 
 def grouped_anees_bounds(groups: Sequence[float]) -> Interval:
-    """Return 95 % bounds of the mean of `groups` if the covariances are right on average.
+    """Return the interval around 3 in which the mean of `groups` lies with 95 % probability for a consistent localizer.
 
-    `groups` has the ANEES of each building. NEES values of one building may be correlated. The bounds are Student's t
-    interval for the logarithm of the mean (delta method). Return None with fewer than MIN_GROUPS buildings, or if the
-    mean is infinite or not positive.
+    `groups` has the ANEES of each building. NEES values of one building may be correlated. The width of the interval is
+    that of Student's t interval for the logarithm of the mean (delta method). Return None with fewer than MIN_GROUPS
+    buildings, or if the mean is infinite or not positive.
     """
     count, mean = len(groups), float(np.mean(groups))
     if count < MIN_GROUPS or not 0.0 < mean < math.inf:

@@ -152,9 +152,9 @@ def _consistency_lines(row: "ParameterSetResults") -> list[str]:
     def lines(name: str, consistency: "Consistency") -> list[str]:
         low, high = consistency.bounds or (0.0, 0.0)
         right = f"; if the covariance is right on average: {low:.2f} … {high:.2f} (95 %)" if consistency.bounds else ""
-        pairs = zip(CHECK_TIMES_S, consistency.moments, strict=True)
+        pairs = zip(CHECK_TIMES_S, consistency.anees_by_time, strict=True)
         moments = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in pairs)
-        low, high = consistency.moment_bounds
+        low, high = consistency.bounds_by_time
         return [
             f"  ANEES {name}: {consistency.anees:.2f}{right}; in the 95 % ellipsoid: {consistency.inside:.1%}",
             f"    {moments}; with normal errors and independent logs: {low:.2f} … {high:.2f} (95 %)",

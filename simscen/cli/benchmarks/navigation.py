@@ -50,7 +50,12 @@ def command(
             help="Number of random goals in each shipped world, of generated buildings, of ramps, and of corridors.",
         ),
     ] = 20,
-    lost: Annotated[int, typer.Option(min=0, max=10_000, help="Number of drives with an unknown start.")] = 50,
+    lost: Annotated[
+        int,
+        typer.Option(
+            min=0, max=10_000, help="Number of drives each with a wrong start, an unknown start, and a kidnapping."
+        ),
+    ] = 50,
     stack: Annotated[
         Path | None,
         typer.Option(

@@ -40,7 +40,7 @@ class Sizes:
     fields:   number of generated obstacle fields; there are half as many narrow fields
     dynamic:  number of fields of moving cylinders at each speed
     goals:    number of random goals in each shipped world, of generated buildings, of ramps, and of corridors
-    lost:     number of drives with an unknown start
+    lost:     number of drives each with a wrong start, an unknown start, and a kidnapping
     """
 
     first: int = 1

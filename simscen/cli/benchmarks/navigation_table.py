@@ -105,8 +105,9 @@ def _value_text(value: float | None, number_format: str, unit: str = "") -> str:
 
 def _localization_lines(experiment: str, localized: LocalizationAccuracy) -> list[str]:
     low, high = localized.bounds
-    moments = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in localized.anees.items())
+    anees = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in localized.anees.items())
     errors = (
         f"{_value_text(localized.rmse, '.3f', ' m')} RMSE, worst run {_value_text(localized.worst_rmse, '.3f', ' m')}"
     )
-    return [f"{experiment}: {errors}", f"  ANEES {moments}; a consistent belief lies in {low:.2f} … {high:.2f} (95 %)"]
+    interval = f"95 % interval of a consistent localizer: {low:.2f} … {high:.2f}"
+    return [f"{experiment}: {errors}", f"  ANEES {anees}; {interval}"]

@@ -1,4 +1,4 @@
-"""Examples of the topics of the scenario language whose docstrings have none."""
+"""Examples for `simscen explain`: one for each part of the scenario language whose docstring has no example."""
 
 EXAMPLES = {
     "trigger.all": "when: {all: [{robot_in: {region: hall}}, {speed_above: 0.4 m/s}]}",
@@ -35,4 +35,4 @@ EXAMPLES = {
     "sensor.lidar": "sensors: {front: {lidar: {beams: 541, field_of_view: 270 deg, mount: {x: 0.35, z: 0.18}}}}",
     "sensor.camera": "sensors: {left_eye: {camera: {width: 64, height: 48, mount: {y: 0.2, yaw: 90 deg}}}}",
 }
-"""YAML text of each example, by group and name of the topic."""
+"""YAML text of each example, by `group.name` of the Topic (see topics.py)."""

@@ -1,6 +1,5 @@
 """Keys of YAML mappings, with descriptions of their values, for `simscen explain` and the language reference."""
 
-import math
 import re
 from dataclasses import dataclass
 from types import NoneType, UnionType
@@ -59,7 +58,10 @@ class Field:
 
 
 def fields_of(model: type[BaseModel]) -> list[Field]:
-    """Return the keys of a model in order; for a Choice, only its modifiers."""
+    """Return the keys of a model in order.
+
+    For a Choice (a mapping with exactly one of several keys), return only the keys that go with any of them.
+    """
     docs = field_docs(model)
     names = model.modifiers if issubclass(model, Choice) else model.model_fields.keys()
     return [
@@ -99,7 +101,7 @@ def kind_of(kind: Any, metadata: tuple[Any, ...] = ()) -> str:
 
 
 def _type_names(group: str) -> str:
-    """Return the names of the types of a group that simscen ships."""
+    """Return the names of the types that simscen ships in a registry group."""
     return " | ".join(f"`{entry.name}`" for entry in all_types(group) if entry.is_shipped)
 
 
@@ -135,8 +137,8 @@ def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
         text = _KIND_NAMES.get(kind, "value")
     found = {name: getattr(mark, name, None) for mark in marks for name in _BOUNDS if hasattr(mark, name)}
     bounds = {name: bound for name, bound in found.items() if bound is not None}
-    if bounds.get("gt", -math.inf) >= bounds.get("ge", math.inf):
-        del bounds["ge"]  # of two lower bounds, the stricter one applies
+    if {"gt", "ge"} <= bounds.keys():  # the stricter one applies
+        del bounds["ge" if bounds["gt"] >= bounds["ge"] else "gt"]
     if bounds.keys() == {"ge", "le"}:
         texts = [f"{bounds['ge']:g} … {bounds['le']:g}"]
     else:
@@ -152,6 +154,6 @@ def _default(model: type[BaseModel], name: str, field: FieldInfo) -> str:
     value = field.get_default(call_default_factory=True)
     if value in (PydanticUndefined, None, "") or isinstance(value, BaseModel | dict):
         return OPTIONAL
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return f"[{', '.join(map(str, value))}]" if value else OPTIONAL
     return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else str(value)

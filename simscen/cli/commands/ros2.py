@@ -108,7 +108,8 @@ def command(
         typer.Option(
             min=0,
             max=100,
-            help="With lockstep: how often all nodes are asked again if no command has arrived; 0: once per node.",
+            help="With lockstep: maximum number of additional rounds, in which all nodes are asked again, until a "
+            "command arrives; 0: as many rounds as there are nodes.",
         ),
     ] = 0,
     wall_time: Annotated[bool, typer.Option(help="Accept nodes that do not use sim time.")] = False,

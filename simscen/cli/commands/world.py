@@ -63,7 +63,7 @@ def inspect(
     root_folder = root or default_root([path])
     source = load_world_file(path, root_folder, world_path or ())
     world = _build(source, root_folder, world_path or [], lenient)
-    built = _draw_map(world, path, height, MAP_RESOLUTION_M, "in scenarios, use `map: none`")
+    built = _with_map(world, path, height, MAP_RESOLUTION_M, "in scenarios, use `map: none`")
     summary = inspect_world(built)
     if as_json:
         print(json.dumps(asdict(summary), indent=2))
@@ -99,7 +99,7 @@ def export(
     root_folder = root or default_root([path])
     source = load_world_file(path, root_folder, world_path or ())
     world = _build(source, root_folder, world_path or [], lenient)
-    grid = _draw_map(world, path, height, resolution, "choose larger cells with --resolution").map
+    grid = _with_map(world, path, height, resolution, "choose larger cells with --resolution").map
     save(map_, lambda file: save_map(grid, file), [path])
     rows, columns = grid.shape
     print_text(f"{escaped(str(map_))}: {columns} x {rows} cells of {grid.resolution:g} m")
@@ -162,7 +162,7 @@ def _build(source: LoadedWorld, root_folder: Path, world_path: list[Path], lenie
         return world_from_file(source, root_folder, world_path, lenient)
 
 
-def _draw_map(world: World, path: Path, height: float, resolution: float, alternative: str) -> BuiltWorld:
+def _with_map(world: World, path: Path, height: float, resolution: float, alternative: str) -> BuiltWorld:
     """Return a world with its map. Raises InvalidInput for the file `path` if the map would be too large.
 
     `alternative` is what users can do instead of changing the world.

@@ -23,7 +23,7 @@ from simscen.reconstruction.scenario_from_log import Reconstruction, Reconstruct
 from simscen.reconstruction.verification.comparison import Verification, compare_with_run
 from simscen.reconstruction.verification.page import verification_page
 
-MAX_COLUMNS = 100
+PIPED_COLUMNS = 100
 """Width of the table in characters if stdout is not a terminal."""
 
 
@@ -102,5 +102,5 @@ def _print_table(verified: Verification) -> None:
         table.add_column(column)
     for row in verified.quantities:
         table.add_row(*(Text(escaped(cell)) for cell in (row.name, row.log, row.run, row.difference)))
-    console = Console(file=sys.stdout, highlight=False, width=None if sys.stdout.isatty() else MAX_COLUMNS)
+    console = Console(file=sys.stdout, highlight=False, width=None if sys.stdout.isatty() else PIPED_COLUMNS)
     console.print(table)

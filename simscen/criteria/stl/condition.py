@@ -129,7 +129,7 @@ class Window(Spec):
     """Interval of time after the evaluation of its condition. Without any key, it is the rest of the run."""
 
     within: PositiveDuration | None = None
-    """Length of the window, which begins when its condition is evaluated: for a criterion, at the start of the run."""
+    """Length of the window. It begins at the start of the run; in a nested condition, at the time of its evaluation."""
     after: PositiveDuration | None = None
     """Time from the evaluation of its condition to the start of the window, which lasts until the end of the run."""
     between: Annotated[list[Duration], Field(min_length=2, max_length=2)] | None = None

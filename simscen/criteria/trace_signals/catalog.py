@@ -116,7 +116,7 @@ SIGNALS: dict[SignalName, Signal] = {
     "travelled": Signal("True distance driven so far, in moves of at least 1 cm.", "length", readers.travelled),
     "time": Signal("Simulated time since the start.", "duration", readers.time),
     "goal_distance": Signal(
-        "True straight-line distance to the goal accepted last, or to the first goal before any goal is accepted.",
+        "True straight-line distance to the goal accepted last; before the first acceptance, to the first of them.",
         "length",
         readers.goal_distance,
         {Evidence.ALIGNMENT, Evidence.NAVIGATION},

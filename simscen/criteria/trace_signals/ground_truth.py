@@ -1,6 +1,6 @@
 """True motion of the robot in a trace: pose, speed, clearance, and driven path.
 
-Functions raise InvalidTrace if a value of the trace is not finite.
+Functions raise InvalidTrace if a value of the trace is not finite, except an infinite clearance.
 """
 
 from __future__ import annotations
@@ -56,9 +56,10 @@ def true_pose(trace: Trace, tick: int) -> Pose2:
 
 
 def clearance(trace: Trace) -> Samples:
-    """Return the distance (n, 1) in m from the robot to the nearest surface, at most the measuring range of the case.
+    """Return the recorded distance (n, 1) in m from the robot to the nearest surface.
 
-    It is negative by the depth of an overlap. Raises InvalidTrace if a value is nan or -inf; inf is allowed.
+    It is negative by the depth of an overlap. Larger distances than `Case.clearance_range` are recorded as this range
+    by simscen, and possibly as inf in other logs. Raises InvalidTrace if a value is nan or -inf.
     """
     distances = trace.clearance.values[:, 0]
     is_invalid = np.isnan(distances) | np.isneginf(distances)

@@ -119,7 +119,7 @@ def localized(query: SignalQuery) -> Array:
 
 
 def goal_distance(query: SignalQuery) -> Array:
-    """Return the true distance in m to the newest accepted goal; before the first acceptance, to the first goal."""
+    """Return the true distance in m to the newest accepted goal; before it, to the first accepted goal."""
     goals, poses = _current_goals(query.trace, query.case), true_poses(query.trace)
     return np.hypot(poses[:, 0] - goals[:, 0], poses[:, 1] - goals[:, 1])
 
@@ -221,7 +221,10 @@ def _age(trace: Trace, received: Ticks) -> Array:
 
 
 def _current_goals(trace: Trace, case: Case) -> Array:
-    """Return x, y, yaw (n, 3) of the newest or else the first accepted goal; (1, 3) of the first goal without one."""
+    """Return x, y, yaw (n, 3) of the newest accepted goal; before the first acceptance, of the first accepted goal.
+
+    If no goal was accepted, return those of the scenario's first goal (1, 3).
+    """
     clock = sample_ticks(trace)
     pose_by_name = {goal.name: goal.pose for goal in reversed(case.every_goal)}
     ticks, poses = [], []

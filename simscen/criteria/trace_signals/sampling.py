@@ -21,7 +21,8 @@ MAX_INTERPOLATED_GAP_S = 0.25
 """Longest gap between samples that `evenly_spaced` interpolates."""
 
 SignalArguments = Mapping[str, object]
-"""Arguments of a signal by YAML key: object, point, goal, region, fault, event, recovery, or with."""
+"""Arguments of a signal by YAML key: `object`, `point`, `goal`, `region`, `fault`, `event`, `recovery`,
+or `with`."""
 
 
 @dataclass(frozen=True, eq=False)

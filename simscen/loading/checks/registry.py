@@ -6,7 +6,7 @@ A check is a generator function that yields problems. It is registered for a sta
     def impossible_triggers(loaded: LoadedScenario) -> Iterator[CheckProblem]: ...
 
 The stages run in the order of the table. If a stage finds errors, later stages do not run, but NAMES runs even if
-WORLD_FILE finds errors. A view is the scenario of one of several robots alone.
+WORLD_FILE finds errors. A view is the part of a scenario that concerns one robot.
 
 | stage | subject | finds, for example | needs |
 |---|---|---|---|
@@ -106,7 +106,7 @@ class WorldFile(NamedTuple):
 
 
 class NameScope(NamedTuple):
-    """View of a scenario with the built world in which names are searched; None before the world is built."""
+    """View of a scenario whose names are checked. `world` is the built world; None before it is built."""
 
     loaded: LoadedScenario
     world: World | None = None

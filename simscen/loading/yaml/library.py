@@ -28,9 +28,9 @@ class Library:
 
     sandbox: PathSandbox
     texts: dict[str, str] = field(default_factory=dict)
-    """Texts of the files read so far, by path as in messages (PathSandbox.display_name)."""
+    """Texts of the files read so far, by display path (path in messages, PathSandbox.display_name)."""
     files: dict[str, Path] = field(default_factory=dict)
-    """Absolute paths of the same files, by path as in messages."""
+    """Absolute paths of the same files, by display path."""
     loaded: dict[tuple[str, Path], Any] = field(default_factory=dict)
     """Worlds, maps, and robots loaded so far, by the name of the method of Assets that loaded them, and by path."""
     unsaved: Mapping[Path, str] = field(default_factory=dict)
@@ -66,7 +66,7 @@ class Library:
         return tree, problems
 
     def add(self, texts: Mapping[str, str], files: Mapping[str, Path]) -> None:
-        """Add texts and absolute paths of files that were read without this library, by path as in messages."""
+        """Add texts and absolute paths of files that were read without this library, by display path."""
         self.texts |= texts
         self.files |= files
 
@@ -164,8 +164,8 @@ def merge_mappings(own: MappingNode, base: MappingNode) -> MappingNode:
 def _are_mergeable(key: str, own: MappingNode, base: MappingNode) -> bool:
     """Return whether two mappings under the same key describe a thing of the same type, by their keys `type`.
 
-    A `type` that is missing in one of them matches all types. An external stack does not match a `stack` with a `type`,
-    and does not extend another stack.
+    A `type` that is missing in one of them matches all types. An external stack replaces a stack of another kind,
+    and a stack with a `type` replaces an external one.
     """
     own_type, base_type = child(own, "type"), child(base, "type")
     if key == "stack" and "external" in own.entries and "external" not in base.entries:

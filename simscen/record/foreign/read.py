@@ -28,7 +28,7 @@ class ForeignLog:
     """Log of a real robot.
 
     trace:     recorded signals and events
-    coverage:  evidence (kinds of information) that the log lacks
+    coverage:  evidence (kinds of information) that is missing or that covers only a part of the time
     notes:     remarks for the user
     sensors:   sensor messages for replays; empty unless requested
     map:       map for replays; None unless requested, or if the log has no map

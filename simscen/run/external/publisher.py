@@ -74,7 +74,8 @@ class StepPublisher:
     def subscribe(self, available: Iterable[str], names: Collection[str]) -> None:
         """Publish only the topics `names` from now on, and queue the latched messages on them.
 
-        `available` are the names of the `available_topics`, which are numbered from 1 in messages.
+        `available` are the names of all topics, in the order of `available_topics`. Messages refer to a topic by its
+        number in this order, from 1.
         """
         self._numbers = {name: number for number, name in enumerate(available, start=1)}
         self._requested_topics = frozenset(names)

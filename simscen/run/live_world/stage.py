@@ -30,8 +30,8 @@ from simscen.stack.validation.stack import CheckedStack
 class LiveStage:
     """Interface of triggers and actions for one robot. Implements core.stage.Stage, and keeps the robot's events.
 
-    An order is a request of an action to the robot's stack: a new goal, a cancellation, or a change of zones. Orders
-    are delivered at the beats of the robot (ticks at which a sensor, its stack, or a truth sample is due).
+    An order is what an action tells the robot's stack: a new goal, a cancellation, or a change of zones. Orders are
+    delivered at the beats of the robot (ticks at which a sensor, its stack, or a truth sample is due).
     """
 
     def __init__(
@@ -81,7 +81,8 @@ class LiveStage:
     def begin_beat(self, truth: Truth | None, is_due: bool) -> None:
         """Update the robot's pose at a beat, from a truth sample if there is one.
 
-        If `is_due`, the beat belongs to this robot, and orders are delivered at once.
+        `is_due` is whether this is a beat of this robot. Orders that actions send during such a beat are delivered at
+        once, all others at the robot's next beat.
         """
         self._is_due = is_due
         previous = self._pose

@@ -22,7 +22,8 @@ PoseCheck = Callable[[float, float, float], bool]
 POSE_SPACING_M = 0.05
 """Maximum distance between the poses of a path."""
 MIN_CHORD_RATIO = 0.995
-"""Ratio of chord to path length of a step below which the step is searched for cusps."""
+"""Minimum ratio of the distance of two successive poses to the path length between them. If it is lower, there may be a
+cusp (change of driving direction) between them, which is searched for."""
 CUSP_TOLERANCE_M = 1e-4
 """Accuracy of the position of a cusp."""
 SHORTCUT_ATTEMPTS = 60

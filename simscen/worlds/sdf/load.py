@@ -178,8 +178,8 @@ def outliers(extents: Mapping[str, Bounds]) -> dict[str, float]:
     """Return the models to leave out so that the others fit on a map, with their distances in m.
 
     Distances are from the median of the centers of all models. `extents` are the bounding rectangles of the models by
-    name. The result is empty if all models fit, if more than MAX_OUTLIER_FRACTION would be outliers, or if an outlier
-    overlaps the area of the other models, because it is then large and not far away.
+    name. The result is empty if all models fit, if more than MAX_OUTLIER_FRACTION of them plus one are outliers, or if
+    an outlier overlaps the area of the other models, because it is then large and not far away.
     """
     names, corners = list(extents), np.array(list(extents.values())).reshape(-1, 2, 2)
     if not names:

@@ -19,7 +19,7 @@ BARN                  30    0.967  0.833 … 0.994      0.033    0.000   0.000  
 localization, tour    20    1.000              -      0.000    0.000   0.000  48.8 s  0.99  0.625      -
 
 localization, tour: 0.030 m RMSE, worst run 0.040 m
-  ANEES 0.02 at 5 s, 2.50 at 10 s; a consistent belief lies in 2.02 … 4.17 (95 %)
+  ANEES 0.02 at 5 s, 2.50 at 10 s; 95 % interval of a consistent localizer: 2.02 … 4.17
 
 with minus without --stack  pairs  better  worse                   success  seconds     SCT                     score
 BARN                           30       0      3  -0.100 (-0.200 … +0.000)     +1.5  -0.050  -0.020 (-0.030 … -0.010)

@@ -147,7 +147,10 @@ def goal_critic(spec: model.MppiGoalCritic, data: CriticData) -> Floats:
 
 
 def goal_angle_critic(spec: model.MppiGoalAngleCritic, data: CriticData) -> Floats:
-    """Return the mean angle in rad between the headings of each rollout and the heading of the goal."""
+    """Return the mean angle in rad between the headings of each rollout and the heading of the goal.
+
+    With `symmetric_yaw_tolerance`, the opposite heading is as good.
+    """
     angle = absolute_angles(data.rollouts.yaw - np.float32(data.goal_yaw))
     if spec.symmetric_yaw_tolerance:
         angle = np.minimum(angle, HALF_TURN_RAD - angle)
