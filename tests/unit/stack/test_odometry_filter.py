@@ -16,8 +16,9 @@ from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.core.random_streams import Streams
-from simscen.model import robot as robots
+from simscen.model import sensors
 from simscen.model.localizers import OdometryFilter as Spec
+from simscen.model.robot import Omnidirectional
 from simscen.model.stack import StackSpec
 from simscen.sensors.imu import ImuSensor
 from simscen.sensors.odometry import WheelOdometrySensor, integrate_arc
@@ -28,9 +29,9 @@ from simscen.stack.protocols import Surroundings
 from simscen.testing.flatland import round_robot
 
 RATE = 240
-DRIVE = robots.Omnidirectional(type="omnidirectional")
-EXACT_WHEELS = robots.WheelOdometry(translation_noise=0.0, rotation_noise=0.0, drift_noise=0.0)
-EXACT_IMU = robots.InertialUnit(gyro_noise=0.0, gyro_bias=0.0)
+DRIVE = Omnidirectional(type="omnidirectional")
+EXACT_WHEELS = sensors.WheelOdometry(translation_noise=0.0, rotation_noise=0.0, drift_noise=0.0)
+EXACT_IMU = sensors.InertialUnit(gyro_noise=0.0, gyro_bias=0.0)
 
 
 class View:
@@ -63,8 +64,8 @@ class Step(NamedTuple):
 def drive(
     seed: int,
     seconds: int,
-    wheels: robots.WheelOdometry | None = None,
-    imu: robots.InertialUnit | None = None,
+    wheels: sensors.WheelOdometry | None = None,
+    imu: sensors.InertialUnit | None = None,
     spec: Spec | None = None,
     odometry_rate: int = 40,
     imu_rate: int = 60,
@@ -80,9 +81,9 @@ def drive(
         SensorSetting(name, RATE // rate, 1 / rate, np.random.default_rng((seed, key)), view, None, DRIVE)  # type: ignore[arg-type]
         for key, (name, rate) in enumerate((("odom", odometry_rate), ("imu", imu_rate or 60)), start=2)
     ]
-    odometer, gyro = WheelOdometrySensor(wheels or robots.WheelOdometry(), setting[0]), None
+    odometer, gyro = WheelOdometrySensor(wheels or sensors.WheelOdometry(), setting[0]), None
     if imu_rate:
-        gyro = ImuSensor(imu or robots.InertialUnit(), setting[1])
+        gyro = ImuSensor(imu or sensors.InertialUnit(), setting[1])
     subject, pose, velocity, target, steps = OdometryFilter(spec or Spec(), RATE), Pose2(0, 0), np.zeros(2), None, []
     for tick in range(seconds * RATE + 1):
         if tick % (2 * RATE) == 0:
@@ -153,10 +154,10 @@ CASES: dict[str, dict[str, Any]] = {
     "without an IMU": {"imu_rate": 0},
     "both at 40 Hz": {"imu_rate": 40},
     "odometry at 20 Hz": {"odometry_rate": 20},
-    "bad wheels": {"wheels": robots.WheelOdometry(translation_noise=0.05, rotation_noise=0.1, drift_noise=0.05)},
+    "bad wheels": {"wheels": sensors.WheelOdometry(translation_noise=0.05, rotation_noise=0.1, drift_noise=0.05)},
     "each odometry reading": {"spec": Spec(frequency=40)},
     "updates at 5 Hz": {"spec": Spec(frequency=5)},
-    "a bad gyroscope": {"imu": robots.InertialUnit(gyro_noise=0.02, gyro_bias=0.01), "spec": Spec(gyro_bias=0.01)},
+    "a bad gyroscope": {"imu": sensors.InertialUnit(gyro_noise=0.02, gyro_bias=0.01), "spec": Spec(gyro_bias=0.01)},
 }
 
 
