@@ -25,7 +25,6 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.report.journal import Journal, require_unlocked
 from simscen.report.journal_reader import JOURNAL_FILE, read_journal
-from simscen.run.process.jobs import Backend
 from simscen.run.reproducibility import plugin_packages
 from simscen.run.sessions.output_folder import RUNS_FOLDER, create_output_folder
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session, scenario_seeds
@@ -57,17 +56,6 @@ def execute_session(
     `on_loaded` is called with the selected scenarios before the first run. `listeners` receive all events.
     Raises InvalidInput, UsageError, and NothingSelected before the first run.
     """
-    with backend_of(request.options) as backend:  # its processes start while the scenarios are loaded
-        return _load_and_run(request, on_loaded, listeners, backend)
-
-
-def _load_and_run(
-    request: SessionRequest,
-    on_loaded: Callable[[Sequence[LoadedScenario]], None],
-    listeners: Sequence[Listener],
-    backend: Backend,
-) -> Exit:
-    """Do the same as `execute_session` with a backend."""
     options, output = request.options, request.output
     scenarios, warnings = load_selection(
         request.paths, request.root, request.world_path, request.lenient, request.selection, request.stacks
@@ -91,13 +79,11 @@ def _load_and_run(
     pending = plan_session(journal, jobs, options.workers, request.selection.shard)
     with open_screen(output.format_, request.durations) as screen:
         live = [LivePage(reports)] if output.open_ else []
-        code = _run(pending, options, reports, [screen, *listeners, *live], backend)
+        code = _run(pending, options, reports, [screen, *listeners, *live])
     return screen.exit_code(code)
 
 
-def _run(
-    pending: PendingRuns, options: SessionOptions, reports: Reports, listeners: Sequence[Listener], backend: Backend
-) -> Exit:
+def _run(pending: PendingRuns, options: SessionOptions, reports: Reports, listeners: Sequence[Listener]) -> Exit:
     """Execute the pending runs, write the reports, and return the exit code.
 
     `listeners` receive all events, including the events of reused results.
@@ -115,7 +101,7 @@ def _run(
     show(pending.started(reports.folder))
     for finished in pending.reused:
         show(finished)
-    with interrupt_on_signals():
+    with interrupt_on_signals(), backend_of(options) as backend:
         done, stopped = run_session(pending.jobs, options, backend, listen)
     finished_runs = RunStore(pending.reused)
     finished_runs.extend(done)

@@ -87,11 +87,11 @@ class ForkServerProcess:
         except BrokenPipeError:  # it has exited; its last messages can still be read
             self._send_buffer.clear()
 
-    def close(self, timeout: float = 0.0) -> None:
-        """Let the fork server kill its workers and exit; kill it if it does not exit within `timeout` seconds."""
+    def close(self) -> None:
+        """Let the fork server kill its workers and exit; kill it if it does not exit in time."""
         os.close(self._send_pipe)
         try:
-            self._process.wait(timeout)
+            self._process.wait(timeout=5)
         except subprocess.TimeoutExpired:
             self._kill()
         os.close(self._receive_pipe)

@@ -16,8 +16,6 @@ from simscen.spec.registry import RegisteredType
 
 MAX_SILENCE_S = 30.0
 """Wall time without a message after which the fork server counts as dead, except while it prepares a job."""
-MAX_EXIT_S = 5.0
-"""Wall time after which a fork server that does not exit is killed."""
 
 
 class Interrupted(BaseException):
@@ -51,8 +49,6 @@ class Supervisor:
         self._responded = False
 
     def __enter__(self) -> "Supervisor":
-        """Start the fork server. It imports its modules while the caller loads the scenarios."""
-        self._start_server()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -72,20 +68,18 @@ class Supervisor:
         self._reported, self._suspect_numbers = set(), set()
         try:
             while (job := self._next_job()) is not None:
-                yield from self._run_jobs(self._server or self._start_server(), job)
+                if self._server is None:
+                    self._responded = False
+                    self._server = ForkServerProcess((*self._entry, *plugin_path_arguments(self._plugins)))
+                yield from self._run_jobs(self._server, job)
         finally:
             if self._running:
                 self.close()
 
-    def _start_server(self) -> ForkServerProcess:
-        self._responded = False
-        self._server = ForkServerProcess((*self._entry, *plugin_path_arguments(self._plugins)))
-        return self._server
-
     def close(self) -> None:
         """Kill all workers and end the fork server."""
-        if self._server is not None:  # without a response, it still imports modules, and has no workers
-            self._server.close(MAX_EXIT_S if self._responded else 0.0)
+        if self._server is not None:
+            self._server.close()
         self._server, self._preparing = None, None
         for jobs in (self._running, self._retries, self._suspects):
             jobs.clear()

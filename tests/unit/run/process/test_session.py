@@ -239,14 +239,6 @@ def test_a_supervisor_keeps_its_processes_between_two_sessions_until_it_is_close
     assert servers[0] not in _children()
 
 
-def test_a_fork_server_starts_with_its_context_and_is_killed_if_it_was_not_used(monkeypatch):
-    monkeypatch.setattr(supervisor, "MAX_EXIT_S", 3600.0)
-    before = _children()
-    with Supervisor(1, ("-c", "import time; time.sleep(3600)")):
-        (server,) = set(_children()) - set(before)
-    assert server not in _children()
-
-
 def test_a_fork_server_that_dies_between_two_sessions_is_started_again(tmp_path):
     file = tmp_path / "fine.scenario.yaml"
     file.write_text(SCENARIO.format(fault="fine"))
