@@ -5,6 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import BaseModel, model_validator
 
+from simscen.core.records.verdict import unique_name
 from simscen.criteria.base import Criterion
 from simscen.spec.base import LazySpec
 from simscen.spec.choice import Choice
@@ -73,13 +74,4 @@ class AnyCriterion(Choice):
 def verdict_names(criteria: Sequence[AnyCriterion]) -> list[str]:
     """Return the verdict name of each criterion: its `id`, or its key. A repeated name gets a number: speed#2."""
     used: set[str] = set()
-    return [unique_verdict_name(entry.id or entry.kind, used) for entry in criteria]
-
-
-def unique_verdict_name(name: str, used: set[str]) -> str:
-    """Return `name`, with the first free number if it is in `used`, and add the result to `used`."""
-    candidate, number = name, 2
-    while candidate in used:
-        candidate, number = f"{name}#{number}", number + 1
-    used.add(candidate)
-    return candidate
+    return [unique_name(entry.id or entry.kind, used) for entry in criteria]

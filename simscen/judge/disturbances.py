@@ -10,9 +10,8 @@ from simscen.core.records.case import Case
 from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
-from simscen.core.records.verdict import Finding, Verdict
+from simscen.core.records.verdict import Finding, Verdict, unique_name
 from simscen.criteria.findings import missed, undecided
-from simscen.criteria.registry import unique_verdict_name
 from simscen.criteria.timeline import end_reason, has_ended
 from simscen.judge.finding_text import DISTURBANCE
 
@@ -43,7 +42,7 @@ def missing_disturbances(
     used = {verdict.id for verdict in others}
     found = []
     for one in missing:
-        name = unique_verdict_name(one.disturbance.name, used)
+        name = unique_name(one.disturbance.name, used)
         found.append((Verdict(DISTURBANCE, name, "fail", (_finding(trace, one),)), one.disturbance.line))
     return tuple(found)
 

@@ -3,9 +3,8 @@
 from collections.abc import Collection, Sequence
 
 from simscen.core.records.run_result import Outcome
-from simscen.core.records.verdict import ExpectedFailure, Status, Verdict
+from simscen.core.records.verdict import ExpectedFailure, Status, Verdict, unique_name
 from simscen.criteria.findings import held, missed
-from simscen.criteria.registry import unique_verdict_name
 from simscen.judge.finding_text import DISTURBANCE
 
 
@@ -55,7 +54,7 @@ def apply_expectation(
     if passed := [verdict for verdict in covered if verdict.status is Status.PASS and expected.criteria]:
         unexpected.insert(0, f"{_names(passed)} passed")
     limit = f"a failure: {expected.reason}"
-    name = unique_verdict_name(EXPECTED, ids)
+    name = unique_name(EXPECTED, ids)
     if unexpected or not failed:
         measured = ", ".join(unexpected) or _describe_no_failure(covered)
         return Outcome.FAILED, Verdict(EXPECTED, name, "fail", (missed(EXPECTED, measured, limit),))

@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element, SubElement
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
 from simscen.core.records.study import ClaimResult, ClaimStatus, Study
+from simscen.core.records.verdict import unique_name
 from simscen.judge.finding_text import disturbance_line, subject
 from simscen.report.display_text import escape_control, one_line, shell_command_text
 from simscen.report.results_json import in_order
@@ -63,7 +64,7 @@ def xml_parts(
             element.set("skipped", str(counts[path].skipped))
             yield b"\n  " + _opening_tag(element)
         parent = Element("testsuite")
-        _add_case(parent, run, _unique(_case_name(run), used_names), family)
+        _add_case(parent, run, unique_name(_case_name(run), used_names, " #"), family)
         ElementTree.indent(parent[0], level=2)
         parent[0].tail = None
         yield b"\n    " + ElementTree.tostring(parent[0], encoding="utf-8")
@@ -130,7 +131,7 @@ def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[R
             SubElement(case, "system-out").text = details
     used_names = {name}
     for run in incomplete:
-        _add_case(suite, run, _unique(_case_name(run), used_names), family)
+        _add_case(suite, run, unique_name(_case_name(run), used_names, " #"), family)
     for element in (root, suite):
         element.set("tests", str(1 + len(incomplete)))
         element.set("failures", str(int(claim.status is ClaimStatus.REFUTED)))
@@ -233,12 +234,3 @@ def _case_name(run: RunFinished) -> str:
     """Return a name such as "lidar_off [seed 7]", with the variation and the stack if there are several."""
     parts = [run.key.variation, f"seed {run.key.seed}", run.key.stack_name]
     return one_line(f"{run.key.scenario.rpartition('/')[2]} [{', '.join(part for part in parts if part)}]")
-
-
-def _unique(name: str, used_names: set[str]) -> str:
-    """Return the name, with a number such as "name #2" if it is used already, and add the result to `used_names`."""
-    candidate, number = name, 2
-    while candidate in used_names:
-        candidate, number = f"{name} #{number}", number + 1
-    used_names.add(candidate)
-    return candidate

@@ -129,3 +129,12 @@ class LogCoverage:
 
 COMPLETE_COVERAGE = LogCoverage()
 """Coverage of a log that lacks nothing."""
+
+
+def unique_name(name: str, used: set[str], separator: str = "#") -> str:
+    """Return `name`, with the first free number from 2 if it is in `used`, and add the result to `used`."""
+    candidate, number = name, 2
+    while candidate in used:
+        candidate, number = f"{name}{separator}{number}", number + 1
+    used.add(candidate)
+    return candidate
