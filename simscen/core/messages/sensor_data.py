@@ -134,8 +134,9 @@ MAX_HEIGHT_M = 2.0
 def level_scan(scan: Scan) -> Scan:
     """Convert the scan of a tilted lidar to the scan of a level lidar at the same position.
 
-    As in pointcloud_to_laserscan, each level beam gets the nearest hit in its direction. Hits below MIN_HEIGHT_M or
-    above MAX_HEIGHT_M are ignored. The range is inf if nothing was hit, and nan in directions without a usable beam.
+    As in pointcloud_to_laserscan, each level beam gets the nearest hit in its direction. Hits below MIN_HEIGHT_M, above
+    MAX_HEIGHT_M, or outside the angles of the level scan are ignored. The range is inf if nothing was hit, and nan in
+    directions without a usable beam.
     A scan without `tilted_mount` is returned unchanged.
     """
     if scan.tilted_mount is None:
@@ -151,7 +152,7 @@ def level_scan(scan: Scan) -> Scan:
         ranges = np.where(is_obstacle | np.isinf(scan.ranges), scan.ranges * flat, np.nan)
     level = np.full(count, np.nan)
     order = np.argsort(-ranges)  # so that the nearest of several hits remains
-    order = order[~np.isnan(ranges[order])]
+    order = order[~np.isnan(ranges[order]) & (beams[order] < count)]
     level[beams[order]] = ranges[order]
     return replace(scan, ranges=level, angle_min=first, angle_increment=increment, tilted_mount=None)
 
@@ -176,8 +177,9 @@ def _level_beams(
 ) -> tuple[float, float, Array, Array, Array]:
     """Return angle_min and angle_increment of the level scan, and three arrays (count,) for the tilted beams.
 
-    The arrays contain the index of the level beam in the same direction, and the horizontal and vertical components of
-    the unit vector along the tilted beam. The tilted beams have the angles `first` + k `increment` in rad.
+    The arrays contain the index of the level beam in the same direction (`count` if there is none), and the horizontal
+    and vertical components of the unit vector along the tilted beam. The tilted beams have the angles `first` + k
+    `increment` in rad.
     """
     rotation = mount.rotation()
     angles = first + increment * np.arange(count, dtype=np.float64)
@@ -186,5 +188,6 @@ def _level_beams(
     lowest = min(first, last) if rotation[2, 2] >= 0 else min(-first, -last)
     step = abs(increment) or 1.0
     offsets = np.remainder(np.arctan2(y, x) - yaw - lowest + step / 2, 2 * math.pi) - step / 2
-    beams = np.rint(offsets / step).astype(np.int64)
-    return lowest, step, np.clip(beams, 0, count - 1), np.hypot(x, y), z
+    beams = np.minimum(np.rint(offsets / step), count - 1).astype(np.int64)
+    beams[offsets / step > count - 0.5 + 1e-6] = count
+    return lowest, step, beams, np.hypot(x, y), z

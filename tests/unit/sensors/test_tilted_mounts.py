@@ -1,6 +1,7 @@
 """Lidars and IMUs with roll and pitch: raw readings in closed form, and readings converted to the plane of the base."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -59,6 +60,13 @@ def test_level_scan_of_a_tilted_lidar_shows_the_walls(mount):
     assert len(hits) > 300
     # A beam is off by at most half an increment, which matters most in the corners.
     assert np.abs(np.abs(hits).max(axis=1) - 3.0).max() < math.hypot(3.5, 3.3) * level.angle_increment / 2
+
+
+def test_hits_outside_the_angles_of_the_level_scan_are_ignored():
+    tilted = scan(at(0, 0), SquareRoom(3.0), {"pitch": -0.4}, field_of_view=math.radians(90), beams=91)
+    tilted = replace(tilted, ranges=np.where(tilted.angles() < math.radians(-43), 1.0, np.inf))
+    assert (tilted.points()[:, 1] < 0).all()
+    assert (level_scan(tilted).points()[:, 1] < 0).all()
 
 
 def test_scan_of_a_level_lidar_is_not_converted():
