@@ -93,17 +93,23 @@ def _active_between_events(trace: Trace, start: EventKind, ends: tuple[EventKind
     `ends` are the kinds of events that can end it. `name` is the name of the start events; None for any name.
     """
     intervals: list[tuple[int, float]] = []
-    for event in trace.of_kind(start):
+    active: list[Event] = []
+    for event in trace.of_kind(start, *ends):
+        if event.kind in ends:
+            intervals += [(begun.tick, event.tick) for begun in active if _ends(event, begun)]
+            active = [begun for begun in active if not _ends(event, begun)]
         is_goal = start is EventKind.GOAL_ACCEPTED
-        if name in (None, event.name) or (is_goal and matches_goal_name(event.name, str(name))):
-            later = (e.tick for e in trace.of_kind(*ends) if _ends(e, event) and e.tick > event.tick)
-            intervals.append((event.tick, next(later, np.inf)))
-    return _active_in_intervals(trace, intervals)
+        is_named = name in (None, event.name) or (is_goal and matches_goal_name(event.name, str(name)))
+        if event.kind == start and is_named:
+            active.append(event)
+    return _active_in_intervals(trace, [*intervals, *((begun.tick, np.inf) for begun in active)])
 
 
 def _ends(event: Event, start: Event) -> bool:
     """Return whether a later event ends the goal, contact, or recovery that began with the event `start`."""
-    return event.name == start.name or event.kind in (EventKind.NAVIGATION_ENDED, EventKind.GOAL_ACCEPTED)
+    if event.kind == EventKind.GOAL_ACCEPTED:
+        return event.tick > start.tick  # the poses of one action can be accepted at the same tick
+    return event.name == start.name or event.kind == EventKind.NAVIGATION_ENDED
 
 
 def _active_in_intervals(trace: Trace, intervals: Iterable[tuple[int, float]]) -> Array:

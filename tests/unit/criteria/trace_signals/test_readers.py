@@ -347,3 +347,16 @@ def test_a_goal_matches_its_name_in_each_loop_and_other_names_match_exactly():
     assert [at(signal("goal_active", words, goal=name), 1.5) for name in ("shelf", "shelf#2", "shelf#1")] == [1, 1, 0]
     assert signal("recovery_active", words, recovery="spin#2").any()
     assert not signal("recovery_active", words, recovery="spin").any()
+
+
+@pytest.mark.parametrize(
+    ("name", "start", "end"),
+    [
+        ("goal_active", "goal.accepted", "goal.failed"),
+        ("in_collision", "collision.started", "collision.ended"),
+        ("recovery_active", "recovery.started", "recovery.ended"),
+    ],
+)
+def test_a_state_that_ends_at_the_tick_of_its_start_counts_at_one_sample(name, start, end):
+    words = {"seconds": 4, "truth": [[0, 0, 0]], "events": [[1, start, "shelf"], [1, end, "shelf"]]}
+    assert np.flatnonzero(signal(name, words)).tolist() == [40]
