@@ -246,7 +246,10 @@ def decision_horizon(condition: Condition, holds: bool = True) -> float:
     if condition.until is not None:
         return condition.until.interval[0] + decision_horizon(condition.until.release) if holds else 0.0
     if isinstance(condition.whenever, Whenever) and condition.then is not None:
-        return _window_horizon(condition.then, condition.whenever, holds, needs_whole_window=holds)
+        response = _window_horizon(condition.then, condition.whenever, holds, needs_whole_window=holds)
+        if condition.whenever.required or not holds:
+            return response
+        return min(response, _window_horizon(condition.whenever, condition.whenever, False, needs_whole_window=True))
     return 0.0
 
 
