@@ -52,7 +52,8 @@ class CountBounds(Spec):
         `what` is the measured quantity, e.g. "replans". `noun` is the name of one event, e.g. "replan". `detail` are
         lines that explain a failure. In a truncated log, a number below `min` is inconclusive.
         """
-        at = (trace, events[-1].tick) if events else None
+        decisive = len(events) - 1 if self.max is None else min(self.max, len(events) - 1)
+        at = (trace, events[decisive].tick) if events else None
         findings = counted(what, len(events), noun, self.min, self.max, at=at, detail=detail)
         if self.min is not None and findings[0].status is Status.FAIL and not has_ended(trace):
             findings[0] = undecided(what, f"{findings[0].measured} so far", findings[0].limit, detail)
