@@ -97,6 +97,7 @@ class PersonalSpace(Spec, Criterion):
             gaps = np.where(speed(trace).at(trace.truth.ticks)[:, 0] > DRIVING_SPEED_M_S, gaps, np.inf)
         nearest = int(np.argmin(gaps))
         if np.isinf(gaps[nearest]):
-            return [undecided("distance to people", "no pedestrian was present while the robot drove", limit)]
+            because = f"no pedestrian was present{' while the robot drove' * self.while_driving}"
+            return [undecided("distance to people", because, limit)]
         at = (trace, int(trace.truth.ticks[nearest]))
         return [at_least("distance to people", float(gaps[nearest]), self.min, "m", at=at)]

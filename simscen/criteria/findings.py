@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from simscen.core.records.verdict import Finding, Status
+from simscen.criteria.timeline import has_ended
 
 if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
@@ -81,6 +82,11 @@ def counted(
 def undecided(what: str, because: str, limit: str = "", detail: Sequence[str] = ()) -> Finding:
     """Return an inconclusive finding with its reason."""
     return Finding(Status.INCONCLUSIVE, what, because, limit, detail=tuple(detail))
+
+
+def if_complete(trace: Trace, finding: Finding) -> Finding:
+    """Return the finding, or an inconclusive one if the log is truncated, so that the value may still change."""
+    return finding if has_ended(trace) else undecided(finding.what, f"{finding.measured} so far", finding.limit)
 
 
 def missed(

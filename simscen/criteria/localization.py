@@ -12,8 +12,8 @@ from simscen.core.geometry import Array
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.core.statistics import chi2_quantile, nees_mean_bounds
 from simscen.criteria.base import Criterion
-from simscen.criteria.findings import at_least, at_most, missed, undecided
-from simscen.criteria.timeline import Span, end_reason, first_sustained, has_ended, never_started, spans
+from simscen.criteria.findings import at_least, at_most, if_complete, missed, undecided
+from simscen.criteria.timeline import Span, end_reason, first_sustained, never_started, spans
 from simscen.criteria.trace_signals.estimation_errors import DIMENSIONS, NO_BELIEF, nees_samples, pose_error
 from simscen.spec.base import Spec
 from simscen.spec.places import DisturbanceName
@@ -79,21 +79,14 @@ class LocalizationError(Spec, Criterion):
         if self.rmse is not None:
             rmse = float(np.sqrt(np.mean(distances**2)))
             bound = at_most("localization_error rmse", rmse, self.rmse, "m", context="(not aligned)")
-            findings.append(_if_complete(trace, bound))
+            findings.append(if_complete(trace, bound))
         if self.final is not None:
             at = (trace, int(error.ticks[-1]))
             bound = at_most("localization_error final", float(distances[-1]), self.final, "m", at=at)
-            findings.append(_if_complete(trace, bound))
+            findings.append(if_complete(trace, bound))
         if self.max_yaw is not None:
             findings.append(_judge_largest(trace, error, angles, "localization_error yaw", self.max_yaw, "rad"))
         return findings
-
-
-def _if_complete(trace: Trace, finding: Finding) -> Finding:
-    """Return the finding, or an inconclusive one if the log is truncated."""
-    if has_ended(trace):
-        return finding
-    return undecided(finding.what, f"{finding.measured} so far", finding.limit)
 
 
 def _judge_largest(trace: Trace, error: Samples, values: Array, what: str, limit: float, unit: str) -> Finding:
@@ -234,7 +227,7 @@ class LocalizationConsistency(Spec, Criterion):
         findings = [at_most("localization_consistency", mean, high, "", at=at, context=context)]
         if low is not None:
             findings.append(at_least("localization_consistency doubt", mean, low, "", context=context))
-        return findings
+        return [if_complete(trace, finding) for finding in findings]
 
     def _bounds(self, count: int) -> tuple[float | None, float]:
         """Return the lower and the upper bound of the average of `count` samples; no lower one without `both_sides`."""
@@ -243,11 +236,14 @@ class LocalizationConsistency(Spec, Criterion):
         return None, chi2_quantile(self.probability, DIMENSIONS * count) / count
 
     def _sampled(self, trace: Trace) -> Samples | None:
-        """Return the NEES (n, 1) at regular times from `after` to the last belief; None without covariances."""
+        """Return the NEES (n, 1) at regular times from `after` to the last belief; None without covariances.
+
+        Each belief is used at most once.
+        """
         all_samples = nees_samples(trace)
         if not len(all_samples):
             return None
         first, last = max(self.after * trace.tick_rate, int(all_samples.ticks[0])), int(all_samples.ticks[-1])
         times = np.arange(first, last + 1, self.every * trace.tick_rate).astype(np.int64)
         chosen = np.searchsorted(all_samples.ticks, times, side="right") - 1
-        return all_samples.select(chosen)
+        return all_samples.select(np.unique(chosen))

@@ -56,7 +56,7 @@ class AnyCriterion(Choice):
     whenever: Annotated[BaseModel | None, LazySpec("simscen.criteria.stl.condition", "Whenever")] = None
 
     @model_validator(mode="after")
-    def _combine_whenever_and_then(self) -> "AnyCriterion":
+    def _check_whenever_and_then(self) -> "AnyCriterion":
         if (self.whenever is None) != (self.then is None):
             raise ValueError("`whenever` and `then` belong together")
         return self

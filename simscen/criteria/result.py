@@ -141,7 +141,7 @@ class NoFalseSuccess(Spec, Criterion):
         findings += [
             undecided(f"goal {event.name}", "reported reached, but the scenario has no such goal") for event in unknown
         ]
-        findings += [finding for k in range(len(ended)) if (finding := _judge_success(trace, case, ended, k))]
+        findings += [finding for k in range(len(ended)) if (finding := _judge_success(trace, case, outcomes, ended, k))]
         return findings or [held("no_false_success", "no success was claimed", "no false success")]
 
     def _judge_goal(self, trace: Trace, outcome: GoalOutcome, outcomes: list[GoalOutcome]) -> Finding:
@@ -157,7 +157,9 @@ class NoFalseSuccess(Spec, Criterion):
         return at_most(f"goal {outcome.goal.name}", distance, self.tolerance, "m", at=(trace, tick), context=context)
 
 
-def _judge_success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -> Finding | None:
+def _judge_success(
+    trace: Trace, case: Case, outcomes: list[GoalOutcome], ended: tuple[Event, ...], k: int
+) -> Finding | None:
     """Return a failed finding if the robot falsely reported SUCCEEDED at the k-th end of navigation, otherwise None.
 
     The report is false if a goal since the previous end of navigation was not reached. The first end of navigation
@@ -166,7 +168,6 @@ def _judge_success(trace: Trace, case: Case, ended: tuple[Event, ...], k: int) -
     end = ended[k]
     if end.name != "SUCCEEDED":
         return None
-    outcomes = goal_outcomes(trace, case)
     own = [each for each in outcomes if _end_index(each, ended) == k or (k == 0 and each.goal in case.goals)]
     unreached = [each for each in own if each.must_be_reached and (each.reached is None or each.reached > end.tick)]
     if not unreached:

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from simscen.core.records.verdict import Evidence, Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.findings import MissingEvidence, at_least, at_most, undecided
+from simscen.criteria.findings import MissingEvidence, at_least, at_most, if_complete, undecided
 from simscen.criteria.trace_signals.catalog import SignalName, read_signal
 from simscen.criteria.trace_signals.ground_truth import speed
 from simscen.criteria.trace_signals.sparc_ldlj import MIN_MOVING_SPEED_M_S, evenly_sampled_speed, ldlj, sparc
@@ -90,7 +90,7 @@ def _judge_mean_jerk(trace: Trace, case: Case, limit: float) -> Finding:
         values = read_signal("jerk", trace, case, {})
     except MissingEvidence as reason:
         return undecided("mean jerk", str(reason), f"≤ {limit:g} m/s^3")
-    return at_most("mean jerk", float(values.mean()), limit, "m/s^3")
+    return if_complete(trace, at_most("mean jerk", float(values.mean()), limit, "m/s^3"))
 
 
 def _judge_sparc_or_ldlj(trace: Trace, name: Literal["sparc", "ldlj"], limit: float) -> Finding:
@@ -104,4 +104,4 @@ def _judge_sparc_or_ldlj(trace: Trace, name: Literal["sparc", "ldlj"], limit: fl
     value = (sparc if name == "sparc" else ldlj)(even_speeds, rate)
     if value is None:
         return undecided(name, "the speed never changed", f"≥ {limit:g}")
-    return at_least(name, value, limit, "")
+    return if_complete(trace, at_least(name, value, limit, ""))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.core.records.trace import Samples, Ticks
+from simscen.core.records.trace import Samples
 from simscen.criteria.findings import MissingEvidence
 
 if TYPE_CHECKING:
