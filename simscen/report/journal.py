@@ -45,9 +45,13 @@ class Journal:
         self.error: OSError | None = None
         self._sync = sync
         self._file = os.open(folder / JOURNAL_FILE, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
-        _lock(self._file, folder)
-        if _truncate_to_complete_lines(self._file) and not resume:
-            raise UsageError(f"the output folder {folder} already contains a session; nothing in it was changed")
+        try:
+            _lock(self._file, folder)
+            if _truncate_to_complete_lines(self._file) and not resume:
+                raise UsageError(f"the output folder {folder} already contains a session; nothing in it was changed")
+        except (UsageError, OSError):
+            self.close()
+            raise
         self._numbers: dict[RunKey, int] = {}
         self._finished: set[RunKey] = set()
         self._start = time.monotonic()

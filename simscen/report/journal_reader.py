@@ -186,7 +186,7 @@ def read_journal(folder: Path) -> JournaledSession:
         return session.result()
     except OSError as error:
         raise _invalid_journal(folder / JOURNAL_FILE, f"cannot read the journal: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError, IndexError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
         raise _invalid_journal(folder / JOURNAL_FILE, f"the journal is damaged: {error}") from error
 
 
@@ -207,12 +207,12 @@ def _last_session_lines(folder: Path) -> Iterator[dict[str, Any]]:
 
 
 def session_process(folder: Path) -> int | None:
-    """Return the ID of the process that wrote the last session; None if the journal has no session.
-
-    Raises OSError or ValueError if the journal cannot be read.
-    """
-    first = next(_last_session_lines(folder), None)
-    return None if first is None else int(first["pid"])
+    """Return the ID of the process that wrote the last session; None if the journal has no readable session."""
+    try:
+        first = next(_last_session_lines(folder), None)
+        return None if first is None else int(first["pid"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
 
 
 class _SessionReader:

@@ -104,6 +104,15 @@ def test_a_folder_belongs_to_one_session_at_a_time(tmp_path, runs):
         Journal(tmp_path)
 
 
+def test_a_refused_session_leaves_the_folder_unlocked(tmp_path, runs):
+    journal = Journal(tmp_path)
+    journal.plan(planned(runs), "0.1.0", 1)
+    journal.close()
+    with pytest.raises(UsageError, match="already contains a session"):
+        Journal(tmp_path)
+    Journal(tmp_path, resume=True).close()
+
+
 def test_full_disk_loses_only_whole_lines(tmp_path, runs, monkeypatch):
     import errno
     import os
@@ -133,7 +142,8 @@ def test_full_disk_loses_only_whole_lines(tmp_path, runs, monkeypatch):
         (b"", "ended before it listed its runs"),
         (b"junk\n", "the journal is damaged"),
         (b'{"event": "planned", "format": 99, "runs": []}\n', "it has format 99"),
-        (b'{"event": "planned", "format": 1, "runs": [{}], "version": "", "workers": 1, "at": 0}\n', "damaged"),
+        (b'{"event": "planned", "format": 2, "runs": [{}], "version": "", "workers": 1, "at": 0}\n', "damaged"),
+        (b'{"event": "planned", "format": 2, "runs": ["a"], "version": "", "workers": 1, "at": 0}\n', "damaged"),
     ],
 )
 def test_other_files_are_refused_as_journals(tmp_path, content, told):
