@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simscen.core.messages.goals import Goal, matches_goal_name
-from simscen.core.records.events import GOAL_END_KINDS, Event, EventKind
+from simscen.core.messages.goals import matches_goal_name
+from simscen.core.records.events import Event, EventKind
 from simscen.core.records.verdict import Status
+from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes
 from simscen.judge.finding_text import comparison, subject
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Canvas, printable
@@ -45,27 +46,27 @@ def error_code_text(event: Event) -> str:
     return f"{name} ({code})" if code else str(name)
 
 
-def _goal_mark(goal: Goal, scene: Scene) -> GoalMark:
-    """Return the mark of a goal according to its last event.
+def _goal_mark(outcome: GoalOutcome, scene: Scene) -> GoalMark:
+    """Return the mark of a goal.
 
     A goal that the stack reported as reached counts as failed if the criterion goals_reached found the robot elsewhere.
     """
-    ends = [event for event in scene.trace.of_kind(*GOAL_END_KINDS) if event.name == goal.name]
-    if not ends:
-        if any(event.name == goal.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED)):
-            return GoalMark("not reached", palette.AMBER, "not reached")
-        return GoalMark("not tried", palette.GRAY, "not tried")
-    match ends[-1].kind:
+    if outcome.end is None:
+        word = "not tried" if outcome.accepted is None else "not reached"
+        return GoalMark(word, palette.GRAY if outcome.accepted is None else palette.AMBER, word)
+    match outcome.end.kind:
         case EventKind.GOAL_FAILED:
-            expected = "as expected" if goal.name in scene.case.expected else ""
-            text = ", ".join(part for part in (f"failed {expected}".strip(), error_code_text(ends[-1])) if part)
+            expected = "as expected" if outcome.failed_as_expected else ""
+            text = ", ".join(part for part in (f"failed {expected}".strip(), error_code_text(outcome.end)) if part)
             return GoalMark("failed", palette.AMBER if expected else palette.RED, text)
         case EventKind.GOAL_CANCELED:
             return GoalMark("canceled", palette.GRAY, "canceled")
         case _:
-            findings = [f for v in scene.result.verdicts if v.criterion == "goals_reached" for f in v.findings]
-            if any(f.status is Status.FAIL and f.what.endswith(f"goal {goal.name}") for f in findings):
-                return GoalMark("failed", palette.RED, "not there")
+            own = f"{scene.robot_name}/" if scene.robot_name else ""
+            verdicts = [v for v in scene.result.verdicts if v.criterion == "goals_reached" and v.id.startswith(own)]
+            findings = [finding for verdict in verdicts for finding in verdict.findings]
+            if any(f.status is Status.FAIL and f.what == f"goal {outcome.goal.name}" for f in findings):
+                return GoalMark("failed", palette.RED, "reached unexpectedly" if outcome.failure else "not there")
             return GoalMark("reached", palette.GREEN)
 
 
@@ -76,7 +77,8 @@ def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """
     sent = {event.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED)}
     goals = [goal for goal in scene.case.every_goal if goal.name in sent or goal not in scene.case.sent]
-    marks = [(goal, _goal_mark(goal, scene)) for goal in goals]
+    outcomes = {outcome.goal.name: outcome for outcome in goal_outcomes(scene.trace, scene.case)}
+    marks = [(goal, _goal_mark(outcomes[goal.name], scene)) for goal in goals]
     names: dict[tuple[float, float], list[str]] = {}
     for goal, mark in marks:
         entries = names.setdefault((goal.pose.x, goal.pose.y), [])

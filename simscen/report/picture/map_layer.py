@@ -19,7 +19,8 @@ MARGIN_M = 0.4
 
 
 def map_extent(grid: OccupancyGrid, points: Array) -> Bounds:
-    """Return the rectangle around all known cells of the map and all `points` (n, 2) in m, with a margin."""
+    """Return the rectangle around all known cells of the map and all finite `points` (n, 2) in m, with a margin."""
+    points = points[np.isfinite(points).all(axis=1)]
     rows, columns = np.nonzero(grid.cells != UNKNOWN)
     if len(rows):
         corners = np.array([(r, c) for r in (rows.min(), rows.max() + 1) for c in (columns.min(), columns.max() + 1)])

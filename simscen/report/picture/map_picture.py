@@ -87,7 +87,13 @@ def draw_map_canvas(scene: Scene) -> Canvas:
     labels = [label for draw in _GROUND_LAYERS for label in draw(canvas, scene)]
     labels += [label for draw in _LAYERS_BELOW_ROBOT for robot in scene.per_robot for label in draw(canvas, robot)]
     labels += [label for draw in _OBJECT_LAYERS for label in draw(canvas, scene)]
-    labels += [label for draw in _LAYERS_ABOVE_ROBOT for robot in scene.per_robot for label in draw(canvas, robot)]
+    labels += [
+        label
+        for draw in _LAYERS_ABOVE_ROBOT
+        for robot in scene.per_robot
+        if len(robot.trace.truth) or draw is path_layer.draw_belief  # the other layers need the true pose
+        for label in draw(canvas, robot)
+    ]
     labels += event_layer.draw_violations(canvas, scene)
     place_labels(canvas, labels, _wall_cells(canvas, scene))
     return canvas

@@ -11,6 +11,7 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.scenery import DrivableSurface, FilterZone, FrictionRegion, MovableObject, Scenery
 from simscen.core.geometry import Pose2
 from simscen.core.records.run_result import RunKey
+from simscen.core.records.trace import Samples
 from simscen.criteria.registry import AnyCriterion
 from simscen.judge.run_result import judge_run
 from simscen.loading.scenario import load_scenario
@@ -143,6 +144,47 @@ def test_goal_that_was_never_sent_is_not_drawn():
 def test_goal_reached_only_by_the_estimate_is_drawn_as_failed():
     events = [[0, "goal.accepted", "shelf"], [9, "goal.reached", "shelf"]]
     assert "goal shelf failed" in {name for name, _ in drawn_parts(everything(events=events))}
+
+
+def goal_parts(events, goals, **case):
+    """The names of the drawn goals of a run without criteria."""
+    trace = synthetic_trace({"seconds": 10, "truth": [[0, 1, 1], [10, 8, 1]], "events": events})
+    result = replace(everything().result, verdicts=())
+    scene = Scene(trace, synthetic_case({"goals": goals, **case}), room(), result)
+    return {name for name, _ in drawn_parts(scene) if name.startswith(("goal ", "label "))}
+
+
+def test_via_pose_without_reports_has_the_result_of_the_next_stop():
+    goals = [{"name": "door", "pose": [4, 1], "via": True}, {"name": "shelf", "pose": [8, 1]}]
+    events = [[0, "goal.accepted", "shelf"], [9, "goal.reached", "shelf"]]
+    assert {"goal door reached", "goal shelf reached"} <= goal_parts(events, goals)
+
+
+@pytest.mark.parametrize(("expected", "label"), [("NO_VALID_PATH", "failed as expected"), ("GOAL_OCCUPIED", "failed")])
+def test_failure_is_as_expected_only_with_the_expected_error_code(expected, label):
+    events = [
+        [0, "goal.accepted", "shelf"],
+        [9, "goal.failed", "shelf", {"error_code": 208, "error_name": "NO_VALID_PATH"}],
+    ]
+    parts = goal_parts(events, [{"name": "shelf", "pose": [8, 1]}], expected={"shelf": expected})
+    assert f"label shelf: {label}, NO_VALID_PATH (208)" in parts
+
+
+def test_log_without_true_poses_is_drawn():
+    scene = everything()
+    nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+    parts = drawn_parts(replace(scene, trace=replace(scene.trace, truth=nothing, velocity=nothing)))
+    assert {"belief", "goal shelf failed"} <= {name for name, _ in parts}
+
+
+def test_samples_that_are_not_finite_are_outside_of_the_picture():
+    scene = everything()
+    values = scene.trace.truth.values.copy()
+    values[5] = np.nan
+    truth = Samples(scene.trace.truth.ticks, values)
+    assert (
+        draw_map_picture(replace(scene, trace=replace(scene.trace, truth=truth))).size == draw_map_picture(scene).size
+    )
 
 
 def test_failure_has_the_error_code_and_name_of_nav2():
