@@ -11,6 +11,7 @@ import numpy as np
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2
+from simscen.core.messages.goals import goal_without_loop
 from simscen.core.records.case import Case
 from simscen.core.records.trace import Samples, Trace
 from simscen.core.records.verdict import Verdict
@@ -211,7 +212,7 @@ def _goals(case: Case, lines: SourceLines) -> list[dict[str, Any]]:
     """Return each goal once, also if the robot drives to it in several loops."""
     goals: dict[tuple[str, float, float], dict[str, Any]] = {}
     for goal in case.every_goal:
-        base = goal.name.partition("#")[0] if goal.name.partition("#")[0] in lines.goals else goal.name
+        base = goal_without_loop(goal.name)
         goals.setdefault(
             (base, goal.pose.x, goal.pose.y),
             {

@@ -36,6 +36,8 @@ _SIGNAL_OF_CRITERION = {
     ("collisions", ""): "collision_count",
 }
 """Signal that a criterion limits, by criterion and by unit of the finding (checked bound)."""
+_OTHER_QUANTITIES = frozenset({"localization_error rmse", "localization_error final"})
+"""Measured quantities of these criteria that do not limit the signal at all times."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +115,8 @@ def _limit(verdict: Verdict, finding: Finding) -> dict[str, Any] | None:
     """Return the signal and the limit of a finding; None if the finding limits no signal."""
     relation = finding.limit[:1]
     if finding.margin is None or finding.value is None or relation not in ("≤", "≥", "<", ">"):
+        return None
+    if finding.what in _OTHER_QUANTITIES:
         return None
     is_minimum = relation in ("≥", ">")
     name = _SIGNAL_OF_CRITERION.get((verdict.criterion, finding.unit)) or finding.what.partition(" ")[0]

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from simscen.core.messages.goals import goal_without_loop
 from simscen.core.records.events import GOAL_END_KINDS, Event, EventKind
 from simscen.core.records.run_result import RunResult
 from simscen.core.records.trace import Trace
@@ -82,16 +83,17 @@ class TimelineEntry:
 def timeline_entries(trace: Trace, lines: SourceLines, with_world: bool) -> list[TimelineEntry]:
     """Return the entries for the events of a robot in order; if `with_world`, also for the events of the world."""
     entries: list[TimelineEntry] = []
-    open_intervals: dict[tuple[EventKind, str], int] = {}
+    open_intervals: dict[tuple[EventKind, str, Any], int] = {}
     for event in trace.events:
         if _is_world_event(event) and not with_world:
             continue
+        entry = event.data.get("entry")  # two faults or events can have the same name
         for start, ends in _INTERVAL_KINDS.items():
-            index = open_intervals.pop((start, event.name), None) if event.kind in ends else None
+            index = open_intervals.pop((start, event.name, entry), None) if event.kind in ends else None
             if index is not None:
                 entries[index] = replace(entries[index], until=event.tick, ended=str(event.kind))
         if event.kind in _INTERVAL_KINDS:
-            open_intervals[event.kind, event.name] = len(entries)
+            open_intervals[event.kind, event.name, entry] = len(entries)
         entries.append(_entry(event, lines))
     for index in open_intervals.values():
         entries[index] = replace(entries[index], until=trace.end)
@@ -144,7 +146,7 @@ def _line(event: Event, lines: SourceLines) -> int:
     if isinstance(entry, int):
         return (lines.faults if str(event.kind).startswith("fault.") else lines.events).get(entry, 0)
     if str(event.kind).startswith("goal."):
-        return lines.goals.get(event.name, lines.goals.get(event.name.rpartition("#")[0], 0))
+        return lines.goals.get(goal_without_loop(event.name), 0)
     return 0
 
 

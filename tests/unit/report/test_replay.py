@@ -151,6 +151,33 @@ def test_bound_is_drawn_on_its_signal() -> None:
     assert "speed" in [strip["name"] for strip in run["robots"][0]["strips"]]
 
 
+def test_bound_on_the_root_mean_square_is_not_drawn_on_the_signal() -> None:
+    finding = Finding(Status.PASS, "localization_error rmse", "0.05 m", "≤ 0.10 m", 0.05, "m", 0.05)
+    log = log_of({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]})
+    verdict = Verdict("localization_error", "localization_error", "fail", (finding,))
+    assert Read(replay_page([(log, result_of(verdict))])).runs[0]["robots"][0]["limits"] == []
+
+
+def test_overlapping_faults_with_one_name_end_separately() -> None:
+    events = [
+        [1, "fault.started", "lidar.off", {"entry": 0}],
+        [2, "fault.started", "lidar.off", {"entry": 1}],
+        [3, "fault.ended", "lidar.off", {"entry": 0}],
+    ]
+    log = log_of({"seconds": 4, "truth": [[0, 0, 0]], "events": events})
+    entries = Read(replay_page([(log, result_of())])).runs[0]["events"]
+    assert [(one["tick"], one["until"]) for one in entries if one["kind"] == "fault.started"] == [
+        (240, 720),
+        (480, 960),
+    ]
+
+
+def test_goal_of_several_loops_is_listed_once() -> None:
+    goals = (Goal("shelf", Pose2(2, 2)), Goal("shelf#2", Pose2(2, 2)))
+    log = log_of({"seconds": 1, "truth": [[0, 0, 0]]}, Case(Pose2(0, 0), goals))
+    assert [goal["name"] for goal in Read(replay_page([(log, result_of())])).runs[0]["robots"][0]["goals"]] == ["shelf"]
+
+
 def test_log_with_little_data_gives_a_small_page() -> None:
     log = log_of({"seconds": 1, "truth": [[0, 0, 0]], "belief": None, "scans": [], "ended": None})
     run = Read(replay_page([(replace(log, complete=False), result_of())])).runs[0]
