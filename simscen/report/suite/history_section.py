@@ -15,8 +15,11 @@ MAX_CHANGES = 20
 _GOOD_OUTCOMES = tuple(outcome for outcome in Outcome if outcome.is_good)
 
 
-def history_html(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
-    """Return the section; "" if `past`, the earlier sessions (newest first), is empty. `runs` are of this session."""
+def history_html(runs: Sequence[RunFinished], past: Sequence[PastSession], good_share: float) -> str:
+    """Return the section; "" if `past`, the earlier sessions (newest first), is empty.
+
+    `runs` are the listed runs of this session. `good_share` is the fraction of good outcomes of all its runs.
+    """
     if not past:
         return ""
     rows = "".join(_session_row(session) for session in past)
@@ -26,7 +29,7 @@ def history_html(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> st
     changes = ", ".join(f"{number} {word}" for number, word in counts if number) or "no change since the last session"
     return (
         '<details class="history"><summary><h2>earlier sessions</h2>'
-        f"{_pass_rate_sparkline(runs, past)}"
+        f"{_pass_rate_sparkline(good_share, past)}"
         f'<span class="quiet">{changes}</span></summary>'
         '<div class="in"><table><thead><tr><th scope="col">session</th><th scope="col">as expected</th>'
         '<th scope="col">failed</th><th scope="col">errors</th><th scope="col">simulated</th></tr></thead>'
@@ -45,10 +48,10 @@ def _session_row(session: PastSession) -> str:
     )
 
 
-def _pass_rate_sparkline(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str:
+def _pass_rate_sparkline(good_share: float, past: Sequence[PastSession]) -> str:
     """Return a line chart of the fraction of good outcomes in the earlier sessions and in this session."""
     shares = [session.count(*_GOOD_OUTCOMES) / max(1, len(session.runs)) for session in reversed(past)]
-    shares.append(sum(run.outcome.is_good for run in runs) / max(1, len(runs)))
+    shares.append(good_share)
     values = ", ".join(f"{share:.0%}" for share in shares)
     return sparkline(shares, f"share of runs as expected, oldest first: {values}", 0.0, 1.0)
 

@@ -88,7 +88,7 @@ def to_html(report: SessionReport) -> str:
         f"{'<noscript><meta http-equiv=refresh content=3></noscript>' if report.live else ''}"
         f"<title>{html_text(report.title)}: {counts}</title>\n<style>{style}</style>\n</head>\n<body>\n"
         f"<header>{_headline(report, totals, counts, len(listed))}</header>\n<main>\n"
-        f"{history_html(listed, report.past)}{comparison}\n"
+        f"{history_html(listed, report.past, totals.good.total() / max(1, len(report.runs)))}{comparison}\n"
         f"{filter_form(listed, report.past)}\n"
         f'<section id="runs" aria-label="runs">\n{groups_html}\n</section>\n'
         '<p id="nothing" class="quiet" hidden>No run matches. <button type="button" id="all">Show all</button></p>\n'
@@ -174,12 +174,12 @@ def _group_element(group: list[RunFinished], report: SessionReport, totals: Tota
     `pictures` is the HTML of the pictures by run key.
     """
     ranked = sorted(group, key=_severity_order)
-    elements = "\n".join(
+    entries = "\n".join(
         run_element(run, report.folder, pictures.get(run.key, ""), past_outcomes(run, report.past), len(group) > 1)
         for run in ranked
     )
     if len(group) == 1:
-        return f'<div class="group">{elements}</div>'
+        return f'<div class="group">{entries}</div>'
     name = group[0].key.scenario
     good, number = totals.good[name], totals.runs[name]
     changed = sum(outcome_change(run, report.past) != "" for run in group)
@@ -189,7 +189,7 @@ def _group_element(group: list[RunFinished], report: SessionReport, totals: Tota
     return (
         f'<details class="group many"{opened}><summary><h2 class="name">{html_text(name)}</h2>'
         f'<span class="quiet">{summary}</span>{marks}</summary>\n'
-        f"{elements}\n</details>"
+        f"{entries}\n</details>"
     )
 
 

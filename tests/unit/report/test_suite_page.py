@@ -12,7 +12,7 @@ from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import Artifacts
 from simscen.report.results_json import json_parts
 from simscen.report.session_history import past_sessions
-from simscen.report.suite import RunningSession, SessionReport, elements, to_html
+from simscen.report.suite import RunningSession, SessionReport, elements, page, to_html
 from simscen.report.suite.elements import anchor
 from simscen.report.suite.run_entry import scenario_folder, smallest_margin
 
@@ -207,6 +207,13 @@ def test_earlier_sessions_are_listed_with_changes(sessions, passed):
     assert '<a href="#run-a-flaky-seed-1">a/flaky, seed 1</a>: passed, failed before' in html
     assert 'aria-label="earlier sessions and this one: passed, failed, passed">✓✗✓</span>' in html
     assert [run.get("data-changed") for run in runs_on(html)] == ["1", None]
+
+
+def test_share_of_good_runs_includes_runs_that_are_not_listed(sessions, passed, failed, monkeypatch):
+    monkeypatch.setattr(page, "MAX_LISTED_RUNS", 1)
+    runs = [called(passed, f"a/{number}") for number in range(3)] + [called(failed, "a/flaky")]
+    html = to_html(SessionReport(runs, past_sessions(sessions / "three")))
+    assert "share of runs as expected, oldest first: 100%, 50%, 75%" in html
 
 
 def test_sessions_with_missing_or_damaged_results_are_ignored(sessions, tmp_path):
