@@ -1,4 +1,4 @@
-"""Console lines of a session: header, runs with their violations, list of failures, and footer."""
+"""Console lines of a session: header, runs with their violations, and footer."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -71,9 +71,9 @@ def _common_folder(ids: Sequence[str]) -> str:
     """Return the common folder of all scenario IDs with its slash, such as "scenarios/"; "" for fewer than two IDs."""
     if len(ids) < 2:
         return ""
-    shortest, longest = min(ids), max(ids)
-    same = next((k for k, (a, b) in enumerate(zip(shortest, longest, strict=False)) if a != b), len(shortest))
-    return shortest[: shortest.rfind("/", 0, same) + 1]
+    first, last = min(ids), max(ids)
+    same = next((k for k, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), len(first))
+    return first[: first.rfind("/", 0, same) + 1]
 
 
 def session_header(started: SessionStarted) -> StyledLine:

@@ -93,6 +93,11 @@ def effect_text(effect: ParameterEffect) -> str:
     return "a larger value lowers the margin" if effect.effect < 0 else "a larger value raises the margin"
 
 
+def effect_size_text(effect: ParameterEffect) -> str:
+    """Return the rank correlation of an ordered parameter, such as "-0.52"; otherwise, epsilon squared."""
+    return f"{effect.effect:+.2f}" if effect.is_ordered else f"{effect.effect:.2f} (epsilon squared)"
+
+
 def significant_effects(study: Study) -> Sequence[ParameterEffect]:
     """Return the effects with a p-value of at most SIGNIFICANCE_LEVEL."""
     return [effect for effect in study.effects if effect.p <= SIGNIFICANCE_LEVEL]
@@ -130,10 +135,9 @@ def _effect_table(study: Study) -> Iterator[StyledLine]:
     names = [f"{one_line(effect.path)} on {one_line(effect.criterion)}" for effect in effects[:MAX_EFFECTS]]
     width = max(map(len, names))
     for name, effect in zip(names, effects, strict=False):
-        size = f"{effect.effect:+.2f}" if effect.is_ordered else f"{effect.effect:.2f} (epsilon squared)"
         yield (
             StyledText(f"  {name:{width}}   "),
-            StyledText(f"{size}   p = {effect.p:.1g}   {effect_text(effect)}", "quiet"),
+            StyledText(f"{effect_size_text(effect)}   p = {effect.p:.1g}   {effect_text(effect)}", "quiet"),
         )
 
 

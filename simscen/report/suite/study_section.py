@@ -4,12 +4,20 @@ A claim is a minimum pass rate that the study tests.
 """
 
 from collections.abc import Sequence
+from math import isfinite
 
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
 from simscen.core.records.study import Study
 from simscen.report.display_text import html_text, relative_path
-from simscen.report.study import claim_text, effect_text, pass_rate_notes, pass_rate_text, significant_effects
+from simscen.report.study import (
+    claim_text,
+    effect_size_text,
+    effect_text,
+    pass_rate_notes,
+    pass_rate_text,
+    significant_effects,
+)
 from simscen.spec.quantities import si_number
 
 MAX_PLOTS = 8
@@ -54,7 +62,7 @@ def _effect_table(study: Study) -> str:
     if not effects:
         return '<p class="quiet">No parameter has a significant effect on a margin.</p>'
     rows = "".join(
-        f"<tr><td>{html_text(effect.path)}</td><td>{html_text(effect.criterion)}</td><td>{effect.effect:+.2f}</td>"
+        f"<tr><td>{html_text(effect.path)}</td><td>{html_text(effect.criterion)}</td><td>{effect_size_text(effect)}</td>"
         f"<td>{effect.p:.1g}</td><td>{effect_text(effect)}</td></tr>"
         for effect in effects
     )
@@ -83,7 +91,7 @@ def _plot(path: str, criterion: str, study: Study, runs: Sequence[RunFinished], 
             for verdict in run.result.verdicts
             if verdict.id == criterion
             for finding in verdict.findings
-            if finding.margin is not None
+            if finding.margin is not None and isfinite(finding.margin)
         ]
         if isinstance(value, int | float) and margins:
             points.append((float(value), min(margins), run))
