@@ -15,8 +15,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from simscen.core.records.events import EventKind
 from simscen.core.records.verdict import Finding, Status
-from simscen.criteria.timeline import has_ended
 
 if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
@@ -86,7 +86,9 @@ def undecided(what: str, because: str, limit: str = "", detail: Sequence[str] = 
 
 def if_complete(trace: Trace, finding: Finding) -> Finding:
     """Return the finding, or an inconclusive one if the log is truncated, so that the value may still change."""
-    return finding if has_ended(trace) else undecided(finding.what, f"{finding.measured} so far", finding.limit)
+    if trace.of_kind(EventKind.RUN_ENDED):
+        return finding
+    return undecided(finding.what, f"{finding.measured} so far", finding.limit)
 
 
 def missed(
