@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.diagnostics import escaped, paths_from_working_folder, print_text
 from simscen.cli.shared_options import LenientOption, RootOption, WorldPathOption
 from simscen.core.errors import Exit, InvalidInput, Problem, UsageError
 from simscen.loading.files.discovery import SCENARIO_SUFFIXES, STUDY_SUFFIXES, default_root
@@ -124,7 +124,8 @@ def _new_file(
     if not target.absolute().parent.is_dir():
         raise UsageError(f"{target.parent} is not a folder; create it first")
     root_folder = root or default_root([target, map_])
-    text = new_scenario_text(target, map_, root_folder, world_path, lenient)
+    with paths_from_working_folder(root_folder):
+        text = new_scenario_text(target, map_, root_folder, world_path, lenient)
     return _edited(target, "scenario", root_folder, world_path), text
 
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
 from simscen.cli.shared_options import RootOption, WorldPathOption
 from simscen.core.errors import InvalidInput
 from simscen.loading.files.discovery import default_root, discover
@@ -35,7 +35,7 @@ def command(
     root_folder = root or default_root(paths)
     tried = [try_variations(file, root_folder, world_path or ()) for file in discover(paths, root_folder)]
     if problems := [problem for found in tried if isinstance(found, list) for problem in found]:
-        raise InvalidInput(problems)
+        raise InvalidInput(relative_to_working_folder(problems, root_folder))
     chosen = select([one for found in tried if isinstance(found, tuple) for one in found], keyword, tag or ())
     width = max(len(scenario.title) for scenario in chosen)
     for scenario in chosen:

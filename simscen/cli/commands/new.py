@@ -8,7 +8,7 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.completions import shipped_scenarios
-from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
 from simscen.cli.session.user_files import create_file
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.core.version import PACKAGE
@@ -153,9 +153,10 @@ def _copy(like: str, file: Path) -> list[Path]:
     from simscen.loading.files.copying import copy_scenario
 
     source = _source(like)
-    loaded = try_variations(source, default_root([source]))
+    root = default_root([source])
+    loaded = try_variations(source, root)
     if isinstance(loaded, list):
-        raise InvalidInput(loaded)
+        raise InvalidInput(relative_to_working_folder(loaded, root))
     return copy_scenario(loaded[-1], file, default_root([file]))[1:]  # the last variation lists the files of all
 
 

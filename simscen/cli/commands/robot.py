@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from simscen.cli.diagnostics import as_json as problems_as_json
-from simscen.cli.diagnostics import as_text, escaped, print_text, relative_to_working_folder
+from simscen.cli.diagnostics import (
+    as_text,
+    escaped,
+    paths_from_working_folder,
+    print_text,
+    relative_to_working_folder,
+)
 from simscen.cli.process import engine_output_on_stderr
 from simscen.cli.session.user_files import save
 from simscen.core.errors import Exit, InvalidInput
@@ -52,7 +58,9 @@ def check(
     from simscen.loading.checks.robot_geometry import geometry_warnings
     from simscen.run.robot_check import check_robot
 
-    file = load_robot_file(robot, root or default_root([Path(robot)]), world_path or ())
+    root_folder = root or default_root([Path(robot)])
+    with paths_from_working_folder(root_folder):
+        file = load_robot_file(robot, root_folder, world_path or ())
     library = file.library
     try:
         spec, body = robot_from_file(file.robot, file.roots)

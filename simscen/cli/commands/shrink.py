@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.diagnostics import escaped, paths_from_working_folder, print_text
 from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, backend_of, workers_and_cluster
 from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.shrinking import BudgetSpent, CandidateRuns, Failure, Shrinker, Stopped, failure_of
@@ -84,9 +84,9 @@ def command(
     chosen = _chosen_run(run, seed, variation, stack)
     root_folder = root or default_root([chosen.file])
     stacks = parse_stacks([] if chosen.stack is None else [chosen.stack], root_folder, world_path or ())
-    scenario = ChangedScenario(
-        chosen.file, root_folder, world_path or (), next(iter(stacks.chosen), None), chosen.variation
-    )
+    choice = next(iter(stacks.chosen), None)
+    with paths_from_working_folder(root_folder):
+        scenario = ChangedScenario(chosen.file, root_folder, world_path or (), choice, chosen.variation)
     target = out or sibling(chosen.file, "minimal")
     if target.exists():
         raise UsageError(f"{target} exists already; choose another file with --out")

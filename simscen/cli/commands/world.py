@@ -61,7 +61,7 @@ def inspect(
     from simscen.worlds.maps.map_size import MAP_RESOLUTION_M
 
     root_folder = root or default_root([path])
-    source = load_world_file(path, root_folder, world_path or ())
+    source = _load(path, root_folder, world_path or [])
     world = _build(source, root_folder, world_path or [], lenient)
     built = _with_map(world, path, height, MAP_RESOLUTION_M, "in scenarios, use `map: none`")
     summary = inspect_world(built)
@@ -97,7 +97,7 @@ def export(
     from simscen.worlds.maps.ros_map import save_map
 
     root_folder = root or default_root([path])
-    source = load_world_file(path, root_folder, world_path or ())
+    source = _load(path, root_folder, world_path or [])
     world = _build(source, root_folder, world_path or [], lenient)
     grid = _with_map(world, path, height, resolution, "choose larger cells with --resolution").map
     save(map_, lambda file: save_map(grid, file), [path])
@@ -122,7 +122,7 @@ def convert(
     Exit code 0: written; 2: the world is unusable or cannot be written.
     """
     root_folder = root or default_root([path])
-    source = load_world_file(path, root_folder, world_path or ())
+    source = _load(path, root_folder, world_path or [])
     spec, changes = _convert(source, root_folder, world_path or [], lenient, height)
     if source.map is not None:
         path_of_map = os.path.relpath(source.map.path.resolve(), out.resolve().parent)
@@ -155,6 +155,11 @@ def _convert(
         details = "; ".join(f"{'.'.join(map(str, detail['loc']))}: {detail['msg']}" for detail in error.errors()[:3])
         message = f"the world cannot be written as a world file: {details}"
         raise InvalidInput([Problem(str(source.path), 0, 0, "SC312", message)]) from None
+
+
+def _load(path: Path, root_folder: Path, world_path: list[Path]) -> LoadedWorld:
+    with paths_from_working_folder(root_folder):
+        return load_world_file(path, root_folder, world_path)
 
 
 def _build(source: LoadedWorld, root_folder: Path, world_path: list[Path], lenient: bool) -> World:

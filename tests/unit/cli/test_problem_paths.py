@@ -1,0 +1,40 @@
+"""Problems name files relative to the working folder, although paths in scenarios are relative to their root."""
+
+from pathlib import Path
+
+import pytest
+
+INVALID_WORLD = "simscen: 1\nwalls: 3\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "place"),
+    [
+        (["list", "."], "bad.scenario.yaml:2:1"),
+        (["new", "copy", "--like", "bad.scenario.yaml"], "bad.scenario.yaml:2:1"),
+        (["study", "variations.scenario.yaml"], "variations.scenario.yaml:11:"),
+        (["falsify", "good.scenario.yaml"], "good.scenario.yaml:"),
+        (["shrink", "bad.scenario.yaml"], "bad.scenario.yaml:2:1"),
+        (["robot", "check", "bad.robot.yaml"], "bad.robot.yaml:1:1"),
+        (["world", "inspect", "bad.world.yaml"], "bad.world.yaml:2:8"),
+        (["world", "export", "bad.world.yaml", "--map", "map.yaml"], "bad.world.yaml:2:8"),
+        (["world", "convert", "bad.world.yaml", "new.world.yaml"], "bad.world.yaml:2:8"),
+        (["edit", "new", "--new", "--map", "bad.world.yaml"], "bad.world.yaml:2:8"),
+    ],
+)
+def test_problems_of_a_file_in_a_subfolder_name_the_path_from_there(
+    simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], place: str
+) -> None:
+    folder = tmp_path / "sub"
+    folder.mkdir()
+    (tmp_path / ".git").mkdir()  # the root of all files
+    good = (tmp_path / "good.scenario.yaml").read_text()
+    (folder / "good.scenario.yaml").write_text(good)
+    (folder / "bad.scenario.yaml").write_text(good.replace("name: drive", "nam: drive"))
+    (folder / "variations.scenario.yaml").write_text(good + "variations: {grid: 3}\n")
+    (folder / "bad.robot.yaml").write_text("simscen: 1\n")
+    (folder / "bad.world.yaml").write_text(INVALID_WORLD)
+    monkeypatch.chdir(folder)
+    ended = simscen(*arguments)
+    assert ended.code == 2
+    assert ended.err.startswith(place), ended.err
