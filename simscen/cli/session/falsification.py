@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
+from simscen.cli.diagnostics import paths_from_working_folder, relative_to_working_folder
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.output_files import OutputOptions, Reports
@@ -15,7 +16,7 @@ from simscen.cli.session.run_session import finish_session, start_session
 from simscen.cli.session.selection import require_not_skipped
 from simscen.cli.session.stacks import parse_stacks
 from simscen.cli.session.terminal import Screen, open_screen
-from simscen.core.errors import Exit, InvalidInput, Problem, UsageError
+from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, UsageError
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
 from simscen.core.records.verdict import Status
@@ -35,6 +36,7 @@ from simscen.report.display_text import number_with_noun
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
 from simscen.run.process.jobs import Backend, Job
+from simscen.run.process.supervisor import Interrupted
 from simscen.run.sessions.output_folder import run_folder, write_atomically
 from simscen.run.sessions.results import display_path
 from simscen.run.sessions.run_session import SessionOptions, run_session
@@ -106,15 +108,16 @@ class Falsification:
     def __init__(self, request: FalsifyRequest) -> None:
         """Read the scenario and its ranges. Raises InvalidInput and UsageError."""
         self._request = request
-        root_folder = request.root or default_root([request.file])
-        stacks = parse_stacks([] if request.stack is None else [request.stack], root_folder, request.world_path)
+        root = request.root or default_root([request.file])
+        stacks = parse_stacks([] if request.stack is None else [request.stack], root, request.world_path)
         choice = next(iter(stacks.chosen), None)
-        self._scenario = ChangedScenario(request.file, root_folder, request.world_path, choice, None)
-        space = search_space(self._scenario.merged_tree)
-        if not isinstance(space, SearchSpace):
-            raise InvalidInput(space)
-        self._space = space
-        self._checker = FileChecker(root_folder, request.world_path, request.lenient, stacks=stacks)
+        with paths_from_working_folder(root):
+            self._scenario = ChangedScenario(request.file, root, request.world_path, choice, None)
+            space = search_space(self._scenario.merged_tree)
+            if not isinstance(space, SearchSpace):
+                raise InvalidInput(space)
+        self._root, self._space = root, space
+        self._checker = FileChecker(root, request.world_path, request.lenient, stacks=stacks)
         self._search: Search = make_search(request.method, space.choice_counts, request.search_seed)
         self._variations: dict[str, Variation] = {}
         self._planned: list[PlannedRun] = []
@@ -125,8 +128,12 @@ class Falsification:
         self.found: list[FoundFailure] = []
 
     def execute(self, backend: Backend, journal: Journal, reports: Reports, screen: Screen) -> Exit:
-        """Search until a limit of the request is reached, or no valid values are found. Return the exit code."""
+        """Search until a limit of the request is reached, or no valid values are found. Return the exit code.
+
+        An error of proposed values, such as InvalidInput, is raised after the reports are written.
+        """
         start, stopped, empty_batches = time.monotonic(), None, 0
+        error: SimscenError | None = None
 
         def listen(event: SessionEvent) -> None:
             journal(event)
@@ -137,7 +144,15 @@ class Falsification:
         screen(SessionStarted(__version__, runs, 1, workers, str(reports.folder), seeds=runs))
         while stopped is None and not self._is_done() and empty_batches < MAX_EMPTY_BATCHES:
             points = self._search.ask(min(BATCH_SIZE, self._request.runs - len(self.finished_runs)))
-            jobs = self._make_jobs(points, reports.folder)
+            try:
+                with interrupt_on_signals():
+                    jobs = self._make_jobs(points, reports.folder)
+            except Interrupted as interrupted:
+                stopped = Exit(128 + interrupted.number)
+                break
+            except SimscenError as raised:
+                error = raised
+                break
             valid = [job for job in jobs if job is not None]
             empty_batches = 0 if valid else empty_batches + 1
             self._plan(journal, valid)
@@ -152,10 +167,13 @@ class Falsification:
                     self._save_failure(finished)
         if not self.finished_runs and stopped is None:
             message = f"none of {self._proposed} proposed values meets the conditions in `require`"
-            raise InvalidInput(self._problems or [Problem(str(self._request.file), 0, 0, "SC016", message)])
+            problems = relative_to_working_folder(self._problems, self._root)
+            raise error or InvalidInput(problems or [Problem(str(self._request.file), 0, 0, "SC016", message)])
         study = evaluate_study(self._study_plan(), (finished.result for finished in self.finished_runs))
         is_interrupted = stopped is not None
         written = finish_session(reports, journal, listen, self.finished_runs, start, is_interrupted, study=study)
+        if error is not None:
+            raise error
         if stopped is not None or not written:
             return stopped or Exit.INCOMPLETE
         if study.errors:

@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
-from simscen.cli.diagnostics import as_text, print_text
+from simscen.cli.diagnostics import as_text, paths_from_working_folder, print_text
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.exit_codes import exit_code
 from simscen.cli.session.live_page import LivePage
@@ -27,7 +27,7 @@ from simscen.cli.session.pending_runs import (
 from simscen.cli.session.run_session import finish_session, plugins_and_stacks, start_session
 from simscen.cli.session.selection import Selection, load_selection, require_not_skipped
 from simscen.cli.session.terminal import open_screen
-from simscen.core.errors import Exit, InvalidInput, Problem, UsageError
+from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, UsageError
 from simscen.core.random_streams import MAX_SEED
 from simscen.core.records.run_result import scenario_title
 from simscen.core.records.run_store import RunStore
@@ -46,6 +46,7 @@ from simscen.model.acceptance import PassRate
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
 from simscen.run.process.jobs import Backend, Job
+from simscen.run.process.supervisor import Interrupted
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
@@ -102,7 +103,8 @@ class _StudySession:
     def __init__(self, request: StudyRequest) -> None:
         self._request = request
         self._root_folder = request.root or default_root([request.file])
-        space = read_variation_space(request.file, self._root_folder, request.world_path)
+        with paths_from_working_folder(self._root_folder):
+            space = read_variation_space(request.file, self._root_folder, request.world_path)
         self._space = space if space is not None and space.blocks else None
         self._is_random = self._space is None or self._space.is_random
         self._loaded: dict[int | None, LoadedScenario] = {}
@@ -140,11 +142,11 @@ class _StudySession:
     def execute(self, backend: Backend, journal: Journal, reports: Reports, listeners: Sequence[Listener]) -> Exit:
         """Run batches until the claim is decided or all runs are done, write the reports, and return the exit code.
 
-        `listeners` receive all events. Raises InvalidInput, after the reports are written, if the values of a later run
-        are invalid.
+        `listeners` receive all events. If a later run cannot be loaded, the error is raised after the reports are
+        written.
         """
         start, finished_runs, stopped = time.monotonic(), RunStore(), None
-        invalid: InvalidInput | None = None
+        error: SimscenError | None = None
         earlier, earlier_keys = previous_results(journal), previous_keys(journal)
         scenario_id = next(iter(self._loaded.values())).id
         longest_title = scenario_id if self._space is None else scenario_title(scenario_id, f"variation-{self.total}")
@@ -170,20 +172,23 @@ class _StudySession:
                 done, stopped = run_session(remaining, self._request.options, backend, listen)
             journal.complete([*reused, *done])
             finished_runs.extend([*reused, *done])
-            if self._is_decided(finished_runs):
+            if stopped is not None or self._is_decided(finished_runs):
                 break
-            self._batch = list(islice(self._runs, self._batch_size))
             try:
-                self._load([run.number for run in self._batch])
-            except InvalidInput as error:  # the values of a later run are invalid: report the runs before it
-                invalid = error
+                with interrupt_on_signals():
+                    self._batch = list(islice(self._runs, self._batch_size))
+                    self._load([run.number for run in self._batch])
+            except Interrupted as interrupted:
+                stopped = Exit(128 + interrupted.number)
+            except SimscenError as raised:
+                error = raised
                 break
         if stopped is None:
             warn_of_dropped_runs(journal, earlier_keys, self._planned)
         study = evaluate_study(self._study_plan(), (finished.result for finished in finished_runs))
         written = finish_session(reports, journal, listen, finished_runs, start, stopped is not None, study=study)
-        if invalid is not None:
-            raise invalid
+        if error is not None:
+            raise error
         return stopped or (exit_code(finished_runs, study) if written else Exit.INCOMPLETE)
 
     @property

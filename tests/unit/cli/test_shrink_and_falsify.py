@@ -227,3 +227,37 @@ def test_unsearchable_scenario_is_an_error(
     done = simscen("falsify", "a.scenario.yaml", *options)
     assert done.code == (5 if "skip" in ranges else 2)
     assert message in done.err
+
+
+BETWEEN_BATCHES = """
+import os, signal, sys
+from simscen.cli.session import falsification
+from simscen.core.errors import UsageError
+
+make_jobs = falsification.Falsification._make_jobs
+
+def make_jobs_after_a_change(self, points, folder):
+    if self.finished_runs:
+        {change}
+    return make_jobs(self, points, folder)
+
+falsification.BATCH_SIZE = 2
+falsification.Falsification._make_jobs = make_jobs_after_a_change
+sys.argv = ["simscen", "falsify", "crates.scenario.yaml", "--method", "sobol", "--runs", "4", "--out", "out"]
+from simscen.cli.main import main
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [("raise UsageError('something is wrong')", 2), ("os.kill(os.getpid(), signal.SIGTERM)", 143)],
+)
+def test_runs_before_an_error_or_a_signal_during_a_search_are_reported(tmp_path: Path, change: str, code: int) -> None:
+    text = SCENARIO.replace("clearance: {min: 1 m}", "clearance: {min: 0.1 m}")
+    sampled = "variations: {sampled: {count: 4, values: {robot.motor_torque: {uniform: [50 %, 100 %]}}}}\n"
+    (tmp_path / "crates.scenario.yaml").write_text(text + sampled)
+    program = [sys.executable, "-c", BETWEEN_BATCHES.format(change=change)]
+    done = subprocess.run(program, cwd=tmp_path, check=False, capture_output=True, text=True)
+    assert done.returncode == code, done.stderr
+    assert len(runs_of(tmp_path / "out")) == 2

@@ -208,3 +208,44 @@ def test_logs_of_passed_runs_are_deleted_on_request(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "simscen", "report", "out"]
     assert subprocess.run(command, cwd=tmp_path, check=False, capture_output=True).returncode == 1
     assert (tmp_path / "out/results.json").read_bytes() == before
+
+
+BETWEEN_BATCHES = """
+import os, signal, sys
+from pathlib import Path
+from simscen.cli.session import study_session
+
+loaded_batches = 0
+load = study_session._StudySession._load
+
+def load_after_a_change(self, numbers):
+    global loaded_batches
+    loaded_batches += 1
+    if loaded_batches == 3:  # the second batch; the first one is loaded in two calls
+        {change}
+    return load(self, numbers)
+
+study_session.BATCH_SIZE = 4
+study_session._StudySession._load = load_after_a_change
+sys.argv = ["simscen", "study", "s.study.yaml", "--out", "out"]
+from simscen.cli.main import main
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "message"),
+    [
+        ("Path('s.study.yaml').open('a').write('# changed')", 2, "s.study.yaml has changed since the study began"),
+        ("os.kill(os.getpid(), signal.SIGTERM)", 143, ""),
+    ],
+)
+def test_runs_before_an_error_or_a_signal_between_two_batches_are_reported(
+    tmp_path: Path, change: str, code: int, message: str
+) -> None:
+    (tmp_path / "s.study.yaml").write_text(SCENARIO + RANDOM)
+    program = [sys.executable, "-c", BETWEEN_BATCHES.format(change=change)]
+    done = subprocess.run(program, cwd=tmp_path, check=False, capture_output=True, text=True)
+    assert done.returncode == code, done.stderr
+    assert message in done.stderr
+    assert results(tmp_path)["total"] == 4
