@@ -134,7 +134,11 @@ def command(
     if keep_logs is KeptLogs.FAILED and (check_determinism or check_against is not None):
         raise UsageError("--keep-logs failed excludes --check-determinism and --check-against, which compare logs")
     if check_determinism and (earlier := [path for path in paths if (path / JOURNAL_FILE).is_file()]):
-        paths, check_determinism, check_against = [p for p in paths if p not in earlier], False, earlier[0]
+        if len(earlier) > 1 or check_against is not None:
+            raise UsageError("--check-determinism compares with one earlier session only")
+        paths, check_determinism, check_against = [path for path in paths if path not in earlier], False, earlier[0]
+        if not paths:
+            raise UsageError(f"name the scenarios to compare with the earlier session {check_against}")
     workers, cluster = workers_and_cluster(workers, backend, address)
     request = SessionRequest(
         paths,

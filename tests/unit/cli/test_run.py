@@ -73,3 +73,20 @@ def test_undefined_stack_runs_nothing(simscen, tmp_path: Path) -> None:
     assert "good.scenario.yaml:11:19: error[SC060] the external stack `mine` has no command" in ended.err
     assert "--stack mine='COMMAND'" in ended.err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected_text"),
+    [
+        (("one",), "name the scenarios to compare with the earlier session one"),
+        (("good.scenario.yaml", "one", "two"), "--check-determinism compares with one earlier session only"),
+        (("good.scenario.yaml", "one", "--check-against", "two"), "compares with one earlier session only"),
+    ],
+)
+def test_determinism_is_checked_against_one_earlier_session(simscen, tmp_path: Path, arguments, expected_text) -> None:
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "events.jsonl").write_text("")
+    ended = simscen("run", *arguments, "--check-determinism")
+    assert ended.code == 2
+    assert expected_text in ended.err
