@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from simscen.cli.process import config_file
+from simscen.core.files import expand_home
 from simscen.core.version import PACKAGE
 
 
@@ -57,7 +58,7 @@ def stacks(incomplete: str) -> list[str]:
 def _files(incomplete: str, suffixes: tuple[str, ...]) -> Iterator[str]:
     """Yield the matching folders, with a slash appended, and the matching files with one of the suffixes."""
     parent, slash, start = incomplete.rpartition("/")
-    folder = Path(parent + slash or ".").expanduser()
+    folder = expand_home(parent + slash or ".")
     try:
         found = sorted(folder.iterdir())
     except OSError:

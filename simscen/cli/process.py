@@ -9,6 +9,7 @@ from pathlib import Path
 
 from simscen.core.cpu_kernels import pinned_variables
 from simscen.core.errors import Exit, UsageError
+from simscen.core.files import expand_home
 
 OUTPUT_LOST_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO})
 """Error numbers with which output to stdout or stderr is lost: disk full, quota exceeded, terminal closed."""
@@ -104,4 +105,4 @@ def caller_environment() -> dict[str, str]:
 def config_file() -> Path:
     """Return the user's configuration file: simscen/config.yaml in $XDG_CONFIG_HOME or ~/.config."""
     config_home = Path(os.environ.get("XDG_CONFIG_HOME", ""))
-    return (config_home if config_home.is_absolute() else Path("~/.config").expanduser()) / "simscen" / "config.yaml"
+    return (config_home if config_home.is_absolute() else expand_home("~/.config")) / "simscen" / "config.yaml"

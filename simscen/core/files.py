@@ -1,4 +1,4 @@
-"""Checks of the paths of output files, and a record of the input files that were read."""
+"""Checks of the paths of output files, the home folder in paths, and a record of the input files that were read."""
 
 import errno
 import os
@@ -28,6 +28,14 @@ def require_not_input(path: Path, inputs: Iterable[Path]) -> None:
     real = os.path.realpath(path)
     if any(os.path.realpath(each) == real for each in inputs):
         raise OSError(errno.EINVAL, "it is one of the input files")
+
+
+def expand_home(path: str | Path) -> Path:
+    """Return a path with its leading `~` replaced by the home folder; unchanged if the home folder is unknown."""
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        return Path(path)
 
 
 _READ: ContextVar[set[Path] | None] = ContextVar("files_read", default=None)

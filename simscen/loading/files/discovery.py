@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput, NothingSelected, Problem
+from simscen.core.files import expand_home
 from simscen.loading.files.paths import exists, is_folder, path_in_messages, scenario_id
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
@@ -79,7 +80,8 @@ def _contains_any(folder: Path, names: tuple[str, ...]) -> bool:
 
 def _is_too_wide(folder: Path) -> bool:
     """Return whether a folder is `/`, the home folder, or a parent of the home folder."""
-    return folder == folder.parent or Path(os.path.realpath(Path("~").expanduser())).is_relative_to(folder)
+    home = expand_home("~")
+    return folder == folder.parent or (home.is_absolute() and Path(os.path.realpath(home)).is_relative_to(folder))
 
 
 def _missing_path_problem(path: Path) -> Problem | None:

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from simscen.core.external_command import ANSWER_TIMEOUT_S, START_TIMEOUT_S, ExternalCommand, split_command
+from simscen.core.files import expand_home
 from simscen.loading.files.paths import exists
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
@@ -41,7 +42,7 @@ def parse_command(
     run.
     """
     program, *arguments = split_command(text)
-    program = str(Path(program).expanduser()) if program.startswith("~") else program
+    program = str(expand_home(program)) if program.startswith("~") else program
     env = {**environment, **(own_variables or {})}
     if program == SIMSCEN_PROGRAM and _why_not_executable(program, env, folder):
         program = str(Path(sys.executable).parent / SIMSCEN_PROGRAM)

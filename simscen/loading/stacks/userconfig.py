@@ -7,6 +7,7 @@ from pathlib import Path
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.external_command import ExternalCommand
+from simscen.core.files import expand_home
 from simscen.loading.files.paths import PathSandbox, exists
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.multirobot import external_stack_name
@@ -37,7 +38,7 @@ class UserConfig:
         if name not in self.spec.stacks:
             return None
         stack = self.spec.stacks[name]
-        working_folder = folder if stack.cwd is None else Path(stack.cwd).expanduser()
+        working_folder = folder if stack.cwd is None else expand_home(stack.cwd)
         if not working_folder.is_dir():
             raise self._invalid((name, "cwd"), "no such folder", "")
         try:

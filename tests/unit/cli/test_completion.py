@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from simscen.cli.commands.doctor import check_stacks
+from simscen.cli.completions import scenarios
+
 COMMAND = [sys.executable, "-c", "from simscen.cli.start import start; start()"]
 
 
@@ -71,3 +74,14 @@ def test_module_runs_the_command(simscen) -> None:
         [sys.executable, "-m", "simscen", "validate", "good.scenario.yaml"], capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stdout) == (0, "1 scenario is valid\n")
+
+
+def test_an_unknown_home_folder_is_no_error(simscen, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def no_home(_: Path) -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "expanduser", no_home)
+    monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
+    assert simscen("list", "good.scenario.yaml").code == 0
+    assert scenarios("~nobody/") == []
+    assert "~/.config/simscen/config.yaml does not exist" in check_stacks()
