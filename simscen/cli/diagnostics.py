@@ -16,6 +16,7 @@ from simscen.core.errors import InvalidInput, Problem
 from simscen.report.display_text import (
     ascii_only,
     display_width,
+    encodable_json,
     escape_ci_markers,
     escape_ci_markers_in_json,
     one_line,
@@ -99,6 +100,11 @@ def print_text(text: str, stream: TextIO | None = None) -> None:
     except UnicodeEncodeError:
         text = ascii_only(text)
     print(text, file=out)
+
+
+def print_json(document: str) -> None:
+    """Print a JSON document to stdout, with escapes for CI commands and for characters that stdout cannot encode."""
+    print(encodable_json(escape_ci_markers_in_json(document), sys.stdout))
 
 
 def _problem_text(problem: Problem) -> str:

@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import json
 import os
 import re
 import unicodedata
@@ -13,6 +14,7 @@ from shutil import get_terminal_size
 from typing import Literal, TextIO
 
 _CONTROL_CHARACTERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+_NOT_ASCII = re.compile("[^\x00-\x7f]+")
 _CI_MARKER = re.compile(r"##(\w*)\[")
 """Start of a CI command that is valid anywhere in a line."""
 _ASCII_REPLACEMENTS = str.maketrans(
@@ -77,6 +79,15 @@ def escape_ci_commands(line: str) -> str:
 def escape_ci_markers(text: str) -> str:
     """Escape the CI commands that are valid anywhere in a line: `##[error]`, `##vso[…]`, `##teamcity[…]`."""
     return _CI_MARKER.sub(r"##\1\\[", text)
+
+
+def encodable_json(document: str, out: TextIO) -> str:
+    """Return a JSON document with escapes if `out` cannot encode it. The parsed data does not change."""
+    try:
+        document.encode(out.encoding or "utf-8")
+    except UnicodeEncodeError:
+        return _NOT_ASCII.sub(lambda match: json.dumps(match[0])[1:-1], document)
+    return document
 
 
 def escape_ci_markers_in_json(document: str) -> str:

@@ -11,6 +11,7 @@ from simscen.report.display_text import (
     TerminalStyle,
     ascii_only,
     can_encode,
+    encodable_json,
     escape_ci_commands,
     escape_ci_markers_in_json,
     plain_text,
@@ -77,5 +78,5 @@ class JsonReporter(Reporter):
             self._runs.append(event)
         if isinstance(event, SessionFinished):
             for part in json_parts(self._runs, event.folder, event.comparison, event.study):
-                self._out.write(escape_ci_markers_in_json(part))
+                self._out.write(encodable_json(escape_ci_markers_in_json(part), self._out))
             self._out.flush()

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from simscen.cli.diagnostics import print_text
+from simscen.cli.diagnostics import print_json, print_text
 from simscen.core.errors import Exit, InvalidInput, Problem
 from simscen.judge.metrics.comparison import compare_sessions, comparison_data, comparison_key
 from simscen.judge.significance import Significance
@@ -85,7 +85,7 @@ def command(
     is_worse = any(change.is_worse for change in against.changes)
     links = _links(sessions)
     if format_ is ComparisonFormat.JSON:
-        print_text(json.dumps({"worse": is_worse, **comparison_data(comparison)}, indent=2, ensure_ascii=False))
+        print_json(json.dumps({"worse": is_worse, **comparison_data(comparison)}, indent=2, ensure_ascii=False))
     elif format_ is ComparisonFormat.MARKDOWN:
         print_text("\n".join(session_comparison_markdown(comparison, links, is_worse)))
     else:

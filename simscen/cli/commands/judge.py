@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.diagnostics import escaped, print_json, print_text
 from simscen.cli.session.exit_codes import exit_code
 from simscen.cli.session.judging import LogJudge, runs_without_log
 from simscen.cli.session.logs import find_logs
@@ -72,7 +72,7 @@ def command(
         print_text(f"note: {escaped(note)}", sys.stderr)
     results = [run for _, run in runs]
     if json_:
-        print(_document(results, _options(foreign, scenario, root, world_path or [])), end="")
+        print_json(_document(results, _options(foreign, scenario, root, world_path or [])))
     else:
         for line in _lines(runs, scenario is not None):
             print_text(escape_ci_commands(plain_text(line)))
@@ -101,7 +101,7 @@ def _document(runs: list[RunFinished], options: list[str]) -> str:
     for log, data in zip(logs, document.get("runs", [document]), strict=True):
         if log:
             data["again"] = shlex.join(["simscen", "judge", log, *options])
-    return json.dumps(document, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(document, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def _options(foreign: ForeignLogOptions, scenario: Path | None, root: Path | None, world_path: list[Path]) -> list[str]:

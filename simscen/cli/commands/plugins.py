@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.diagnostics import escaped, print_json, print_text
 from simscen.cli.shared_options import TextOrJson
 from simscen.core.errors import Exit
 from simscen.spec.registry import (
@@ -36,7 +36,7 @@ def command(format_: Annotated[TextOrJson, typer.Option("--format", help="Output
     by_package = sorted([*found, *unknown_groups()], key=lambda one: (one.distribution.lower(), one.distribution))
     listed = [_row(entry) for entry in by_package]
     if format_ is TextOrJson.JSON:
-        print(json.dumps({"plugins": listed}, indent=2, ensure_ascii=False))
+        print_json(json.dumps({"plugins": listed}, indent=2, ensure_ascii=False))
     else:
         print_text(_text(listed))
     sys.exit(Exit.INCOMPLETE if any(row["broken"] for row in listed) else Exit.PASSED)

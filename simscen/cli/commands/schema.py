@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from simscen.cli.diagnostics import escaped, print_text
+from simscen.cli.diagnostics import escaped, print_json, print_text
 from simscen.cli.session.user_files import save
 from simscen.core.version import PACKAGE
 from simscen.spec.registry import GROUPS, plugin_types
@@ -34,7 +34,7 @@ def command(
     first line of a scenario. The schemas include the types of installed packages.
     """
     if write is None:
-        print_text(schema_text(kind.value).rstrip())
+        print_json(schema_text(kind.value).rstrip())
         return
     for each in SchemaKind:
         text = schema_text(each.value)

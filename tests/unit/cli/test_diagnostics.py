@@ -1,8 +1,10 @@
 import io
+import json
+import sys
 
 import pytest
 
-from simscen.cli.diagnostics import as_github, as_text, escaped, print_text
+from simscen.cli.diagnostics import as_github, as_text, escaped, print_json, print_text
 from simscen.core.errors import Problem
 
 
@@ -81,3 +83,15 @@ def test_ascii_stream_gets_ascii() -> None:
     print_text("a → b … 机", stream)
     stream.flush()
     assert raw.getvalue().isascii()
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_json_on_stdout_is_valid_in_every_encoding(monkeypatch: pytest.MonkeyPatch, encoding: str) -> None:
+    stream = io.TextIOWrapper(io.BytesIO(), encoding)
+    monkeypatch.setattr(sys, "stdout", stream)
+    data = {"limit": "≤ 1 °C", "name": "täst 😀", "file": "\udcff", "marker": "##[error]"}
+    print_json(json.dumps(data, ensure_ascii=False))
+    stream.flush()
+    written = stream.buffer.getvalue().decode(encoding)
+    assert json.loads(written) == data
+    assert "##[" not in written
