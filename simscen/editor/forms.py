@@ -109,6 +109,8 @@ class _Form:
 
     def _scalar(self, schema: Schema, value: Any, written: SourceNode | None) -> dict[str, Any]:
         """Return the part of a field that describes a scalar. `written` is its syntax node; None if it is inherited."""
+        if isinstance(value, float) and not math.isfinite(value):
+            value = str(value)  # JSON has no such numbers
         if "enum" in schema:
             return {"type": "choice", "choices": schema["enum"], "value": value}
         if isinstance(value, bool) or schema.get("type") == "boolean":

@@ -12,7 +12,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from simscen.core.errors import InvalidInput
+from simscen.core.errors import InvalidInput, SimscenError
 from simscen.core.version import PACKAGE
 from simscen.editor.session import EditorSession, RequestRefused
 from simscen.report.picture.palette import css_variables
@@ -220,6 +220,8 @@ def _response(session: EditorSession, name: str, body: bytes) -> Response:
         return _error("the request is not JSON", HTTPStatus.BAD_REQUEST)
     except RequestRefused as refused:
         return _json({**refused.data, "error": str(refused)}, refused.status)
+    except SimscenError as error:  # such as a file that cannot be written
+        return _error(str(error), HTTPStatus.UNPROCESSABLE_ENTITY)
     except Exception:
         traceback.print_exc()
         message = "internal error: this is a bug in simscen; the terminal shows details"

@@ -16,7 +16,7 @@ from simscen.editor.checking import TextChecks
 from simscen.editor.document import NEW, ChangedMeanwhile, Content, Document, EditedFile
 from simscen.editor.forms import form_data
 from simscen.editor.map_view.background import Backgrounds
-from simscen.editor.map_view.map_edits import read_edits
+from simscen.editor.map_view.map_edits import read_edits, read_keys
 from simscen.editor.map_view.map_objects import MapObject
 from simscen.editor.map_view.scene import map_objects, object_at_problem, scene_data, scene_parts
 from simscen.editor.preview import preview_data
@@ -143,13 +143,15 @@ class EditorSession:
 
     def form(self, request: Data) -> Data:
         """Return the form of the value at `keys`."""
-        text, keys = _text(request), request.get("keys")
-        if not isinstance(keys, list):
-            raise RequestRefused("the request has no keys")
+        text = _text(request)
+        try:
+            keys = read_keys(request.get("keys"))
+        except EditRefused as error:
+            raise RequestRefused(str(error)) from error
         parts = scene_parts(self.file, text)
         if parts is None:
             raise RequestRefused("the text is not valid YAML; correct it first", 422)
-        return form_data(self.file.kind, text, parts.tree.plain, tuple(keys))
+        return form_data(self.file.kind, text, parts.tree.plain, keys)
 
     def preview(self, request: Data) -> Data:
         """Return the shortest paths and the clearances of the robots after `edits`."""

@@ -3,6 +3,7 @@
 import shutil
 import tempfile
 import threading
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -124,6 +125,10 @@ class TrialRuns:
             trial.state, trial.message = "canceled", "the run was stopped"
         except (SimscenError, OSError) as error:
             trial.state, trial.message = "error", one_line(str(error))
+        except Exception as error:
+            traceback.print_exc()
+            message = f"internal error: {type(error).__name__}; this is a bug in simscen"
+            trial.state, trial.message = "error", message
 
     def _finish(self, trial: TrialRun, result: RunResult) -> None:
         for verdict, line in result.verdicts_with_lines:

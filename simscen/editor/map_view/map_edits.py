@@ -29,7 +29,7 @@ def _read_change(one: Any, source: SourceNode | None, order: tuple[str, ...]) ->
     """Yield the edits for one change. `source` is the syntax tree of the text; `order` is the order of new keys."""
     if not isinstance(one, dict):
         raise EditRefused("an edit must be a mapping")
-    keys = _keys(one.get("keys"))
+    keys = read_keys(one.get("keys"))
     match one.get("op"):
         case "set":
             yield SetValue(keys, one.get("value"), order)
@@ -93,12 +93,12 @@ def degrees_text(yaw: float) -> str:
     return f"{round(math.degrees(yaw), 3):g} deg"
 
 
-def _keys(value: Any) -> Keys:
-    """Return the keys of a change. Raises EditRefused if they are not a list of strings and indices."""
+def read_keys(value: Any) -> Keys:
+    """Return the keys in a request. Raises EditRefused if they are not a list of strings and indices."""
     if not isinstance(value, list) or not all(
         isinstance(key, str) or (isinstance(key, int) and not isinstance(key, bool) and key >= 0) for key in value
     ):
-        raise EditRefused("an edit needs a list of keys")
+        raise EditRefused("the request has no list of keys")
     return tuple(value)
 
 

@@ -169,5 +169,6 @@ def motion_path(
         line: Literal["open", "closed"] = "closed" if motion.get("repeat") == "loop" and start is None else "open"
         yield MapObject(keys, "path", label, through, line=line, origin=start, points_keys=(*keys, "through"))
     elif keyframes := keyframe_handles(motion.get("keyframes"), (*keys, "keyframes")):
-        begins_there = number(items(items(motion.get("keyframes"))[0])[0]) == 0
+        times = [number(one[0]) for one in map(items, items(motion.get("keyframes"))) if one]
+        begins_there = times[0] == 0
         yield MapObject(keys, "path", label, keyframes, line="open", origin=None if begins_there else start)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
+from simscen.criteria.registry import AnyCriterion
 from simscen.editor.map_view.map_objects import (
     Keys,
     MapObject,
@@ -21,6 +22,8 @@ from simscen.editor.map_view.map_objects import (
     point_handles,
     pose_handle,
 )
+from simscen.model.disturbances import FaultEntry
+from simscen.spec.choice import Choice
 
 PERSON_RADIUS_M = 0.25
 """Radius of a pedestrian without the key `radius`."""
@@ -54,7 +57,7 @@ def scenario_objects(data: dict[str, Any], places: Places) -> Iterator[MapObject
     yield from _zones(data, (), "")
     yield from _faults(data, (), places)
     for index, criterion in enumerate(map(mapping, items(data.get("pass")))):
-        kind = _first_key(criterion)
+        kind = _kind(criterion, AnyCriterion)
         condition = mapping(criterion.get(kind))
         region = condition.get("region", condition.get("in"))
         yield MapObject(("pass", index), "criterion", kind, region=region if isinstance(region, str) else "")
@@ -163,11 +166,12 @@ def _faults(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObj
     """Yield the faults of a scenario or robot, and the objects for their triggers."""
     for index, fault in enumerate(map(mapping, items(data.get("faults")))):
         own = (*keys, "faults", index)
-        label = str(fault.get("name", f"{fault.get('sensor', 'fault')} {_first_key(fault, ('name', 'sensor'))}"))
+        label = str(fault.get("name", f"{fault.get('sensor', 'fault')} {_kind(fault, FaultEntry)}"))
         yield MapObject(own, "fault", label)
         yield from _triggers(fault.get("when"), (*own, "when"), f"trigger of {label}", places)
 
 
-def _first_key(entry: dict[str, Any], without: tuple[str, ...] = ("id", "severity", "robot")) -> str:
-    """Return the kind of a criterion or fault: its first key that is not in `without`."""
-    return next((key for key in entry if key not in without), "entry")
+def _kind(entry: dict[str, Any], model: type[Choice]) -> str:
+    """Return the kind of a criterion or fault: its first key that is not a modifier of its `model`."""
+    modifiers = model.known_keys() - model.choices().keys() | {"robot"}
+    return next((key for key in entry if key not in modifiers), "entry")

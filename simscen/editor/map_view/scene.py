@@ -165,9 +165,10 @@ def object_at_problem(problem: Problem, objects: Sequence[MapObject], source: So
     """
     if not problem.line or source is None:
         return ""
-    lines = text.split("\n")
-    line_start = sum(len(line) + 1 for line in lines[: problem.line - 1])
-    index, line_end = line_start + max(problem.col - 1, 0), line_start + len(lines[problem.line - 1])
+    lines = [*text.splitlines(keepends=True), ""]
+    line_start = sum(map(len, lines[: problem.line - 1]))
+    index = line_start + max(problem.col - 1, 0)
+    line_end = line_start + len(lines[problem.line - 1].rstrip("\r\n\x85\u2028\u2029"))
     nodes = [(node, one) for one in objects if one.keys and (node := source_at(source, one.keys)) is not None]
     around = [(node.end - node.start, one) for node, one in nodes if node.start <= index <= node.end]
     behind = [(node.end - node.start, one) for node, one in nodes if index < node.start <= line_end]

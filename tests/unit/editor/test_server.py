@@ -160,6 +160,15 @@ def test_saving_requires_the_version_that_was_read(server: EditorServer) -> None
     assert server.session.file.path.read_text() == TEXT
 
 
+def test_the_page_is_told_why_a_file_cannot_be_saved(server: EditorServer) -> None:
+    opened, file = ask(server, "open").data, server.session.file.path
+    file.rename(file.with_name("other.yaml"))
+    file.symlink_to("other.yaml")
+    refused = ask(server, "save", text=TEXT + "#\n", version=opened["version"])
+    assert refused.status == 422
+    assert "a.scenario.yaml: cannot be written: it is a symbolic link" in refused.data["error"]
+
+
 def test_a_world_file_has_a_page_of_its_own_as_soon_as_the_scenario_names_it(server: EditorServer) -> None:
     world = server.session.file.path.with_name("b.world.yaml")
     world.write_text("simscen: 1\n")

@@ -104,6 +104,9 @@ def test_a_text_with_mistakes_still_has_a_map(session: MakeSession) -> None:
     assert found["goals/1"]["handles"] == [] and found["goals/0"]["handles"]
     with pytest.raises(RequestRefused, match="not a YAML mapping"):
         one.scene({"text": "a: [1"})
+    half_written = TEXT.replace("through: [[3, 4]], speed: 1 m/s", "keyframes: [5, [], [1, 3, 4, 0]]")
+    path = things(one, half_written)["world/objects/0/move"]
+    assert [handle["keys"][-1] for handle in path["handles"]] == [2]
 
 
 def test_problems_refer_to_objects_on_the_map(session: MakeSession) -> None:
@@ -118,6 +121,33 @@ def test_problems_refer_to_objects_on_the_map(session: MakeSession) -> None:
     found = one.problems({"text": TEXT.replace("distance: 1}", "distence: 1}")})["problems"]
     assert {problem["object"] for problem in found} == {"events/0/when/any/1/robot_within"}
     assert one.problems({"text": "a: [1"})["problems"][0]["code"] == "SC003"
+
+
+@pytest.mark.parametrize("line_break", ["\r", "\x85", "\u2028", "\u2029"])
+def test_lines_of_problems_are_counted_as_in_yaml(session: MakeSession, line_break: str) -> None:
+    text = f"# one{line_break}# two\n" + TEXT.replace("distance: 1}", "distence: 1}")
+    found = session().problems({"text": text})["problems"]
+    assert {problem["object"] for problem in found} == {"events/0/when/any/1/robot_within"}
+
+
+def test_the_kind_of_a_fault_or_criterion_is_not_one_of_its_modifiers(session: MakeSession) -> None:
+    text = TEXT.replace("{sensor: lidar, off: {}, ", "{for: 1 s, sensor: lidar, required: false, off: {}, ").replace(
+        "for: 1 s}\n", "}\n"
+    )
+    objects = things(session(), text.replace("pass: [", "pass: [{severity: warn, then: [], collisions: {max: 0}}, "))
+    assert (objects["faults/0"]["label"], objects["pass/0"]["label"]) == ("lidar off", "collisions")
+
+
+def test_a_form_shows_a_number_that_is_not_finite_as_text(session: MakeSession) -> None:
+    text = TEXT.replace("speed: 1 m/s", "speed: 1 m/s, repeat: .nan")
+    form = session().form({"text": text, "keys": ["world", "objects", 0, "move"]})
+    assert [one["value"] for one in form["fields"] if one["key"] == "repeat"] == ["nan"]
+
+
+@pytest.mark.parametrize("keys", [None, [{}], [[1]], [-1], [None]])
+def test_a_form_needs_a_list_of_keys(session: MakeSession, keys: Any) -> None:
+    with pytest.raises(RequestRefused, match="no list of keys"):
+        session().form({"text": TEXT, "keys": keys})
 
 
 def test_problem_is_not_assigned_to_another_object_in_the_same_line(session: MakeSession) -> None:

@@ -80,3 +80,17 @@ def test_new_run_stops_the_previous_one_and_exit_deletes_their_files(loaded: Loa
     assert folder.is_dir() and folder.name.startswith("simscen-edit-")
     runs.close()
     assert not folder.exists()
+
+
+class BrokenBackend(EndlessBackend):
+    def run(self, *_: object) -> Iterator[JobUpdate]:
+        raise RuntimeError("broken")
+
+
+def test_an_unexpected_error_ends_the_run(loaded: LoadedScenario, capsys: pytest.CaptureFixture[str]) -> None:
+    runs = TrialRuns(BrokenBackend)
+    trial = runs.start(loaded)
+    until(lambda: trial.state == "error" and trial.message != "")
+    assert trial.message == "internal error: RuntimeError; this is a bug in simscen"
+    assert "RuntimeError: broken" in capsys.readouterr().err
+    runs.close()
