@@ -13,7 +13,6 @@ import pytest
 from simscen.pytesting import OUT_OPTION, positive_number
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from simscen.pytesting.scenario_items import Simscen
@@ -95,8 +94,8 @@ def pytest_configure_node(node: Any) -> None:
 
 
 @pytest.fixture
-def simscen(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Simscen]:
+def simscen(request: pytest.FixtureRequest, tmp_path: Path) -> Simscen:
     """Provide a callable that runs a scenario and returns its Run: `simscen("goal.scenario.yaml", seed=7)`."""
     from simscen.pytesting.scenario_items import Simscen
 
-    yield Simscen(request.path.parent, tmp_path)
+    return Simscen(request.path.parent, tmp_path, request.config.getini("simscen_world_path"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 from argparse import ArgumentTypeError
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import datetime, timezone
 from itertools import count
 from pathlib import Path
@@ -84,9 +84,12 @@ def _folder(config: pytest.Config) -> Path:
 class Simscen:
     """Value of the fixture `simscen`. Runs scenarios in the process of the test."""
 
-    def __init__(self, folder: Path, out: Path) -> None:
-        """Take the folder to which paths of scenarios are relative, and the folder for logs."""
-        self._folder, self._out = folder, out
+    def __init__(self, folder: Path, out: Path, world_path: Sequence[Path] = ()) -> None:
+        """Take the folder to which paths of scenarios are relative, and the folder for logs.
+
+        `world_path` are additional folders with worlds and models.
+        """
+        self._folder, self._out, self._world_path = folder, out, world_path
         self._runs = 0
 
     def __call__(
@@ -95,11 +98,13 @@ class Simscen:
         """Run a scenario with the arguments of `simscen.simulate`, and return the run."""
         self._runs += 1
         log = self._out / f"run-{self._runs}.mcap"
-        return simscen.simulate(self._folder / scenario, seed, log=log, stack=stack, variation=variation)
+        return simscen.simulate(
+            self._folder / scenario, seed, log=log, world_path=self._world_path, stack=stack, variation=variation
+        )
 
     def variations(self, scenario: str | Path) -> list[str]:
         """Return the names of a scenario's variations; `[""]` if it has none."""
-        return simscen.variations(self._folder / scenario)
+        return simscen.variations(self._folder / scenario, world_path=self._world_path)
 
 
 PYTEST_MARKERS = frozenset(
@@ -150,7 +155,7 @@ class ScenarioRun(pytest.Item):
         name = short_run_name(scenario.key(seed), with_seed, f"{folder}/" if folder else "")
         item: ScenarioRun = cls.from_parent(parent, name=name, scenario=scenario, seed=seed)
         for tag in ("simscen", *scenario.spec.tags):
-            if tag not in PYTEST_MARKERS:
+            if tag not in PYTEST_MARKERS and not tag.startswith("_"):
                 item.config.addinivalue_line("markers", f"{tag}: a tag of scenarios")
                 item.add_marker(tag)
         if scenario.spec.skip is not None:

@@ -162,3 +162,22 @@ def test_fixture_runs_a_scenario_in_a_test_and_reports_why_it_failed(run, projec
     assert code == 1, output
     assert "1 failed, 1 passed" in output
     assert re.search(r"<Run of scenarios/bad, seed 1: failed; clearance 0\.\d\d m \(≥ 2.00 m\)>.passed", output)
+
+
+def test_fixture_finds_worlds_in_the_configured_folders(
+    run, project: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    worlds = tmp_path_factory.mktemp("worlds")
+    (worlds / "room.world.yaml").write_text("simscen: 1\nwalls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]\n")
+    inline = ROOM.splitlines()[2]
+    (project / "scenarios/good.scenario.yaml").write_text(ROOM.replace(inline, "world: room.world.yaml"))
+    (project / "pytest.ini").write_text(f"[pytest]\nsimscen_world_path = {worlds}\n")
+    (project / "test_own.py").write_text(TEST)
+    code, output = run("-p", "no:xdist", "test_own.py", "-k", "passes")
+    assert code == 0, output
+
+
+def test_tag_with_an_underscore_is_no_marker(run, project: Path) -> None:
+    (project / "scenarios/good.scenario.yaml").write_text(ROOM.replace("[smoke]", "[_private]"))
+    code, output = run("-p", "no:xdist", "--collect-only", "-q", "scenarios/good.scenario.yaml")
+    assert code == 0, output
