@@ -9,7 +9,7 @@ import inspect
 import json
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from typing import Any, get_type_hints
+from typing import Any
 
 from pydantic import RootModel, ValidationError
 
@@ -105,8 +105,8 @@ def _specification_classes(component: str) -> Sequence[Any]:
         module, _, name = component.partition(":")
         try:
             component_class = getattr(import_module(module), name)
-        except (ImportError, AttributeError) as error:
-            raise InvalidTarget(f"{component}: {error}") from error
+        except Exception as error:  # the module of a plug-in can raise anything
+            raise InvalidTarget(f"{component}: {type(error).__name__}: {error}") from error
         return [specification_of(component_class, component)]
     entries = [entry for group in GROUPS if (entry := find_type(group, component)) is not None]
     if not entries:
@@ -128,8 +128,14 @@ def specification_of(component_class: Any, component: str) -> Any:
         raise InvalidTarget(f"{component} is not a class")
     if hasattr(component_class, "model_validate"):
         return component_class
-    parameters = list(inspect.signature(component_class).parameters)
-    hint = get_type_hints(component_class.__init__).get(parameters[0]) if parameters else None
+    try:
+        parameter = next(iter(inspect.signature(component_class).parameters.values()), None)
+        annotation = parameter.annotation if parameter else None
+        # Only the first annotation is evaluated: others can be names that are imported for type checkers only.
+        module_globals = getattr(component_class.__init__, "__globals__", {})
+        hint = eval(annotation, module_globals) if isinstance(annotation, str) else annotation
+    except Exception:  # a class without a signature, or a name that is not defined at run time
+        hint = None
     if not inspect.isclass(hint) or not hasattr(hint, "model_validate"):
         raise InvalidTarget(
             f"{component}: its first argument is not annotated with a specification; give the specification instead"

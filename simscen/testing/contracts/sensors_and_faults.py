@@ -111,7 +111,8 @@ class FaultContract(Contract):
         """Given the same inputs and random generator then bit-identical outputs."""
         for kind in sorted(self.spec.affects):
             one, other = (self.outputs(kind) for _ in range(2))
-            require(all(map(are_identical, one, other)), f"returns different outputs for the same {kind} and generator")
+            same = len(one) == len(other) and all(map(are_identical, one, other))
+            require(same, f"returns different outputs for the same {kind} and generator")
 
     @promise
     def a_reading_is_never_changed(self) -> None:

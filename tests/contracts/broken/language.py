@@ -12,6 +12,7 @@ from simscen.core.stage import Effect
 from simscen.criteria.base import Criterion, Measure
 from simscen.faults.base import Fault, FaultEffect
 from simscen.spec.base import Spec
+from simscen.testing.contracts.sensors_and_faults import FAULT_READING_COUNT, READINGS
 from simscen.triggers.base import Condition
 from tests.contracts.broken.cases import COUNT, breaks_contract
 
@@ -100,6 +101,16 @@ class ChangesSensorName(ScanFault):
 class FaultUsesGlobalRandom(ScanFault):
     def changed(self, reading):
         return replace(reading, ranges=reading.ranges + random.random())
+
+
+@breaks_contract("the same generator", "for the same")
+class DelaysOneReadingMoreTheSecondTime(ScanFault):
+    def begin(self, rng, wheels):
+        work, number = FaultEffect(), FAULT_READING_COUNT - 1
+        if next(COUNT) % 2:
+            last = READINGS["Scan"](number)
+            work.arriving_readings = lambda: [last] if wheels.now() == last.tick else []  # type: ignore[method-assign]
+        return work
 
 
 @breaks_contract("a reading is never changed", "changes the Scan")

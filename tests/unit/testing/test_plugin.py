@@ -8,8 +8,14 @@ from pathlib import Path
 import pytest
 
 OWN = """
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from simscen.model.controllers import GoalCheckerSpec
-from simscen.stack.setting import Setting
+
+if TYPE_CHECKING:
+    from simscen.stack.setting import Setting
 
 
 class Spec(GoalCheckerSpec):
@@ -97,6 +103,8 @@ INVALID_TARGETS = {
     "own:Nothing": "has no attribute 'Nothing'",
     "nowhere:Nothing": "No module named 'nowhere'",
     "headless": "no installed package adds anything of that name",
+    "builtins:dict": "its first argument is not annotated with a specification",
+    ":Nothing": "Empty module name",
 }
 RUN_EACH_TARGET = """
 import contextlib, io, json, sys
