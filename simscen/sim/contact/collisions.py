@@ -13,7 +13,7 @@ END_DELAY_S = 0.1
 MIN_CAUSING_SPEED_M_S = 0.02
 """Smallest speed at which a robot counts as the cause of a collision.
 
-This is its speed in any direction if the object is static, otherwise its speed along the contact normal.
+This is its speed in any direction if the object cannot move, otherwise its speed along the contact normal.
 """
 
 
@@ -24,7 +24,6 @@ class ContactPoint:
     name, other_id:  name and body id of the object
     point, normal:   point and unit normal towards the robot in the world frame
     impulse:         contact impulse in N s
-    is_static:       whether the object never moves
     """
 
     name: str
@@ -32,7 +31,6 @@ class ContactPoint:
     point: Vector
     normal: Vector
     impulse: float
-    is_static: bool
 
 
 class BodyMotion(NamedTuple):
@@ -107,11 +105,11 @@ class CollisionTracker:
 
 
 def _started_event(tick: int, contact: ContactPoint, robot: BodyMotion, other: BodyMotion | None) -> Event:
-    """Return the event for the start of a collision. `other` is None for an object that does not move."""
+    """Return the event for the start of a collision. `other` is None for an object that cannot move."""
     robot_velocity = _velocity_at(robot, contact.point)
     other_velocity = _velocity_at(other, contact.point) if other else (0.0, 0.0, 0.0)
     approach = -_dot(robot_velocity, contact.normal)
-    is_grazing = contact.is_static and math.hypot(*robot_velocity) >= MIN_CAUSING_SPEED_M_S
+    is_grazing = other is None and math.hypot(*robot_velocity) >= MIN_CAUSING_SPEED_M_S
     return Event(
         tick,
         EventKind.COLLISION_STARTED,

@@ -255,7 +255,7 @@ class Robot:
         enclosing = clearance.enclosed_by
         if enclosing is not None and enclosing not in {contact.name for contact in contacts}:
             up = (0.0, 0.0, 1.0)
-            contacts.append(ContactPoint(enclosing, NO_BODY, motion.origin, up, 0.0, is_static=True))
+            contacts.append(ContactPoint(enclosing, NO_BODY, motion.origin, up, 0.0))
         self._collisions.update(tick, contacts, motion, motions)
 
     def contacts(self) -> list[ContactPoint]:
@@ -272,7 +272,7 @@ class Robot:
             name = names[other] or self.clearance.static_solid_at(point)
             known = found.get(name)
             impulse = force * tick_seconds + (known.impulse if known else 0.0)
-            found[name] = ContactPoint(name, other, point, normal, impulse, names[other] is None)
+            found[name] = ContactPoint(name, other, point, normal, impulse)
         return [found[name] for name in sorted(found)]
 
     def close(self) -> None:

@@ -11,6 +11,8 @@ from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.motion_paths import MAX_STEP_M
 from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid
+from simscen.sim.contact.collisions import MIN_CAUSING_SPEED_M_S
+from simscen.worlds.world_file import ramp_solid
 
 RADIUS = 0.22
 WALL = box("wall", 1.05, 0, 0.1, 4)
@@ -53,11 +55,16 @@ def test_collision_ends_a_tenth_of_a_second_after_the_last_contact(simulate):
     assert not simulation.robot.touching()
 
 
-def test_grazing_a_wall_is_a_collision_caused_by_the_robot(simulate):
-    # The hull overlaps the wall by a millimeter while the robot drives along it.
-    wall = box("wall", 3.0, RADIUS + 0.05 - 0.001, 4.0, 0.1)
-    (hit, *_) = started(collisions(simulate(solids=[wall], drive=(0.5, 0.0, 0.0)), 960))
-    assert hit.data["robot_caused"] is True
+def test_grazing_an_object_that_cannot_move_is_a_collision_caused_by_the_robot(simulate):
+    # The robot drives along the object and approaches it by 2 degrees, more slowly than MIN_CAUSING_SPEED_M_S.
+    y = RADIUS + 0.07
+    wall, ramp = box("wall", 1.0, y, 8.0, 0.1), ramp_solid((-3.0, y), (5.0, y), 0.1, 1.0, "ramp")
+    door = Body("door", (box("door", 0, 0, 8.0, 0.1),), Pose3(1.0, y))
+    for name, objects in (("wall", {"solids": [wall]}), ("ramp", {"solids": [ramp]}), ("door", {"bodies": [door]})):
+        simulation = simulate(**objects, pose=Pose2(0.0, 0.0, math.radians(2)), drive=(0.5, 0.0, 0.0))
+        (hit, *_) = started(collisions(simulation, 960))
+        assert (hit.name, hit.data["robot_caused"]) == (name, True)
+        assert hit.data["robot_speed"] < MIN_CAUSING_SPEED_M_S
 
 
 def test_cart_that_hits_a_stationary_robot_causes_the_collision_and_pushes_it(simulate):
