@@ -74,11 +74,16 @@ def approach_angle(body: RobotBody) -> float:
     """
     foremost = max(body.wheels, key=lambda wheel: wheel.x)
     raised = [c for c in casters_for_uneven_ground(body.casters) if caster_gap(c) > 0 and c.pose.x > foremost.x]
-    points = np.concatenate([solid.pose.apply(hull_points(solid.shape)) for solid in body.hull])
-    corners = [(x - foremost.x, z, 0.0) for x, _, z in points.tolist() if x > foremost.x]
-    corners += [(c.pose.x - foremost.x, c.pose.z, c.shape.radius) for c in raised if isinstance(c.shape, Sphere)]
-    radius = foremost.radius
+    x, _, z = np.concatenate([solid.pose.apply(hull_points(solid.shape)) for solid in body.hull]).T
+    ahead = x > foremost.x
+    balls = [(c.pose.x, c.pose.z, c.shape.radius) for c in raised if isinstance(c.shape, Sphere)]
+    ball_x, ball_z, ball_radius = np.array(balls).reshape(-1, 3).T
+    x, z = np.r_[x[ahead], ball_x] - foremost.x, np.r_[z[ahead], ball_z] - foremost.radius
+    gap = np.r_[np.zeros(ahead.sum()), ball_radius] - foremost.radius
     slopes = np.radians(np.arange(0.0, MAX_SLOPE_DEG, SLOPE_STEP_DEG))
-    is_clear = [-x * np.sin(slopes) + (z - radius) * np.cos(slopes) >= size - radius for x, z, size in corners]
-    touches = ~np.logical_and.reduce(is_clear) if is_clear else np.zeros(len(slopes), np.bool_)
-    return float(slopes[np.argmax(touches)]) if touches.any() else float(slopes[-1])
+    touching = (
+        slope
+        for slope, sine, cosine in zip(slopes.tolist(), np.sin(slopes), np.cos(slopes), strict=True)
+        if (-x * sine + z * cosine < gap).any()
+    )
+    return next(touching, float(slopes[-1]))

@@ -75,7 +75,7 @@ def assemble_body(
     Adds boxes around the wheels (see `wheel_guards`), motors, and casters for a differential drive. If the
     specification has neither footprint nor radius, the footprint is the outline of the hull.
     """
-    hull = (*parts, *(guard for wheel in wheels for guard in wheel_guards(wheel, parts)))
+    hull = (*parts, *wheel_guards(wheels, parts))
     outline = footprint(hull)
     casters: tuple[Solid, ...] = ()
     if spec.drive.type == "differential":

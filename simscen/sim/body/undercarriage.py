@@ -1,7 +1,7 @@
 """Wheels, casters, and motors below the hull of a robot."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from simscen.core.environment.world_model import GRAVITY_M_S2
@@ -105,16 +105,17 @@ def add_motors(wheels: tuple[Wheel, ...], drive: Drive, mass: float) -> tuple[Wh
     )
 
 
-def wheel_guards(wheel: Wheel, parts: Sequence[Solid]) -> tuple[Solid, ...]:
-    """Return a box around a wheel that collides with obstacles, or () if one of the hull's `parts` covers the wheel.
+def wheel_guards(wheels: Iterable[Wheel], parts: Iterable[Solid]) -> tuple[Solid, ...]:
+    """Return a box around each wheel that collides with obstacles, except for wheels that one of the `parts` covers.
 
-    The box does not touch the ground.
+    The boxes do not touch the ground. `parts` are the solids of the hull.
     """
-    box = Solid(
-        Box((2 * wheel.radius, wheel.width, 1.2 * wheel.radius)), Pose3(wheel.x, wheel.y, wheel.radius), "wheel"
+    outlines = [footprint([part]) for part in parts]
+    boxes = (
+        Solid(Box((2 * wheel.radius, wheel.width, 1.2 * wheel.radius)), Pose3(wheel.x, wheel.y, wheel.radius), "wheel")
+        for wheel in wheels
     )
-    hidden = any(_contains(footprint([part]), footprint([box])) for part in parts)
-    return () if hidden else (box,)
+    return tuple(box for box in boxes if not any(_contains(outline, footprint([box])) for outline in outlines))
 
 
 def _contains(outer: Polygon, inner: Polygon) -> bool:
