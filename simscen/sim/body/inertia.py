@@ -45,8 +45,10 @@ def combine(parts: Sequence[MassProperties]) -> MassProperties:
 
 
 def inertia_of_solids(solids: Sequence[Solid], mass: float) -> MassProperties:
-    """Return the properties of solids of equal density with a total mass of `mass` kg."""
+    """Return the properties of solids of equal density (equal mass if all are flat) with a total mass of `mass` kg."""
     volumes = [volume(solid.shape) for solid in solids]
+    if not any(volumes):
+        volumes = [1.0] * len(solids)
     parts = [
         inertia_of_shape(s.shape, mass * v / sum(volumes)).transformed(s.pose)
         for s, v in zip(solids, volumes, strict=True)

@@ -106,8 +106,9 @@ class DifferentialDrive(WheelDrive):
 class AckermannDrive(WheelDrive):
     """Drive of a car that steers its front wheels. It cannot turn in place.
 
-    The steering angle follows from the bicycle model: tan(steering angle) = wheel base * turn rate / speed. The angles
-    of the two front wheels differ (Ackermann condition; Siegwart et al., Autonomous Mobile Robots, section 3.3).
+    The steering angle follows from the bicycle model: tan(steering angle) = wheel base * turn rate / speed. The angle
+    of each front wheel depends on its lateral position (Ackermann condition; Siegwart et al., Autonomous Mobile Robots,
+    section 3.3).
     """
 
     def __init__(self, client: int, vehicle: WheeledBase, body: RobotBody, period: float) -> None:
@@ -115,9 +116,9 @@ class AckermannDrive(WheelDrive):
         self._drive = body.drive
         self._max_steering_step = STEERING_RATE_RAD_S * period
         self._steering = 0.0
-        wheels = list(zip(body.wheels, vehicle.joints, strict=True))
-        # Left before right, like the angles in _set_steering.
-        self._knuckles = [joint for wheel, joint in sorted(wheels, key=lambda w: -w[0].y) if wheel.is_steered]
+        steered = [pair for pair in zip(body.wheels, vehicle.joints, strict=True) if pair[0].is_steered]
+        self._knuckles = [joint for _, joint in steered]
+        self._lateral_ratios = [wheel.y / body.drive.wheel_base for wheel, _ in steered]
         self._servo_torque = 0.5 * body.mass * GRAVITY_M_S2 * body.drive.wheel_radius
         super().__init__(client, vehicle, body, period)
         # The front wheels roll freely.
@@ -143,8 +144,8 @@ class AckermannDrive(WheelDrive):
             super().advance()
 
     def _set_steering(self) -> None:
-        tangent, ratio = math.tan(self._steering), self._drive.wheel_separation / (2 * self._drive.wheel_base)
-        angles = (math.atan(tangent / (1 - tangent * ratio)), math.atan(tangent / (1 + tangent * ratio)))
+        tangent = math.tan(self._steering)
+        angles = [math.atan(tangent / (1 - tangent * ratio)) for ratio in self._lateral_ratios]
         pybullet.setJointMotorControlArray(
             self._robot,
             self._knuckles,

@@ -11,7 +11,7 @@ from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Cylinder, Solid, Sphere
 from simscen.model.robot import Mecanum, Omnidirectional, RobotSpec
-from simscen.sim.body.inertia import MassProperties, combine
+from simscen.sim.body.inertia import MassProperties, combine, inertia_of_solids
 from simscen.sim.body.outline import hull_points
 from simscen.sim.body.robot_body import MIN_GROUND_CLEARANCE_M, RobotBody, assemble_body
 from simscen.sim.body.undercarriage import Wheel, wheel_inertia
@@ -25,6 +25,8 @@ MAX_CASTER_SIZE_RATIO = 0.35
 """Largest length and width of a caster that is not round, divided by the length and width of the hull."""
 MAX_CASTER_AXIS_Z = 0.1
 """Largest z component of the axis of a cylinder that is a caster (6 degrees)."""
+MIN_INERTIA_RATIO = 1e-6
+"""Smallest principal moment of inertia divided by the sum of all three; a smaller one counts as missing."""
 ROUNDING_M = 1e-6
 """Rounding error in m of a radius that a xacro file computes."""
 
@@ -90,10 +92,11 @@ def body_from_tree(spec: RobotSpec, tree: LinkTree) -> RobotBody:
     base_from_root = _base_from_root(joints, solids)
     hull = tuple(replace(solid, pose=base_from_root.compose(solid.pose)) for solid in solids)
     scale = _mass_scale(spec, tree)
+    chassis = _with_possible_inertia(_combine_masses(tree, fixed, base_from_root, scale), hull)
     wheels = tuple(_build_wheel(tree, joint, base_from_root, scale, spec) for joint in joints)
     if wheels:  # an omnidirectional base has no ground contact
         hull = _without_casters(tree, hull, max(wheel.radius for wheel in wheels))
-    return assemble_body(spec, hull, wheels, _combine_masses(tree, fixed, base_from_root, scale))
+    return assemble_body(spec, hull, wheels, chassis)
 
 
 def _check_wheels(spec: RobotSpec, tree: LinkTree, wheels: list[WheelJoint]) -> None:
@@ -151,6 +154,16 @@ def _combine_masses(tree: LinkTree, links: Sequence[str], base_from_root: Pose3,
         raise InvalidInput([tree.element.problem("no link besides the wheels has a mass; give one an <inertial>")])
     whole = combine(parts)
     return MassProperties(whole.mass * scale, whole.center, whole.tensor * scale)
+
+
+def _with_possible_inertia(chassis: MassProperties, solids: Sequence[Solid]) -> MassProperties:
+    """Return the chassis, with the inertia of solids of uniform density if a moment of inertia is missing or negative.
+
+    With such a moment, the wheels could not move the robot as commanded.
+    """
+    if np.linalg.eigvalsh(chassis.tensor)[0] > MIN_INERTIA_RATIO * np.trace(chassis.tensor):
+        return chassis
+    return replace(chassis, tensor=inertia_of_solids(solids, chassis.mass).tensor)
 
 
 def _build_wheel(tree: LinkTree, wheel: WheelJoint, base_from_root: Pose3, scale: float, spec: RobotSpec) -> Wheel:

@@ -6,10 +6,11 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from pydantic import ValidationError
 
 from simscen.assets.folders import AllowedFolders
 from simscen.core.errors import InvalidInput
-from simscen.model.robot import Ackermann, Differential, Drive, Limits, RobotSpec, SkidSteer
+from simscen.model.robot import Ackermann, Differential, Limits, RobotSpec, SkidSteer
 from simscen.model.sensors import InertialUnit, Lidar, Mount, Sensor, WheelOdometry
 from simscen.sim.body.robot_body import hull_height
 from simscen.sim.urdf.body import body_from_tree, read_tree
@@ -29,6 +30,8 @@ LIDAR_NAMES = ("laser", "lidar", "scan")
 """A link carries a lidar if its name contains one of these words."""
 ROBOT_FILE_HINT = "write a *.robot.yaml next to it with its drive, limits, and sensors; see `simscen explain robot`"
 
+InferredDrive = Ackermann | Differential | SkidSteer
+
 
 def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshReader | None = None) -> RobotSpec:
     """Infer the specification of a robot from its URDF: the drive, its limits, and a lidar, odometry, and an IMU.
@@ -41,6 +44,16 @@ def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshRead
     """
     folders = AllowedFolders.of(roots or (path.resolve().parent,))
     tree = read_tree(path, folders, read_mesh)
+    try:
+        return _infer_from_tree(tree, path)
+    except ValidationError as error:
+        problem = error.errors()[0]
+        message = f"the robot cannot be inferred, because its `{problem['loc'][-1]}` is not valid: {problem['msg']}"
+        raise InvalidInput([tree.element.problem(message, ROBOT_FILE_HINT)]) from error
+
+
+def _infer_from_tree(tree: LinkTree, path: Path) -> RobotSpec:
+    """Infer the specification from the links and joints; raises InvalidInput, or ValidationError for invalid values."""
     wheels, others = examine_joints(tree)
     drive = _infer_drive(tree, wheels, others)
     draft = RobotSpec(
@@ -59,7 +72,7 @@ def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshRead
     return draft.model_copy(update={"sensors": sensors})
 
 
-def _infer_drive(tree: LinkTree, wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> Drive:
+def _infer_drive(tree: LinkTree, wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> InferredDrive:
     driven = [wheel for wheel in wheels if not wheel.is_steered]
     left, right = ([w for w in driven if w.is_left is side] for side in (True, False))
     if not left or len(left) != len(right):
@@ -73,7 +86,7 @@ def _infer_drive(tree: LinkTree, wheels: list[WheelJoint], others: Mapping[str, 
     if steered:
         check_front_steering([*driven, *steered])
         base = float(np.mean([wheel.center[0] for wheel in steered]) - np.mean(axles))
-        steering = _max_steering(steered, separation / (2 * base))
+        steering = _max_steering(steered, max(abs(wheel.center[1]) for wheel in steered) / base)
         return Ackermann.model_validate({"type": "ackermann", "wheel_base": base, "max_steering": steering, **size})
     if max(axles) - min(axles) < AXLE_TOLERANCE_M:
         return Differential.model_validate({"type": "differential", **size})
@@ -94,7 +107,8 @@ def _skid_factor(axles: Sequence[float]) -> float:
 def _max_steering(wheels: list[WheelJoint], ratio: float) -> float:
     """Return the largest steering angle in rad of the bicycle model, from the limits of the steering joints.
 
-    `ratio` is wheel separation / (2 * wheel base). cot(bicycle angle) = cot(angle of the inner wheel) + ratio.
+    `ratio` is the lateral distance of the steered wheels from the middle, divided by the wheel base. cot(bicycle angle)
+    = cot(angle of the inner wheel) + ratio.
     """
     ranges = [min(-wheel.steering.limits.lower, wheel.steering.limits.upper) for wheel in wheels if wheel.steering]
     limits = [angle for angle in ranges if 0 < angle < math.pi / 2]
@@ -104,15 +118,14 @@ def _max_steering(wheels: list[WheelJoint], ratio: float) -> float:
     return math.atan(tangent / (1 + tangent * ratio))
 
 
-def _infer_limits(wheels: list[WheelJoint], drive: Drive) -> Limits:
+def _infer_limits(wheels: list[WheelJoint], drive: InferredDrive) -> Limits:
     speeds = [wheel.joint.limits.velocity * wheel.radius for wheel in wheels if not wheel.is_steered]
     linear = min([1.0, *(speed for speed in speeds if speed > 0)])
-    angular = min(1.5, 2 * linear / getattr(drive, "wheel_separation", 1.0))
+    angular = min(1.5, 2 * linear / drive.wheel_separation)
     return Limits(linear=linear, angular=angular, linear_acceleration=1.0, angular_acceleration=2.0)
 
 
 def _infer_lidar_mount(tree: LinkTree, draft: RobotSpec, wheels: list[WheelJoint]) -> Mount:
-    body = body_from_tree(draft, tree)
     ground = min(wheel.bottom for wheel in wheels)
     axle = np.mean([wheel.center for wheel in wheels if not wheel.is_steered], axis=0)
     for name in tree.links:
@@ -121,4 +134,4 @@ def _infer_lidar_mount(tree: LinkTree, draft: RobotSpec, wheels: list[WheelJoint
             x, y, z = float(pose.x - axle[0]), float(pose.y - axle[1]), float(pose.z - ground)
             roll = math.pi if pose.rotation()[2, 2] < MAX_UPSIDE_DOWN_Z else 0.0
             return Mount(x=x, y=y, z=max(0.0, z), roll=roll, yaw=pose.yaw)
-    return Mount(z=hull_height(body) + 0.02)
+    return Mount(z=hull_height(body_from_tree(draft, tree)) + 0.02)

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from simscen.core.geometry import Pose3
-from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Solid, Sphere
+from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Solid, Sphere
 from simscen.sim.body.inertia import MassProperties, combine, inertia_of_shape, inertia_of_solids, volume
 from simscen.worlds.geometry.triangulation import triangulate
 
@@ -37,6 +37,14 @@ def test_inertia_of_two_halves_equals_that_of_the_whole_box():
     ours = inertia_of_solids(halves, 2.0)
     assert ours.center == pytest.approx(whole.center)
     assert ours.tensor == pytest.approx(whole.tensor)
+
+
+def test_inertia_of_a_flat_mesh_equals_that_of_a_sheet():
+    corners = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    sheet = Solid(Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32)))
+    ours = inertia_of_solids([sheet], 12.0)
+    assert ours.center == pytest.approx((1.0, 0.5, 0.0))
+    assert np.diag(ours.tensor) == pytest.approx((1.0, 4.0, 5.0))
 
 
 def test_principal_moments_do_not_change_with_rotation():

@@ -81,6 +81,27 @@ def test_drive_of_a_robot_without_wheels_is_not_inferred(infer):
         infer(to_urdf(build_robot_body(robot_spec("omni"))))
 
 
+def test_urdf_with_a_name_that_is_too_long_is_an_error_at_its_line(infer):
+    text = to_urdf(build_robot_body(robot_spec("amr"))).replace('name="amr"', f'name="{"a" * 121}"')
+    with pytest.raises(InvalidInput, match="its `name` is not valid: String should have at most 120") as caught:
+        infer(text)
+    assert caught.value.problems[0].line == 2
+
+
+def test_single_front_wheel_steers_as_far_as_its_joint(infer):
+    tricycle = to_urdf(build_robot_body(robot_spec("turtlebot"))).replace(
+        "</robot>",
+        '<link name="fork"/><joint name="steer" type="revolute"><parent link="base_link"/><child link="fork"/><origin '
+        'xyz="0.3 0 0.033"/><axis xyz="0 0 1"/><limit lower="-0.6" upper="0.6" effort="1" velocity="1"/></joint>'
+        '<link name="front"><collision><geometry><sphere radius="0.033"/></geometry></collision>'
+        '<inertial><mass value="0.1"/></inertial></link>'
+        '<joint name="roll" type="continuous"><parent link="fork"/><child link="front"/><axis xyz="0 1 0"/></joint>'
+        "</robot>",
+    )
+    drive = infer(tricycle).drive
+    assert (drive.type, drive.max_steering) == ("ackermann", pytest.approx(0.6))
+
+
 @pytest.mark.skipif(not JACKAL.exists(), reason="shared/data/jackal_urdf is missing: see CONTRIBUTING.md")
 def test_the_jackal_is_skid_steered():
     spec = infer_robot_spec(JACKAL)
@@ -243,7 +264,7 @@ def car(limit):
 def test_limits_of_the_steering_joints_limit_the_inner_wheel(infer, lower, upper, inner):
     drive = infer(car(f'<limit lower="{lower}" upper="{upper}"/>')).drive
     radius = drive.wheel_base / math.tan(drive.max_steering)
-    assert math.atan(drive.wheel_base / (radius - drive.wheel_separation / 2)) == pytest.approx(inner)
+    assert math.atan(drive.wheel_base / (radius - 0.14)) == pytest.approx(inner)
 
 
 @pytest.mark.parametrize("limit", ["", '<limit lower="-3.2" upper="3.2"/>', '<limit effort="1"/>'])

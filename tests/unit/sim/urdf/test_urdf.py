@@ -331,20 +331,31 @@ def test_a_urdf_outside_the_root_is_refused(tmp_path):
         build_robot_body(spec(urdf="../robot.urdf"), tmp_path / "in/cart.robot.yaml", [tmp_path / "in"])
 
 
-def test_car_is_steered_by_the_wheels_below_vertical_joints(load):
+@pytest.mark.parametrize("front", [{"left": 0.2, "right": -0.2}, {"middle": 0.0}])
+def test_car_is_steered_by_the_wheels_below_vertical_joints(load, front):
     steering = "".join(
         f"""
   <link name="knuckle_{side}"/>
   <joint name="steer_{side}" type="revolute"><parent link="base"/><child link="knuckle_{side}"/>
     <origin xyz="0.5 {y} 0"/><axis xyz="0 0 1"/><limit lower="-0.5" upper="0.5" effort="1" velocity="1"/></joint>
   {FRONT_WHEEL.format(side=side)}"""
-        for side, y in (("left", 0.2), ("right", -0.2))
+        for side, y in front.items()
     )
     drive = {"type": "ackermann", "wheel_radius": 0.05, "wheel_separation": 0.4, "wheel_base": 0.4, "max_steering": 0.5}
     body = load(robot(extra=steering), drive=drive)
     assert [(w.is_steered, w.is_driven, round(w.x, 3)) for w in body.wheels] == [
-        (False, True, 0.0), (False, True, 0.0), (True, False, 0.4), (True, False, 0.4)]  # fmt: skip
+        (False, True, 0.0), (False, True, 0.0), *[(True, False, 0.4)] * len(front)]  # fmt: skip
     simulation = SingleRobotSimulation(body)
+    simulation.drive(Twist(0.4, 0.0, 0.4))
+    simulation.step(720)
+    assert simulation.truth().twist == pytest.approx((0.4, 0.0, 0.4), abs=0.02)
+    simulation.close()
+
+
+@pytest.mark.parametrize("inertia", ["", '<inertia ixx="0.05" iyy="0.06" izz="0.08" ixy="1"/>'])
+def test_robot_with_missing_or_impossible_inertia_drives_as_commanded(load, inertia):
+    base = BASE.replace('<inertia ixx="0.05" iyy="0.06" izz="0.08"/>', inertia)
+    simulation = SingleRobotSimulation(load(robot(base=base)))
     simulation.drive(Twist(0.4, 0.0, 0.4))
     simulation.step(720)
     assert simulation.truth().twist == pytest.approx((0.4, 0.0, 0.4), abs=0.02)
