@@ -5,11 +5,12 @@ import os
 import stat
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path, PurePath, PurePosixPath
 
 from typing_extensions import Self
 
-from simscen.assets.uris import PACKAGE_SCHEMES, SCHEMES, candidate_paths, is_package_name, parse_fuel_uri
+from simscen.assets.uris import PACKAGE_SCHEMES, SCHEMES, FolderTree, candidate_paths, is_package_name, parse_fuel_uri
 from simscen.core.files import record_read_file
 
 MAX_PATH_LENGTH = 1000
@@ -46,6 +47,10 @@ class AllowedFolders:
     def of(cls, roots: Sequence[Path], packages: Mapping[str, Path] | None = None) -> Self:
         """Create an instance from folders whose paths may be relative or contain symbolic links."""
         return cls(tuple(Path(os.path.realpath(root)) for root in roots), packages or {})
+
+    @cached_property
+    def _tree(self) -> FolderTree:
+        return FolderTree(self.roots)
 
     @property
     def search_folders(self) -> tuple[Path, ...]:
@@ -85,7 +90,7 @@ class AllowedFolders:
             raise UnusableFile("absolute paths are not read", "write it relative to this file")
         real_base, tried = Path(os.path.realpath(base)), []
         first: Path | None = None
-        for folder, candidate in candidate_paths(uri, real_base, self.roots, self.packages):
+        for folder, candidate in candidate_paths(uri, real_base, self._tree, self.packages):
             # Other folders could be links, and hints must not reveal their content.
             if folder in (real_base, *self.search_folders):
                 tried.append((folder, candidate))
@@ -116,7 +121,7 @@ class AllowedFolders:
         if not is_package_name(name):
             raise UnusableFile(f"{name[:60]!r} is not the name of a package")
         first: Path | None = None
-        for _, folder in candidate_paths(f"package://{name}", near, self.roots, self.packages):
+        for _, folder in candidate_paths(f"package://{name}", near, self._tree, self.packages):
             real = Path(os.path.realpath(folder))
             if self._contains(real) and real.is_dir():
                 manifest = real / "package.xml"

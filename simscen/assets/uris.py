@@ -1,10 +1,15 @@
 """Paths at which the file of a Gazebo or ROS URI (model://, package://, file://, Fuel) may be found."""
 
+import itertools
+import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from urllib.parse import unquote
+
+from simscen.core.decorators import cached_on_instance
 
 PACKAGE_SCHEMES = ("package://", "model://")
 """Schemes of ROS and Gazebo whose first path component is the name of a package or model."""
@@ -67,13 +72,54 @@ def parse_fuel_uri(uri: str) -> FuelUri | None:
     return None if any(unsafe in parts.values() for unsafe in (".", "..")) else FuelUri(**parts)
 
 
+class FolderTree:
+    """Folders up to two levels below the `roots`, the allowed folders (see `AllowedFolders`).
+
+    They are listed only once, at the first search for a package.
+    """
+
+    def __init__(self, roots: tuple[Path, ...]) -> None:
+        self.roots = roots
+
+    @cached_property
+    def _folders(self) -> tuple[Path, ...]:
+        """All folders one level below the roots, then all folders two levels below."""
+        upper = [_subfolders(root) for root in self.roots]
+        lower = [folder for folders in upper for parent in folders for folder in _subfolders(parent)]
+        return *itertools.chain.from_iterable(upper), *lower
+
+    @cached_on_instance
+    def find(self, name: str) -> tuple[Path, ...]:
+        """Return what is called `name` two or three levels below a root, the upper level first."""
+        return tuple(folder / name for folder in self._folders if os.path.lexists(f"{folder}/{name}"))
+
+    @cached_property
+    def packages(self) -> dict[str, list[Path]]:
+        """The roots and the folders below that have a package.xml, by the name of the package, the upper ones first."""
+        found: dict[str, list[Path]] = {}
+        for folder in (*self.roots, *self._folders):
+            if os.path.lexists(f"{folder}/package.xml"):
+                found.setdefault(_manifest_name(folder / "package.xml"), []).append(folder)
+        return found
+
+
+def _subfolders(folder: Path) -> list[Path]:
+    """Return the subfolders of a folder, sorted; [] if it cannot be read."""
+    try:
+        with os.scandir(folder) as entries:
+            # Unlike the methods of `entry` and Path, isdir never raises, for example for a loop of links.
+            return sorted(Path(entry.path) for entry in entries if os.path.isdir(entry.path))  # noqa: PTH112
+    except OSError:
+        return []
+
+
 def candidate_paths(
-    uri: str, base: Path, roots: Sequence[Path], packages: Mapping[str, Path]
+    uri: str, base: Path, tree: FolderTree, packages: Mapping[str, Path]
 ) -> Iterator[tuple[Path, Path]]:
     """Yield pairs (folder, path in it) at which the file of a URI may be found, the preferred one first.
 
-    `base` is the folder of the file that contains the URI. `roots` are the allowed folders, see `AllowedFolders`. The
-    search folders are all roots except the first.
+    `base` is the folder of the file that contains the URI. The search folders are all roots of the `tree` except the
+    first.
 
     - model:// and package:// with a name in `packages`: only that folder.
     - model:// and package:// with another name: the search folders, then `_package_folders`.
@@ -81,7 +127,7 @@ def candidate_paths(
       name of a search folder (`file://models/crate` in a folder `models`).
     - Fuel: the search folders.
     """
-    address, search = parse_fuel_uri(uri), roots[1:]
+    address, search = parse_fuel_uri(uri), tree.roots[1:]
     if address is not None:
         for folder in search:
             yield from ((folder, place) for place in address.candidate_paths_in(folder))
@@ -96,7 +142,7 @@ def candidate_paths(
             return
         yield from ((folder, folder / path) for folder in search)
         if is_package_name(name):
-            yield from ((folder, folder / below.lstrip("/")) for folder in _package_folders(name, base, roots))
+            yield from ((folder, folder / below.lstrip("/")) for folder in _package_folders(name, base, tree))
         return
     yield base, base / rest
     first, _, below = rest.partition("/")
@@ -111,7 +157,7 @@ def is_package_name(name: str) -> bool:
     return name.replace("_", "").replace("-", "").isalnum()
 
 
-def _package_folders(name: str, near: Path, roots: Sequence[Path]) -> Iterator[Path]:
+def _package_folders(name: str, near: Path, tree: FolderTree) -> Iterator[Path]:
     """Yield folders that may be the ROS package `name`, to which a file in the folder `near` refers.
 
     First come folders of this name: `near`, its parents, their subfolders, and folders up to three levels below the
@@ -121,25 +167,16 @@ def _package_folders(name: str, near: Path, roots: Sequence[Path]) -> Iterator[P
         if folder.name == name:
             yield folder
         yield folder / name
-        if folder in roots:
+        if folder in tree.roots:
             break
-    yield from (root if root.name == name else root / name for root in roots)
-    for pattern in (f"*/{name}", f"*/*/{name}"):
-        for root in roots:
-            yield from sorted(root.glob(pattern))
-    yield from _folders_by_manifest(name, near, roots)
-
-
-def _folders_by_manifest(name: str, near: Path, roots: Sequence[Path]) -> Iterator[Path]:
-    """Yield folders whose package.xml contains this package name."""
+    yield from (root if root.name == name else root / name for root in tree.roots)
+    yield from tree.find(name)
     for folder in (near, *near.parents):
-        if not any(folder.is_relative_to(root) for root in roots):
+        if not any(folder.is_relative_to(root) for root in tree.roots):
             break
         if _manifest_name(folder / "package.xml") == name:
             yield folder
-    for pattern in ("package.xml", "*/package.xml", "*/*/package.xml"):
-        for root in roots:
-            yield from (path.parent for path in sorted(root.glob(pattern)) if _manifest_name(path) == name)
+    yield from tree.packages.get(name, ())
 
 
 def _manifest_name(path: Path) -> str:

@@ -1,5 +1,6 @@
 """Tests of the search for referenced files in the allowed folders."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -61,6 +62,21 @@ def test_a_package_xml_behind_a_link_is_not_read(folders: AllowedFolders, tmp_pa
     (folders.roots[0] / "linked").symlink_to(outside)
     with pytest.raises(NoSuchFile):
         folders.package_folder("cart", folders.roots[0])
+
+
+def test_the_search_for_missing_packages_lists_each_folder_once(
+    folders: AllowedFolders, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root, models = folders.roots
+    put(root / "robots" / "cart" / "base.stl")
+    (root / "round").symlink_to(root / "round")
+    listed, scandir = [], os.scandir
+    monkeypatch.setattr(os, "scandir", lambda path: listed.append(Path(path)) or scandir(path))
+    for name in ("one", "two", "three"):
+        with pytest.raises(NoSuchFile):
+            folders.package_folder(name, root)
+    assert folders.package_folder("cart", models) == root / "robots" / "cart"
+    assert sorted(listed) == sorted([root, models, root / "robots"])
 
 
 def test_a_package_with_a_specified_path_is_not_searched(folders: AllowedFolders, tmp_path: Path) -> None:
