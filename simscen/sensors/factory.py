@@ -9,7 +9,6 @@ import numpy as np
 
 from simscen.core.clock import Clock
 from simscen.core.errors import BROKEN_COMPONENT, RunError
-from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.ray_fans import RayCaster
 from simscen.core.messages import sensor_data
 from simscen.core.messages.sensor_data import Reading
@@ -19,8 +18,8 @@ from simscen.model.sensors import SensorSpec
 from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
 
 T = TypeVar("T")
-_DISTANCE_ARRAYS = frozenset({"ranges", "depth"})
-"""Fields of readings that contain distances. nan (invalid), inf (no hit), and -inf (too close, REP 117) are valid."""
+_DISTANCE_ARRAYS = {"ranges": 1, "depth": 2}
+"""Dimensions of the fields of readings that contain distances."""
 
 
 def build_sensors(
@@ -93,15 +92,22 @@ class PluginSensor:
 
 
 def _field_defect(name: str, value: object) -> str:
-    """Return the defect of a reading's field as part of a message, or "" if the field is valid."""
+    """Return the defect of a reading's field as part of a message, or "" if the field is valid.
+
+    Valid distances are numbers of at least 0, nan (invalid), inf (no hit), and -inf (too close, REP 117).
+    """
     match value:
         case np.ndarray() if name in _DISTANCE_ARRAYS:
-            is_wrong = value.dtype.kind != "f" or (np.isfinite(value) & (value < 0)).any() or not value.size
-            return "is not an array of distances" if is_wrong else ""
+            has_shape = value.ndim == _DISTANCE_ARRAYS[name] and value.size > 0
+            is_valid = has_shape and value.dtype.kind == "f" and not (np.isfinite(value) & (value < 0)).any()
+            return "" if is_valid else "is not an array of distances"
         case np.ndarray():
             return "" if value.dtype == np.uint8 and value.ndim == 3 else "is not an array of colors"
-        case tuple() | Twist():
-            return "" if np.isfinite(np.array(value, dtype=float)).all() else "is not finite"
+        case tuple():
+            is_valid = all(isinstance(number, int | float | np.number) and np.isfinite(number) for number in value)
+            return "" if is_valid else "does not consist of finite numbers"
+        case float() | np.floating() if name == "angle_increment" and value == 0:
+            return "is 0"
         case float() | np.floating():
             return "" if np.isfinite(value) else "is not finite"
         case bool() | int() | str() | np.bool_():

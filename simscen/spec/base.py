@@ -75,15 +75,21 @@ class Ranged(Spec):
     unlimited_at_zero: ClassVar[tuple[str, ...]] = ()
     """Names of the fields `max_x` in which 0 or less means "no limit"."""
 
-    @model_validator(mode="after")
-    def _check_order(self) -> "Ranged":
+    def range_problem(self) -> str:
+        """Return a message about the first minimum that exceeds its maximum; "" if there is none."""
         for low in type(self).model_fields:
             high = low.replace("min", "max")
             if high == low or high not in type(self).model_fields:
                 continue
             minimum, maximum = getattr(self, low), getattr(self, high)
             if minimum > maximum and not (high in self.unlimited_at_zero and maximum <= 0):
-                raise ValueError(f"`{low}` {minimum:g} is greater than `{high}` {maximum:g}")
+                return f"`{low}` {minimum:g} is greater than `{high}` {maximum:g}"
+        return ""
+
+    @model_validator(mode="after")
+    def _check_ranges(self) -> "Ranged":
+        if problem := self.range_problem():
+            raise ValueError(problem)
         return self
 
 

@@ -250,10 +250,15 @@ class ReferenceStack:
             self._on_motion(reading)
 
     def _filtered_odometry(self, reading: Odometry) -> Odometry | None:
-        """Return the filtered odometry; None if there is no new estimate. Without a filter, return the reading."""
+        """Return the filtered odometry; None if there is no new estimate. Without a filter, return the reading.
+
+        Only the sensor of the first reading is used, because the poses of two sensors drift apart.
+        """
+        if reading.sensor != self._wheel_sensor:
+            return None
         if self._odometry_filter is None:
             return reading
-        odometry = self._odometry_filter.fuse(reading) if reading.sensor == self._wheel_sensor else None
+        odometry = self._odometry_filter.fuse(reading)
         if odometry is not None:
             self._filtered.append(odometry)
         return odometry

@@ -181,6 +181,19 @@ def test_undefined_metric_has_a_reason(run) -> None:
             "is not an array of",
         ),
         ("sensor", "return Scan('extra', tick, np.ones(3), np.nan, 1., 0., 9.)", "broken-component", "is not finite"),
+        (
+            "sensor",
+            "return Scan('extra', tick, np.ones((2, 3)), 0., 1., 0., 9.)",
+            "broken-component",
+            "`ranges` is not",
+        ),
+        ("sensor", "return Scan('extra', tick, np.ones(3), 0., 0., 0., 9.)", "broken-component", "increment` is 0"),
+        (
+            "sensor",
+            "return Scan('extra', tick, np.ones(3), 0., 1., 0., 9., ('x',))",
+            "broken-component",
+            "`mount` does",
+        ),
     ],
 )
 def test_invalid_result_of_a_component_is_an_error_with_its_name(run, kind, text, error, message) -> None:

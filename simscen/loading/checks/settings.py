@@ -15,6 +15,7 @@ from simscen.model.localizers import Amcl
 from simscen.model.navigation import expected_failure_name
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import MAX_GOALS
+from simscen.model.stack import StackSpec
 
 TICK_RATE_KEYS = ("physics", "tick_rate")
 
@@ -62,6 +63,17 @@ def goals_that_do_not_fit_the_mode(scope: NameScope) -> Iterator[CheckProblem]:
             if used and key in goal.model_fields_set:
                 message = f"only the last goal of navigate_through_poses can have `{key}`: elsewhere the robot {why}"
                 yield CheckProblem(("goals", index, key), message)
+
+
+@NAMES.check("SC016")
+def empty_ranges_of_the_local_costmap(scope: NameScope) -> Iterator[CheckProblem]:
+    """Find a minimum of the local costmap that exceeds its maximum, of which `costmap` supplies one."""
+    stack = scope.loaded.spec.stack
+    if isinstance(stack, StackSpec) and (
+        problem := stack.local_costmap.with_defaults_from(stack.costmap).range_problem()
+    ):
+        message = f"{problem}; values that `local_costmap` does not set are those of `costmap`"
+        yield CheckProblem(("stack", "local_costmap"), message)
 
 
 FULL_TURN_RAD = 2 * math.pi

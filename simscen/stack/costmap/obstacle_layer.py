@@ -76,8 +76,8 @@ def in_view(cells: Cells, frame: GridFrame, scan: Scan, base: Pose2) -> npt.NDAr
     lidar = base.compose(scan.mount)
     offset = frame.centers(cells) - np.array([lidar.x, lidar.y])
     bearing = np.arctan2(offset[:, 1], offset[:, 0])
-    turned = (bearing - lidar.yaw - scan.angle_min) % (2 * math.pi)
-    return np.asarray(turned <= abs(scan.angle_increment) * len(scan.ranges))
+    turned = np.remainder(bearing - lidar.yaw - scan.angle_min, math.copysign(2 * math.pi, scan.angle_increment))
+    return np.asarray(np.abs(turned) <= abs(scan.angle_increment) * len(scan.ranges))
 
 
 def crossed_cells(
@@ -128,7 +128,7 @@ def _nearest_beams(bearing: Array, scan: Scan, values: Array) -> tuple[CellIndic
     if divides_turn and beams_per_turn == count:
         beam = np.rint(bearing / step).astype(np.int64)
         return beam, values.take(beam, mode="wrap")
-    beam = np.rint((bearing % (2 * math.pi)) / step).astype(np.int64)
+    beam = np.rint(np.remainder(bearing, math.copysign(2 * math.pi, step)) / step).astype(np.int64)
     if divides_turn:
         beam %= beams_per_turn
     return beam, np.where((beam >= 0) & (beam < count), values.take(beam, mode="clip"), np.nan)

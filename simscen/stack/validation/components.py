@@ -1,6 +1,5 @@
 """Wrappers that check the return values of planners, controllers, and other components of a stack."""
 
-import math
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -20,7 +19,7 @@ from simscen.model.stack_base import ControllerSpec
 from simscen.spec.base import Component
 from simscen.stack.protocols import LETHAL, Behavior, Controller, CostmapView, GoalChecker, Localizer, Planner
 from simscen.stack.setting import Setting
-from simscen.stack.validation.plugin import CheckedPlugin
+from simscen.stack.validation.plugin import CheckedPlugin, are_numbers
 
 T = TypeVar("T")
 S = TypeVar("S", bound=Component)
@@ -89,7 +88,7 @@ class CheckedController(CheckedPlugin):
     def full_speed(self) -> float:
         """Speed in m/s without a speed limit."""
         speed = self.call(lambda: self.inner.full_speed)
-        if not isinstance(speed, float | int) or not math.isfinite(speed) or speed < 0:
+        if not are_numbers((speed,)) or speed < 0:
             self.raise_invalid(f"returned {speed!r} as its full speed, which is not a finite number of at least 0")
         return float(speed)
 
@@ -123,7 +122,7 @@ class CheckedGoalChecker(CheckedPlugin):
     def reached(self, goal: Goal, pose: Pose2, twist: Twist) -> bool:
         """Return whether the goal is reached. Raises RunError if the result is not a boolean."""
         reached = self.call(self.inner.reached, goal, pose, twist)
-        if reached not in (True, False):
+        if not isinstance(reached, bool | np.bool_):
             self.raise_invalid(f"returned {reached!r} instead of True or False")
         return bool(reached)
 

@@ -129,7 +129,7 @@ def are_numbers(values: Iterable[object]) -> bool:
     """Return whether all values are real numbers and finite."""
     try:
         return math.isfinite(math.hypot(*values))  # type: ignore[arg-type]  # other types raise
-    except TypeError:
+    except (TypeError, OverflowError):
         return False
 
 
@@ -143,4 +143,5 @@ def _shape_text(points: object) -> str:
 
 
 def _is_finite_table(value: object, columns: int) -> bool:
-    return isinstance(value, np.ndarray) and value.shape[1:] == (columns,) and all_finite(value)
+    is_table = isinstance(value, np.ndarray) and value.dtype.kind in "fiu" and value.shape[1:] == (columns,)
+    return is_table and all_finite(value)

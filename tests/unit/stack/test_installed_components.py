@@ -15,7 +15,7 @@ from simscen.core.errors import InvalidInput, RunError
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.goals import Goal
-from simscen.core.messages.navigation import ErrorCode
+from simscen.core.messages.navigation import Belief, ErrorCode
 from simscen.core.random_streams import Streams
 from simscen.loading.scenario import load_scenario
 from simscen.model.stack import StackSpec
@@ -129,6 +129,24 @@ def test_error_names_the_role_of_the_component(odd, stack: dict, told: str) -> N
         driven(**stack).run(1)
     assert broken.value.kind == "broken-component"
     assert told in str(broken.value)
+
+
+@pytest.mark.parametrize(
+    ("role", "kind", "method", "replacement"),
+    [
+        ("goal_checker", "unsure", "UnsureChecker.reached", lambda *asked: np.array([True, False])),
+        ("localizer", "lost", "LostLocalizer.belief", Belief(Pose2(0.0, 0.0), np.full((3, 3), None))),
+        ("localizer", "lost", "LostLocalizer.belief", Belief(Pose2(10**400, 0.0), np.eye(3))),
+    ],
+)
+def test_result_of_another_type_is_an_error_of_the_component(
+    odd, monkeypatch, role: str, kind: str, method: str, replacement: object
+) -> None:
+    monkeypatch.setattr(f"odd.{method}", replacement, raising=False)
+    monkeypatch.setattr("odd.LostLocalizer.reset", lambda *asked: None)
+    with pytest.raises(RunError, match=rf"^{role} `{kind}`") as broken:
+        driven(**{role: {"type": kind}}).run(1)
+    assert broken.value.kind == "broken-component"
 
 
 @pytest.mark.parametrize(

@@ -330,15 +330,20 @@ def test_motion_is_complete_after_lost_odometry_messages() -> None:
 # In the stack
 
 
-def decisions(spec: StackSpec, has_imu: bool = True, turn: float = 0.2) -> list[Any]:
-    """Half a second of a robot that stands, while its wheels report a turn and its gyroscope does not."""
+def decisions(spec: StackSpec, has_imu: bool = True, turn: float = 0.2, has_spare: bool = False) -> list[Any]:
+    """Half a second of a robot that stands, while its wheels report a turn and its gyroscope does not.
+
+    `has_spare`: a second odometry sensor reports a motion.
+    """
     surroundings = Surroundings(round_robot(), None, RATE, has_imu=has_imu)
     stack = build_stack(spec, surroundings, Streams(1), Clock(RATE))
     stack.start(Estimate(Pose2(0.0, 0.0)), (Goal("away", Pose2(9.0, 0.0)),))
     made = []
     for tick in range(0, RATE // 2, 6):
         yaw = turn * tick / RATE
-        made.append(stack.decide(tick, (imu(tick, 0.0), odometry(tick, Pose2(0.0, 0.0, yaw), (0.0, 0.0, 1e-2)))))
+        wheels = odometry(tick, Pose2(0.0, 0.0, yaw), (0.0, 0.0, 1e-2))
+        spare = Odometry("spare", tick, Pose2(0.01 * tick, -2.0, 1.0), Twist(2.4))
+        made.append(stack.decide(tick, (imu(tick, 0.0), wheels, *([spare] if has_spare else []))))
     return made
 
 
@@ -361,3 +366,11 @@ def test_odometry_is_not_filtered_without_an_imu_or_by_other_fusing_localizers(s
     assert not any(decision.odometry for decision in made)
     if spec.localizer.type != "ekf":
         assert [each.belief for each in made if each.belief is not None][-1].pose.yaw > 0.05
+
+
+@pytest.mark.parametrize("has_imu", [True, False])
+def test_a_second_odometry_sensor_does_not_move_the_robot(has_imu: bool) -> None:
+    one, two = decisions(StackSpec(), has_imu), decisions(StackSpec(), has_imu, has_spare=True)
+    assert [decision.command for decision in one] == [decision.command for decision in two]
+    poses = [[each.belief.pose for each in made if each.belief is not None] for made in (one, two)]
+    assert poses[0] == poses[1]

@@ -39,7 +39,7 @@ class CriticManager:
         self._names = [name for name in names if getattr(spec, name).enabled]
 
     def costs(self, data: CriticData) -> tuple[Array, bool]:
-        """Return the costs (n,) of the rollouts, and whether all of them collide."""
+        """Return the costs (n,) of the rollouts, and whether all of them collide according to any critic."""
         total = np.zeros(data.rollouts.x.shape[1])
         all_collide = False
         for name in self._names:
@@ -48,7 +48,7 @@ class CriticManager:
                 critic: model.MppiCritic = getattr(self._spec, name)
                 total += costs.astype(np.float64) ** critic.cost_power
             if collides is not None:
-                all_collide = bool(collides.all())
+                all_collide |= bool(collides.all())
         return total, all_collide
 
     def _evaluate(self, name: model.CriticName, data: CriticData) -> tuple[Floats | None, Mask | None]:

@@ -291,3 +291,13 @@ def test_velocity_deadband_critic_penalizes_velocities_below_the_deadband() -> N
 
 def test_twirling_critic_is_the_mean_turn_rate() -> None:
     assert critics.twirling_critic(model.MppiTwirlingCritic(), scene(along(0.3, turn=-0.5))) == pytest.approx([5.0])
+
+
+@pytest.mark.parametrize("order", [("CostCritic", "ObstaclesCritic"), ("ObstaclesCritic", "CostCritic")])
+def test_rollouts_collide_if_any_critic_says_so(order: tuple[model.CriticName, ...]) -> None:
+    circle = model.MppiObstaclesCritic(consider_footprint=False)
+    spec = model.Mppi(type="mppi", critics=list(order), ObstaclesCritic=circle)
+    data = replace(scene(along(0.8), view_of((0.5, 0.2, 1.0, 0.4))), footprint=Footprint(box_robot(width=0.36), 0.05))
+    assert not critics.obstacles_critic(circle, data)[1].any()
+    assert critics.cost_critic(spec.CostCritic, data)[1].all()
+    assert critics.CriticManager(spec, omni=False).costs(data)[1]

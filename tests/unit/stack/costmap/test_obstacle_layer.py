@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from simscen.core.messages.sensor_data import Scan
 from simscen.model.costmaps import Costmap as Spec
 from simscen.stack.costmap import costmaps
 from simscen.stack.costmap.grid_frame import GridFrame
-from simscen.stack.costmap.obstacle_layer import crossed_cells, hit_points
+from simscen.stack.costmap.obstacle_layer import crossed_cells, hit_points, in_view
 
 FRAME = GridFrame((-4.0, -4.0), 0.05, (160, 160))
 
@@ -41,6 +42,27 @@ def test_crossed_cells_equal_those_of_fine_steps_along_the_beams(beams: int) -> 
     assert len(found - truth) <= 0.01 * len(truth)
     missed = {c for c in far - found if all(max(abs(c[0] - e[0]), abs(c[1] - e[1])) > 1 for e in ends)}
     assert len(missed) <= 0.03 * len(far)
+
+
+@pytest.mark.parametrize("beams", [200, 271])
+def test_a_lidar_that_counts_its_beams_clockwise_sees_the_same_cells(beams: int) -> None:
+    spec, base, edge = Spec(), Pose2(0.31, -0.22, 0.7), math.radians(135)
+    step, ranges = 2 * edge / (beams - 1), 2.0 + np.sin(0.1 * np.arange(beams))
+    scan = Scan("l", 0, ranges, -edge, step, 0.05, 12.0, Pose2(0.1, 0.05, 0.2))
+    clockwise = replace(scan, ranges=ranges[::-1], angle_min=edge, angle_increment=-step)
+    cells = np.argwhere(np.ones(FRAME.shape, dtype=bool))
+    x, y = base.compose(scan.mount).inverse().apply(FRAME.centers(cells)).T
+    bearing = np.abs(np.arctan2(y, x))
+    for each in (scan, clockwise):
+        is_seen = in_view(cells, FRAME, each, base)
+        assert is_seen[bearing < edge].all()
+        assert not is_seen[bearing > edge + step].any()
+    centers = FRAME.points(np.arange(len(cells)))
+    crossed, also_crossed = (
+        crossed_cells(centers, FRAME.resolution, each, base, spec)[0] for each in (scan, clockwise)
+    )
+    assert len(crossed) > 1000
+    assert len(np.setxor1d(crossed, also_crossed)) <= 0.01 * len(crossed)  # cells that only the first beam touches
 
 
 def test_hits_are_points_in_the_map() -> None:
