@@ -37,7 +37,7 @@ class Costmap(Ranged):
     (Nav2: 1 Hz)."""
     lethal_cost_threshold: Annotated[int, Field(ge=1, le=100)] = 65
     """Minimum occupancy, in percent, of map cells that are obstacles (Nav2: 100). It has no effect on maps of the mode
-    `trinary`, whose cells are either free or occupied."""
+    `trinary`, whose known cells have an occupancy of 0 or 100 %."""
     obstacle_max_range: PositiveLength = 2.5
     """Maximum distance at which obstacles are marked."""
     obstacle_min_range: NonNegativeLength = 0.0

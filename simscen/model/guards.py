@@ -43,7 +43,7 @@ class CollisionMonitor(Spec):
     enabled: bool = True
     """Whether to use the collision monitor."""
     source_timeout: PositiveDuration = 0.3
-    """Time without lidar data after which the robot stops (Nav2's default is 1 s)."""
+    """Time without lidar data after which the robot stops (nav2_bringup: 1 s)."""
     time_before_collision: PositiveDuration = 0.5
     """Action APPROACH: minimum time before a collision. The robot slows down to keep this time."""
     simulation_time_step: PositiveDuration | None = None

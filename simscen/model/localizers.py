@@ -37,7 +37,7 @@ class LocalizerSpec(Typed):
 class AmclParameters(Ranged, LocalizerSpec):
     """Base class of particle filters, with the parameters of nav2_amcl.
 
-    Only the default of `laser_model_type` differs from nav2_amcl.
+    The defaults are those of nav2_amcl, except for `robot_model` and `laser_model_type`.
     """
 
     needs_map: ClassVar[bool] = True
@@ -92,9 +92,9 @@ class AmclParameters(Ranged, LocalizerSpec):
     laser_max_range: Length = 100.0
     """Maximum range of used beams, if it is below the maximum of the lidar; 0 or less = the maximum of the lidar."""
     recovery_alpha_slow: Probability = 0.0
-    """Decay rate of the slow average of the weights; 0 = no random particles are added."""
+    """Decay rate of the slow average of the likelihood of scans; 0: all scans have the same weight."""
     recovery_alpha_fast: Probability = 0.0
-    """Decay rate of the fast average of the weights; 0 = no random particles are added."""
+    """Decay rate of the fast average of the likelihood of scans; 0 = no random particles are added."""
     selective_resampling: bool = False
     """Whether to resample only if the effective number of particles is below half of their number."""
     do_beamskip: bool = False

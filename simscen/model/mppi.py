@@ -205,7 +205,8 @@ class Mppi(PathFollowerSpec):
     motion_model: Literal["DiffDrive", "Omni", "Ackermann"] | None = None
     """Motion model; default: the model of the robot's drive."""
     min_turning_r: PositiveLength | None = None
-    """Minimum turning radius of the Ackermann model; default: the minimum of the robot (Nav2: 0.2 m)."""
+    """Minimum turning radius with any motion model; default: the minimum of the robot. Nav2 uses it only with the
+    Ackermann model (default: 0.2 m)."""
     time_steps: Annotated[int, Field(ge=5, le=200)] = 56
     """Number of time steps per sample."""
     model_dt: Annotated[PositiveDuration, Field(le=1)] = 0.05
@@ -260,7 +261,7 @@ class Mppi(PathFollowerSpec):
     regenerate_noises: bool = False
     """Whether to draw new samples for each command."""
     retry_attempt_limit: Annotated[int, Field(ge=0, le=20)] = 1
-    """Number of restarts per command if all trajectories collide."""
+    """Number of restarts per command if all trajectories collide, or if the optimized one does."""
     open_loop: bool = False
     """Whether to use the last command instead of the measured velocity."""
     sgf_order: Annotated[int, Field(ge=1, le=2)] = 2

@@ -72,7 +72,7 @@ class Ackermann(WheeledDrive):
     wheel_width: PositiveLength = 0.04
     wheel_base: PositiveLength
     """Distance between the front and the rear wheels."""
-    max_steering: PositiveAngle
+    max_steering: Annotated[PositiveAngle, Field(le=1.5)]
     """Maximum steering angle of a virtual front wheel in the middle."""
     steering: JointNames | None = None
     """Steering joints of the URDF; default: found by position."""

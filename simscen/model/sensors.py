@@ -50,7 +50,7 @@ class Mount(Spec):
 
 
 class SensorSpec(Component):
-    """Base class of sensor specifications. The component is called with a simscen.sensors.sensor.SensorSetting."""
+    """Base class of sensor specifications. The setting of the component is simscen.sensors.sensor.SensorSetting."""
 
     reading_type: ClassVar[str]
     """Name of the class of the readings in simscen.core.messages.sensor_data: Scan, Odometry, Imu, Bump, or Image."""
@@ -82,7 +82,7 @@ class Lidar(Ranged, SensorSpec):
     """Rate of the scans."""
     beams: Annotated[int, Field(ge=1, le=4096)] = 360
     """Number of beams per scan, evenly spread over the field of view."""
-    field_of_view: PositiveAngle = 6.283185307179586
+    field_of_view: Annotated[PositiveAngle, Field(le=6.3)] = 6.283185307179586
     """Field of view, centered on straight ahead."""
     min_range: NonNegativeLength = 0.12
     """Minimum range; a nearer object gives the range -inf."""
@@ -152,7 +152,7 @@ class Camera(SensorSpec):
     """Width of the image in pixels."""
     height: Annotated[int, Field(ge=8, le=480)] = 48
     """Height of the image in pixels."""
-    field_of_view: PositiveAngle = 1.2
+    field_of_view: Annotated[PositiveAngle, Field(le=3.1)] = 1.2
     """Horizontal field of view."""
     max_range: PositiveLength = 10.0
     """Maximum range of the depth image."""

@@ -33,10 +33,10 @@ class ImuSensor:
         if (placements := self._view.placements()) != self._placements:
             self._placements, (px, py, pz) = placements, linear
         self._velocity = vx, vy, vz = linear
-        seconds, base_from_world = self._seconds, (-i, -j, -k, w)
-        p, q, r = rotated(base_from_world, angular)
+        seconds, sensor_from_world = self._seconds, (-i, -j, -k, w)
+        p, q, r = rotated(sensor_from_world, angular)
         x, y, z = rotated(
-            base_from_world, ((vx - px) / seconds, (vy - py) / seconds, (vz - pz) / seconds + GRAVITY_M_S2)
+            sensor_from_world, ((vx - px) / seconds, (vy - py) / seconds, (vz - pz) / seconds + GRAVITY_M_S2)
         )
         gyro, force, (bp, bq, br) = self._gyro_std, self._force_std, self._bias
         np, nq, nr, nx, ny, nz = self._normals.take(6)

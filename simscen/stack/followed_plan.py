@@ -99,14 +99,14 @@ class FollowedPlan:
     def is_blocked(self) -> bool:
         """Return whether any point ahead of the robot is occupied.
 
-        Every second point is checked. Occupied points before the first free one, if any, are ignored, so that a robot
-        in collision can leave.
+        Every second point is checked. Occupied points before the first free one are ignored, so that a robot in
+        collision can leave.
         """
         occupied = self._occupied[self._updated_tracker.index :: 2]
         if not occupied.any():
             return False
         first_free = int((~occupied).argmax())
-        return bool(occupied[first_free:].any() or occupied.all())
+        return bool(occupied[first_free:].any())
 
 
 class LocalPathSender:

@@ -303,5 +303,5 @@ class Surroundings:
     keepout: tuple[Polygon, ...] = ()
     speed_zones: tuple[tuple[Polygon, float], ...] = ()
     masks: FilterMasks = field(default_factory=FilterMasks)
-    lidars: tuple[str, ...] = field(default=())
+    lidars: tuple[str, ...] = ()
     has_imu: bool = False

@@ -30,7 +30,8 @@ class Setting:
     streams:          random streams by name, derived from the seed of the run; use `rng` for your own stream
     control_period:   time in s between two calls of a controller, goal checker, or behavior
     resolution:       cell size in m of the costmaps that the component gets
-    estimate:         initial pose estimate; `reset` or `start` gets it, too
+    estimate:         initial pose estimate of a localizer that is built alone; in a run, the estimate is unknown until
+                      `reset` or `start` passes it
     stop_on_failure:  whether a failed goal ends the task (for a whole stack)
     mode:             Nav2 action that the task imitates (for a whole stack)
     clear_costmap:    clears both costmaps, as described in `Costmaps.clear` (for a behavior)

@@ -195,8 +195,7 @@ class RegulatedPurePursuit(PathFollower):
         """Return the speed in m/s, regulated by curvature, obstacles, the path ahead, and the end of the segment."""
         speed, regulation, spec = self._speed, self._speed_regulation, self._spec
         regulated = regulation.for_curvature(speed, curvature)
-        if spec.use_cost_regulated_linear_velocity_scaling:
-            regulated = min(regulated, regulation.for_distance(speed, distance_at(costmap, pose.x, pose.y)))
+        regulated = min(regulated, regulation.for_distance(speed, distance_at(costmap, pose.x, pose.y)))
         regulated = regulation.for_path_ahead(speed, regulated, tracker, costmap)
         regulated = max(regulated, spec.regulated_linear_scaling_min_speed)
         return min(speed, self._approach_speed(tracker, regulated, pose))

@@ -172,7 +172,7 @@ class LayeredCostmap:
         self._reset_to_static_layer()
 
     def fits_static(self, pose: Pose2, tolerance: float) -> bool:
-        """Return whether the inscribed circle fits on the map within `tolerance` m of a pose that is not in a wall.
+        """Return whether a pose is not in a wall, and the inscribed circle fits on the map within `tolerance` m of it.
 
         Return True for a pose outside the costmap, where walls are unknown.
         """

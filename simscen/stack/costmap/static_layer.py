@@ -84,8 +84,10 @@ def _unrotated_cells(grid: OccupancyGrid) -> tuple[GridFrame, npt.NDArray[np.int
 def _keepout_cells(frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None) -> Mask:
     """Return the cells (rows, columns) that keepout polygons or the keepout mask cover."""
     lethal = np.zeros(frame.shape, dtype=bool)
-    for polygon in keepout:
-        lethal |= points_in_polygon(polygon, _all_centers(frame)).reshape(frame.shape)
+    if keepout:
+        centers = _all_centers(frame)
+        for polygon in keepout:
+            lethal |= points_in_polygon(polygon, centers).reshape(frame.shape)
     if mask is not None:
         columns = np.arange(frame.shape[1])
         for row in range(frame.shape[0]):

@@ -143,5 +143,6 @@ def _shape_text(points: object) -> str:
 
 
 def _is_finite_table(value: object, columns: int) -> bool:
-    is_table = isinstance(value, np.ndarray) and value.dtype.kind in "fiu" and value.shape[1:] == (columns,)
-    return is_table and all_finite(value)
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiu":
+        return False
+    return value.shape[1:] == (columns,) and all_finite(value)

@@ -1,11 +1,14 @@
+import math
+
 import numpy as np
 import pytest
 from puppet import Puppet, SquareRoom
+from pydantic import ValidationError
 
 from simscen.core.clock import Clock
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Scan
 from simscen.core.random_streams import Streams
-from simscen.model.robot import RobotSpec
+from simscen.model.robot import Ackermann, RobotSpec
 from simscen.sensors.factory import build_sensors
 
 SENSORS = {
@@ -45,6 +48,18 @@ def test_periods_are_whole_ticks():
 def test_a_rate_that_does_not_divide_the_clock_is_refused_with_the_nearest_that_does():
     with pytest.raises(ValueError, match="7 Hz does not divide 240 Hz; the nearest that does is"):
         build({"lidar": {"lidar": {"rate": 7.0}}})
+
+
+@pytest.mark.parametrize("sensor", [{"lidar": {"field_of_view": 7.0}}, {"camera": {"field_of_view": math.pi}}])
+def test_field_of_view_wider_than_the_sensor_can_have_is_refused(sensor):
+    with pytest.raises(ValidationError, match="field_of_view"):
+        robot({"wide": sensor})
+
+
+def test_steering_by_a_quarter_turn_is_refused():
+    size = {"wheel_radius": 0.1, "wheel_separation": 0.3, "wheel_base": 0.3}
+    with pytest.raises(ValidationError, match="max_steering"):
+        Ackermann(type="ackermann", max_steering=math.pi / 2, **size)
 
 
 def test_each_sensor_type_returns_its_reading_type():
