@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from heapq import nsmallest
+from itertools import accumulate
 from typing import TextIO
 from urllib.parse import quote
 
@@ -24,8 +25,8 @@ from simscen.report.violations import (
 
 MAX_PICTURES = 10
 """Maximum number of pictures in the summary."""
-MAX_ROWS = 1000
-"""Maximum number of runs in the summary; GitHub refuses a summary of more than 1 MiB."""
+MAX_ROWS, MAX_TABLE_BYTES = 1000, 2**19
+"""Maximum number of runs in the summary, and maximum size of their rows; GitHub refuses a summary of over 1 MiB."""
 
 
 class GitHubReporter(Reporter):
@@ -76,7 +77,7 @@ def annotations(run: RunFinished) -> list[str]:
 
 
 def summary_markdown(runs: Sequence[RunFinished], session: SessionFinished, pictures_url: str = "") -> str:
-    """Return the job summary: counts, a table of at most MAX_ROWS runs, and the comparison of several stacks.
+    """Return the job summary: counts, a table of runs, and the comparison of several stacks.
 
     The table begins with errors and failures. With `pictures_url`, the URL of the output folder, the summary also
     contains pictures of these runs.
@@ -100,8 +101,10 @@ def summary_markdown(runs: Sequence[RunFinished], session: SessionFinished, pict
         f"| {run.result.simulated:.1f} s | {_reason_cell(run)} |"
         for run in listed
     ]
-    if len(listed) < len(runs):
-        rows.append(f"| | and {len(runs) - len(listed)} more | | |")
+    sizes = accumulate(len(row.encode()) for row in rows)
+    rows = [row for row, size in zip(rows, sizes, strict=True) if size <= MAX_TABLE_BYTES]
+    if len(rows) < len(runs):
+        rows.append(f"| | and {len(runs) - len(rows)} more | | |")
     picture_lines = _picture_lines(listed, session.folder, pictures_url) if pictures_url else []
     table = ["| | scenario | simulated | |", "|---|---|---:|---|", *rows]
     return "\n".join([head, "", *table, *comparison, "", *picture_lines, ""])

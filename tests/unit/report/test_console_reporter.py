@@ -182,6 +182,15 @@ def test_github_summary_lists_failures_first_and_is_escaped(session, passed, cra
     assert row.count("|") == 5
 
 
+def test_github_summary_stays_below_the_size_limit_of_github(session, failed):
+    violations = failed.result.verdicts * 100
+    runs = [of(failed, key=RunKey("a/b", seed), verdicts=violations, lines=()) for seed in range(1, 400)]
+    summary = summary_markdown(runs, session[-1])
+    assert len(summary.encode()) < 2**20
+    listed = sum(line.startswith("| ❌") for line in summary.splitlines())
+    assert f"and {len(runs) - listed} more" in summary
+
+
 def test_in_the_summary_every_criterion_has_its_own_line(session, failed):
     (row,) = summary_markdown([failed], session[-1]).splitlines()[4:5]
     stopped, fast = row.rsplit("|", 2)[1].split("<br>")
