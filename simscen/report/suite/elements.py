@@ -36,9 +36,15 @@ def outcome_symbols(outcomes: Sequence[Outcome | None], label: str) -> str:
 
 def link(path: str, folder: str, label: str) -> str:
     """Return a link to a file in the output `folder` of the session; "" for a file outside of the folder."""
+    target = address(path, folder)
+    return f'<a href="{target}">{html_text(label)}</a>' if target else ""
+
+
+def address(path: str, folder: str) -> str:
+    """Return the relative URL of a file in the output `folder` of the session; "" for a file outside of the folder."""
     if not path or not folder or not PurePath(path).is_relative_to(folder) or ".." in PurePath(path).parts:
         return ""
-    return f'<a href="./{quote(relative_path(path, folder))}">{html_text(label)}</a>'
+    return f"./{quote(relative_path(path, folder))}"
 
 
 def anchor(key: RunKey) -> str:

@@ -9,7 +9,7 @@ from math import isfinite
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished
 from simscen.core.records.study import Study
-from simscen.report.display_text import html_text, relative_path
+from simscen.report.display_text import html_text
 from simscen.report.study import (
     claim_text,
     effect_size_text,
@@ -18,6 +18,7 @@ from simscen.report.study import (
     pass_rate_text,
     significant_effects,
 )
+from simscen.report.suite.elements import address
 from simscen.spec.quantities import si_number
 
 MAX_PLOTS = 8
@@ -119,14 +120,14 @@ def _plot(path: str, criterion: str, study: Study, runs: Sequence[RunFinished], 
 
 
 def _dot(x: float, y: float, run: RunFinished, folder: str) -> str:
-    """Return the point of a run at (x, y) in SVG units, with a link if the run has a replay or a log."""
+    """Return the point of a run at (x, y) in SVG units, with a link if the output folder has its replay or log."""
     name = f"{run.key.variation or run.key.scenario}, seed {run.key.seed}: {run.outcome.value}"
     mark = (
         f'<circle class="{"good" if run.outcome is Outcome.PASSED else "bad"}" cx="{x:.1f}" cy="{y:.1f}" r="3.5">'
         f"<title>{html_text(name)}</title></circle>"
     )
-    target = run.artifacts.replay or run.artifacts.mcap
-    return f'<a href="{html_text(relative_path(target, folder))}">{mark}</a>' if target else mark
+    target = address(run.artifacts.replay or run.artifacts.mcap, folder)
+    return f'<a href="{target}">{mark}</a>' if target else mark
 
 
 def _range(values: Sequence[float]) -> tuple[float, float]:

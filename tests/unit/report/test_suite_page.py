@@ -1,6 +1,7 @@
 """Tests of the HTML of report.html: content, order, and escaping."""
 
 import json
+import math
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -10,11 +11,14 @@ from PIL import Image
 
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import Artifacts
+from simscen.core.records.study import ParameterEffect, Study
+from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.report.results_json import json_parts
 from simscen.report.session_history import past_sessions
 from simscen.report.suite import RunningSession, SessionReport, elements, page, to_html
 from simscen.report.suite.elements import anchor
 from simscen.report.suite.run_entry import scenario_folder, smallest_margin
+from simscen.report.suite.study_section import study_html
 
 VOID = ("meta", "img", "input", "rect", "polyline", "circle")
 
@@ -237,3 +241,23 @@ def test_session_without_runs_has_a_page():
 def test_every_outcome_has_a_symbol_and_a_color(passed):
     page = to_html(SessionReport([passed]))
     assert f'class="pill {Outcome.PASSED.value}"><span aria-hidden="true">✓ </span>passed' in page
+
+
+def test_points_of_a_study_link_to_files_and_have_finite_positions(passed):
+    def run(seed, margin, replay):
+        finding = Finding(Status.PASS, "clearance", "", "", margin, "m", margin)
+        result = replace(
+            passed.result, key=RunKey("a/b", seed), verdicts=(Verdict("clearance", "clearance", "fail", (finding,)),)
+        )
+        return replace(passed, result=result, artifacts=Artifacts(replay=replay))
+
+    runs = [run(1, 0.5, "out/seed-1 50%/replay.html"), run(2, math.inf, "out/b/replay.html"), run(3, 0.1, "/etc/hosts")]
+    effects = (
+        ParameterEffect("x", "clearance", 0.9, 0.01, 3, True),
+        ParameterEffect("y", "clearance", 0.4, 0.02, 3, False),
+    )
+    values = {one.key: {"x": one.key.seed, "y": "a"} for one in runs}
+    html = study_html(Study("a/b", True, 3, 0, 0, None, None, (), effects, {}, values), runs, "out")
+    assert re.findall('href="([^"]*)"', html) == ["./seed-1%2050%25/replay.html"]
+    assert html.count("<circle") == 2 and "nan" not in html
+    assert "<td>+0.90</td>" in html and "<td>0.40 (epsilon squared)</td>" in html
