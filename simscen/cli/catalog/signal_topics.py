@@ -7,8 +7,8 @@ from simscen.criteria.trace_signals.catalog import SIGNALS, Signal
 SIGNALS_TEXT = """\
 - A signal has one value per sample of the truth (`physics: truth_rate`, 40 Hz by default). Its values are the same in
   the run and in its log.
-- Data with a lower rate (belief, command, scans, plans) keeps its value until the next message. The first value also
-  holds before it.
+- Data with a lower rate (belief, command, scans, plans) keeps its value until the next message. Unless the table states
+  otherwise, the first value also holds before it.
 - An event that is shorter than a sample counts at the next sample.
 - Derivatives are differences between two samples, divided by the time between them.
 - A jump by `kidnap` does not count as motion.

@@ -28,7 +28,7 @@ class Finding:
         limit: Limit as text.
         margin: Distance of the value from the limit in `unit`; negative if the limit is violated; None if undefined.
         value: Measured value in `unit`; None if it is not a number.
-        tick: Tick with the smallest margin; None if the value does not belong to a tick.
+        tick: Tick that decides the finding, such as that of the largest value; None if no single tick decides it.
         place: True position (x, y) of the robot in m at this tick; None if unknown.
         detail: Explanation, as lines of text.
     """

@@ -116,13 +116,13 @@ SIGNALS: dict[SignalName, Signal] = {
     "travelled": Signal("True distance driven so far, in moves of at least 1 cm.", "length", readers.travelled),
     "time": Signal("Simulated time since the start.", "duration", readers.time),
     "goal_distance": Signal(
-        "True straight-line distance to the goal accepted last; before the first acceptance, to the first of them.",
+        "True straight-line distance to the goal accepted last; before any acceptance, to the goal accepted first.",
         "length",
         readers.goal_distance,
         {Evidence.ALIGNMENT, Evidence.NAVIGATION},
     ),
     "goal_heading_error": Signal(
-        "Angle between the true heading and that of the goal of goal_distance.",
+        "Angle between the true heading and the heading of the goal to which goal_distance is measured.",
         "angle",
         readers.goal_heading_error,
         {Evidence.ALIGNMENT, Evidence.NAVIGATION},
@@ -162,7 +162,7 @@ SIGNALS: dict[SignalName, Signal] = {
         {Evidence.ALIGNMENT, Evidence.BELIEF},
     ),
     "localization_yaw_error": Signal(
-        "Angle between estimated and true heading, at the same times.",
+        "Angle between estimated and true heading, at the times of localization_error.",
         "angle",
         readers.localization_yaw_error,
         {Evidence.ALIGNMENT, Evidence.BELIEF},
@@ -184,13 +184,26 @@ SIGNALS: dict[SignalName, Signal] = {
         readers.nees,
         {Evidence.ALIGNMENT, Evidence.BELIEF, Evidence.COVARIANCE},
     ),
-    "belief_age": Signal("Time since the newest belief.", "duration", readers.belief_age, {Evidence.BELIEF}),
-    "scan_age": Signal("Time since the stack last received a scan.", "duration", readers.scan_age, {Evidence.SCANS}),
+    "belief_age": Signal(
+        "Time since the newest belief; before the first one, since the start of the run.",
+        "duration",
+        readers.belief_age,
+        {Evidence.BELIEF},
+    ),
+    "scan_age": Signal(
+        "Time since the stack last received a scan; before the first one, since the start of the run.",
+        "duration",
+        readers.scan_age,
+        {Evidence.SCANS},
+    ),
     "command_speed": Signal(
-        "Magnitude of the speed that the stack commands.", "speed", readers.command_speed, {Evidence.COMMANDS}
+        "Magnitude of the speed that the stack commands; 0 before the first command.",
+        "speed",
+        readers.command_speed,
+        {Evidence.COMMANDS},
     ),
     "command_turn_rate": Signal(
-        "Magnitude of the turn rate that the stack commands.",
+        "Magnitude of the turn rate that the stack commands; 0 before the first command.",
         "angular speed",
         readers.command_turn_rate,
         {Evidence.COMMANDS},
@@ -256,7 +269,7 @@ SIGNALS: dict[SignalName, Signal] = {
         alternative_arguments=("fault",),
     ),
     "event_active": Signal(
-        "The event has begun and not ended; one without an end lasts to the end of the run.",
+        "The event has begun and not ended; an event without a duration lasts to the end of the run.",
         YES_OR_NO,
         event_readers.is_active,
         {Evidence.DISTURBANCES},
@@ -264,7 +277,7 @@ SIGNALS: dict[SignalName, Signal] = {
         alternative_arguments=("event",),
     ),
     "started": Signal(
-        "The fault or event has just begun: true at the one sample after each start.",
+        "The fault or event has just begun: true at the first sample at or after each start.",
         YES_OR_NO,
         event_readers.has_just_started,
         {Evidence.DISTURBANCES},

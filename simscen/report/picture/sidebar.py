@@ -28,7 +28,7 @@ CriterionRow = tuple[Status, Color, list[str]]
 def draw_sidebar(scene: Scene, parts: Sequence[str], min_height: int) -> Image.Image:
     """Return the sidebar, which is at least `min_height` pixels high.
 
-    `parts` are the names of the drawn parts of the map. The legend explains only these parts.
+    `parts` are the names of the drawn parts of the map. The legend explains path and plans, and these parts.
     """
     reasons, rows = _reasons(scene), _criteria(scene)
     legend = [entry[1:] for entry in _legend(round_time_step(scene.result.simulated)) if _is_drawn(parts, entry[0])]
