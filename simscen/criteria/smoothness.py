@@ -48,7 +48,7 @@ class Smoothness(Spec, Criterion):
     max_mean_jerk: PositiveJerk | None = None
     """Maximum mean of the absolute jerk in m/s³."""
     min_sparc: Annotated[float, Field(lt=0, ge=-1000)] | None = None
-    """Minimum spectral arc length; a straight drive at one speed has about -2."""
+    """Minimum spectral arc length; a straight drive at one speed has -2.1 to -2.4."""
     min_ldlj: Annotated[float, Field(ge=-1000, le=1000)] | None = None
     """Minimum log dimensionless jerk."""
 

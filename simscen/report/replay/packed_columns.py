@@ -83,14 +83,14 @@ Indices = npt.NDArray[np.int64]
 """Sorted indices of samples."""
 
 
-def evenly_spaced(count: int, max_count: int) -> Indices:
+def evenly_spaced_indices(count: int, max_count: int) -> Indices:
     """Return at most `max_count` evenly spaced indices below `count`, including the first and the last."""
     if count <= max_count:
         return np.arange(count)
     return np.unique(np.rint(np.linspace(0, count - 1, max(max_count, 1))).astype(np.int64))
 
 
-def spaced_in_time(ticks: Ticks, period: int) -> Indices:
+def indices_spaced_in_time(ticks: Ticks, period: int) -> Indices:
     """Return the indices of samples that are at least `period` ticks apart.
 
     The last sample, and the last sample before a gap of more than two periods, are included as well.
@@ -105,7 +105,7 @@ def spaced_in_time(ticks: Ticks, period: int) -> Indices:
     return np.array(indices, dtype=np.int64)
 
 
-def keep_extremes(values: Array, max_count: int) -> Indices:
+def extreme_indices(values: Array, max_count: int) -> Indices:
     """Return the indices of at most `max_count` samples: minimum and maximum of each of several equal segments."""
     if len(values) <= max_count:
         return np.arange(len(values))

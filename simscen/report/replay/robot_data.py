@@ -20,7 +20,7 @@ from simscen.record import frame_names
 from simscen.record.log_reader import Log
 from simscen.record.sensor_messages import LoggedMessages, SensorMessages
 from simscen.report.display_text import one_line
-from simscen.report.replay.packed_columns import PackedColumns, evenly_spaced, spaced_in_time
+from simscen.report.replay.packed_columns import PackedColumns, evenly_spaced_indices, indices_spaced_in_time
 from simscen.report.replay.signal_plots import signal_limits, signal_plots
 from simscen.report.replay.source_lines import SourceLines
 from simscen.report.replay.stack_report import behavior_tree_data, log_lines_data, parameters_data
@@ -47,7 +47,7 @@ def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, column
     first = sensors.decode_scan(messages[0][1])
     stride = -(-max(1, len(first.ranges)) // MAX_BEAMS)
     beams = -(-len(first.ranges) // stride)
-    indices = evenly_spaced(len(messages), max(1, MAX_RANGES // max(1, beams))).tolist()
+    indices = evenly_spaced_indices(len(messages), max(1, MAX_RANGES // max(1, beams))).tolist()
     scans = [(messages[k][0], sensors.decode_scan(messages[k][1])) for k in indices]
     scans = [(tick, scan) for tick, scan in scans if len(scan.ranges) == len(first.ranges)]
     columns.note_reduction(f"scans on {one_line(topic)}", len(scans), len(messages))
@@ -72,9 +72,9 @@ def _particles(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any
     """Return at most MAX_CLOUDS particle clouds with at most MAX_PARTICLES particles; None if the log has none."""
     if not sensors.particles:
         return None
-    indices = evenly_spaced(len(sensors.particles), MAX_CLOUDS).tolist()
+    indices = evenly_spaced_indices(len(sensors.particles), MAX_CLOUDS).tolist()
     clouds = [(sensors.particles[k][0], sensors.decode_particles(sensors.particles[k][1])) for k in indices]
-    subsets = [cloud[evenly_spaced(len(cloud), MAX_PARTICLES)] for _, cloud in clouds]
+    subsets = [cloud[evenly_spaced_indices(len(cloud), MAX_PARTICLES)] for _, cloud in clouds]
     table = np.concatenate(subsets)
     columns.note_reduction("particle clouds", len(clouds), len(sensors.particles))
     columns.note_reduction("particles of a cloud", max(map(len, subsets)), max(len(cloud) for _, cloud in clouds))
@@ -89,7 +89,7 @@ def _particles(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any
 
 def _local_plans(sensors: SensorMessages, columns: PackedColumns) -> dict[str, Any] | None:
     """Return the controller's local plans; None without local plans."""
-    indices = evenly_spaced(len(sensors.local_plans), MAX_LOCAL_PLANS).tolist()
+    indices = evenly_spaced_indices(len(sensors.local_plans), MAX_LOCAL_PLANS).tolist()
     columns.note_reduction("local plans", len(indices), len(sensors.local_plans))
     messages = [sensors.local_plans[k] for k in indices]
     return _paths([(tick, sensors.decode_path(message)) for tick, message in messages], columns)
@@ -100,7 +100,7 @@ def _paths(paths: list[tuple[int, Array]], columns: PackedColumns) -> dict[str, 
     if not paths:
         return None
     max_points = max(8, min(MAX_PLAN_POINTS, MAX_PATH_POINTS // len(paths)))
-    points = [path[evenly_spaced(len(path), max_points)] for _, path in paths]
+    points = [path[evenly_spaced_indices(len(path), max_points)] for _, path in paths]
     table = np.concatenate(points)
     return {
         "ticks": columns.add([tick for tick, _ in paths]),
@@ -132,7 +132,7 @@ def _costmap(
 ) -> dict[str, Any]:
     """Return the grids of a topic. A grid with the origin and size of the previous grid is stored as differences."""
     _, first = sensors.decode_costmap(messages[0][1])
-    indices = evenly_spaced(len(messages), max(1, MAX_GRID_CELLS // max(1, first.cells.size))).tolist()
+    indices = evenly_spaced_indices(len(messages), max(1, MAX_GRID_CELLS // max(1, first.cells.size))).tolist()
     columns.note_reduction(f"grids on {one_line(topic)}", len(indices), len(messages))
     grids = []
     previous: OccupancyGrid | None = None
@@ -229,7 +229,7 @@ def _goals(case: Case, lines: SourceLines) -> list[dict[str, Any]]:
 
 def _poses(samples: Samples, columns: PackedColumns) -> dict[str, Any]:
     """Return at most MAX_POSES poses with their ticks. Headings are unwrapped."""
-    indices = evenly_spaced(len(samples), MAX_POSES)
+    indices = evenly_spaced_indices(len(samples), MAX_POSES)
     columns.note_reduction("poses", len(indices), len(samples))
     x, y, yaw = samples.values[indices, :3].T
     return {
@@ -244,7 +244,7 @@ def _belief(samples: Samples, columns: PackedColumns) -> dict[str, Any] | None:
     """Return the estimated poses with their covariances; None without estimates."""
     if not len(samples):
         return None
-    indices = evenly_spaced(len(samples), MAX_POSES)
+    indices = evenly_spaced_indices(len(samples), MAX_POSES)
     xx, xy, _, yy, _, aa = samples.values[indices, 3:9].T
     covariance = {"xx": xx, "xy": xy, "yy": yy, "aa": aa}
     return {**_poses(samples, columns), **{key: columns.add(part, 1e-5) for key, part in covariance.items()}}
@@ -256,6 +256,6 @@ def moving_objects(trace: Trace, columns: PackedColumns, robots: frozenset[str])
     for name, samples in sorted(trace.objects.items()):
         if name in robots or not len(samples):
             continue
-        indices = spaced_in_time(samples.ticks, max(1, trace.tick_rate // 20))
+        indices = indices_spaced_in_time(samples.ticks, max(1, trace.tick_rate // 20))
         objects.append({"name": one_line(name), **_poses(samples.select(indices), columns)})
     return objects

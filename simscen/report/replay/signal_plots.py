@@ -15,7 +15,7 @@ from simscen.criteria.trace_signals.catalog import SIGNALS, SignalName, read_sig
 from simscen.criteria.trace_signals.sampling import SignalArguments
 from simscen.model.scenario import ScenarioSpec
 from simscen.report.display_text import one_line
-from simscen.report.replay.packed_columns import PackedColumns, keep_extremes
+from simscen.report.replay.packed_columns import PackedColumns, extreme_indices
 
 MAX_SAMPLES = 6000
 """Maximum number of samples per plot."""
@@ -84,7 +84,7 @@ def _plot_data(plot: SignalPlot, trace: Trace, case: Case, columns: PackedColumn
         return None
     if not len(values) or not np.isfinite(values).any():
         return None
-    indices = keep_extremes(np.nan_to_num(values), MAX_SAMPLES)
+    indices = extreme_indices(np.nan_to_num(values), MAX_SAMPLES)
     return {
         "name": plot.name,
         "text": signal.text,

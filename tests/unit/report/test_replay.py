@@ -26,7 +26,12 @@ from simscen.record.messages.encode import occupancy_grid
 from simscen.record.sensor_messages import SensorMessages
 from simscen.record.topics import GLOBAL_COSTMAP
 from simscen.report.replay import replay_page
-from simscen.report.replay.packed_columns import PackedColumns, evenly_spaced, keep_extremes, spaced_in_time
+from simscen.report.replay.packed_columns import (
+    PackedColumns,
+    evenly_spaced_indices,
+    extreme_indices,
+    indices_spaced_in_time,
+)
 from simscen.report.replay.page import PAGE_FOLDER, joined_script
 from simscen.report.replay.robot_data import costmaps_data, map_from_odom
 from simscen.testing.synthetic_trace import synthetic_trace
@@ -192,13 +197,13 @@ def test_equal_runs_give_equal_bytes_and_two_runs_one_page() -> None:
 
 
 def test_thinning_keeps_ends_pauses_and_extremes() -> None:
-    assert evenly_spaced(3, 10).tolist() == [0, 1, 2] and evenly_spaced(100, 3).tolist() == [0, 50, 99]
+    assert evenly_spaced_indices(3, 10).tolist() == [0, 1, 2] and evenly_spaced_indices(100, 3).tolist() == [0, 50, 99]
     ticks = np.array([0, 6, 12, 18, 24, 264, 504, 510])
-    kept = ticks[spaced_in_time(ticks, 12)].tolist()
+    kept = ticks[indices_spaced_in_time(ticks, 12)].tolist()
     assert kept == [0, 12, 24, 264, 504, 510]
     values = np.zeros(10_000)
     values[[1234, 7777]] = 5.0, -5.0
-    chosen = keep_extremes(values, 100)
+    chosen = extreme_indices(values, 100)
     assert len(chosen) <= 100 and {1234, 7777} <= set(chosen.tolist())
 
 
