@@ -11,6 +11,7 @@ from simscen.criteria.base import Criterion
 from simscen.criteria.findings import MissingEvidence, at_least, undecided
 from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, pedestrian_gap
 from simscen.criteria.trace_signals.ground_truth import clearance, speed
+from simscen.criteria.trace_signals.sampling import sample_and_hold
 from simscen.spec.base import Spec
 from simscen.spec.quantities import NonNegativeLength
 
@@ -91,10 +92,11 @@ class PersonalSpace(Spec, Criterion):
         limit = f"≥ {self.min:.2f} m"
         try:
             gaps = pedestrian_gap(trace, case)
+            if self.while_driving:
+                speeds = sample_and_hold(trace, speed(trace), "velocity")[:, 0]
+                gaps = np.where(speeds > DRIVING_SPEED_M_S, gaps, np.inf)
         except MissingEvidence as reason:
             return [undecided("distance to people", str(reason), limit)]
-        if self.while_driving:
-            gaps = np.where(speed(trace).at(trace.truth.ticks)[:, 0] > DRIVING_SPEED_M_S, gaps, np.inf)
         nearest = int(np.argmin(gaps))
         if np.isinf(gaps[nearest]):
             because = f"no pedestrian was present{' while the robot drove' * self.while_driving}"
