@@ -8,7 +8,7 @@ from sys import intern
 from typing import Any, TypeVar
 
 from simscen.core.errors import InvalidInput, Problem
-from simscen.core.records.run_result import RunFailure, RunKey, error_result
+from simscen.core.records.run_result import INTERRUPTED, NOT_RUN, RunFailure, RunKey, error_result
 from simscen.core.records.run_store import FinishedRuns, RunStore
 from simscen.core.records.session_events import Artifacts, RunFinished, SessionStarted, session_started
 from simscen.judge.result_json import from_data, read_key, result_data
@@ -165,7 +165,7 @@ class JournaledSession:
     def _unfinished(self, run: PlannedRun) -> RunFinished:
         """Return the result of a run that was not finished: the error `interrupted` or `not-run`."""
         has_started = run.key in self.started
-        kind = "interrupted" if has_started else "not-run"
+        kind = INTERRUPTED if has_started else NOT_RUN
         failure = RunFailure(kind, f"simscen ended before the run {'was finished' if has_started else 'started'}")
         return RunFinished(error_result(run.key, run.path, failure, run.stack), again=run.again, file=run.file)
 

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from heapq import nsmallest
 
-from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.run_result import INTERRUPTED, NONDETERMINISTIC, NOT_RUN, Outcome, RunKey
 from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import (
     RunFinished,
@@ -27,9 +27,6 @@ from simscen.report.session_lines import (
 )
 from simscen.report.study import study_lines
 from simscen.report.violations import error_summary, first_violation
-
-INTERRUPTED, NOT_RUN = "interrupted", "not-run"
-"""Error kinds of runs that were not finished. These runs are not printed, only counted at the end."""
 
 
 class SessionFormatter:
@@ -56,7 +53,7 @@ class SessionFormatter:
                 yield session_header(event)
             case RunFinished():
                 self._runs.append(event)
-                if _error_kind(event) not in (INTERRUPTED, NOT_RUN):
+                if _error_kind(event) not in (INTERRUPTED, NOT_RUN):  # these runs are only counted at the end
                     yield from run_lines(event, self.naming)
                     for text in event.warnings:  # of the external stack; each is printed once per session
                         if text not in self._warned:
@@ -96,8 +93,6 @@ def _error_kind(run: RunFinished) -> str:
 
 MAX_DETAILED_FAILURES = 20
 """Maximum number of failures that are listed with paths. Further failures are listed only with their cause."""
-NONDETERMINISTIC = "nondeterministic"
-"""Error kind of a run whose log differs from the log of its repetition."""
 
 NameOfRun = Callable[[RunKey], str]
 """Function that returns the name of a run for a list of runs."""

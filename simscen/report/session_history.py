@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.errors import InvalidInput
-from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.run_result import INTERRUPTED, NOT_RUN, Outcome, RunKey
 from simscen.core.records.session_events import RunFinished
 from simscen.judge.result_json import read_key
 from simscen.report.journal_reader import JOURNAL_FILE, read_journal
@@ -84,7 +84,7 @@ def outcome_change(run: RunFinished, past: Sequence[PastSession]) -> str:
 
 MAX_SEARCHED_SESSIONS = 50
 """Maximum number of sessions to search for failures."""
-UNFINISHED_KINDS = frozenset({"interrupted", "not-run"})
+UNFINISHED_KINDS = frozenset({INTERRUPTED, NOT_RUN})
 """Error kinds of runs that were not finished. `last_failed` uses the outcome of such a run in an earlier session."""
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from simscen.core.errors import Exit
-from simscen.core.records.run_result import Outcome
+from simscen.core.records.run_result import NOT_RUN, Outcome
 from simscen.core.records.session_events import RunFinished
 from simscen.core.records.study import ClaimStatus, Study
 
@@ -27,6 +27,6 @@ def exit_code(finished_runs: Sequence[RunFinished], study: Study | None = None) 
     if outcomes == {Outcome.SKIPPED}:
         return Exit.NOTHING_SELECTED
     if Outcome.ERROR in outcomes:
-        only_not_run = all(a.result.error is None or a.result.error.kind == "not-run" for a in finished_runs)
+        only_not_run = all(a.result.error is None or a.result.error.kind == NOT_RUN for a in finished_runs)
         return Exit.FAILED if only_not_run and Outcome.FAILED in outcomes else Exit.INCOMPLETE
     return Exit.FAILED if Outcome.FAILED in outcomes else Exit.PASSED

@@ -87,6 +87,12 @@ def scenario_title(scenario: str, variation: str) -> str:
     return f"{scenario}[{variation}]" if variation else scenario
 
 
+INTERRUPTED, NOT_RUN = "interrupted", "not-run"
+"""Values of `RunFailure.kind` for a run that was started but not finished, and for a run that was not started."""
+NONDETERMINISTIC = "nondeterministic"
+"""Value of `RunFailure.kind` for a run whose log differs from the log of an equal run."""
+
+
 @dataclass(frozen=True)
 class RunFailure:
     """Reason why a run could not be completed.

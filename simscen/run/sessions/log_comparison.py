@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput
-from simscen.core.records.run_result import Outcome, RunFailure, RunResult
+from simscen.core.records.run_result import NONDETERMINISTIC, Outcome, RunFailure, RunResult
 from simscen.core.records.session_events import RunFinished
 from simscen.judge.result_json import from_json
 from simscen.run.sessions.output_folder import run_folder
@@ -51,7 +51,7 @@ def compare_with_session(run: RunFinished, earlier: Path) -> RunFinished:
 
 
 def _nondeterministic(run: RunFinished, message: str) -> RunFinished:
-    failure = RunFailure("nondeterministic", message)
+    failure = RunFailure(NONDETERMINISTIC, message)
     return replace(run, result=replace(run.result, outcome=Outcome.ERROR, error=failure))
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from simscen.core.errors import Exit, UsageError
 from simscen.core.random_streams import MAX_SEED
-from simscen.core.records.run_result import RunFailure, RunKey
+from simscen.core.records.run_result import INTERRUPTED, NOT_RUN, RunFailure, RunKey
 from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import Listener, RunFinished, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
@@ -151,5 +151,5 @@ def delete_log(run: RunFinished) -> RunFinished:
 def _unfinished_reason(was_started: bool, stopped: Exit | None) -> RunFailure:
     """Return why a run has no result. `stopped` is the exit code of an interrupted session, else None."""
     if was_started:
-        return RunFailure("interrupted", "interrupted before it was finished")
-    return RunFailure("not-run", "interrupted" if stopped else "another run did not pass (--fail-fast)")
+        return RunFailure(INTERRUPTED, "interrupted before it was finished")
+    return RunFailure(NOT_RUN, "interrupted" if stopped else "another run did not pass (--fail-fast)")
