@@ -22,6 +22,8 @@ from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, Usage
 from simscen.core.records.session_events import RunFinished, SessionEvent
 from simscen.loading.files.discovery import default_root, discover
 from simscen.loading.loaded import LoadedScenario
+from simscen.report.display_text import number_with_noun
+from simscen.report.journal_reader import JOURNAL_FILE
 from simscen.run.reproducibility import scenario_files
 
 FileStamps = dict[Path, tuple[int, int, int] | None]
@@ -38,6 +40,16 @@ def file_stamps(files: Iterable[Path]) -> FileStamps:
         except OSError:
             stamps[file] = None
     return stamps
+
+
+def searched_folders(path: Path) -> Iterator[Path]:
+    """Yield a folder and its subfolders, except hidden folders and output folders; nothing for a file."""
+    for folder, subfolders, names in os.walk(path.absolute()):
+        if JOURNAL_FILE in names:
+            subfolders.clear()
+            continue
+        subfolders[:] = [name for name in subfolders if not name.startswith(".")]
+        yield Path(folder)
 
 
 class WatchReporter:
@@ -75,9 +87,9 @@ class WatchState:
 
     def __init__(self, find_scenarios: Callable[[], Sequence[Path]], paths: Iterable[Path]) -> None:
         """Take the paths to watch, and a function that returns the scenarios below these paths."""
-        self._find_scenarios = find_scenarios
-        self._folders = {path.absolute() for path in paths if path.is_dir()}
-        self._files: dict[Path, set[Path]] = {file: {file} for file in self._discovered()}
+        self._find_scenarios, self._paths = find_scenarios, tuple(paths)
+        self._folders: set[Path] = set()
+        self._files: dict[Path, set[Path]] = {file: {file} for file in self._discover()}
         self._not_passed: set[Path] = set()
         self._invalid: set[Path] = set()
         self._requested: Sequence[Path] = ()
@@ -95,7 +107,7 @@ class WatchState:
 
     @property
     def files(self) -> list[Path]:
-        """Files and folders to watch. A folder changes when a scenario is added."""
+        """Files and folders to watch. A folder changes when a scenario or subfolder is added."""
         return sorted({*self._folders, *self._invalid, *(file for files in self._files.values() for file in files)})
 
     def begin(self, paths: Sequence[Path]) -> None:
@@ -124,7 +136,7 @@ class WatchState:
         """Return the scenarios to run after these files changed: affected, new, and all of a session to repeat."""
         unfinished = {file for path in self._unfinished for file in self._below(path)}
         known = set(self._files)
-        existing = set(self._discovered()) if changed & self._folders else known
+        existing = set(self._discover()) if changed & self._folders else known
         self._files = {file: self._files.get(file, {file}) for file in sorted(existing)}
         new = existing - known
         affected = {file for file, files in self._files.items() if files & changed}
@@ -134,8 +146,9 @@ class WatchState:
         """Return the watched scenarios in a folder, or the scenario at `path` itself."""
         return [file for file in self._files if file.is_relative_to(path.absolute())]
 
-    def _discovered(self) -> Sequence[Path]:
-        """Return the existing scenarios; none if the search fails."""
+    def _discover(self) -> Sequence[Path]:
+        """Return the existing scenarios (none if the search fails), and watch the folders in which they can be."""
+        self._folders |= {folder for path in self._paths for folder in searched_folders(path)}
         try:
             return self._find_scenarios()
         except SimscenError:
@@ -165,7 +178,7 @@ def watch_session(request: SessionRequest) -> int:
     code, seen = _run_in_child(replace(request, root=root_folder), state)
     while code not in INTERRUPTED_CODES:
         keys = f"a = run all, f = run those that did not pass ({len(state.failed)}), q = quit"
-        print_text(f"watching {len(state.files)} files of {len(state.scenarios)} scenarios: {keys}")
+        print_text(f"watching {number_with_noun(len(state.scenarios), 'scenario')}: {keys}")
         sys.stdout.flush()
         files = _wait_for_changes(state, seen)
         if files is None:

@@ -78,3 +78,13 @@ def test_stamp_changes_when_a_file_is_saved_created_or_deleted(files: Path) -> N
     file.unlink()
     stamps.append(file_stamps([file]))
     assert stamps[0] != stamps[1] != stamps[2] == {file: None}
+
+
+def test_new_subfolders_are_watched_except_output_folders(watching: WatchState, files: Path) -> None:
+    (files / "new" / "deep").mkdir(parents=True)
+    (files / ".hidden").mkdir()
+    (files / "out" / "runs").mkdir(parents=True)
+    (files / "out" / "events.jsonl").write_text("")
+    watching.scenarios_to_run({files})
+    folders = {path.relative_to(files).as_posix() for path in watching.files if path.is_dir()}
+    assert folders == {".", "new", "new/deep"}
