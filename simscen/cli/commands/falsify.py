@@ -75,10 +75,10 @@ def command(
 ) -> None:
     """Search the ranges of a scenario for values with which it fails.
 
-    The search prefers values for which the criteria have small margins. It writes each new kind of failure beside the
-    file as a scenario NAME.failure-N.scenario.yaml. Two failures are of different kinds if they differ in the failed
-    criteria, in the triggered events and faults, or in their position. The result does not depend on the number of
-    parallel runs.
+    With `tpe`, the search prefers values for which the criteria have small margins. It writes each new kind of failure
+    beside the file as a scenario NAME.failure-N.scenario.yaml. Two failures are of different kinds if they differ in
+    the failed criteria, in the triggered events and faults, or in their position. The result does not depend on the
+    number of parallel runs.
 
     Exit code 0: no failure was found; 1: a failure was found; 2: an invalid scenario; 3: a run could not be completed;
     5: the scenario is skipped; 129, 130, and 143: interrupted.

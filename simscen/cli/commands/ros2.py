@@ -62,7 +62,10 @@ def command(
         Path | None, typer.Option(help="With nav2: check the parameter file with which Nav2 was started.")
     ] = None,
     python: Annotated[
-        str | None, typer.Option(help="Python interpreter with rclpy; default: the first one on the PATH.")
+        str | None,
+        typer.Option(
+            help="Python interpreter with rclpy; default: SIMSCEN_ROS_PYTHON, or the first such python3 on the PATH."
+        ),
     ] = None,
     sync: Annotated[Sync, typer.Option(help="Let the simulation wait for the graph, or run at its own pace.")] = (
         Sync.LOCKSTEP

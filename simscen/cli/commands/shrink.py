@@ -79,7 +79,7 @@ def command(
     parallel runs.
 
     Exit code 0: the file was written; 1: it was written, but --runs did not suffice; 2: invalid options, or the run did
-    not fail; 3: the run could not be completed.
+    not fail; 3: the run could not be completed; 129, 130, and 143: interrupted.
     """
     chosen = _chosen_run(run, seed, variation, stack)
     root_folder = root or default_root([chosen.file])
@@ -150,14 +150,15 @@ def _planned_run(folder: Path) -> PlannedRun:
 def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: bool) -> tuple[Shrinker, MappingNode]:
     """Run the scenario, and make it as small as possible. Return the shrinker, and the scenario before shrinking.
 
-    Raises UsageError if the scenario is invalid or does not fail, BudgetSpent, and Stopped.
+    Raises UsageError if the scenario is invalid or does not fail, RunError if its run could not be completed,
+    BudgetSpent, and Stopped.
     """
     scenario = candidates.scenario
     (first,) = candidates.results([scenario.tree])
     if first is None:
         raise UsageError(f"{scenario.file} is not valid; see simscen validate")
     failure = failure_of(first, criterion, keep)
-    print_text(f"the run fails: {_failure_text(first, failure)}")
+    print_text(f"the run fails: {escaped(_failure_text(first, failure))}")
     tree = with_only_criterion(scenario.tree, failure.criterion, failure.verdict_id, candidates.seed)
     if not keep_world and (loaded := candidates.load(tree)) is not None:
         inline = with_inline_world(tree, loaded.world.tree)

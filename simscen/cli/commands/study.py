@@ -79,7 +79,8 @@ def command(
     parallel runs.
 
     Exit code 0: the claim holds, or all runs passed if there is no claim; 1: the claim is refuted, or a run failed; 2:
-    an invalid scenario; 3: a run could not be completed; 6: the claim is undecided; 129, 130, and 143: interrupted.
+    an invalid scenario; 3: a run could not be completed; 5: the scenario is skipped; 6: the claim is undecided; 129,
+    130, and 143: interrupted.
     """
     workers, cluster = workers_and_cluster(workers, backend, address)
     options = SessionOptions(workers, seed, wall_limit=wall_limit, replay=replay, keep_logs=keep_logs, cluster=cluster)

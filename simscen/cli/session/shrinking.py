@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from simscen.cli.session.backends import interrupt_on_signals
 from simscen.cli.session.file_checks import FileChecker
-from simscen.core.errors import Exit, UsageError
+from simscen.core.errors import Exit, RunError, UsageError
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.verdict import Status, Verdict
 from simscen.loading.loaded import LoadedScenario
@@ -239,10 +239,12 @@ def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
     """Return the failure of a run in a criterion, named by ID or kind; "" for the first failed criterion.
 
     `share` (0 to 1) is the fraction of the violation that a smaller scenario must still have. Raises UsageError if the
-    run did not fail in this criterion.
+    run did not fail in this criterion, and RunError if it could not be completed.
     """
-    if result.error is not None and result.error.by_stack and not criterion:
-        return Failure("", "")
+    if result.error is not None:
+        if result.error.by_stack and not criterion:
+            return Failure("", "")
+        raise RunError(result.error.kind, f"the run could not be completed: {result.error.message}")
     failed = [verdict for verdict in result.verdicts if verdict.status is Status.FAIL]
     chosen = next((one for one in failed if criterion in ("", one.id, one.criterion)), None)
     if result.outcome is not Outcome.FAILED or chosen is None:

@@ -2,10 +2,13 @@
 
 from collections.abc import Sequence
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simscen.cli.session.shrinking import minimize
+from simscen.cli.session.shrinking import failure_of, minimize
+from simscen.core.errors import Exit, RunError
+from simscen.core.records.run_result import RunFailure, RunKey, error_result
 
 
 @given(st.sets(st.integers(0, 30)), st.integers(1, 31))
@@ -37,3 +40,12 @@ def test_no_single_part_can_be_removed_from_the_result(causes: set[frozenset[int
     left = minimize(range(10), first_failing)
     assert fails(left)
     assert not any(fails([part for part in left if part != one]) for one in left)
+
+
+def test_an_aborted_run_is_no_failure_to_shrink_unless_the_stack_aborted_it() -> None:
+    aborted = error_result(RunKey("a", 1), "a.scenario.yaml", RunFailure("out-of-memory", "too many particles"))
+    with pytest.raises(RunError, match="the run could not be completed: too many particles") as error:
+        failure_of(aborted, "", 0.5)
+    assert error.value.exit is Exit.INCOMPLETE
+    by_stack = error_result(RunKey("a", 1), "a.scenario.yaml", RunFailure("stack-crashed", "gone", by_stack=True))
+    assert failure_of(by_stack, "", 0.5).criterion == ""
