@@ -63,6 +63,8 @@ JUNIT_ERROR_TYPES = {
     BROKEN_COMPONENT: "A component of an installed package returned an invalid value.",
 }
 """Meaning of each type of the JUnit element `<error>`."""
+KINDS_WITHOUT_EXIT_CODE = frozenset({"interrupted", "not-run"})
+"""Error types of runs for which a signal or the failure of another run determines the exit code."""
 
 
 def code_topics() -> list[Topic]:
@@ -74,7 +76,8 @@ def code_topics() -> list[Topic]:
         text = f"Nav2's error code {number}.\n\n{meaning}{note}"
         found.append(Topic("error code", code.name, None, text, example, alias=number))
     for kind, meaning in JUNIT_ERROR_TYPES.items():
-        text = f"{meaning}\n\nThe run could not be completed: a JUnit `<error>`, and exit code 3."
+        exit_code_text = "" if kind in KINDS_WITHOUT_EXIT_CODE else ", and exit code 3"
+        text = f"{meaning}\n\nThe run could not be completed: a JUnit `<error>`{exit_code_text}."
         found.append(Topic("error type", kind, None, text))
     for exit_code, meaning in EXIT_CODES.items():
         found.append(Topic("exit code", f"exit {exit_code.value}", None, meaning, alias=f"{exit_code.value}"))

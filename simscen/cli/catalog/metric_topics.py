@@ -24,7 +24,7 @@ SESSION_METRICS_TEXT = """\
 A session reports these numbers in results.json under `suite`, and `simscen report DIR` prints them. With several
 `--stack`, `suites` contains them for each stack:
 
-- `runs`: number of runs, without the second runs of `--check-determinism`.
+- `runs`: number of runs, without skipped runs and the second runs of `--check-determinism`.
 - `success_rate`: share of successful runs in all runs, including errors, with its 95 % Wilson interval.
 - `spl`, `soft_spl`: means over the runs that have these metrics. `spl_runs` is their number.
 - `collisions_per_km`, `collisions_per_hour`: collisions per driven kilometer and per simulated hour. `measured_runs` is
@@ -37,8 +37,9 @@ With several `--stack`, `comparison` compares each stack with the first one (`ba
 - `pairs`: number of pairs of runs with the same scenario and seed. `left_out` counts the `broken_pairs`, in which a run
   was not completed, and the `runs_without_partner`.
 - `flips`: pairs that passed with one stack and failed with the other; `flips_p` is from McNemar's exact test.
-- `differences`: for each metric, the mean `difference` over pairs, its 95 % bootstrap `interval` (from five pairs on),
-  and `p` from Wilcoxon's signed-rank test.
+- `differences`: for each metric, the mean `difference` over the pairs in which the same robots reach their last goals
+  (for collisions, over all pairs), its 95 % bootstrap `interval` (from five pairs on), and `p` from Wilcoxon's
+  signed-rank test.
 
 The compared metrics are time, path length, clearance, jerk, standing time, replans, recoveries, collisions (of each
 robot: `a/collisions`), and those of installed packages."""

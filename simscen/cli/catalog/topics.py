@@ -121,6 +121,7 @@ def topics(installed: bool = False) -> list[Topic]:
     ]
 
 
+# Models of the topics of each group that is not a Choice, by name of the topic.
 _SCENARIO: dict[str, type[BaseModel]] = {
     "scenario": scenario.ScenarioSpec,
     "robot entry": scenario.RobotEntry,
@@ -196,7 +197,6 @@ _ROBOT: dict[str, type[BaseModel]] = {
 _DRIVES: dict[str, type[BaseModel]] = {
     get_args(model.model_fields["type"].annotation)[0]: model for model in get_args(get_args(robot.Drive)[0])
 }
-"""Models of the topics of seven groups by name of the topic."""
 
 
 def _models(group: str, models: Mapping[str, type[BaseModel]]) -> Iterator[Topic]:

@@ -72,8 +72,10 @@ def _parallel_job(environ: Mapping[str, str]) -> str:
         first = environ.get(job.first_variable, str(job.first))
         if index.isdecimal() and count.isdecimal() and first.isdecimal():
             return f"{int(index) - int(first) + 1}/{count}"
-    known = ", ".join(job.index_variable for job in PARALLEL_JOBS)
-    raise UsageError(f"--shard auto: none of these variables and its count are set: {known}; use --shard i/n")
+    known = ", ".join(f"{job.index_variable} and {job.count_variable}" for job in PARALLEL_JOBS)
+    raise UsageError(
+        f"--shard auto: no CI system has set the variables of its parallel jobs ({known}); use --shard i/n"
+    )
 
 
 def scenarios_of_shard(
