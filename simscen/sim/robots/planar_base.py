@@ -21,7 +21,7 @@ IDENTITY = (0.0, 0.0, 0.0, 1.0)
 CARRIER_COUNT = 2
 """Number of links without a shape between the world and the hull: one for each of the joints along x and y."""
 CARRIER_MASS_KG = 0.001
-"""Mass of a carrier, because the engine requires one."""
+"""Mass of each carrier, and of each link of the hull except the first, because the engine requires one."""
 
 
 class PlanarBase:
@@ -66,6 +66,7 @@ class PlanarBase:
         for link in self.hull_links:
             pybullet.setCollisionFilterGroupMask(self.id, link, engine.HULL, ~engine.GROUND, physicsClientId=client)
         self._mass, self._floor_friction, self._motor_ratio = body.mass, 1.0, body.motor_ratio
+        self._target_velocity = STOP
         self._radius = body.circumscribed_radius
         self.place(pose)
 
@@ -94,10 +95,13 @@ class PlanarBase:
     def set_friction(self, friction: Callable[[float, float], float]) -> None:
         """Limit the motor force by the friction coefficient that `friction` returns at the base's (x, y)."""
         x, y, _ = self.pose()
-        self._floor_friction = friction(x, y)
+        if (value := friction(x, y)) != self._floor_friction:
+            self._floor_friction = value
+            self.set_motors(self._target_velocity)
 
     def set_motors(self, velocity: Twist) -> None:
         """Set the target velocity of the motors along the world axes, and their largest force."""
+        self._target_velocity = velocity
         max_force = min(MAX_FORCE_PER_WEIGHT * self._motor_ratio, self._floor_friction) * self._mass * GRAVITY_M_S2
         pybullet.setJointMotorControlArray(
             self.id,

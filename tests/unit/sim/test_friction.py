@@ -114,6 +114,16 @@ def test_motors_of_planar_base_overcome_friction_of_hull_below_one(simulate, fri
     assert simulation.truth().twist.vy == pytest.approx(0.2 if friction < 1 else 0.0, abs=0.01)
 
 
+def test_planar_base_at_rest_on_ice_is_pushed_away(simulate):
+    simulation = simulate("omni")
+    simulation.step(TICKS)
+    simulation.add_friction_patch("ice", Patch(WHOLE_FLOOR, 0.0))
+    simulation.step(1)
+    simulation.push_robot((20.0, 0.0))
+    simulation.step(TICKS)
+    assert simulation.truth().twist.vx == pytest.approx(20.0 / simulation.robot.body.mass, rel=0.01)
+
+
 def test_casters_glide_without_friction(simulate):
     """A robot with its wheels on ice keeps its speed, although its hull has friction."""
     simulation = simulate("turtlebot", drive=(0.4, 0.0, 0.0))
