@@ -18,6 +18,8 @@ from simscen.worlds.sdf.shapes import ShapeReader
 
 ACTOR_SHAPE = Cylinder(0.3, 1.8)
 """Shape (radius and height in m) of an actor that has a skin or visuals, but no collision geometry."""
+MAX_ID_LENGTH = 18
+"""Maximum number of characters of the id of a trajectory."""
 
 Waypoint = tuple[float, Pose3]
 """Time in s and pose in the world."""
@@ -37,7 +39,7 @@ def read_actor(actor: ModelNode, world: ModelNode, reader: ShapeReader, report: 
     if not solids:
         report.note(element.location, "an actor without skin and collision geometry is ignored")
         return None
-    path = _motion_path(script, waypoints, report) if script and len(waypoints) > 1 else None
+    path = _motion_path(script, waypoints, report) if script and waypoints and waypoints[-1][0] > 0 else None
     if path is None:
         report.note(element.location, "an actor without a scripted trajectory stands still")
     return Body(actor.name, solids, ground_pose, 0.0, path)
@@ -95,7 +97,7 @@ def _without_repetitions(waypoints: list[Waypoint]) -> list[Waypoint]:
 
 def _trajectory_id(trajectory: Element) -> int:
     text = trajectory.attributes.get("id", "0")
-    if not (text.isascii() and text.strip().isdecimal()):
+    if not (text.isascii() and text.strip().isdecimal() and len(text) <= MAX_ID_LENGTH):
         raise trajectory.unusable(f"the id must be a whole number, got {text[:40]!r}")
     return int(text)
 
@@ -117,6 +119,8 @@ def _motion_path(script: Element, waypoints: list[Waypoint], report: ImportRepor
         report.note(script.location, "the actor keeps the height and the tilt of its first waypoint")
     delay_element = script.child("delay_start")
     delay = read_numbers(delay_element, 1)[0] if delay_element else 0.0
+    if delay_element and delay < 0:
+        raise delay_element.unusable(f"must not be negative, got {delay_element.text}")
     times = [time for time, _ in waypoints]
     poses = [pose.plane for _, pose in waypoints]
     if not read_bool(script.child("loop"), default=True):

@@ -15,6 +15,8 @@ MODEL_FILES = ("model.config", "model.sdf")
 MAX_WORLD_BYTES = 20 * 2**20
 MAX_MESH_BYTES = 64 * 2**20
 MAX_SHOWN_URI_LENGTH = 1000
+MAX_VERSION_DIGITS = 9
+"""Maximum number of digits of each part of an SDF version."""
 OLDEST_VERSION, NEWEST_VERSION = (1, 3), (1, 12)
 _NEWEST_PATCH = (*NEWEST_VERSION, 99)
 """Upper bound of patch versions such as 1.12.1."""
@@ -173,4 +175,5 @@ def _check_root(root: Element) -> None:
 def _version(element: Element) -> tuple[int, ...]:
     """Return the `version` attribute as numbers, because 1.10 is newer than 1.9; (0,) if it is missing or invalid."""
     words = element.attributes.get("version", "").strip().split(".")
-    return tuple(int(word) for word in words) if all(word.isdecimal() for word in words) else (0,)
+    is_valid = all(word.isdecimal() and len(word) <= MAX_VERSION_DIGITS for word in words)
+    return tuple(int(word) for word in words) if is_valid else (0,)

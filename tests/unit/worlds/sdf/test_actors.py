@@ -95,6 +95,13 @@ def test_a_path_that_climbs_is_flattened_with_a_note(load):
     assert any("keeps the height and the tilt" in note for note in world.notes)
 
 
+def test_actor_whose_script_takes_no_time_stands_at_its_first_waypoint(load):
+    points = trajectory([(0, 1, 0, 1, 0)]) + trajectory([(0, 5, 0, 1, 0)], number=1)
+    world = load(actor(points))
+    assert (world.bodies[0].path, world.bodies[0].pose.plane) == (None, Pose2(1, 0, 0))
+    assert any("stands still" in note for note in world.notes)
+
+
 def test_included_actors_walk(load, tmp_path):
     (tmp_path / "anna.sdf").write_text(f"<sdf version='1.9'>{actor(WALK)}</sdf>")
     (body,) = load("<include><uri>anna.sdf</uri><name>berta</name></include>").bodies
@@ -107,6 +114,8 @@ def test_included_actors_walk(load, tmp_path):
         (trajectory([(-1, 0, 0, 0, 0)]), "a time before the start"),
         (trajectory([("nan", 0, 0, 0, 0)]), "must be a finite number"),
         (WALK.replace("id='0'", "id='first'"), "the id must be a whole number"),
+        (WALK.replace("id='0'", f"id='{'1' * 5000}'"), "the id must be a whole number"),
+        ("<loop>0</loop><delay_start>-2</delay_start>" + WALK, "must not be negative, got -2"),
     ],
 )
 def test_invalid_script_is_refused(refuse, script, message):

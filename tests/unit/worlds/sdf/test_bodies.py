@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 
+from simscen.worlds.sdf.bodies import LinkGroups
+
 BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
 
 
@@ -30,6 +32,13 @@ def test_links_on_a_fixed_joint_are_one_body_with_both_masses(load):
     assert body.mass == 4
     assert [solid.pose.x for solid in body.solids] == [0, 4]
     assert not load(model(link("a") + link("b", 4) + joint("a", "b", "fixed"))).notes
+
+
+def test_a_long_chain_of_links_is_one_body():
+    groups, count = LinkGroups(), 50_000
+    for number in reversed(range(1, count)):
+        groups.join(number - 1, number)
+    assert {groups.root(number) for number in range(count)} == {0}
 
 
 def test_movable_joints_are_held_rigid_with_a_note(load):

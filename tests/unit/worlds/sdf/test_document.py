@@ -31,6 +31,7 @@ def test_a_doctype_is_refused(refuse):
         ("<?xml version='1.0'?>\n" + "<a>" * 200_000, 2, "nested deeper than 100"),
         ("<sdf version='1.9'>\n</sdf>", 1, "contains neither a world nor a model"),
         ("<sdf version='1.99'><world name='w'/></sdf>", 1, "SDF version 1.99 is not read"),
+        (f"<sdf version='1.{'1' * 5000}'><world name='w'/></sdf>", 1, "SDF version 1.1111"),
     ],
 )
 def test_invalid_sdf_is_refused_with_a_line(refuse, content, line, message):
