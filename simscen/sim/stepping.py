@@ -131,7 +131,7 @@ class Stepper:
         scene.tick = tick
 
     def _no_contact_before(self, ticks: int) -> int:
-        """Return the tick before which no contact is possible, or -1 if contact is possible in the next step.
+        """Return a tick before which no contact is possible; not in the future if contact is possible in the next step.
 
         Also creates the walls that pushable objects can reach within `ticks`.
         """

@@ -17,7 +17,7 @@ from simscen.sim.body.undercarriage import caster_gap, casters_for_uneven_ground
 WHEEL_FRICTION = 1.0
 """Friction coefficient of the wheels on the ground, as for rubber on dry concrete."""
 MAX_SLOPE_DEG, SLOPE_STEP_DEG = 50.0, 0.1
-"""Steepest slope that `approach_angle` examines, and the difference between two examined slopes."""
+"""Upper bound of the slopes that `approach_angle` examines, and the difference between two examined slopes."""
 
 
 class ClimbLimits(NamedTuple):
@@ -43,7 +43,8 @@ def compute_climb_limits(body: RobotBody) -> ClimbLimits:
 def grip_angle(body: RobotBody, friction: float) -> float:
     """Return the slope θ in rad above which the wheels spin: tan θ = μ · (weight on driven wheels / total weight).
 
-    The ratio includes the weight that shifts to a caster behind the axle on a slope.
+    The ratio includes the weight that shifts to a caster behind the axle on a slope. Returns 0 for a robot whose center
+    of mass is beyond a caster, because it tips over.
     """
     x, z = (float(body.chassis.center[axis]) for axis in (0, 2))
     ground_casters = [caster.pose.x for caster in body.casters if not caster_gap(caster)]
@@ -51,7 +52,7 @@ def grip_angle(body: RobotBody, friction: float) -> float:
         return math.atan(friction * _driven_weight_ratio(body))
     chassis_ratio = body.chassis.mass / body.mass
     span = abs(ground_casters[0])
-    level = 1.0 - chassis_ratio * abs(x) / span
+    level = max(0.0, 1.0 - chassis_ratio * abs(x) / span)
     # tan θ = μ (level - chassis_ratio z tan θ / span), if the caster is behind the axle.
     return math.atan(friction * level / (1.0 + friction * chassis_ratio * z / span))
 

@@ -45,7 +45,7 @@ class Actor:
 
     segments:         line segments; every position of its origin on the path is within their `deviation`
     max_speed:        upper bound in m/s of the speed of any of its points on the path
-    bounding_radius:  radius in m of its bounding sphere around the origin
+    bounding_radius:  radius in m of its bounding sphere around its origin
     cylinder_radius:  radius in m of its bounding cylinder around the vertical axis
     surface:          its surface in the body frame if its collision shape is a hollow triangle mesh, else None
     """

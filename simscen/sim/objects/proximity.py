@@ -14,8 +14,8 @@ EXTRA_RADIUS_M = 2.0
 REQUERY_DISTANCE_M = 1.0
 """Distance that a robot moves after which the result of its last query of deferred actors is invalid."""
 ACTIVATION_PERIOD_S = 0.05
-"""Period in which the Stepper checks whether a robot must query again. In this time, a robot moves at most
-REQUERY_DISTANCE_M - EARLY_QUERY_DISTANCE_M."""
+"""Period in which the Stepper checks whether a robot must query again. In this time, a robot with at most 10 m/s moves
+no farther than REQUERY_DISTANCE_M - EARLY_QUERY_DISTANCE_M."""
 EARLY_QUERY_DISTANCE_M = 0.5
 """Distance that a robot moves after which it queries again at the next check, before its last result is invalid."""
 ROUNDING_MARGIN_M = 1e-3

@@ -67,7 +67,7 @@ class WheelJoint:
 def examine_joints(tree: LinkTree) -> tuple[list[WheelJoint], Mapping[str, list[str]]]:
     """Return the wheels in a URDF, and the names of all other movable joints by the reason why they are not wheels.
 
-    A wheel is a joint about the y axis with a round child link that stands on the ground.
+    A wheel is a round link that stands on the ground and turns without limits about the y axis.
     """
     joints = [joint for joint in tree.joints.values() if joint.type != "fixed"]
     steering_joints = [

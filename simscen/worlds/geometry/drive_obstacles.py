@@ -49,11 +49,11 @@ def drive_obstacles(
     mesh = merge_solids(solids)
     normals = face_normals(mesh)
     drivable = drivable_solids(mesh, wheel_radius)
-    ground = [owner for owner in drivable if _is_convex_or_height_field(mesh, normals, owner)]
+    ground = {owner for owner in drivable if _is_convex_or_height_field(mesh, normals, owner)}
     if not ground:
         return solids
     obstacles = [solid for number, solid in enumerate(solids) if number not in ground]
-    is_ground = np.isin(mesh.owners, ground)
+    is_ground = np.isin(mesh.owners, sorted(ground))
     walls = _walls_at_edges(mesh, normals, is_ground, max_step)
     return (*obstacles, *walls, *_steep_faces(mesh, normals, is_ground, max_slope))
 

@@ -11,6 +11,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, Box, Mesh, Solid
 from simscen.sim.body.climb_limits import compute_climb_limits, grip_angle
 from simscen.sim.body.from_spec import build_robot_body
+from simscen.sim.body.robot_body import add_payload
 from simscen.worlds.geometry.drive_obstacles import drive_obstacles
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.world_file import ramp_solid
@@ -183,3 +184,8 @@ def test_imu_on_a_slope_measures_gravity_along_x(on_ground):
     drive_into(simulation, 1)
     base_from_world = simulation.truth().pose.rotation().T
     assert (base_from_world @ (0.0, 0.0, 9.81))[0] == pytest.approx(9.81 * math.sin(math.radians(5)), abs=0.02)
+
+
+def test_robot_that_tips_over_a_caster_climbs_no_slope():
+    body = build_robot_body(robot_spec("turtlebot"))
+    assert compute_climb_limits(add_payload(body, 100.0, (1.0, 0.0, 0.2))).slope == 0.0
