@@ -51,6 +51,8 @@ def command() -> None:
             sign, result = "✓", check()
         except CheckFailed as failure:
             passed, sign, result = False, "✗", str(failure)
+        except Exception as error:  # such as a library that the physics engine needs, but that cannot be loaded
+            passed, sign, result = False, "✗", f"{type(error).__name__}: {error}"
         indents = f"  {sign} {name:10} ", " " * RESULT_COLUMN
         wrapper = textwrap.TextWrapper(width, *indents, break_long_words=False, break_on_hyphens=False)
         print_text(wrapper.fill(escaped(result)))

@@ -43,6 +43,17 @@ def test_failed_check_is_reported_and_the_others_still_run(simscen, quick, monke
     assert ended.out.splitlines()[-1] == "  ✓ speed      not now, either"
 
 
+def test_engine_that_cannot_be_imported_is_a_failed_check(simscen, quick, monkeypatch) -> None:
+    def missing_library() -> str:
+        raise ImportError("libGL.so.1: cannot open shared object file")
+
+    monkeypatch.setattr(doctor, "check_run", missing_library)
+    ended = simscen("doctor")
+    assert ended.code == 3
+    assert "  ✗ run        ImportError: libGL.so.1: cannot open shared object file\n" in ended.out
+    assert ended.out.splitlines()[-1] == "  ✓ speed      not now, either"
+
+
 def test_cache_is_shown_and_a_foreign_cache_fails(tmp_path: Path, monkeypatch) -> None:
     assert doctor.check_cache() == "disabled by SIMSCEN_CACHE_DIR"
     monkeypatch.setenv("SIMSCEN_CACHE_DIR", str(tmp_path))
