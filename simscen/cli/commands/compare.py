@@ -66,7 +66,7 @@ def command(
     replay of the failure. Nothing is simulated again.
 
     Exit code 0: not worse; 1: worse, see --fail-on; 2: a folder cannot be read, or its scenarios differ; 3: the
-    candidate has runs that could not be completed.
+    candidate has runs that could not be completed, or every pair has such a run, so that nothing was compared.
     """
     folders = {BASELINE: baseline, CANDIDATE: candidate}
     sessions = {name: read_journal(folder) for name, folder in folders.items()}
@@ -90,10 +90,10 @@ def command(
         print_text("\n".join(session_comparison_markdown(comparison, links, is_worse)))
     else:
         print_lines(session_comparison_lines(comparison, links, is_worse), sys.stdout)
-    incomplete = any(row[CANDIDATE].errors for row in comparison.outcomes.values())
+    is_incomplete = not against.pairs or any(row[CANDIDATE].errors for row in comparison.outcomes.values())
     has_flipped = any(flip.failed == CANDIDATE for flip in against.flips)
     has_failed = {Gate.WORSE: is_worse, Gate.FLIP: has_flipped, Gate.NEVER: False}[fail_on]
-    sys.exit(Exit.FAILED if has_failed else Exit.INCOMPLETE if incomplete else Exit.PASSED)
+    sys.exit(Exit.FAILED if has_failed else Exit.INCOMPLETE if is_incomplete else Exit.PASSED)
 
 
 def _check_scenarios(sessions: dict[str, JournaledSession], candidate: Path, changed_scenarios: bool) -> None:

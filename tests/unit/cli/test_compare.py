@@ -62,6 +62,13 @@ def test_equal_sessions_are_not_worse(folder: Callable[..., Path]) -> None:
     assert done.output.rstrip().endswith("candidate is not significantly worse in 4 pairs")
 
 
+@pytest.mark.parametrize("outcome", [PASS, FAIL])
+def test_a_baseline_without_completed_runs_shows_nothing(folder: Callable[..., Path], outcome: Outcome) -> None:
+    done = compare(folder("a", [result(ERROR, 1)]), folder("b", [result(outcome, 1)]))
+    assert "nothing to compare" in done.output
+    assert done.exit_code == 3
+
+
 def test_six_of_six_runs_that_fail_now_are_worse_and_five_are_not(folder: Callable[..., Path]) -> None:
     """McNemar's exact test: p = 2 / 2^6 = 0.031 and 2 / 2^5 = 0.0625."""
     before = [result(PASS, seed) for seed in range(6)]
