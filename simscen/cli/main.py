@@ -201,6 +201,12 @@ def _run_command() -> int:
         return report_lost_output(error) if lost else _print_internal_error()
     except Exception:
         return _print_internal_error()
+    except BaseException as error:
+        from simscen.run.process.supervisor import Interrupted  # light commands do not need it
+
+        if not isinstance(error, Interrupted):
+            raise
+        return 128 + error.number
     return Exit.PASSED
 
 

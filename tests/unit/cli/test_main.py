@@ -1,3 +1,4 @@
+import signal
 import subprocess
 import sys
 
@@ -5,6 +6,7 @@ import pytest
 
 import simscen.cli.main as cli
 from simscen.core.errors import NothingSelected, UsageError
+from simscen.run.process.supervisor import Interrupted
 
 
 def test_help_lists_the_commands_without_importing_them(simscen) -> None:
@@ -45,6 +47,7 @@ def test_unknown_command_is_a_usage_error(simscen) -> None:
         (NothingSelected("nothing matches"), 5, "simscen: nothing matches\n"),
         (UsageError("::error::[/red]\nx"), 2, "simscen: :\\:error::[/red] x\n"),
         (KeyboardInterrupt(), 130, ""),
+        (Interrupted(signal.SIGTERM), 143, ""),  # a signal after the last run, but before the reports
     ],
 )
 def test_errors_become_messages_and_exit_codes(
