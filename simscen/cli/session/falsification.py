@@ -10,7 +10,7 @@ from pathlib import Path
 from simscen.cli.diagnostics import paths_from_working_folder, relative_to_working_folder
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.file_checks import FileChecker
-from simscen.cli.session.output_files import OutputOptions, Reports
+from simscen.cli.session.output_files import OutputOptions, Reports, require_writable_junit
 from simscen.cli.session.pending_runs import plan_runs
 from simscen.cli.session.run_session import finish_session, start_session
 from simscen.cli.session.selection import require_not_skipped
@@ -236,6 +236,9 @@ class Falsification:
         )
         if checked is None:
             self._problems = problems
+            return None
+        output = self._request.output
+        require_writable_junit(output.junit, output.out, (*checked.files.values(), *checked.read_files))
         return checked
 
     def _plan(self, journal: Journal, jobs: Sequence[Job]) -> None:

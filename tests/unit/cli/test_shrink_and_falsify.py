@@ -261,3 +261,14 @@ def test_runs_before_an_error_or_a_signal_during_a_search_are_reported(tmp_path:
     done = subprocess.run(program, cwd=tmp_path, check=False, capture_output=True, text=True)
     assert done.returncode == code, done.stderr
     assert len(runs_of(tmp_path / "out")) == 2
+
+
+def test_the_junit_report_of_a_search_does_not_replace_its_world(tmp_path: Path) -> None:
+    world = "simscen: 1\nwalls: [{points: [[0, 0], [12, 0], [12, 12], [0, 12], [0, 0]]}]\n"
+    (tmp_path / "hall.world.yaml").write_text(world)
+    start, end = SCENARIO.partition("world:\n")[0], SCENARIO.partition("robot:\n")[2]
+    (tmp_path / "a.scenario.yaml").write_text(f"{start}world: hall.world.yaml\nrobot:\n{end}{RANGES}")
+    done = simscen(tmp_path, "falsify", "a.scenario.yaml", "--runs", "1", "--junit", "hall.world.yaml")
+    assert done.returncode == 2, done.stdout
+    assert "cannot write hall.world.yaml: it is one of the input files" in done.stderr
+    assert (tmp_path / "hall.world.yaml").read_text() == world
