@@ -47,7 +47,8 @@ def preview_data(checks: TextChecks, text: str) -> dict[str, Any]:
 def _reason(problems: Sequence[Problem]) -> str:
     """Return the text of the first problem, as the reason why no path is shown."""
     first = min(problems)
-    return f"No path is shown until this is corrected: line {first.line}: {first.message}"
+    place = f"line {first.line}: " if first.line else ""
+    return f"No path is shown until this is corrected: {place}{first.message}"
 
 
 def _robot_data(loaded: LoadedScenario, checks: TextChecks) -> dict[str, Any]:

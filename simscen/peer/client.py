@@ -104,7 +104,8 @@ class Peer:
         connection: None for the socket that simscen passes to the processes that it starts.
 
     Attributes:
-        hello, task: Contents of the frames HELLO and GOAL.
+        hello: Content of the frame HELLO.
+        task: Content of the frame GOAL; {} before the first step.
         goals: Queue of goals.
         command: Last commanded velocity vx, vy, wz.
         accepted_topics: Numbers of the topics that simscen accepts, by name.
@@ -128,6 +129,7 @@ class Peer:
         self.goals = Goals()
         self.command: tuple[float, float, float] = (0.0, 0.0, 0.0)
         self._connection = connection or Connection.inherited()
+        self.task: dict[str, Any] = {}
         self._canceled = False
         self._bye_content: dict[str, Any] = {}
         kind, body = self._connection.receive()

@@ -1,8 +1,8 @@
 """Classes for the ROS 2 messages of the stack protocol, and functions that read and serialize them.
 
 `read` deserializes a message that a stack receives. The functions that return bytes serialize messages (CDR) that a
-stack sends. The messages are those of common_interfaces, nav2_msgs and tf2_msgs of ROS 2 Humble. Only the planar part
-of most poses and velocities is used: x, y, yaw (m, rad) and vx, vy, wz (m/s, rad/s).
+stack sends. The messages are those of common_interfaces, nav2_msgs, rcl_interfaces, and tf2_msgs of ROS 2 Humble. Only
+the planar part of most poses and velocities is used: x, y, yaw (m, rad) and vx, vy, wz (m/s, rad/s).
 """
 
 from __future__ import annotations

@@ -46,8 +46,7 @@ class FakeStage:
     calls: list[Any] = field(default_factory=list)
 
     def last_scan_tick(self, sensor: str | None) -> int | None:
-        """Return the tick of the newest scan of the lidar `sensor` (of all lidars if None). Without a scan, return
-        None."""
+        """Return the tick of the newest scan of the lidar `sensor`, or of all lidars for None; None without a scan."""
         return max(self.scans.values(), default=None) if sensor is None else self.scans.get(sensor)
 
     @property

@@ -6,7 +6,7 @@ Schema = dict[str, Any]
 
 
 def simplify_for_editors(node: Any, definitions: Schema) -> Any:
-    """Return an equivalent schema for editors: unions as if/then, no nulls, titles, and defaults that are mappings."""
+    """Return a schema for editors: with if/then instead of unions; without null, titles, and long defaults."""
     if isinstance(node, list):
         return [simplify_for_editors(item, definitions) for item in node]
     if not isinstance(node, dict):
