@@ -19,6 +19,7 @@ from simscen.reconstruction.drive.goals import find_goals, trim_to_first_goal
 from simscen.reconstruction.drive.log_messages import LoggedMessage, LogMessages, PolygonMessage, collect_messages
 from simscen.reconstruction.drive.recorded_drive import (
     DEFAULT_LIDAR_HEIGHT_M,
+    Mask,
     Polygon,
     RecordedDrive,
     Scans,
@@ -38,6 +39,10 @@ MAX_CLOCK_DIFFERENCE_NS = 10 * NS_PER_SECOND
 """Maximum difference between the stamp and the log time of a message if both are from the same clock."""
 MIN_POSES = 2
 """Minimum number of poses of a topic or transform that is used as the source of poses."""
+MAX_COORDINATE_M = 1e6
+"""Limit of valid coordinates, velocities, and covariances."""
+MIN_RESOLUTION_M = 1e-6
+"""Minimum edge length of the cells of a valid map."""
 MIN_LIDAR_HEIGHT_M = 0.05
 """Lower limit of the height of any lidar."""
 MAX_FOOTPRINT_M = 5.0
@@ -127,29 +132,41 @@ class _DriveReader:
         """Convert a log time in ns to s since the start."""
         return (logged - self._start) / NS_PER_SECOND
 
-    def _times(self, messages: Sequence[LoggedMessage]) -> tuple[Array, Array]:
-        """Return the times of measurement (n,) and the log times (n,) of messages, in s since the start."""
-        arrivals = np.array([message.log_time - self._start for message in messages], dtype=np.float64) / NS_PER_SECOND
-        if not any(message.stamp for message in messages):
-            return arrivals, arrivals
-        stamps = np.array([message.stamp - self._stamp_start for message in messages], dtype=np.float64) / NS_PER_SECOND
-        return stamps, arrivals
+    def _times(self, role: str, messages: Sequence[LoggedMessage]) -> tuple[Array, Array]:
+        """Return the times of measurement (n,) and the log times (n,) of messages, in s since the start.
+
+        Raises UnusableLog if the clock of the stamps jumps by more than the duration of the log.
+        """
+        logged = np.array([message.log_time for message in messages], dtype=np.int64)
+        stamps = np.array([message.stamp for message in messages], dtype=np.int64)
+        is_stamped = stamps != 0
+        jumps = np.abs(np.diff((stamps - logged)[is_stamped]))
+        if (jumps > max(MAX_CLOCK_DIFFERENCE_NS, self._end - self._start)).any():
+            seconds = jumps.max() / NS_PER_SECOND
+            raise UnusableLog(f"the stamps of the topic for `{role}` jump by {seconds:.1f} s", "cut the log there")
+        arrivals = (logged - self._start) / NS_PER_SECOND
+        return np.where(is_stamped, (stamps - self._stamp_start) / NS_PER_SECOND, arrivals), arrivals
 
     def _signal(self, role: str, columns: int, row_of: Callable[[Any], Sequence[float]]) -> TimedValues:
         """Return the values of the messages of a role. `row_of` converts a decoded message to a row of values."""
         messages = self._messages.of(role)
         if not messages:
             return no_values(columns)
-        times, arrivals = self._times(messages)
+        times, arrivals = self._times(role, messages)
         rows = [tuple(row_of(message.content)) for message in messages]
         values = np.array(rows, dtype=np.float64).reshape(len(messages), columns)
+        is_valid: Mask = np.all(np.abs(values) < MAX_COORDINATE_M, axis=1)  # also false for nan
+        if not is_valid.all():
+            self._notes.append(f"{int((~is_valid).sum())} messages of `{role}` have invalid numbers, and are ignored")
         order = np.argsort(times, kind="stable")
+        order = order[is_valid[order]]
         return TimedValues(times[order], values[order], arrivals[order])
 
     def _poses(self, odometry: TimedValues, belief: TimedValues) -> tuple[TimedValues, str, bool]:
         """Return the best known poses in the map frame, the source in words, and whether it is a ground truth."""
-        if self._messages.of("truth"):
-            return self._signal("truth", 3, lambda truth: Pose3(*truth.pose).plane), "ground truth", True
+        truth = self._signal("truth", 3, lambda truth: Pose3(*truth.pose).plane)
+        if len(truth):
+            return truth, "ground truth", True
         for base in BASE_FRAMES:
             poses = self._poses_of_tf("map", base)
             if poses is not None:
@@ -172,7 +189,7 @@ class _DriveReader:
     def _poses_of_tf(self, outer: str, inner: str) -> TimedValues | None:
         """Return the poses x, y, yaw of the frame `inner` in `outer`; None if /tf does not contain the transform."""
         try:
-            stamped, poses = self._transforms.between(outer, inner)
+            _, logged, stamped, poses = self._transforms.between(outer, inner)
         except UnknownTransform:
             return None
         except UnusableLog as error:
@@ -180,10 +197,11 @@ class _DriveReader:
             return None
         if len(poses) < MIN_POSES:
             return None
-        times = (stamped.stamps - self._stamp_start) / NS_PER_SECOND
+        arrivals = (logged - self._start) / NS_PER_SECOND
+        times = arrivals if stamped is None else (stamped.stamps - self._stamp_start) / NS_PER_SECOND
         order = np.argsort(times, kind="stable")
         planar = np.array([Pose3(*pose).plane for pose in poses[order].tolist()])
-        return TimedValues(times[order], planar, (stamped.logged[order] - self._start) / NS_PER_SECOND)
+        return TimedValues(times[order], planar, arrivals[order])
 
     @cached_property
     def _transforms(self) -> TransformTree:
@@ -195,7 +213,7 @@ class _DriveReader:
         return tree
 
     def _scans(self) -> Scans | None:
-        """Return the scans of the lidar frame with the most scans; None without scans."""
+        """Return the scans of the lidar frame with the most scans; None without valid scans."""
         messages = self._messages.of("scan")
         if not messages:
             return None
@@ -203,9 +221,13 @@ class _DriveReader:
         frame = min(frames, key=lambda name: (-frames[name], name))
         messages = [message for message in messages if message.content.frame == frame]
         beams = Counter(len(message.content.ranges) for message in messages).most_common(1)[0][0]
-        times, arrivals = self._times(messages)
+        times, arrivals = self._times("scan", messages)
         order = np.argsort(times, kind="stable")
         first: ScanMessage = next(message.content for message in messages if len(message.content.ranges) == beams)
+        layout = first.angle_min, first.angle_increment, first.range_min, first.range_max
+        if beams < 2 or not first.angle_increment or not np.isfinite(layout[:3]).all() or not first.range_max > 0.0:
+            self._notes.append(f"the scans of `{frame}` have invalid angles or range limits, and are ignored")
+            return None
         ranges = np.full((len(messages), beams), np.nan)
         is_malformed = np.zeros(len(messages), dtype=bool)
         for row, index in enumerate(order.tolist()):
@@ -242,10 +264,14 @@ class _DriveReader:
         return mount.plane, max(mount.z, MIN_LIDAR_HEIGHT_M), is_upside_down(mount)
 
     def _map(self) -> OccupancyGrid | None:
-        """Return the last map; None without a map."""
+        """Return the last map; None without a valid map."""
         maps = self._messages.of("map")
         grid: OccupancyGrid | None = maps[-1].content if maps else None
         if grid is None:
+            return None
+        is_valid = MIN_RESOLUTION_M <= grid.resolution < np.inf and np.isfinite(grid.origin).all()
+        if not is_valid or not grid.cells.size:
+            self._notes.append("the map has no cells, or an invalid resolution or origin, and is ignored")
             return None
         # The message rounds the resolution to single precision.
         return OccupancyGrid(grid.cells, round(grid.resolution, 6), grid.origin)
@@ -262,7 +288,11 @@ class _DriveReader:
         corners = np.array(polygon.corners, dtype=np.float64).reshape(-1, 2)
         if not self._is_base(polygon.frame):
             in_frame = self._poses_in(polygon.frame, odometry)
-            x, y, yaw = (poses if in_frame is None else in_frame).poses_at(self._times(messages[:1])[0])[0].tolist()
+            x, y, yaw = (
+                (poses if in_frame is None else in_frame)
+                .poses_at(self._times("footprint", messages[:1])[0])[0]
+                .tolist()
+            )
             corners = Pose2(x, y, yaw).inverse().apply(corners)
         if len(corners) < 3 or not np.abs(corners).max() <= MAX_FOOTPRINT_M:  # also false for nan
             return ()

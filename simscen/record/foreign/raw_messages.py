@@ -2,13 +2,14 @@
 
 import json
 import re
-from collections.abc import Callable, Container, Iterator
+from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 from mcap import records
 
+from simscen.record.foreign.bag_metadata import read_bag_metadata
 from simscen.record.log_header import ROBOTS_KEY
 from simscen.record.log_reader import invalid_log, unreadable_log_as_invalid_input
 from simscen.record.mcap_reader import RecordReader, is_mcap, open_log
@@ -55,13 +56,15 @@ class RawMessage(NamedTuple):
 class McapMessages:
     """Iterable of the messages of an MCAP file.
 
-    After the iteration, `complete` is False if the file is truncated, and `topics` has the message types by topic. The
-    iteration raises UnusableLog for ROS 1 and for files that are not MCAP, and mcap exceptions for damaged files.
+    After the iteration, `complete` is False if the file is truncated, `count` is the number of messages, and `topics`
+    has the message types by topic. The iteration raises UnusableLog for ROS 1, for files that are not MCAP, and for
+    several concatenated files, and mcap exceptions for damaged files.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self.complete = False
+        self.count = 0
         self.topics: dict[str, str] = {}
 
     def __iter__(self) -> Iterator[RawMessage]:
@@ -71,6 +74,8 @@ class McapMessages:
                 raise UnusableLog("it is not an MCAP file")
             reader = RecordReader(stream)
             yield from self._messages(reader)
+            if stream.read(1):
+                raise UnusableLog("data follows its end", "if it is a file of several logs, split it")
             self.complete = not reader.is_truncated
 
     def _messages(self, reader: RecordReader) -> Iterator[RawMessage]:
@@ -89,6 +94,7 @@ class McapMessages:
                 case records.Message():
                     channel = channels[record.channel_id]
                     message_type, encoding = types.get(channel.schema_id, ""), channel.message_encoding
+                    self.count += 1
                     yield RawMessage(channel.topic, message_type, encoding, record.log_time, record.data)
                 case _:
                     pass
@@ -146,23 +152,26 @@ class BagMessages:
 
     def __iter__(self) -> Iterator[RawMessage]:
         """Yield the messages of all files. Raises UnusableLog."""
-        files = sorted(self._folder.glob("*.mcap"), key=_file_number)
-        return self._read_mcap(files) if files and not self._is_compressed() else self._read_with_rosbags()
+        metadata = read_bag_metadata(self._folder)
+        if metadata is None:
+            files = sorted(self._folder.glob("*.mcap"), key=_file_number)
+            return self._read_mcap(files, 0) if files else self._read_with_rosbags()
+        if metadata.storage != "mcap" or metadata.is_compressed:
+            return self._read_with_rosbags()
+        return self._read_mcap([self._folder / name for name in metadata.files], metadata.message_count)
 
-    def _is_compressed(self) -> bool:
-        """Return whether rosbag2 has compressed the messages or files, in addition to the compression of MCAP."""
-        metadata = self._folder / "metadata.yaml"
-        text = metadata.read_text(encoding="utf-8", errors="replace") if metadata.is_file() else ""
-        return re.search(r"compression_mode:\s*['\"]?(message|file)", text, re.IGNORECASE) is not None
-
-    def _read_mcap(self, files: list[Path]) -> Iterator[RawMessage]:
-        complete = []
+    def _read_mcap(self, files: Sequence[Path], expected_count: int) -> Iterator[RawMessage]:
+        """Yield the messages of MCAP files, which should have at least `expected_count` messages in total."""
+        if missing := [file.name for file in files if not file.exists()]:
+            raise UnusableLog(f"metadata.yaml lists {missing[0]}, which is missing", "add the file to the folder")
+        complete, count = [], 0
         for file in files:
             messages = McapMessages(file)
             yield from messages
             self.topics.update(messages.topics)
             complete.append(messages.complete)
-        self.complete = all(complete)
+            count += messages.count
+        self.complete = all(complete) and count >= expected_count
 
     def _read_with_rosbags(self) -> Iterator[RawMessage]:
         try:

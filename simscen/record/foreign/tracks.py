@@ -80,15 +80,13 @@ def track_from_topic(topic: str, messages: Sequence[tuple[int, StampedPose]], op
 
 
 def track_from_tf(outer: str, inner: str, decoded: DecodedMessages, options: ForeignLogOptions) -> Track:
-    """Return the track of the frame `inner` in the frame `outer` from tf. Raises UnknownTransform."""
+    """Return the track of the frame `inner` in the frame `outer` from tf. Raises UnknownTransform, or UnusableLog."""
     tree = TransformTree()
     for role in ("tf_static", "tf"):
         for logged, links in decoded.by_role[role]:
             tree.add(logged, links, is_static=role == "tf_static")
-    times, poses = tree.between(outer, inner)
-    covariances = np.tile(NO_COVARIANCE, (len(poses), 1))
-    stamped = None if options.clock == "log" or not times.stamps.any() else times
-    return Track(times.topic, outer, times.logged, stamped, poses, covariances, None)
+    source, times, stamped, poses = tree.between(outer, inner, use_log_time=options.clock == "log")
+    return Track(source, outer, times, stamped, poses, np.tile(NO_COVARIANCE, (len(poses), 1)), None)
 
 
 def velocity_from_poses(ticks: Ticks, poses: Array, rate: int) -> Array:

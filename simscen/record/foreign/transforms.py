@@ -4,25 +4,48 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from simscen.core.geometry import Array, Pose3
 from simscen.core.records.trace import Ticks
 from simscen.record.foreign.raw_messages import UnusableLog
-from simscen.record.foreign.timebase import StampedMessages
+from simscen.record.foreign.timebase import StampedMessages, check_recorder_clock
 from simscen.record.messages.decode import StampedPose
 
 
 @dataclass
 class _Link:
-    """Poses of a frame in its parent frame, with times of logging and stamps in ns."""
+    """Poses of a frame in its parent frame, with times of logging and stamps in ns.
+
+    `is_static` is False if any message was on /tf.
+    """
 
     parent: str
     logged: list[int] = field(default_factory=list)
     stamps: list[int] = field(default_factory=list)
     poses: list[tuple[float, ...]] = field(default_factory=list)
-    is_static: bool = False
+    is_static: bool = True
+
+    def times(self, use_log_time: bool) -> Ticks:
+        """Return the times of logging or the stamps as an array."""
+        return np.array(self.logged if use_log_time else self.stamps, dtype=np.int64)
+
+
+class TransformTrack(NamedTuple):
+    """Poses of a frame in another frame, in the order of logging.
+
+    source:   pair of frames, for messages to the user
+    logged:   times of logging (n,) in ns
+    stamped:  stamps; None if the times of logging are used instead
+    poses:    x, y, z and a quaternion x, y, z, w (n, 7)
+    """
+
+    source: str
+    logged: Ticks
+    stamped: StampedMessages | None
+    poses: Array
 
 
 class UnknownTransform(UnusableLog):
@@ -43,13 +66,14 @@ class TransformTree:
         for transform in links:
             link = self._links.get(transform.child)
             if link is None or link.parent != transform.frame:
-                link = self._links[transform.child] = _Link(transform.frame, is_static=is_static)
+                link = self._links[transform.child] = _Link(transform.frame)
+            link.is_static &= is_static
             link.logged.append(logged)
             link.stamps.append(transform.stamp)
             link.poses.append(transform.pose)
 
-    def between(self, outer: str, inner: str) -> tuple[StampedMessages, Array]:
-        """Return times and poses (n, 7) of the frame `inner` in `outer`. Raises UnknownTransform, or UnusableLog.
+    def between(self, outer: str, inner: str, use_log_time: bool = False) -> TransformTrack:
+        """Return the poses of the frame `inner` in `outer`. Raises UnknownTransform, or UnusableLog.
 
         Each message of the dynamic transform nearest to `inner` yields one pose. Other transforms are not interpolated:
         they have the value of their latest message.
@@ -58,16 +82,19 @@ class TransformTree:
         moving = next((link for link in chain if not link.is_static), None)
         if moving is None:
             raise UnknownTransform(f"tf between {outer} and {inner} never changes")
-        times = np.array(moving.stamps, dtype=np.int64)
-        begin = max(min(link.stamps) for link in chain if not link.is_static)
-        is_connected = times >= begin
-        poses = np.tile([0.0, 0, 0, 0, 0, 0, 1], (int(is_connected.sum()), 1))
-        for link in chain:
-            poses = _compose(_latest_poses(link, times[is_connected]), poses)
-        if not is_connected.any():
+        source = f"tf {outer}:{inner}"
+        check_recorder_clock(source, moving.logged, moving.stamps)
+        use_log_time = use_log_time or not any(any(link.stamps) for link in chain if not link.is_static)
+        begin = max(int(link.times(use_log_time).min()) for link in chain if not link.is_static)
+        order = np.argsort(moving.logged, kind="stable")
+        order = order[moving.times(use_log_time)[order] >= begin]
+        if not len(order):
             raise UnknownTransform(f"tf never connects {outer} and {inner} at the same time")
-        logged = np.array(moving.logged, dtype=np.int64)[is_connected]
-        return StampedMessages(f"tf {outer}:{inner}", logged, times[is_connected]), poses
+        times, logged = moving.times(use_log_time)[order], moving.times(use_log_time=True)[order]
+        poses = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(order), 1))
+        for link in chain:
+            poses = _compose(_latest_poses(link, times, use_log_time), poses)
+        return TransformTrack(source, logged, None if use_log_time else StampedMessages(source, logged, times), poses)
 
     def _chain(self, outer: str, inner: str) -> list[_Link]:
         """Return the transforms from `inner` up to `outer`. Raises UnknownTransform if they are not connected."""
@@ -84,11 +111,11 @@ class TransformTree:
         return chain
 
 
-def _latest_poses(link: _Link, times: Ticks) -> Array:
-    """Return the latest poses (n, 7) of a link at `times` (n,)."""
-    stamps, poses = np.array(link.stamps, dtype=np.int64), np.array(link.poses)
-    order = np.argsort(stamps, kind="stable")
-    newest = np.searchsorted(stamps[order], times, side="right") - 1
+def _latest_poses(link: _Link, times: Ticks, use_log_time: bool) -> Array:
+    """Return the latest poses (n, 7) of a link at `times` (n,), which are times of logging or stamps."""
+    link_times, poses = link.times(use_log_time), np.array(link.poses)
+    order = np.argsort(link_times, kind="stable")
+    newest = np.searchsorted(link_times[order], times, side="right") - 1
     latest: Array = poses[order][len(order) - 1 if link.is_static else np.maximum(newest, 0)]
     return np.tile(latest, (len(times), 1)) if latest.ndim == 1 else latest
 

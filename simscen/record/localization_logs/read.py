@@ -84,9 +84,11 @@ def _initial_pose(rows: LocalizationRows) -> Pose2 | None:
     """Return the pose at the start of the odometry, from the first initial pose and the odometry before it."""
     if not rows.initial:
         return None
+    # The stamp of an initial pose is often zero, so the order of logging counts.
     first = min(rows.initial, key=lambda row: row.order)
-    nearest = min(rows.odometry, key=lambda row: abs(row.time - first.time))
-    return first.pose.compose(nearest.pose.between(rows.odometry[0].pose))
+    begin = rows.odometry[0]
+    before = next((row for row in reversed(rows.odometry) if row.order < first.order), begin)
+    return first.pose.compose(before.pose.between(begin.pose))
 
 
 def _check_readings(readings: Sequence[Odometry | Scan]) -> Iterator[str]:

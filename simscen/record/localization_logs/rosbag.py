@@ -37,7 +37,7 @@ class _Messages:
     """Decoded messages of a log, and message types of all topics.
 
     `static_transforms` are by child frame. `tf_indices` are the indices of the messages with transforms by time of
-    logging.
+    logging. `is_complete` is False for a truncated log.
     """
 
     odometry: list[LoggedMessage] = field(default_factory=list)
@@ -48,6 +48,7 @@ class _Messages:
     transforms: TransformTree = field(default_factory=TransformTree)
     tf_indices: dict[int, int] = field(default_factory=dict)
     topics: dict[str, str] = field(default_factory=dict)
+    is_complete: bool = True
 
     def sort_by_time(self) -> None:
         """Sort all messages by the time of logging, and number them again: an MCAP file may have any order.
@@ -63,10 +64,11 @@ class _Messages:
 
     def between(self, outer: str, inner: str) -> list[LoggedMessage]:
         """Return the poses of the frame `inner` in `outer` as messages. Raises UnusableLog if the poses are unknown."""
-        times, poses = self.transforms.between(outer, inner)
+        _, times, stamped, poses = self.transforms.between(outer, inner)
+        stamps = [0] * len(times) if stamped is None else stamped.stamps.tolist()
         return [
             (logged, self.tf_indices[logged], StampedPose(stamp, outer, tuple(pose), child=inner))
-            for logged, stamp, pose in zip(times.logged.tolist(), times.stamps.tolist(), poses.tolist(), strict=True)
+            for logged, stamp, pose in zip(times.tolist(), stamps, poses.tolist(), strict=True)
         ]
 
 
@@ -89,6 +91,8 @@ def read_rosbag_rows(path: Path, odometry: str, scan: str, reference: str | None
     rows = LocalizationRows(hint=f"its topics: {names}; name others with --odom, --scan and --reference")
     if reference is not None and not messages.truth:
         raise UnusableLog(f"it has no messages on {reference}", rows.hint)
+    if not messages.is_complete:
+        rows.notes.append("the log is truncated")
     truth = reference or topics.TRUTH.name
     by_topic = {odometry: messages.odometry, scan: messages.scans, truth: messages.truth}
     unstamped = [name for name, logged in by_topic.items() if logged and not any(each.stamp for *_, each in logged)]
@@ -125,13 +129,15 @@ def _collect_messages(path: Path, odometry: str, scan: str, truth: str) -> _Mess
             pose = raw.time, index, _decode(raw, POSE_DECODERS)
             messages.odometry += [pose] if raw.topic == odometry else []
             messages.truth += [pose] if raw.topic == truth else []
-    messages.topics = stream.topics
+    messages.topics, messages.is_complete = stream.topics, stream.complete
     messages.sort_by_time()
     return messages
 
 
 def _decode(raw: RawMessage, decoders: Decoders) -> Any:
-    if raw.encoding != "cdr" or raw.type not in decoders:
+    if raw.encoding != "cdr":
+        raise UnusableLog(f"{raw.topic} is encoded as {raw.encoding or 'something unknown'}, not as CDR")
+    if raw.type not in decoders:
         raise UnusableLog(f"{raw.topic} is a {raw.type or 'type without a name'}, expected {' or '.join(decoders)}")
     return raw.decode(decoders[raw.type])
 

@@ -98,6 +98,17 @@ def test_transform_between_two_frames_can_be_the_ground_truth(read: Callable[...
     assert lost == "tf does not connect map with wheel; frames: base_link, map, marker, odom"
 
 
+def test_a_transform_that_is_static_until_a_localizer_starts_is_dynamic(read: Callable[..., ForeignLog]) -> None:
+    messages = [Message("/tf_static", BEGIN, link(BEGIN, "map", "odom", 0.0))]
+    for k in range(201):
+        stamp = BEGIN + k * SECOND // 20
+        messages.append(Message("/tf", stamp, link(stamp, "odom", "base_link", SPEED * k / 20)))
+    stamp = BEGIN + 5 * SECOND
+    messages.append(Message("/tf", stamp, link(stamp, "map", "odom", 0.0, 2.0)))
+    trace = read(messages, ForeignLogOptions(truth="map:base_link")).trace
+    np.testing.assert_allclose(trace.truth.values[:, 1], np.where(trace.truth.ticks < 5000, 0.0, 2.0))
+
+
 def test_ground_truth_in_another_frame_is_not_compared_with_the_map(read: Callable[..., ForeignLog]) -> None:
     log = read(drive(mocap="vicon"))
     assert "frame `vicon`, the map frame is `map`" in log.coverage.missing[Evidence.ALIGNMENT]

@@ -15,11 +15,12 @@ from foreign_logs import (
     believed,
     drive,
     header,
+    link,
     stamped_pose,
 )  # fmt: skip
 
 from simscen.core.records.verdict import Evidence
-from simscen.record.foreign.options import ForeignLogOptions
+from simscen.record.foreign.options import Clock, ForeignLogOptions
 from simscen.record.foreign.read import ForeignLog
 from simscen.record.foreign.timebase import find_clock_step
 
@@ -176,3 +177,35 @@ def test_log_times_replace_zero_stamps(read: Callable[..., ForeignLog]) -> None:
     log = read(messages)
     assert len(log.trace.truth) == 201
     assert log.notes == ["/mocap: all stamps are zero, so the times of logging are used"]
+
+
+def transforms(stamp_of_step: Callable[[int], int]) -> list[Message]:
+    """Return a drive on /tf, map → odom → base_link at 20 Hz, with the stamp of each step."""
+    messages = []
+    for k in range(201):
+        time, stamp = BEGIN + k * SECOND // 20, stamp_of_step(k)
+        messages.append(Message("/tf", time, link(stamp, "map", "odom", SPEED * k / 40)))
+        messages.append(Message("/tf", time, link(stamp, "odom", "base_link", SPEED * k / 40)))
+    return messages
+
+
+@pytest.mark.parametrize("clock", ["header", "log"])
+def test_log_times_replace_zero_stamps_of_transforms(read: Callable[..., ForeignLog], clock: Clock) -> None:
+    log = read(transforms(lambda _: 0), ForeignLogOptions(truth="map:base_link", clock=clock))
+    np.testing.assert_allclose(log.trace.truth.values[:, 0], SPEED * log.trace.truth.ticks / 1000, atol=1e-6)
+    assert len(log.trace.truth) == 201
+
+
+def test_transforms_of_a_clock_that_jumps_back_are_judged_by_log_times(
+    read: Callable[..., ForeignLog], refused: Callable[..., str]
+) -> None:
+    messages = transforms(lambda k: BEGIN + k * SECOND // 20 - (5 * SECOND if k > 100 else 0))
+    assert "the time of tf map:base_link jumps back by 5.0 s" in refused(messages, ForeignLogOptions("map:base_link"))
+    log = read(messages, ForeignLogOptions(truth="map:base_link", clock="log"))
+    np.testing.assert_allclose(log.trace.truth.values[:, 0], SPEED * log.trace.truth.ticks / 1000, atol=1e-6)
+
+
+def test_order_of_transforms_in_the_file_does_not_matter(read: Callable[..., ForeignLog]) -> None:
+    messages, options = transforms(lambda k: BEGIN + k * SECOND // 20), ForeignLogOptions(truth="map:base_link")
+    shuffled = random.Random(1).sample(messages, len(messages))
+    assert (read(shuffled, options).trace.truth.values == read(messages, options).trace.truth.values).all()
