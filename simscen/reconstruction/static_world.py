@@ -9,6 +9,7 @@ from scipy.ndimage import distance_transform_edt
 
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.environment.world_model import BuiltWorld, World
+from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Array, Pose2
 from simscen.reconstruction.drive.recorded_drive import Indices, Mask, RecordedDrive, Scans
 from simscen.worlds.extent import placed_solids
@@ -89,6 +90,8 @@ def beam_ends(poses: Array, angles: Array, ranges: Array) -> Array:
 
 RESOLUTION_M = 0.05
 """Cell size of the map that is built from scans."""
+MAX_CELLS = 100_000_000
+"""Maximum number of cells of the map that is built from scans."""
 MARGIN_M = 1.0
 """Distance between the border of the map and all hits and poses."""
 TARGET_SCANS = 1500
@@ -107,18 +110,21 @@ MIN_OCCUPIED_LOG_ODDS, MAX_FREE_LOG_ODDS = 0.8, -0.4
 
 
 def map_from_scans(drive: RecordedDrive) -> OccupancyGrid:
-    """Return a map built from the scans and poses of a drive; without scans, a free map around the driven path."""
+    """Return a map built from the scans and poses of a drive; without scans, a free map around the driven path.
+
+    Raises InvalidInput if the map would have more than MAX_CELLS cells.
+    """
     path = drive.poses.values[:, :2]
     if drive.scans is None or not len(drive.scans):
         low, high = path.min(axis=0) - 5.0, path.max(axis=0) + 5.0
-        return OccupancyGrid(np.zeros(_shape(low, high), dtype=np.int8), RESOLUTION_M, Pose2(*low.tolist()))
+        return OccupancyGrid(np.zeros(_shape(drive, low, high), dtype=np.int8), RESOLUTION_M, Pose2(*low.tolist()))
     scans = drive.scans.thinned(TARGET_SCANS)
     poses, hits = lidar_poses(drive, scans), scans.is_hit() & (scans.ranges <= MAX_RANGE_M)
     ends = beam_ends(poses, scans.angles, scans.ranges)
     everything = np.concatenate((ends[hits], path))
     low, high = everything.min(axis=0) - MARGIN_M, everything.max(axis=0) + MARGIN_M
     low = np.floor(low / RESOLUTION_M) * RESOLUTION_M
-    odds = np.zeros(_shape(low, high))
+    odds = np.zeros(_shape(drive, low, high))
     for row in range(len(scans)):
         if hits[row].any():
             _add_scan(odds, poses[row, :2] - low, ends[row][hits[row]] - low)
@@ -134,9 +140,13 @@ def _driven_cells(shape: tuple[int, ...], path: Array) -> Mask:
     return distance_transform_edt(~is_path) * RESOLUTION_M <= BODY_RADIUS_M
 
 
-def _shape(low: Array, high: Array) -> tuple[int, int]:
+def _shape(drive: RecordedDrive, low: Array, high: Array) -> tuple[int, int]:
     """Return the numbers of rows and columns of the map between two opposite corners (2,) in m."""
     columns, rows = np.ceil((high - low) / RESOLUTION_M).astype(int).tolist()
+    if rows * columns > MAX_CELLS:
+        width, height = (high - low).tolist()
+        text = f"its poses and scans cover {width:.0f} m x {height:.0f} m, too much to build a map"
+        raise InvalidInput([Problem(drive.name, 0, 0, "SC804", text, "give the map with --map, or cut the log")])
     return rows + 1, columns + 1
 
 

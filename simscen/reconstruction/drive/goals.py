@@ -162,7 +162,7 @@ def trim_to_first_goal(drive: RecordedDrive) -> RecordedDrive:
     if not drive.goals:
         return drive
     begin = drive.goals[0].sent
-    if drive.goals[0].status == "reached" and not drive.goals[0].source.startswith("/"):
+    if drive.goals[0].source in (STOP_SOURCE, BEND_SOURCE):
         moved = np.hypot(*(drive.poses.values[:, :2] - drive.poses.values[0, :2]).T) > 0.05
         begin = float(drive.poses.times[np.argmax(moved)]) - LEAD_S
     begin = max(begin, float(drive.poses.times[0]))

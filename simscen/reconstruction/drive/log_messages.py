@@ -121,8 +121,8 @@ def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, 
         role = roles.get(raw.topic)
         if role is not None and raw.type in _DECODERS[role]:
             messages.by_role.setdefault(role, []).append(_without_robot(_decode(raw, role), robot))
-        elif role is None and raw.type == topics.SCAN_TYPE:
-            other_scans.setdefault(raw.topic, []).append(_decode(raw, "scan"))
+        elif role is None and raw.type == topics.SCAN_TYPE and raw.topic.startswith(f"{prefix}/" if robot else ""):
+            other_scans.setdefault(raw.topic, []).append(_without_robot(_decode(raw, "scan"), robot))
     if not messages.of("scan") and other_scans:
         messages.by_role["scan"] = other_scans[min(other_scans)]
     robot_topics = {name: kind for name, kind in stream.topics.items() if not robot or name.startswith(f"{prefix}/")}

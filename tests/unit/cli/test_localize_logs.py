@@ -154,11 +154,14 @@ def test_start_is_initialpose_without_a_reference(simscen, tmp_path: Path) -> No
     time = BEGIN + round(t * SECOND)
     where = T["geometry_msgs/msg/PoseWithCovariance"](pose=pose(*true_pose), covariance=np.zeros(36))
     output = T["geometry_msgs/msg/PoseWithCovarianceStamped"](header=header(time, "map"), pose=where)
+    unstamped = replace(output, header=header(0, "map"))
     write_bag(tmp_path / "output", [*messages, Message("/initialpose", time + LATENCY, output)])
+    write_bag(tmp_path / "unstamped", [*messages, Message("/initialpose", time + LATENCY, unstamped)])
     write_bag(tmp_path / "without", messages)
-    ended = simscen("localize", "output", *OPTIONS, "--json")
     x, y, _ = drive()[-1][1]
-    assert json.loads(ended.out)["end"][:2] == pytest.approx([x, y], abs=0.15)
+    for log in ("output", "unstamped"):
+        ended = simscen("localize", log, *OPTIONS, "--json")
+        assert json.loads(ended.out)["end"][:2] == pytest.approx([x, y], abs=0.15), log
     assert simscen("localize", "without", *OPTIONS).code == 2
 
 
@@ -341,6 +344,20 @@ def test_invalid_csv_log_is_rejected(simscen, tmp_path: Path, text: str) -> None
     assert ended.code == 2
     assert "bad.csv" in ended.err
     assert "Traceback" not in ended.err
+
+
+def test_truncated_log_is_noted(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    whole = write_mcap(tmp_path / "cut.mcap", drive_log(), chunk_size=10_000)
+    whole.write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    assert "note: the log is truncated\n" in localized(simscen, "cut.mcap")["err"]
+
+
+def test_messages_that_are_not_cdr_are_refused(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    write_mcap(tmp_path / "json.mcap", drive_log(), encoding="json")
+    ended = simscen("localize", "json.mcap", *OPTIONS, "--start", "1,0.8,0")
+    assert (ended.code, "is encoded as json, not as CDR" in ended.err) == (2, True)
 
 
 def test_every_truncated_log_gives_figures_or_an_error(simscen, tmp_path: Path) -> None:

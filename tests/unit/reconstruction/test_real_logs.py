@@ -264,6 +264,20 @@ def test_goals_come_from_the_ends_of_plans_and_the_status_of_the_action(tmp_path
     assert (only.status, only.ended) == ("reached", pytest.approx(11.0, abs=0.2))
 
 
+def test_a_drive_starts_when_its_first_plan_does_even_if_the_robot_is_stuck(tmp_path):
+    """The robot has the goal 10 s before it moves."""
+    said = messages(with_goal=False, idle=10.0)
+    end = logs.T["geometry_msgs/msg/PoseStamped"](header=logs.header(logs.BEGIN, "map"), pose=logs.pose(*GOAL))
+    plan = logs.T["nav_msgs/msg/Path"](header=logs.header(logs.BEGIN, "map"), poses=[end, end])
+    said.append(logs.Message("/plan", logs.BEGIN + 10_000_000, plan))
+    for time, status in ((0.01, 2), (21.0, 4)):
+        at = logs.BEGIN + round(time * logs.SECOND)
+        said.append(logs.Message("/navigate_to_pose/_action/status", at, logs.statuses((1, logs.BEGIN, status))))
+    drive = read_drive(logs.write_bag(tmp_path / "bag", sorted(said, key=lambda one: one.time)))
+    assert drive.begin == 0.0
+    assert drive.duration == pytest.approx(10.0 + drives.DURATION_S, abs=0.2)
+
+
 def test_log_before_the_first_goal_is_ignored(tmp_path):
     drive = read_drive(logs.write_bag(tmp_path / "bag", messages(idle=5.0)))
     assert drive.goals[0].sent == 0.0
@@ -299,3 +313,75 @@ def test_an_unusable_log_ends_with_exit_code_2_and_leaves_no_file(name, content,
     result = CliRunner().invoke(app, ["new", "--from-log", str(tmp_path / name), "--out", str(target)])
     assert isinstance(result.exception, InvalidInput) or result.exit_code == 2
     assert not target.exists()
+
+
+def with_nan(said):
+    said.message.pose.pose.position.x = math.nan
+
+
+def without_stamp(said):
+    said.message.header.stamp = logs.stamp_of(0)
+
+
+def without_beams(said):
+    said.message.ranges = np.zeros(0, dtype=np.float32)
+
+
+def with_one_direction(said):
+    said.message.angle_increment = 0.0
+
+
+def with_nan_angles(said):
+    said.message.angle_min = math.nan
+
+
+def with_nan_limit(said):
+    said.message.range_max = math.nan
+
+
+def without_resolution(said):
+    said.message.info.resolution = 0.0
+
+
+@pytest.mark.parametrize(
+    ("topic", "change", "changes_all", "text"),
+    [
+        ("/odom", with_nan, False, "1 messages of `odom` have invalid numbers, and are ignored"),
+        ("/amcl_pose", with_nan, True, "messages of `amcl_pose` have invalid numbers, and are ignored"),
+        ("/odom", without_stamp, False, ""),
+        ("/scan", without_beams, True, "the scans of `lidar` have invalid angles or range limits"),
+        ("/scan", with_one_direction, True, "the scans of `lidar` have invalid angles or range limits"),
+        ("/scan", with_nan_angles, True, "the scans of `lidar` have invalid angles or range limits"),
+        ("/scan", with_nan_limit, True, "the scans of `lidar` have invalid angles or range limits"),
+        ("/map", without_resolution, True, "the map has no cells, or an invalid resolution or origin"),
+    ],
+)
+def test_a_log_with_invalid_messages_gives_a_valid_scenario(topic, change, changes_all, text, tmp_path):
+    said = messages()
+    chosen = [one for one in said if one.topic == topic]
+    for one in chosen if changes_all else chosen[30:31]:
+        change(one)
+    bag = logs.write_bag(tmp_path / "bag", said)
+    made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
+    load_scenario(made.file, tmp_path)
+    assert any(text in unknown for unknown in made.contents.unknowns)
+    (only,) = made.contents.goals
+    assert math.dist(only.pose[:2], GOAL) < 0.1
+
+
+def test_a_clock_that_jumps_by_more_than_the_drive_is_refused(tmp_path):
+    said = messages()
+    odometry_messages = [one for one in said if one.topic == "/odom"]
+    odometry_messages[30].message.header.stamp = logs.stamp_of(logs.BEGIN + 10**8 * logs.SECOND)
+    with pytest.raises(InvalidInput, match="the stamps of the topic for `odom` jump by 99999998"):
+        read_drive(logs.write_bag(tmp_path / "bag", said))
+
+
+def test_a_drive_across_a_country_needs_a_map(tmp_path):
+    far = [replace(one, message=logs.odometry(one.time, "odom", 1e4 * k, 0.5)) for k, one in enumerate(
+        one for one in messages() if one.topic == "/odom"
+    )]  # fmt: skip
+    far[-1].message.pose.pose.position.y = 1e5
+    bag = logs.write_bag(tmp_path / "bag", far)
+    with pytest.raises(InvalidInput, match="too much to build a map"):
+        scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())

@@ -8,6 +8,7 @@ import pytest
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2
 from simscen.loading.scenario import load_scenario
+from simscen.reconstruction.drive.log_messages import collect_messages
 from simscen.reconstruction.drive.run_description import choose_robot
 from simscen.reconstruction.objects.find_objects import object_of_robot
 from simscen.reconstruction.scenario.given_parts import GivenFiles
@@ -60,3 +61,11 @@ def test_the_box_of_a_robot_is_around_its_footprint():
     box = object_of_robot("cart", ((-0.2, -0.3), (0.6, -0.3), (0.6, 0.3), (-0.2, 0.3)), times, poses)
     assert box.size == (0.8, 0.6)
     assert box.keyframes[0] == pytest.approx((0.0, 1.0, 1.2, np.pi / 2))
+
+
+def test_a_robot_without_a_lidar_does_not_get_the_scans_of_another_one(log):
+    assert len(collect_messages(log, {}, None, "blue").of("scan")) > 10
+    renamed = {"scan": "/front/scan"}
+    own = collect_messages(log, renamed, None, "blue").of("scan")
+    assert {message.content.frame for message in own} == {"lidar"}
+    assert collect_messages(log, renamed, None, "blu").of("scan") == []
