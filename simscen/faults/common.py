@@ -99,10 +99,15 @@ class ChangedCommands(FaultEffect):
         return self._change(command)
 
 
+MAX_ODOMETRY = 1e6
+"""Maximum absolute value of a coordinate in m, or of a heading in rad, that odometry can reach."""
+
+
 class OdometryDistortion(FaultEffect):
     """Effect on odometry. Distorts each increment and integrates the distorted increments to a pose.
 
-    The reported pose does not jump when the fault begins. The accumulated error remains when the fault ends.
+    The reported pose does not jump when the fault begins. The accumulated error remains when the fault ends. Garbage
+    from another fault, such as nan, is returned unchanged, and is not part of any increment.
     """
 
     def __init__(self, distort: Callable[[Twist, Twist, int], tuple[Twist, Twist]]) -> None:
@@ -117,8 +122,8 @@ class OdometryDistortion(FaultEffect):
         self._ended = False
 
     def reading(self, reading: Reading) -> Reading:
-        """Return the distorted odometry. Other readings are returned unchanged."""
-        if not isinstance(reading, Odometry):
+        """Return the distorted odometry. Garbage and other readings are returned unchanged."""
+        if not (isinstance(reading, Odometry) and all(abs(value) <= MAX_ODOMETRY for value in reading.pose)):
             return reading
         previous, pose = self._previous.get(reading.sensor, (reading, reading.pose))
         step, velocity = Twist(*previous.pose.between(reading.pose)), reading.twist

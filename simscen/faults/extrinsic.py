@@ -61,7 +61,8 @@ class Extrinsic(Spec, Fault):
                     image = simulator.image(error)
                     return replace(reading, rgb=image.rgb, depth=image.depth)
                 case Imu(angular_velocity=angular, linear_acceleration=linear):
-                    (x, y, z), (a, b, c) = (np.array([angular, linear]) @ error.rotation()).tolist()
+                    with np.errstate(invalid="ignore"):  # garbage from another fault
+                        (x, y, z), (a, b, c) = (np.array([angular, linear]) @ error.rotation()).tolist()
                     return replace(reading, angular_velocity=(x, y, z), linear_acceleration=(a, b, c))
                 case _:
                     return reading

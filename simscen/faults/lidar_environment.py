@@ -79,7 +79,7 @@ class Rain(Spec, Fault):
             errors = relative_std * rng.standard_normal(len(scan.ranges))
             is_finite = np.isfinite(scan.ranges)
             noisy = np.where(is_finite, np.round(scan.ranges * (1 + errors), 3), scan.ranges)
-            with np.errstate(invalid="ignore"):
+            with np.errstate(invalid="ignore", divide="ignore"):
                 returned_light = self.reflectivity * np.exp(-2 * extinction * scan.ranges) / scan.ranges**2
                 is_detected = returned_light >= REFERENCE_REFLECTIVITY / scan.range_max**2
             return np.where(is_finite & ~is_detected, np.inf, clip_to_sensor_range(scan, noisy))

@@ -150,15 +150,16 @@ def _costmap(
 def map_from_odom(trace: Trace, tick: int) -> Pose2:
     """Return the pose of the odom frame in the map frame, from the newest belief at `tick`.
 
-    Without belief or odometry, return the identity.
+    Without belief or odometry, or if one is garbage such as nan, return the identity.
     """
     if not len(trace.belief) or not len(trace.odometry):
         return Pose2(0.0, 0.0)
     newest = trace.belief.ticks[max(int(np.searchsorted(trace.belief.ticks, tick, side="right")) - 1, 0)]
     ticks = np.array([newest])
-    belief = Pose2(*trace.belief.at(ticks)[0, :3].tolist())
-    odometry = Pose2(*trace.odometry.at(ticks)[0, :3].tolist())
-    return belief.compose(odometry.inverse())
+    belief, odometry = (samples.at(ticks)[0, :3] for samples in (trace.belief, trace.odometry))
+    if not (np.isfinite(belief).all() and np.isfinite(odometry).all()):
+        return Pose2(0.0, 0.0)
+    return Pose2(*belief.tolist()).compose(Pose2(*odometry.tolist()).inverse())
 
 
 def _rounded(pose: Sequence[float]) -> list[float]:

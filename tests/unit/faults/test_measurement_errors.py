@@ -97,6 +97,15 @@ def test_drift_grows_with_the_time_since_its_start():
         assert lidar.reading(scan([2.0], tick)).ranges == pytest.approx([2.0 + 0.05 * seconds])
 
 
+@pytest.mark.parametrize("garbage", [math.nan, math.inf, 1e30])
+def test_garbage_does_not_change_later_distorted_odometry(garbage):
+    effect = start({"scale": {"factor": 2.0}}, "Odometry")
+    assert effect.reading(odometry(Pose2(0, 0))).pose == Pose2(0, 0)
+    rubbish = odometry(Pose2(garbage, garbage, garbage))
+    assert effect.reading(rubbish) is rubbish
+    assert effect.reading(odometry(Pose2(1, 0))).pose == Pose2(2, 0)
+
+
 def test_odometry_drifts_at_standstill_and_keeps_the_drift_after_the_fault():
     effect = start({"drift": {"linear": "10 cm/s"}}, "Odometry")
     for tick in range(0, 481, 6):

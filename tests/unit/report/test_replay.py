@@ -19,6 +19,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.goals import Goal
 from simscen.core.records.case import Case
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
+from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.record.log_header import LogHeader
 from simscen.record.log_reader import Log
@@ -224,6 +225,13 @@ def test_local_costmap_is_drawn_at_the_estimated_odom_frame() -> None:
     believed = log.trace.belief.at(np.array([240]))[0]
     rolled = Pose2(*log.trace.odometry.at(np.array([240]))[0])
     assert correction.compose(rolled) == pytest.approx(tuple(believed[:3]))
+
+
+@pytest.mark.parametrize("garbage", [math.nan, math.inf])
+def test_local_costmap_is_drawn_in_the_map_frame_if_the_odometry_is_garbage(garbage: float) -> None:
+    trace = log_of({"seconds": 2, "truth": [[0, 1, 0, 0], [2, 3, 0, 0]]}).trace
+    odometry = Samples(trace.odometry.ticks, np.full_like(trace.odometry.values, garbage))
+    assert map_from_odom(replace(trace, odometry=odometry), 240) == Pose2(0.0, 0.0)
 
 
 def test_grids_with_equal_frame_are_stored_as_differences() -> None:
