@@ -50,13 +50,15 @@ def simulate(
     pin_kernels()  # before NumPy is imported
     from pathlib import Path
 
+    from simscen.cli.diagnostics import paths_from_working_folder
     from simscen.cli.session.stacks import load_with_stack
     from simscen.run.preparation import prepare
     from simscen.run.simulate import simulate as run
 
     root_folder = None if root is None else Path(root)
     loaded = load_with_stack(stack, Path(scenario), root_folder, [Path(folder) for folder in world_path], variation)
-    return run(prepare(loaded), seed, log=None if log is None else Path(log))
+    with paths_from_working_folder(loaded.root):
+        return run(prepare(loaded), seed, log=None if log is None else Path(log))
 
 
 def variations(
@@ -72,6 +74,7 @@ def variations(
     """
     from pathlib import Path
 
+    from simscen.cli.diagnostics import relative_to_working_folder
     from simscen.core.errors import InvalidInput
     from simscen.loading.files.discovery import default_root
     from simscen.loading.scenario import try_variations
@@ -80,5 +83,5 @@ def variations(
     root_folder = default_root([file]) if root is None else Path(root)
     found = try_variations(file, root_folder, [Path(folder) for folder in world_path])
     if isinstance(found, list):
-        raise InvalidInput(found)
+        raise InvalidInput(relative_to_working_folder(found, root_folder))
     return [one.variation for one in found]

@@ -14,7 +14,7 @@ import pytest
 from _pytest._code.code import ReprEntryNative, ReprExceptionInfo, ReprFileLocation, ReprTraceback
 
 import simscen
-from simscen.cli.diagnostics import as_text
+from simscen.cli.diagnostics import as_text, relative_to_working_folder
 from simscen.cli.session.backends import FORK_SERVER
 from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.stacks import parse_stacks
@@ -133,7 +133,7 @@ class ScenarioFile(pytest.File):
         options = SessionOptions(seed=_seed(config), repeat=config.getoption("--simscen-repeat"))
         for choice in checker.choices:
             scenarios, problems = checker.check_scenario(self.path, choice)
-            _raise_errors(problems)
+            _raise_errors(problems, root)
             for scenario in scenarios:
                 loaded = scenario.with_changes(several_stacks=len(checker.choices) > 1)
                 for seed in scenario_seeds(loaded, options):
@@ -164,7 +164,7 @@ class ScenarioRun(pytest.Item):
 
     def runtest(self) -> None:
         """Run the scenario in its own process. Raises ScenarioFailed if the run fails unexpectedly or is aborted."""
-        _raise_errors(world_problems(self._scenario))
+        _raise_errors(world_problems(self._scenario), self._scenario.root)
         run = runner_of(self.config).run(self._scenario, self._seed)
         self.user_properties += _properties(run)
         if run.outcome is Outcome.FAILED_AS_EXPECTED:
@@ -185,10 +185,13 @@ class ScenarioRun(pytest.Item):
         return self.path, 0, self.name
 
 
-def _raise_errors(problems: list[Problem]) -> None:
-    """Raise InvalidInput if there is a problem with severity error. Ignore warnings."""
+def _raise_errors(problems: list[Problem], root: Path) -> None:
+    """Raise InvalidInput if there is a problem with severity error. Ignore warnings.
+
+    Paths in `problems` are relative to `root`, and in InvalidInput to the working folder.
+    """
     if errors := [problem for problem in problems if problem.severity == "error"]:
-        raise InvalidInput(errors)
+        raise InvalidInput(relative_to_working_folder(errors, root))
 
 
 def _seed(config: pytest.Config) -> int | None:

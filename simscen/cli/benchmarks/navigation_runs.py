@@ -10,7 +10,7 @@ from simscen.bench.localization.consistency import anees_bounds, nees_at
 from simscen.bench.navigation.experiments import Drive, Experiment
 from simscen.bench.navigation.summary import ExperimentSummary, Trial, mean, summarize
 from simscen.cli.benchmarks.results import print_progress
-from simscen.cli.diagnostics import print_text
+from simscen.cli.diagnostics import paths_from_working_folder, print_text
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.pending_runs import plan_session
 from simscen.core.errors import Exit, InvalidInput
@@ -109,10 +109,11 @@ def _plan_jobs(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job],
     drives: dict[RunKey, tuple[int, Drive]] = {}
     for number, experiment in enumerate(experiments):
         for index, drive in enumerate(experiment.drives):
-            scenario = load_scenario(drive.file, experiment.root, experiment.world_path)
-            found = world_problems(scenario) if index == 0 else []
-            if problems := [problem for problem in found if problem.severity == "error"]:
-                raise InvalidInput(problems)
+            with paths_from_working_folder(experiment.root):
+                scenario = load_scenario(drive.file, experiment.root, experiment.world_path)
+                found = world_problems(scenario) if index == 0 else []
+                if problems := [problem for problem in found if problem.severity == "error"]:
+                    raise InvalidInput(problems)
             for seed in drive.seeds:
                 key = RunKey(scenario.id, seed)
                 if key in drives:

@@ -112,9 +112,10 @@ def load_with_stack(
     root_folder = root or default_root([file])
     stacks = parse_stacks([] if stack is None else [stack], root_folder, world_path)
     chosen = next(iter(stacks.chosen), None)
-    loaded, problems = stacks.with_command(load_scenario(file, root_folder, world_path, chosen, variation))
-    if problems:
-        raise InvalidInput(problems)
+    with paths_from_working_folder(root_folder):
+        loaded, problems = stacks.with_command(load_scenario(file, root_folder, world_path, chosen, variation))
+        if problems:
+            raise InvalidInput(problems)
     return loaded
 
 

@@ -4,7 +4,21 @@ from pathlib import Path
 
 import pytest
 
+from simscen import simulate, variations
+from simscen.core.errors import InvalidInput
+
 INVALID_WORLD = "simscen: 1\nwalls: 3\n"
+
+
+def subfolder(root: Path) -> Path:
+    """Return a folder with a valid and an invalid scenario, in a repository, which is the root of all files."""
+    folder = root / "sub"
+    folder.mkdir()
+    (root / ".git").mkdir()
+    good = (root / "good.scenario.yaml").read_text()
+    (folder / "good.scenario.yaml").write_text(good)
+    (folder / "bad.scenario.yaml").write_text(good.replace("name: drive", "nam: drive"))
+    return folder
 
 
 @pytest.mark.parametrize(
@@ -25,12 +39,8 @@ INVALID_WORLD = "simscen: 1\nwalls: 3\n"
 def test_problems_of_a_file_in_a_subfolder_name_the_path_from_there(
     simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], place: str
 ) -> None:
-    folder = tmp_path / "sub"
-    folder.mkdir()
-    (tmp_path / ".git").mkdir()  # the root of all files
-    good = (tmp_path / "good.scenario.yaml").read_text()
-    (folder / "good.scenario.yaml").write_text(good)
-    (folder / "bad.scenario.yaml").write_text(good.replace("name: drive", "nam: drive"))
+    folder = subfolder(tmp_path)
+    good = (folder / "good.scenario.yaml").read_text()
     (folder / "variations.scenario.yaml").write_text(good + "variations: {grid: 3}\n")
     (folder / "bad.robot.yaml").write_text("simscen: 1\n")
     (folder / "bad.world.yaml").write_text(INVALID_WORLD)
@@ -38,3 +48,13 @@ def test_problems_of_a_file_in_a_subfolder_name_the_path_from_there(
     ended = simscen(*arguments)
     assert ended.code == 2
     assert ended.err.startswith(place), ended.err
+
+
+@pytest.mark.usefixtures("simscen")
+@pytest.mark.parametrize("function", [simulate, variations])
+def test_exceptions_of_the_python_interface_name_the_path_from_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, function
+) -> None:
+    monkeypatch.chdir(subfolder(tmp_path))
+    with pytest.raises(InvalidInput, match=r"^bad\.scenario\.yaml:2:1"):
+        function("bad.scenario.yaml")

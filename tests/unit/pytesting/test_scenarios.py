@@ -56,11 +56,11 @@ def project(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def run(project: Path):
-    def call(*arguments: str) -> tuple[int, str]:
+    def call(*arguments: str, folder: str = ".") -> tuple[int, str]:
         plugin = ("-p", "no:simscen", "-p", "simscen.testing.plugin", "--strict-markers", "--color=no")
         done = subprocess.run(
             [sys.executable, "-m", "pytest", *plugin, *arguments],
-            cwd=project, capture_output=True, text=True, check=False,
+            cwd=project / folder, capture_output=True, text=True, check=False,
         )  # fmt: skip
         return done.returncode, done.stdout + done.stderr
 
@@ -75,6 +75,14 @@ def test_without_configuration_nothing_is_collected(run, project: Path) -> None:
     code, output = run("--collect-only", "-q")
     assert (code, collected(output)) == (0, ["test_own.py::test_own"])
     assert not (project / "simscen-out").exists()
+
+
+def test_problems_name_files_relative_to_the_working_folder(run, project: Path) -> None:
+    (project / ".git").mkdir()  # the root of the scenarios
+    (project / "scenarios/wrong.scenario.yaml").write_text(ROOM.replace("goals", "gaols"))
+    code, output = run("--collect-only", "wrong.scenario.yaml", folder="scenarios")
+    assert code == 2, output
+    assert "\nwrong.scenario.yaml:5:1: error[SC012]" in output
 
 
 @pytest.mark.slow
