@@ -53,11 +53,18 @@ def object_positions(trace: Trace, name: str) -> Array:
 
     Raises MissingEvidence if the trace does not contain the object.
     """
+    spawned = [event for event in trace.of_kind(EventKind.OBJECT_SPAWNED) if event.name == name]
     if name in trace.objects:
-        return check_samples(trace.objects[name], f"the pose of {name}", trace).at(trace.truth.ticks)
-    for event in trace.of_kind(EventKind.OBJECT_SPAWNED):
+        samples, clock = check_samples(trace.objects[name], f"the pose of {name}", trace), trace.truth.ticks
+        poses = samples.at(clock)
+        for event in spawned:  # until its next sample, the newest one is from before it was removed
+            first = int(np.searchsorted(samples.ticks, event.tick, side="right"))
+            if first < len(samples):
+                poses[(clock >= event.tick) & (clock < samples.ticks[first])] = samples.values[first]
+        return poses
+    for event in spawned:
         x, y = event.data.get("x"), event.data.get("y")
-        if event.name == name and isinstance(x, int | float) and isinstance(y, int | float):
+        if isinstance(x, int | float) and isinstance(y, int | float):
             return np.array([[x, y]], dtype=np.float64)
     raise MissingEvidence(f"`{name}` never existed, or does not move")
 

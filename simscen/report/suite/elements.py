@@ -48,7 +48,7 @@ def address(path: str, folder: str) -> str:
 
 
 def anchor(key: RunKey) -> str:
-    """Return the unique HTML ID of the entry of a run, such as "run-faults-lidar_off-seed-7"."""
+    """Return the HTML ID of the entry of a run, such as "run-faults-lidar_off-seed-7"."""
     parts = [key.scenario, key.variation, f"seed-{key.seed}", key.stack_name]
     return "run-" + re.sub(r"[^\w.=]+", "-", "-".join(part for part in parts if part), flags=re.ASCII)
 

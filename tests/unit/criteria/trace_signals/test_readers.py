@@ -360,3 +360,11 @@ def test_a_goal_matches_its_name_in_each_loop_and_other_names_match_exactly():
 def test_a_state_that_ends_at_the_tick_of_its_start_counts_at_one_sample(name, start, end):
     words = {"seconds": 4, "truth": [[0, 0, 0]], "events": [[1, start, "shelf"], [1, end, "shelf"]]}
     assert np.flatnonzero(signal(name, words)).tolist() == [40]
+
+
+def test_object_that_is_spawned_again_is_at_its_new_position_at_once():
+    events = [[0, "object.spawned", "box"], [1, "object.removed", "box"], [2, "object.spawned", "box"]]
+    trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0]], "events": events})
+    box = Samples(np.array([6, 486], dtype=np.int64), np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]]))
+    values = read_signal("distance_to", replace(trace, objects={"box": box}), synthetic_case({}), {"object": "box"})
+    assert [at(values, seconds) for seconds in (0, 0.5, 1.5, 2, 3)] == [0, 0, math.inf, 5, 5]
