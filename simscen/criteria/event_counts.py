@@ -13,6 +13,7 @@ from simscen.core.records.verdict import Evidence, Finding, Status
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import counted, undecided
 from simscen.criteria.timeline import has_ended
+from simscen.criteria.trace_signals.event_readers import replans
 from simscen.spec.base import Spec
 from simscen.spec.extensible_union import BehaviorName
 
@@ -69,6 +70,8 @@ class Replans(CountBounds, Criterion):
         replans all the time does not follow any plan.
     Source: Nav2's navigate_to_pose_w_replanning trees.
 
+    Inconclusive if an external stack reports plans, but not why it made them.
+
     Example: `replans: {min: 1}`
     """
 
@@ -81,15 +84,11 @@ class Replans(CountBounds, Criterion):
     evidence: ClassVar[frozenset[Evidence]] = frozenset({Evidence.PLANNING})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for each bound."""
-        plans = trace.of_kind(EventKind.PLAN_MADE)
-        replans = [plan for plan in plans if plan.data.get("reason", "goal") != "goal"]
-        if self.reason is not None:
-            replans = [plan for plan in replans if plan.data.get("reason") == self.reason]
-        details = [
-            f"t = {trace.seconds(plan.tick):.2f} s: {plan.data.get('reason', 'goal')}" for plan in plans[:MAX_DETAILS]
-        ]
-        return self.judge_count(trace, "replans", "replan", replans, details or ["no plan was ever made"])
+        """Return one finding for each bound. Raises MissingEvidence if the reasons for the plans are unknown."""
+        counted_replans = [plan for plan in replans(trace) if self.reason in (None, plan.data["reason"])]
+        plans = trace.of_kind(EventKind.PLAN_MADE)[:MAX_DETAILS]
+        details = [f"t = {trace.seconds(plan.tick):.2f} s: {plan.data.get('reason', 'goal')}" for plan in plans]
+        return self.judge_count(trace, "replans", "replan", counted_replans, details or ["no plan was ever made"])
 
 
 class Recoveries(CountBounds, Criterion):

@@ -135,7 +135,7 @@ class Speed(Spec, Criterion):
         return at_most("speed", value, limit, "m/s", at=(trace, int(signal.ticks[k])), context=context)
 
     def _inside(self, trace: Trace, case: Case, signal: Samples) -> ground_truth.Flags | None:
-        """Return a mask (n,) of the samples at which the robot's center was in the region `in`, by default all.
+        """Return for each sample whether the robot's center was in the region `in`; always True without `in`.
 
         Return None if the world has no such region.
         """

@@ -70,7 +70,7 @@ class SpeedLimits:
 
 
 def in_keepout_mask(mask: OccupancyGrid, points: Array) -> npt.NDArray[np.bool_]:
-    """Return a mask (n,) of the points (n, 2) in the map frame that lie in occupied cells of a keepout mask."""
+    """Return for each of the points (n, 2) in the map frame whether it lies in an occupied cell of a keepout mask."""
     return np.asarray(mask.values_at(points) == OCCUPIED)
 
 

@@ -69,8 +69,18 @@ def collision_count(query: SignalQuery) -> Array:
 
 def replan_count(query: SignalQuery) -> Array:
     """Return the number of plans that were made so far for another reason than a new goal."""
-    plans = query.trace.of_kind(EventKind.PLAN_MADE)
-    return _count_until_samples(query.trace, [plan for plan in plans if plan.data.get("reason", "goal") != "goal"])
+    return _count_until_samples(query.trace, replans(query.trace))
+
+
+def replans(trace: Trace) -> list[Event]:
+    """Return the events of plans that were made for another reason than a new goal.
+
+    Raises MissingEvidence if the trace has plans, but the stack did not report why it made them.
+    """
+    plans = trace.of_kind(EventKind.PLAN_MADE)
+    if trace.plans and not plans:
+        raise MissingEvidence("the stack did not report why it made its plans")
+    return [plan for plan in plans if plan.data.get("reason", "goal") != "goal"]
 
 
 def recovery_count(query: SignalQuery) -> Array:

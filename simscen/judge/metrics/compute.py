@@ -20,6 +20,7 @@ from simscen.criteria.goal_outcomes import goal_outcomes
 from simscen.criteria.goals_reached import GoalsReached
 from simscen.criteria.trace_signals.catalog import read_signal
 from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M, pedestrian_gap
+from simscen.criteria.trace_signals.event_readers import replans
 from simscen.criteria.trace_signals.ground_truth import clearance, drive, speed, truth, turn_rate
 from simscen.criteria.trace_signals.sparc_ldlj import MIN_MOVING_SPEED_M_S, evenly_sampled_speed, ldlj, sparc
 from simscen.judge.evaluation import missing_evidence_reason, partial_evidence_reason
@@ -203,13 +204,19 @@ def _event_metrics(trace: Trace) -> Values:
     # The end of a contact that began before the log must not cancel another one.
     contact_counts = np.array(list(accumulate(steps, lambda number, step: max(number, 0) + step)))
     durations = np.diff([*(event.tick for event in events), trace.end])
-    plans = trace.of_kind(EventKind.PLAN_MADE)
     return {
         "collisions": float(steps.count(1)),
         "contact_time": trace.seconds(int(durations[contact_counts > 0].sum())),
-        "replans": float(sum(plan.data.get("reason", "goal") != "goal" for plan in plans)),
+        "replans": _replan_count(trace),
         "recoveries": float(len(trace.of_kind(EventKind.RECOVERY_STARTED))),
     }
+
+
+def _replan_count(trace: Trace) -> float | str:
+    try:
+        return float(len(replans(trace)))
+    except MissingEvidence as reason:
+        return str(reason)
 
 
 def person_metrics(trace: Trace, case: Case) -> Values:
