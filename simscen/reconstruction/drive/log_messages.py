@@ -48,7 +48,6 @@ EXTRA_TOPICS = {
     "bumper": "/bumper",
     "map": topics.MAP.name,
     "goal": topics.GOAL.name,
-    "initial": "/initialpose",
     "footprint": "/local_costmap/published_footprint",
     "events": topics.EVENTS.name,
 }
@@ -75,7 +74,6 @@ def decode_polygon(reader: MessageReader) -> PolygonMessage:
 
 _DECODERS: dict[str, Decoders] = {
     **DECODERS,
-    "initial": decode.POSE_DECODERS,
     "goal": decode.POSE_DECODERS,
     "scan": {topics.SCAN_TYPE: decode.laser_scan},
     "imu": {topics.IMU_TYPE: decode_imu},

@@ -121,7 +121,7 @@ class RecordedGoal:
         ended: Time in s of the result; None if the log has no result.
         status: "reached", "passed" (without a stop), "failed", "canceled", or "unknown".
         error: Name of the error code; "" for none.
-        source: Source of the goal in words. It begins with the topic if the goal is from a message.
+        source: Source of the goal in words. It begins with `/goal_pose` if the goal is from a message on this topic.
     """
 
     name: str

@@ -43,8 +43,13 @@ def propose_criteria(
     """Yield criteria for a drive. `is_refusal_expected` states that the robot must refuse all goals."""
     broken = {incident.criterion: incident for incident in incidents}
     if drive.goals:
-        yield ProposedCriterion("goals_reached", {}, _limit_reason(broken, "goals_reached", "all goals were reached"))
+        goals = _limit_reason(broken, "goals_reached", "all goals were reached")
+        if "goals_reached" not in broken and any(goal.status not in ("reached", "passed") for goal in drive.goals):
+            goals = Reason("the log does not show that all goals were reached", confidence="low")
+        yield ProposedCriterion("goals_reached", {}, goals)
     contact = _limit_reason(broken, "collisions", "no contact was recorded")
+    if not len(drive.bumper):
+        contact = Reason("the log does not show contacts, because it has no bumper", confidence="low")
     yield ProposedCriterion("collisions", {"max": 0}, contact)
     if "stuck" in broken:
         yield ProposedCriterion("stuck", {"max": f"{STUCK_S:g} s"}, _limit_reason(broken, "stuck", ""))

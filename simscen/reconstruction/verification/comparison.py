@@ -19,6 +19,7 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedG
 from simscen.reconstruction.scenario.criteria import path_length
 from simscen.reconstruction.scenario.incidents import Incident, find_incidents
 from simscen.reconstruction.scenario_from_log import Reconstruction
+from simscen.record.log_reader import invalid_log
 from simscen.record.mcap_reader import attached_result
 
 STEP_S = 0.1
@@ -105,11 +106,16 @@ class Verification:
 
 
 def compare_with_run(reconstruction: Reconstruction, log: Path) -> Verification:
-    """Compare the recorded drive with the log of a run of the scenario. Raises InvalidInput for an unusable log."""
+    """Compare the recorded drive with the log of a run of the scenario.
+
+    Raises InvalidInput for an unusable log, or a log without the result of the run.
+    """
     repeated = read_drive(log)
     incidents, others = compare_incidents(find_incidents(reconstruction.drive), find_incidents(repeated))
-    verdicts = (attached_result(log) or {}).get("verdicts", [])
-    failed = [verdict["id"] for verdict in verdicts if verdict["status"] != "pass"]
+    result = attached_result(log)
+    if result is None:
+        raise invalid_log(log, "SC802", "it has no result")
+    failed = [verdict["id"] for verdict in result["verdicts"] if verdict["status"] != "pass"]
     quantities = [*compare_drives(reconstruction.drive, repeated)]
     return Verification(reconstruction.drive, repeated, log, quantities, incidents, others, failed)
 

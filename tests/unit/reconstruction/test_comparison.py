@@ -1,16 +1,23 @@
+import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import synthetic_drives as drives
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "record"))
+import foreign_logs as logs
+
+from simscen.core.errors import InvalidInput
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.scenario.incidents import Incident
 from simscen.reconstruction.verification.comparison import (
     Verification,
     compare_drives,
     compare_incidents,
+    compare_with_run,
     fraction_seen_alike,
 )
 from simscen.reconstruction.verification.page import verification_page
@@ -106,3 +113,9 @@ def test_the_page_shows_the_clearance_and_what_is_not_on_the_map():
     assert len(pictures) == 2 and pictures[0].partition('"')[0] != pictures[1].partition('"')[0]
     assert page.count("<figure>") == 4
     assert "no incident" in page
+
+
+def test_a_run_without_a_result_does_not_meet_all_criteria(tmp_path):
+    log = logs.write_mcap(tmp_path / "run.mcap", logs.drive(2.0))
+    with pytest.raises(InvalidInput, match="it has no result"):
+        compare_with_run(SimpleNamespace(drive=drives.drive()), log)

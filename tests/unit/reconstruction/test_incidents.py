@@ -6,7 +6,7 @@ import synthetic_drives as drives
 
 from simscen.core.geometry import Pose2
 from simscen.reconstruction.drive.goals import STOP_SOURCE
-from simscen.reconstruction.drive.recorded_drive import RecordedGoal
+from simscen.reconstruction.drive.recorded_drive import RecordedGoal, no_values
 from simscen.reconstruction.scenario.criteria import propose_criteria
 from simscen.reconstruction.scenario.incidents import find_incidents, longest_stay
 
@@ -101,3 +101,20 @@ def test_a_broken_criterion_has_the_limit_that_was_broken():
     found = limits(one)
     assert found["stuck"] == {"max": "10 s"}
     assert "time_to_goal" not in found
+
+
+def reasons(one):
+    return {each.kind: each.reason.comment for each in propose_criteria(one, find_incidents(one), (), False)}
+
+
+def test_criteria_do_not_state_what_the_log_does_not_show():
+    canceled = replace(drives.drive(), goals=(replace(REACHED, status="canceled"),))
+    assert reasons(canceled)["goals_reached"].startswith("the log does not show that all goals were reached")
+    assert reasons(drive())["goals_reached"].startswith("held: all goals were reached")
+    assert reasons(drive(bumper=drives.signal(np.zeros(0), np.zeros(0))))["collisions"].startswith(
+        "the log does not show contacts, because it has no bumper"
+    )
+    times = np.arange(0.0, drives.DURATION_S, 0.05)
+    assert reasons(drive(bumper=drives.signal(times, np.zeros(len(times)))))["collisions"].startswith(
+        "held: no contact"
+    )
