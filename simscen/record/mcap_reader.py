@@ -76,13 +76,21 @@ class RecordReader:
 
 
 def _decompressed(chunk: records.Chunk) -> records.Chunk:
-    """Return a chunk, decompressed if it uses lz4. Raises ValueError if the chunk has more than MAX_RECORD_BYTES."""
-    if chunk.compression == "lz4":  # the library would decompress it without a limit
-        data = LZ4FrameDecompressor().decompress(chunk.data, max_length=MAX_RECORD_BYTES + 1)
-        chunk = replace(chunk, compression="", data=data, uncompressed_size=len(data))
+    """Return a chunk, decompressed if it uses lz4.
+
+    Raises ValueError if the chunk is damaged or has more than MAX_RECORD_BYTES.
+    """
     if chunk.uncompressed_size > MAX_RECORD_BYTES:
         raise ValueError(f"a chunk has more than {MAX_RECORD_BYTES >> 20} MiB of messages")
-    return chunk
+    if chunk.compression != "lz4":
+        return chunk
+    try:  # the library would decompress it without a limit
+        data = LZ4FrameDecompressor().decompress(chunk.data, max_length=chunk.uncompressed_size + 1)
+    except RuntimeError as error:
+        raise ValueError(f"a chunk cannot be decompressed: {error}") from error
+    if len(data) != chunk.uncompressed_size:
+        raise ValueError("a chunk does not have the size in its header")
+    return replace(chunk, compression="", data=data)
 
 
 class _ExactStream:

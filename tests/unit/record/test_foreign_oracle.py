@@ -2,10 +2,11 @@
 
 import random
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from foreign_logs import drive, write_mcap
+from foreign_logs import CHUNKED, drive, write_mcap
 from mcap import records
 from mcap.writer import Writer
 
@@ -95,10 +96,9 @@ def test_verdicts_and_margins_are_equal(own: Path, disguised: Path, text: dict[s
     assert Status.INCONCLUSIVE not in {finding.status for finding in its.findings}
 
 
-@pytest.mark.parametrize("compressed", [True, False])
-def test_a_log_with_wrong_bytes_is_read_or_refused(tmp_path: Path, compressed: bool) -> None:
+@pytest.mark.parametrize("options", [*CHUNKED.values(), {"use_chunking": False}])
+def test_a_log_with_wrong_bytes_is_read_or_refused(tmp_path: Path, options: dict[str, Any]) -> None:
     rng, file = random.Random(7), tmp_path / "a.mcap"
-    options = {} if compressed else {"use_chunking": False}
     data = write_mcap(file, drive(2.0), **options).read_bytes()
     refused = 0
     for _ in range(150):
