@@ -101,7 +101,7 @@ SLIP_DURATION_S = (0.3, 1.5)
 
 @dataclass(frozen=True)
 class OdometryErrors:
-    """Standard deviations of systematic errors of wheel odometry. The errors are drawn once for each log.
+    """Standard deviations of systematic errors of wheel odometry. `simulate_odometry` draws the errors once per call.
 
     scale:      relative error of distances, caused by a wrong wheel radius
     turn:       relative error of rotations, caused by a wrong wheel separation
