@@ -114,7 +114,7 @@ def _defect(finding: object) -> str:
     margin, status = finding.margin, finding.status
     if margin is None or status not in (Status.PASS, Status.FAIL):
         return ""
-    if (margin < 0) is not (status is Status.FAIL):
+    if (margin < 0) != (status is Status.FAIL):  # `!=`, because numpy compares to its own bool
         return f"{what} has the status {status.value} but a margin of {margin:g}"
     if math.isinf(margin) and (finding.value is None or math.isfinite(finding.value)):
         return f"the margin of {what} is infinite, so its limit is not finite"

@@ -136,3 +136,9 @@ GOOD = Finding(Status.PASS, "value", "1 m", "≥ 0 m", 1.0, "m", 1.0)
 )
 def test_findings_of_plug_ins_are_checked(findings: object, defect: str) -> None:
     assert findings_defect(findings) == defect
+
+
+@pytest.mark.parametrize(("margin", "status"), [(0.5, Status.PASS), (-0.5, Status.FAIL)])
+def test_a_margin_may_be_a_number_of_numpy(margin, status):
+    assert findings_defect([Finding(status, "speed", "1", "≤ 2", np.float64(margin))]) == ""
+    assert "a margin of" in findings_defect([Finding(status, "speed", "1", "≤ 2", np.float64(-margin))])
