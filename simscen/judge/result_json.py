@@ -51,7 +51,7 @@ def from_json(text: str) -> RunResult:
     """Parse the text that `to_json` returned. Raises ValueError for other content or another format."""
     try:
         return from_data(json.loads(text))
-    except (AttributeError, KeyError, TypeError) as error:
+    except (AttributeError, LookupError, OverflowError, RecursionError, TypeError) as error:
         raise ValueError(f"not a result of a run: {error!r}") from error
 
 
@@ -63,7 +63,7 @@ def read_result(path: Path) -> RunResult:
 def from_data(data: dict[str, Any]) -> RunResult:
     """Return the result from the JSON data that `result_data` returned.
 
-    Raises ValueError, KeyError or TypeError for other content.
+    Raises ValueError, AttributeError, LookupError, OverflowError, or TypeError for other content.
     """
     if data["format"] != FORMAT:
         raise ValueError(f"a result of format {data['format']}; this version reads {FORMAT}")
@@ -157,6 +157,7 @@ def _finite_or_none(value: float | None) -> float | None:
 
 
 def _finding_data(verdict: Verdict, finding: Finding, tick_rate: int) -> dict[str, Any]:
+    place = finding.place
     return {
         "status": finding.status.value,
         "what": finding.what,
@@ -167,7 +168,7 @@ def _finding_data(verdict: Verdict, finding: Finding, tick_rate: int) -> dict[st
         "unit": finding.unit,
         "tick": finding.tick,
         "time": None if finding.tick is None else finding.tick / tick_rate,
-        "place": None if finding.place is None else list(finding.place),
+        "place": list(place) if place is not None and all(map(math.isfinite, place)) else None,
         "detail": list(finding.detail),
         "message": sentence(verdict, finding, tick_rate),
     }

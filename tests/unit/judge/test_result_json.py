@@ -95,3 +95,24 @@ def test_error_states_whether_the_stack_is_its_cause(by_stack):
     result = RunResult(RunKey("a", 1), "a", Outcome.ERROR, error=failure)
     assert from_json(to_json(result)).error == failure
     assert ("by_stack" in result_data(result)["error"]) == by_stack
+
+
+@pytest.mark.parametrize("change", [{"simulated_seconds": 10**400}, {"verdicts": [{"line": 0, "findings": []}]}])
+def test_values_that_cannot_be_converted_are_refused(change):
+    with pytest.raises(ValueError, match="not a result of a run"):
+        from_json(json.dumps({**result_data(FAILED), **change}))
+
+
+def test_deeply_nested_text_and_a_place_without_numbers_are_refused():
+    with pytest.raises(ValueError, match="not a result of a run"):
+        from_json("[" * 100_000)
+    data = result_data(FAILED)
+    data["verdicts"][0]["findings"][0]["place"] = []
+    with pytest.raises(ValueError, match="not a result of a run"):
+        from_json(json.dumps(data))
+
+
+def test_a_place_that_is_not_finite_is_written_as_unknown():
+    finding = replace(PLACED, place=(math.nan, 0.0))
+    result = replace(FAILED, verdicts=(Verdict("speed", "speed", "fail", (finding,)),))
+    assert from_json(to_json(result)).verdicts[0].findings[0].place is None
