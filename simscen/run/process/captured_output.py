@@ -1,7 +1,8 @@
-"""Output of a process: its log file of limited size, and the part that an error message quotes."""
+"""Output and end of a process: its log file of limited size, and the texts that an error message quotes."""
 
 import os
 import re
+import signal
 from pathlib import Path, PurePath
 
 MAX_HEAD_BYTES = 1 << 20
@@ -66,6 +67,14 @@ class CappedLog:
         except OSError:  # no space left: the run reports it for its own files
             os.close(self._file)
             self._file = None
+
+
+def signal_name(number: int) -> str:
+    """Return the name of a signal, such as "SIGKILL"; "signal 40" for a real-time signal without a name."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 TAIL_LINES = 20

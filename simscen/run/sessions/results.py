@@ -15,7 +15,7 @@ from simscen.judge.result_json import from_json
 from simscen.loading.files.discovery import default_root
 from simscen.loading.loaded import LoadedScenario
 from simscen.record.log_file import PARTIAL_SUFFIX
-from simscen.run.process.captured_output import innermost_frame, output_tail
+from simscen.run.process.captured_output import innermost_frame, output_tail, signal_name
 from simscen.run.process.isolation import MAX_MEMORY_BYTES
 from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd
 
@@ -101,7 +101,7 @@ def _failure_at_end(end: ProcessEnd | ForkServerDeath) -> RunFailure | None:
     if end.signal == signal.SIGKILL:
         return _worker_failure(end, f"killed (SIGKILL; possibly out of memory; {peak})")
     if end.signal is not None:
-        return _worker_failure(end, f"crashed: {signal.Signals(end.signal).name}{_crash_place(end)} ({peak})")
+        return _worker_failure(end, f"crashed: {signal_name(end.signal)}{_crash_place(end)} ({peak})")
     if end.code != 0:
         return _worker_failure(end, f"exited {end.code} ({peak})")
     if end.final_message is None:
