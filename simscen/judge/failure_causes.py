@@ -125,21 +125,25 @@ def _describe_hit(trace: Trace, touched: MovableObject, hit: Event) -> str:
             distance = touched.distance(np.array([trace.place(touched.since)]))[0]
             change = f"spawned it {distance:.2f} m from the robot's center"
         parts.append(f"event `{touched.event}` had {change} {ago}")
-    if (speed := _speed(trace, touched.name, hit.tick)) >= OBJECT_MOVING_SPEED_M_S:
+    if (speed := _speed(trace, touched, hit.tick)) >= OBJECT_MOVING_SPEED_M_S:
         parts.append(f"it moved at {speed:.2f} m/s")
     if hit.data.get("robot_caused") is False and parts:
         parts.append("and ran into the robot")
     return f"{touched.name}: {', '.join(parts)}" if parts else ""
 
 
-def _speed(trace: Trace, name: str, tick: int) -> float:
-    """Return the mean speed of an object in m/s during OBJECT_SPEED_WINDOW_S before `tick`."""
-    samples = trace.objects.get(name)
+def _speed(trace: Trace, touched: MovableObject, tick: int) -> float:
+    """Return the mean speed of an object in m/s in OBJECT_SPEED_WINDOW_S before `tick`, but after its last change."""
+    samples = trace.objects.get(touched.name)
     if samples is None:
         return 0.0
-    before = tick - round(OBJECT_SPEED_WINDOW_S * trace.tick_rate)
-    (x0, y0), (x1, y1) = samples.at(np.array([before, tick]))[:, :2].tolist()
-    return float(np.hypot(x1 - x0, y1 - y0)) / OBJECT_SPEED_WINDOW_S
+    # The sample at the tick of a change, such as a teleportation, precedes the change.
+    later = samples.ticks[samples.ticks > touched.since]
+    begin = max(tick - round(OBJECT_SPEED_WINDOW_S * trace.tick_rate), int(later[0])) if len(later) else tick
+    if begin >= tick:
+        return 0.0
+    (x0, y0), (x1, y1) = samples.at(np.array([begin, tick]))[:, :2].tolist()
+    return float(np.hypot(x1 - x0, y1 - y0)) / trace.seconds(tick - begin)
 
 
 ODOMETRY_FAULTS = frozenset({"bias", "slip", "scale", "drift", "noise"})

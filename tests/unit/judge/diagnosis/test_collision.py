@@ -27,3 +27,13 @@ def test_object_faster_than_6_cm_per_second_is_moving():
     )
     assert why("collisions", crate, at=2, objects=slow) == ["why: crate: it moved at 0.06 m/s"]
     assert why("collisions", crate, at=2, objects=still) == []
+
+
+def test_teleportation_of_an_object_is_not_a_speed():
+    """The sample at the tick of the event still has the earlier pose."""
+    placed = with_event("crate jumps", 1.9, [1.9, "object.placed", "crate", {}])
+    hit = [*HIT[:3], {"robot_caused": False}]
+    trajectory = {"crate": [[0, 2, 4], [1.9, 2, 4], [1.901, 2, 0.3], [10, 2, 0.3]]}
+    assert why("collisions", [*box(0, "crate", 2, 4, 0.4, 0.4), *placed, hit], at=2, objects=trajectory) == [
+        "why: crate: event `crate jumps` had moved it 0.10 s before, and ran into the robot"
+    ]
