@@ -71,11 +71,19 @@ def _compare(results: Iterable[RunResult], stacks: Mapping[str, str], significan
     """Compare the first of the `stacks` with each other one. `stacks` are the given values or folders by stack name."""
     runs = {one.key: one for one in results if not one.key.is_repetition and one.outcome is not Outcome.SKIPPED}
     baseline, *others = stacks
+    counts: dict[str, dict[str, Counter[Outcome]]] = {}
+    for key, run in runs.items():
+        own = counts.setdefault(key.test, {name: Counter() for name in stacks})
+        if key.stack_name in own:
+            own[key.stack_name][_own_outcome(run)] += 1
     return Comparison(
         stacks,
         {
-            scenario: {name: _outcomes(runs, scenario, name) for name in stacks}
-            for scenario in sorted({key.test for key in runs})
+            scenario: {
+                name: OutcomeCounts(count[Outcome.PASSED], count[Outcome.FAILED], count[Outcome.ERROR])
+                for name, count in own.items()
+            }
+            for scenario, own in sorted(counts.items())
         },
         tuple(_compare_with_baseline(runs, baseline, other, significance) for other in others),
     )
@@ -88,12 +96,6 @@ def _own_outcome(run: RunResult) -> Outcome:
     decisive = [verdict for verdict in run.verdicts if verdict.severity == "fail" and verdict.criterion != EXPECTED]
     has_passed = bool(run.reason) and all(verdict.status is Status.PASS for verdict in decisive)
     return Outcome.PASSED if has_passed or run.outcome is Outcome.PASSED else Outcome.FAILED
-
-
-def _outcomes(runs: Mapping[RunKey, RunResult], scenario: str, stack: str) -> OutcomeCounts:
-    """Return the numbers of outcomes of a scenario or variation with a stack."""
-    count = Counter(_own_outcome(run) for key, run in runs.items() if (key.test, key.stack_name) == (scenario, stack))
-    return OutcomeCounts(count[Outcome.PASSED], count[Outcome.FAILED], count[Outcome.ERROR])
 
 
 def _compare_with_baseline(
