@@ -38,7 +38,8 @@ class LaunchedCommand:
         code = self._process.poll()
         if code is None:
             return None
-        return f"ended by signal {code - 128}" if code > 128 else f"ended with exit code {code}"
+        number = -code if code < 0 else code - 128
+        return f"ended by signal {number}" if 0 < number < signal.NSIG else f"ended with exit code {code}"
 
     def end(self) -> None:
         """End the command and all processes that it started, and wait until they have ended."""

@@ -17,6 +17,7 @@ from simscen.peer.cdr import HEADER
 from simscen.record.messages import message_templates
 from simscen.ros2 import messages
 from simscen.ros2.graph_names import TopicNames
+from simscen.ros2.launch import LaunchedCommand
 from simscen.ros2.options import AdapterError
 from simscen.ros2.ros_domain import claim_domain, ros_environment
 
@@ -152,6 +153,22 @@ def test_the_launcher_exits_with_the_code_of_its_command() -> None:
     for command, code in (("exit 3", 3), ("kill -9 $$", 137)):
         keeper = subprocess.Popen([sys.executable, str(FOLDER / "launch.py"), command], stdin=subprocess.PIPE)
         assert keeper.wait(30) == code
+
+
+@pytest.mark.parametrize(
+    ("command", "reason"),
+    [
+        ("exit 255", "ended with exit code 255"),
+        ("exit 3", "ended with exit code 3"),
+        ("kill -9 $$", "ended by signal 9"),
+    ],
+)
+def test_the_reason_for_the_end_of_a_command_is_its_exit_code_or_signal(command: str, reason: str) -> None:
+    launched = LaunchedCommand(command, os.environ)
+    while (found := launched.end_reason) is None:
+        time.sleep(0.02)
+    launched.end()
+    assert found == reason
 
 
 def test_poses_are_composed() -> None:
