@@ -123,6 +123,8 @@ def _belief(messages: MessagesByTopic, correction: Pose2 | None, dead_reckoned: 
     particles = _decode_last(messages, topics.PARTICLES.name, _decode_particles)
     exact_particles = _decode_last(messages, topics.PARTICLES.name + EXACT_SUFFIX, lambda data: _decode_table(data, 4))
     cloud = exact_particles if exact_particles is not None else particles
+    if cloud is not None and not np.isfinite(cloud).all():
+        raise ProtocolViolation(f"a particle on {topics.PARTICLES.name} that is not finite")
     return Belief(pose, covariance, correction, cloud if cloud is not None else np.empty((0, 4)))
 
 

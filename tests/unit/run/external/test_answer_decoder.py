@@ -170,3 +170,11 @@ def test_an_event_that_cannot_be_logged_is_refused(said: str) -> None:
 def test_a_welcome_that_cannot_be_logged_is_refused(told: str) -> None:
     with pytest.raises((ProtocolViolation, wire.Malformed)):
         Welcome.parse(wire.WELCOME, told.encode(), ())
+
+
+@pytest.mark.parametrize("topic", ["/particle_cloud", "/particle_cloud/exact"])
+def test_particles_that_are_not_finite_are_refused(topic: str) -> None:
+    particle = (1.0, 2.0, 3.0, float("nan"))
+    data = messages.float64_array(particle) if "exact" in topic else messages.particle_cloud((1, 0), [particle])
+    with pytest.raises(ProtocolViolation, match="a particle on /particle_cloud that is not finite"):
+        understand(**{"/amcl_pose": EXAMPLES["/amcl_pose"], topic: data})
