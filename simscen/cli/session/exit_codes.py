@@ -24,7 +24,7 @@ def exit_code(finished_runs: Sequence[RunFinished], study: Study | None = None) 
     if study is not None and study.claim is not None:
         return CLAIM_EXIT_CODES[study.claim.status]
     outcomes = {finished.outcome for finished in finished_runs}
-    if outcomes == {Outcome.SKIPPED}:
+    if outcomes <= {Outcome.SKIPPED}:
         return Exit.NOTHING_SELECTED
     if Outcome.ERROR in outcomes:
         only_not_run = all(a.result.error is None or a.result.error.kind == NOT_RUN for a in finished_runs)

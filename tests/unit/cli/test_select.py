@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from simscen.cli.session.exit_codes import exit_code
 from simscen.cli.session.selection import Selection, load_selection, shard_of
-from simscen.core.errors import InvalidInput, UsageError
+from simscen.core.errors import Exit, InvalidInput, UsageError
 
 TEXT = """\
 simscen: 1
@@ -56,3 +57,7 @@ def test_notes_of_a_world_are_reported_once(folder: Path) -> None:
     assert [warning.severity for warning in warnings] == ["warning"]
     assert "only the first world of a file is loaded" in warnings[0].message
     assert load_selection([folder], folder, [], False, Selection(keyword="a"))[1] == []
+
+
+def test_a_session_without_runs_is_not_passed() -> None:
+    assert exit_code([]) is Exit.NOTHING_SELECTED
