@@ -77,7 +77,7 @@ def test_study_finds_the_parameter_that_lowers_the_margin(tmp_path: Path) -> Non
     page = (tmp_path / "out/report.html").read_text()
     assert "margin of clearance against robot.pose.x" in page
     assert page.count('<circle class="bad"') == 2 * found["failed"]
-    assert 'href="runs/s.study/' in page
+    assert 'href="./runs/s.study/' in page
 
 
 def test_results_do_not_depend_on_the_number_of_workers_or_on_batches(tmp_path: Path) -> None:
