@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simscen.cli.session.exit_codes import exit_code
-from simscen.cli.session.pending_runs import divide_runs, previous_results, write_reused
+from simscen.cli.session.pending_runs import divide_runs, previous_session, reusable_results, write_reused
 from simscen.core.errors import Exit
 from simscen.core.records.disturbances import Disturbance, DisturbanceOutcome
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
@@ -219,7 +219,7 @@ def test_resumed_session_runs_each_planned_run_that_has_no_result(tmp_path_facto
     plan = [replace(one, digest="new") if one.key in changed else one for one in planned(runs)]
     jobs = [SimpleNamespace(key=run.key) for run in runs]
     journal = Journal(folder, resume=True, sync=False)
-    remaining, reused = divide_runs(jobs, plan, previous_results(journal))
+    remaining, reused = divide_runs(jobs, plan, reusable_results(previous_session(journal)))
     journal.plan(plan, "1", 2)
     write_reused(journal, reused)
     done = [replace(run, wall=7.0) for run in runs if run.key in {job.key for job in remaining}]

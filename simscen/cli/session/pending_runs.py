@@ -15,7 +15,7 @@ from simscen.judge.result_json import result_data
 from simscen.loading.loaded import LoadedScenario
 from simscen.report.display_text import number_with_noun
 from simscen.report.journal import Journal
-from simscen.report.journal_reader import PlannedRun, read_journal
+from simscen.report.journal_reader import JournaledSession, PlannedRun, read_journal
 from simscen.report.session_history import last_failed
 from simscen.report.violations import short_run_name
 from simscen.run.process.jobs import Job
@@ -58,8 +58,9 @@ def plan_session(journal: Journal, jobs: Sequence[Job], workers: int, shard: tup
     `shard` is the number of this shard (from 1) and the count of shards.
     """
     planned = plan_runs(jobs)
-    warn_of_dropped_runs(journal, previous_keys(journal), planned)
-    remaining, reused = divide_runs(jobs, planned, previous_results(journal))
+    past = previous_session(journal)
+    warn_of_dropped_runs(journal.folder, past, planned)
+    remaining, reused = divide_runs(jobs, planned, reusable_results(past))
     journal.plan(planned, __version__, workers, shard)
     write_reused(journal, reused)
     return PendingRuns(
@@ -111,14 +112,20 @@ def write_reused(journal: Journal, reused: Sequence[RunFinished]) -> None:
         raise UsageError(f"cannot write the journal in {journal.folder}: {journal.error.strerror}")
 
 
-def previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:
-    """Return the reusable results of an earlier session in the folder of the journal, by planned run.
+def previous_session(journal: Journal) -> JournaledSession | None:
+    """Return the earlier session in the folder of the journal; None for a new folder."""
+    try:
+        return read_journal(journal.folder)
+    except InvalidInput:
+        return None
+
+
+def reusable_results(past: JournaledSession | None) -> dict[PlannedRun, RunFinished]:
+    """Return the reusable results of an earlier session, by planned run.
 
     A result is reusable if it is not an error and equals the result in its log.
     """
-    try:
-        past = read_journal(journal.folder)
-    except InvalidInput:  # a new folder
+    if past is None:
         return {}
     results = {run: past.finished[run.key] for run in past.planned if run.key in past.finished}
     return {
@@ -128,22 +135,15 @@ def previous_results(journal: Journal) -> dict[PlannedRun, RunFinished]:
     }
 
 
-def previous_keys(journal: Journal) -> Sequence[RunKey]:
-    """Return the keys of the planned runs of an earlier session in the folder of the journal."""
-    try:
-        return [run.key for run in read_journal(journal.folder).planned]
-    except InvalidInput:  # a new folder
-        return []
-
-
-def warn_of_dropped_runs(journal: Journal, earlier: Sequence[RunKey], planned: Sequence[PlannedRun]) -> None:
-    """Print a warning if runs of an earlier session in the folder are not planned again: reports will omit them."""
+def warn_of_dropped_runs(folder: Path, past: JournaledSession | None, planned: Sequence[PlannedRun]) -> None:
+    """Print a warning if runs of the earlier session in a folder are not planned again: reports will omit them."""
+    earlier = () if past is None else past.planned
     now = {run.key for run in planned}
-    dropped = [key for key in earlier if key not in now]
+    dropped = [run.key for run in earlier if run.key not in now]
     if dropped:
         runs = f"{number_with_noun(len(dropped), 'run')} of {len(earlier)}"
         text = f"{runs} of the session to resume, such as {short_run_name(dropped[0])}, will not be in its reports"
-        print_text(f"simscen: warning: {journal.folder}: {text}, because the selection has changed", sys.stderr)
+        print_text(f"simscen: warning: {folder}: {text}, because the selection has changed", sys.stderr)
 
 
 def _has_matching_log(finished: RunFinished) -> bool:

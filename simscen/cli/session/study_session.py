@@ -19,8 +19,8 @@ from simscen.cli.session.output_files import OutputOptions, Reports
 from simscen.cli.session.pending_runs import (
     divide_runs,
     plan_runs,
-    previous_keys,
-    previous_results,
+    previous_session,
+    reusable_results,
     warn_of_dropped_runs,
     write_reused,
 )
@@ -147,7 +147,8 @@ class _StudySession:
         """
         start, finished_runs, stopped = time.monotonic(), RunStore(), None
         error: SimscenError | None = None
-        earlier, earlier_keys = previous_results(journal), previous_keys(journal)
+        past = previous_session(journal)
+        earlier = reusable_results(past)
         scenario_id = next(iter(self._loaded.values())).id
         longest_title = scenario_id if self._space is None else scenario_title(scenario_id, f"variation-{self.total}")
 
@@ -184,7 +185,7 @@ class _StudySession:
                 error = raised
                 break
         if stopped is None:
-            warn_of_dropped_runs(journal, earlier_keys, self._planned)
+            warn_of_dropped_runs(journal.folder, past, self._planned)
         study = evaluate_study(self._study_plan(), (finished.result for finished in finished_runs))
         written = finish_session(reports, journal, listen, finished_runs, start, stopped is not None, study=study)
         if error is not None:
