@@ -66,7 +66,7 @@ class TimeToGoal(Spec, Criterion):
 
     def _judge_time(self, trace: Trace, what: str, start: int | None, outcome: GoalOutcome) -> Finding:
         """Return the finding for the time from the tick `start` until the goal was reached."""
-        if outcome.failure:
+        if outcome.expected_failure:
             return undecided(what, "the robot is expected to fail at this goal")
         expected = f"to be there within {self.max:.2f} s"
         detail = [f"goal {outcome.goal.name}: {outcome.summary}"]
@@ -135,7 +135,7 @@ class PathLength(Spec, Criterion):
             return undecided(what, because, f"≤ {self.max_ratio:g}")
         limit = self.max_ratio * shortest
         context = f"({self.max_ratio:g} times the shortest path of {shortest:.2f} m)"
-        unreached = [one for one in goal_outcomes(trace, case) if one.reached is None and not one.failure]
+        unreached = [one for one in goal_outcomes(trace, case) if one.reached is None and not one.expected_failure]
         if unreached and path.length <= limit:
             name = unreached[0].goal.name
             return undecided(what, f"goal {name} was not reached, so the path is incomplete", context)

@@ -27,14 +27,14 @@ class GoalOutcome:
     """Outcome of one goal, as reported by the robot.
 
     `accepted` is the tick at which the robot accepted the goal; None if it did not. `end` is the event that ended the
-    goal; None if the goal did not end. `failure` is the failure that the scenario expects: "failed", or the name of an
+    goal; None if the goal did not end. `expected_failure` is the failure that the scenario expects: "failed", or the name of an
     error code; "" if no failure is expected.
     """
 
     goal: Goal
     accepted: int | None
     end: Event | None
-    failure: str = ""
+    expected_failure: str = ""
 
     @property
     def reached(self) -> int | None:
@@ -44,14 +44,14 @@ class GoalOutcome:
     @property
     def must_be_reached(self) -> bool:
         """Whether the goal was not preempted and is not expected to fail."""
-        return not self.was_preempted and not self.failure
+        return not self.was_preempted and not self.expected_failure
 
     @property
     def failed_as_expected(self) -> bool:
         """Whether the goal failed as the scenario expects."""
         if self.end is None or self.end.kind != EventKind.GOAL_FAILED:
             return False
-        return self.failure in (FAILED, error_code_name(self.end))
+        return self.expected_failure in (FAILED, error_code_name(self.end))
 
     @property
     def was_preempted(self) -> bool:
@@ -70,9 +70,9 @@ class GoalOutcome:
 
 
 def goal_outcomes(trace: Trace, case: Case) -> list[GoalOutcome]:
-    """Return the outcome of each goal of the scenario and of each goal that an event sent, in order of acceptance.
+    """Return the outcome of each goal of the scenario and of each goal that an event sent, sorted by `outcome_start`.
 
-    Goals of the scenario that were never accepted come last. A via pose (a pose that the robot passes without a stop)
+    Goals without any report come last. A via pose (a pose that the robot passes without a stop)
     without reports gets the outcome of the next goal at which the robot stops, as Nav2 reports only whole actions.
     """
     reports = _reports_by_goal(trace)

@@ -76,7 +76,7 @@ class GoalsReached(Spec, Criterion):
         if not chosen and not findings:
             return [undecided("goals_reached", "the scenario has no goals", "reached")]
         for outcome in chosen:
-            if outcome.failure and not outcome.was_preempted:
+            if outcome.expected_failure and not outcome.was_preempted:
                 findings.append(_judge_expected_failure(trace, outcome))
             elif outcome.reached is None:
                 findings.append(self._judge_unreached(trace, outcome))
@@ -171,7 +171,7 @@ def _judge_time(trace: Trace, outcome: GoalOutcome, within: float) -> Finding:
 
 
 def _judge_expected_failure(trace: Trace, outcome: GoalOutcome) -> Finding:
-    expected = FAILED if outcome.failure == FAILED else f"failed with {outcome.failure}"
+    expected = FAILED if outcome.expected_failure == FAILED else f"failed with {outcome.expected_failure}"
     if outcome.end is None and not has_ended(trace):
         return _truncated_log_finding(trace, outcome, expected)
     at = (trace, trace.end if outcome.end is None else outcome.end.tick)

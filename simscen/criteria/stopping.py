@@ -30,15 +30,16 @@ class StoppedWithin(Spec, Criterion):
     """The robot stopped in time after a fault or an event.
 
     What is measured: the time from each start of `after` until the robot stands. The robot stands if its true speed is
-        at most `speed` and its true turn rate at most `turn_rate` for the duration `hold`.
+        at most `speed` and its true turn rate at most `turn_rate` for the duration `hold`. The time ends when this
+        duration begins.
     When it fails: the time is longer than `time`. With `stay`, it also fails if the robot moves again before the fault
         or event ends.
     Why this: a robot without sensor data must not drive. The true speed counts, because a robot can roll on after a
         command of zero.
     Source: Nav2's collision monitor, whose source_timeout stops a robot without sensor data.
 
-    Inconclusive if `after` never started, if the fault, event, or run ended before `time`, or if the robot was already
-    standing at each start of `after`.
+    Inconclusive if `after` never started, if the robot was already standing at each start of `after`, or if the fault,
+    event, or run ended before `time` and before the robot had stopped.
 
     Example: `stopped_within: {time: 0.5 s, after: lidar.off}`
     """

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from simscen.criteria.trace_signals.ground_truth import Flags
 
 START_KINDS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED, EventKind.MARK)
-"""Kinds of events with which a fault, event, or mark starts."""
+"""Kinds of recorded events that start a fault, an event of the scenario, or a mark."""
 _ENDS = (EventKind.FAULT_ENDED, EventKind.EVENT_ENDED)
 NEVER_ENABLED = "no event enabled the zone for longer than `grace`: leave `while_on` out to judge the whole run"
 """Reason of inconclusive findings with `while_on` if there is no interval in which the zone was enabled."""

@@ -17,7 +17,7 @@ from simscen.judge.outcome import apply_expectation
 T = TypeVar("T")
 SUCCESS = "success"
 """Name of the success metric (1 or 0), which the run and each robot have."""
-WORLD_EVENT_PREFIXES = ("object.", "pedestrian.", "event.", "mark", "run.")
+WORLD_EVENT_PREFIXES = ("object.", "pedestrian.", "floor.", "event.", "mark", "run.")
 """Prefixes of the kinds of events of the world, which the trace of each robot contains."""
 
 
@@ -87,7 +87,10 @@ def _with_robot_names(parts: Mapping[str, Mapping[str, T]]) -> dict[str, T]:
 
 
 def _events(traces: Mapping[str, Trace]) -> dict[str, int]:
-    """Return the number of events by kind. Events of the world count once."""
+    """Return the number of events by kind. Events of the world count once.
+
+    The spawning of robots, which are objects in the traces of the other robots, does not count.
+    """
     first = next(iter(traces.values()))
     counts = Counter(str(event.kind) for event in first.events if _is_world_event(event) and event.name not in traces)
     for trace in traces.values():

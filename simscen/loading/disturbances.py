@@ -10,7 +10,7 @@ from simscen.loading.yaml.tree import Key, node_at
 
 
 def disturbances_of(loaded: LoadedScenario) -> Iterator[Disturbance]:
-    """Yield the events of a scenario, each followed by the steps of its sequence, then its faults."""
+    """Yield the events of a scenario, each followed by the steps of its sequence, and then the faults."""
     for step in loaded.spec.steps:
         when = "" if step.when is None else _one_line_yaml(loaded, *step.keys, "when")
         yield Disturbance(step.name, "event", when, step.required, _line(loaded, *step.keys), step.after)

@@ -1,4 +1,4 @@
-"""Planner of the advanced stack: BIT* on samples of the medial axis, followed by an optimization of the path."""
+"""Planner of the advanced stack: BIT* on samples of the medial axis and optimization of the path; RRT-Connect for cars."""
 
 from collections.abc import Iterator
 
@@ -45,7 +45,10 @@ class MedialAxisPlanner:
         self._costs: TraversalCosts | None = None
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return poses in the map frame, at most SPACING_M apart. Raises NavigationFailure if there is no path."""
+        """Return poses in the map frame, at most SPACING_M apart. Tries a straight path, with a detour near the start, first.
+
+        Raises NavigationFailure if there is no path.
+        """
         radius = self._robot.circumscribed_radius
         points = straight_path(
             costmap, start, goal, radius, lambda part, part_goal: self._path_on_part(part, start, part_goal, seed)
@@ -61,7 +64,7 @@ class MedialAxisPlanner:
         return Path(with_headings(self._points(costs, start, goal, seed), goal))
 
     def _path_on_part(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> tuple[Array, float]:
-        """Return a path (n, 2) on a part of the costmap, and its cost."""
+        """Return a path (n, 2) on the part of the costmap in which a straight path needs a detour, and its cost."""
         costs = self._make_costs(costmap)
         points = self._points(costs, start, goal, seed)
         return points, costs.along(points)

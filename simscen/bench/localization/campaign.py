@@ -114,7 +114,7 @@ class ParameterSetResults:
     shares:          success rate by circumstance
     median:          median of `Trial.median` over the logs with circumstance "tracked"
     median_interval: interval of the mean of `Trial.median` over the same logs
-    sure:            consistency by circumstance
+    consistency:     consistency by circumstance
     ms:              mean CPU time per scan in ms, including odometry
     slowest_ms:      CPU time of the slowest message in ms
     """
@@ -123,7 +123,7 @@ class ParameterSetResults:
     shares: Mapping[str, SuccessRate]
     median: float
     median_interval: Interval
-    sure: Mapping[str, Consistency]
+    consistency: Mapping[str, Consistency]
     ms: float
     slowest_ms: float
 
@@ -199,7 +199,7 @@ def summarize(name: str, trials: Sequence[Trial]) -> ParameterSetResults:
         shares={group: _success_rate(members) for group, members in groups.items()},
         median=float(np.median([trial.median for trial in tracked])),
         median_interval=_interval(_means_by_building(tracked, [trial.median for trial in tracked])),
-        sure={group: _consistency(groups[group]) for group in CONSISTENCY_CIRCUMSTANCES if groups[group]},
+        consistency={group: _consistency(groups[group]) for group in CONSISTENCY_CIRCUMSTANCES if groups[group]},
         ms=float(np.mean([trial.ms for trial in trials])),
         slowest_ms=max(trial.slowest_ms for trial in trials),
     )

@@ -1,4 +1,4 @@
-"""Summary of runs of `simscen bench nav` with the scores of published benchmarks, and comparison of two stacks.
+"""Summary of runs of `simscen bench nav` by the scores that published benchmarks define, and comparison of two stacks.
 
 An experiment has several drives (scenarios). Each drive is run with several seeds. A trial is one of these runs.
 """
@@ -245,7 +245,7 @@ class ExperimentComparison:
 
 
 def compare_experiment(experiment: str, baseline: Sequence[Trial], other: Sequence[Trial]) -> ExperimentComparison:
-    """Compare the trials of two stacks. Raises ValueError if drives, seeds, or their order differ."""
+    """Compare the trials of two stacks. Raises ValueError if number, worlds, seeds, or order differ."""
     pairs = list(zip(baseline, other, strict=True))
     if any(first.world != second.world or first.run.key.seed != second.run.key.seed for first, second in pairs):
         raise ValueError(f"{experiment}: the runs are not of the same drives")

@@ -43,7 +43,7 @@ def command(
 
     The buildings are asymmetric office floors of 40 m and more with people, moved furniture, and glass. The robot has a
     lidar of 181 or 361 beams over 180° and wheels that slip. Each building has eleven logs: five with a known start;
-    two in the building as it was mapped, without and with slip; one with an unknown start; one in which half of the
+    two without people and with the furniture of the map, one of them also without slip; one with an unknown start; one in which half of the
     floor was rebuilt after mapping; one with a map of only half of the floor; and one of a kidnapped robot. Each log is
     evaluated with several sets of parameters, including Nav2's and simscen's defaults. Intervals are by bootstrap over
     buildings. Lost robots are listed on standard error. Takes a few minutes on two cores.
@@ -83,7 +83,7 @@ def _measure_sparse_logs(numbers: range, workers: int, only: list[str] | None, f
     from simscen.bench.localization.sparse_logs import run_sparse_logs, sparse_table
 
     if only:
-        raise UsageError("--sparse compares all localizers; remove --only")
+        raise UsageError("--sparse compares all variants of AMCL; remove --only")
     trials: list[SparseTrial] = []
     for new in run_sparse_logs(numbers, workers):
         trials += new
@@ -160,4 +160,4 @@ def _consistency_lines(row: "ParameterSetResults") -> list[str]:
             f"    {moments}; with normal errors and independent logs: {low:.2f} … {high:.2f} (95 %)",
         ]
 
-    return [row.parameters, *(line for name, consistency in row.sure.items() for line in lines(name, consistency))]
+    return [row.parameters, *(line for name, consistency in row.consistency.items() for line in lines(name, consistency))]

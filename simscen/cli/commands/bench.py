@@ -37,16 +37,18 @@ def command(
     Without a subcommand, simulates a patrol of 60 s on one core with all features enabled: 240 Hz physics, 360 beams at
     10 Hz, 500 to 2000 particles, and a full MCAP log. Prints:
 
-    - the speed relative to real time, and to PyBullet alone with the same steps and scans, and the share of each part
+    - the speed relative to real time, and to PyBullet alone with the same steps and scans; and the share of CPU time of
+      each part of the simulation
 
-    - the overhead of a run: set-up and verdicts, its process, the start of a session, and the memory of a worker
+    - the overhead of a run: set-up and verdicts, its process, preparing a scenario, the start of a session,
+      `simscen validate`, and the memory of a worker
 
     - the time of a scan of 720 beams and of a physics step among obstacles, compared to PyBullet with one body for each
       obstacle
 
     - the wall time per cycle for which a run waits for an external stack
 
-    All other times are CPU times. Takes less than a minute on an idle machine; the subcommands take longer. --compare
+    All times are CPU times unless the output says otherwise. Takes less than a minute on an idle machine; the subcommands take longer. --compare
     compares the result with an earlier result of --format json, and the subcommand `compare` compares two such results.
     """
     if ctx.invoked_subcommand is not None:
@@ -135,6 +137,6 @@ def _field_lines(fields: "list[ObstacleFieldTimes]") -> list[str]:
 def _external_lines(external: "ExternalStackCost") -> list[str]:
     return [
         f"the stack of the patrol as an external process with all topics, {external.cycles} cycles",
-        f"    {external.external_us:.0f} µs per cycle; "
+        f"    {external.external_us:.0f} µs of wall time per cycle; "
         f"in process {external.in_process_us:.0f} µs ({external.ratio:.1f} times)",
     ]

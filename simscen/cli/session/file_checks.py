@@ -81,7 +81,10 @@ class FileChecker:
         return (loaded if usable else None), list(dict.fromkeys(problems))
 
     def check_world(self, file: Path) -> list[Problem]:
-        """Return the problems of a world file."""
+        """Return the problems of a world file that appear when it is loaded and, unless `fast`, built.
+
+        `check_file` finds all others.
+        """
         try:
             source = load_world_file(file, self.root, self.world_path)
             notes = list(source.map.notes) if source.map else []
@@ -90,7 +93,7 @@ class FileChecker:
             return error.problems
 
     def check_robot(self, file: Path) -> list[Problem]:
-        """Return the problems of a robot file."""
+        """Return the problems of a robot file that appear when its geometry is checked; [] if `fast`."""
         if self.fast:
             return []
         try:

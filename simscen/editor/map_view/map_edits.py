@@ -15,8 +15,8 @@ def read_edits(request: Any, text: str, kind: str) -> list[Edit]:
     """Return the edits of `text` for a list of changes in `request`. `kind` is "scenario" or "world".
 
     A change is a mapping with the operation `op`, the path `keys`, and further arguments. The operations `set`, `add`,
-    and `remove` change any value. `pose`, `point`, and `keyframe` set a position in m and a heading in rad. Raises
-    EditRefused for a malformed request.
+    and `remove` change any value. `pose` and `keyframe` set a position in m and, if given, a heading in rad; `point` sets
+    a position. Raises EditRefused for a malformed request.
     """
     if not isinstance(request, list):
         raise EditRefused("the request has no list of edits")
@@ -76,7 +76,7 @@ def _pose_edits(
 def _list_edits(keys: Keys, axes: dict[int, float], source: SourceNode | None) -> Iterator[Edit]:
     """Yield edits that set numbers of a list such as [x, y] or [t, x, y, yaw]. `axes` are the new numbers by index.
 
-    Raises EditRefused if the text has no such list and `axes` do not contain its first number, such as t.
+    If the text has no such list, `axes` become a new list. Raises EditRefused if they lack index 0, such as the time t.
     """
     node = None if source is None else source_at(source, keys)
     if node is not None and node.kind == "sequence":

@@ -1,4 +1,4 @@
-"""Checks for robots with a file that contradicts the URDF, or with wheels that are not on the ground."""
+"""Checks of a robot's geometry: dimensions that contradict the URDF, and wheels, casters, or parts at a wrong height."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -64,7 +64,10 @@ def _urdf_dimensions(wheels: tuple[Wheel, ...]) -> dict[str, float]:
 
 
 def robot_problems(file: RobotFile) -> list[Problem]:
-    """Return the errors and warnings about the geometry of a robot, which is built if it has a URDF."""
+    """Return the errors and warnings about the geometry of a robot.
+
+    A robot with a URDF is built. Without one, only the ground clearance of its body is checked.
+    """
     robot = file.robot
     try:
         if robot.urdf is not None:

@@ -61,7 +61,7 @@ IGNORED_NAME_PARTS = (
     "frame", "topic", "plugin", "use_sim_time", "transform_t", "introspection_mode", "publish", "visualize", "bond",
     "qos", "realtime_priority", "stamp", "transport",
 )  # fmt: skip
-"""Parts of names: further parameters with one of these parts in their names have no effect in simulation."""
+"""Other parameters have no effect in simulation if the last part of their dotted name contains one of these texts."""
 EQUIVALENT_VALUES: Mapping[str, tuple[object, ...]] = {
     "enabled": (True,), "marking": (True,), "clearing": (True,), "use_astar": (False,), "scale_velocities": (False,),
     "feedback": ("OPEN_LOOP",), "base_shift_correction": (True,), "deadband_velocity": ([0.0, 0.0, 0.0],),
@@ -108,11 +108,12 @@ class Translation:
     value: Any
     """Value in simscen, or the ignored value."""
     note: str = ""
-    """Message for the user; "" for none."""
+    """Message of a separate warning. Ignored parameters without a note are listed in one warning of their node."""
     covers: str | None = None
     """Prefix of the names of other parameters that this translation includes, so that they need no translation of their
     own; None if there are none."""
     hint: str = "it is ignored"
+    """Hint of the separate warning: what simscen does instead."""
 
 
 def translate_same_name(

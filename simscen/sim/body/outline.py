@@ -11,8 +11,8 @@ from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid
 
 MIN_POINTS_TO_FILTER = 200
 """Smallest number of points for which `convex_hull` first discards points that cannot be corners."""
-_CIRCLE_CORNERS = 64
-"""Number of corners of the polygon that approximates a circle."""
+_HULL_CIRCLE_POINTS = 64
+"""Number of points that `hull_points` places on a circle."""
 
 
 def circle(radius: float, corners: int = 32) -> Polygon:
@@ -114,8 +114,8 @@ def _chain(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
 
 def _circle_points(radii: Array, heights: Array) -> Array:
     """Return the points (n, 3) of horizontal circles around the z axis, given their radii and heights in m."""
-    angles = np.arange(_CIRCLE_CORNERS) * (2 * math.pi / _CIRCLE_CORNERS)
-    points = np.empty((len(radii), _CIRCLE_CORNERS, 3))
+    angles = np.arange(_HULL_CIRCLE_POINTS) * (2 * math.pi / _HULL_CIRCLE_POINTS)
+    points = np.empty((len(radii), _HULL_CIRCLE_POINTS, 3))
     points[:, :, 0], points[:, :, 1] = np.outer(radii, np.cos(angles)), np.outer(radii, np.sin(angles))
     points[:, :, 2] = heights[:, None]
     return points.reshape(-1, 3)
@@ -123,13 +123,13 @@ def _circle_points(radii: Array, heights: Array) -> Array:
 
 def _ellipsoid_points(radii: tuple[float, float, float]) -> Array:
     """Return points (n, 3) on an ellipsoid at the origin."""
-    latitudes = np.linspace(-math.pi / 2, math.pi / 2, _CIRCLE_CORNERS // 2 + 1).tolist()
+    latitudes = np.linspace(-math.pi / 2, math.pi / 2, _HULL_CIRCLE_POINTS // 2 + 1).tolist()
     rings = [(max(0.0, math.cos(latitude)), math.sin(latitude)) for latitude in latitudes]
     result: Array = _circle_points(*np.array(rings).T) * radii
     return result
 
 
-MAX_HULL_VERTICES = 256
+MAX_UNREDUCED_VERTICES = 256
 """Number of vertices up to which `reduce_hull_vertices` keeps all of them."""
 HULL_TOLERANCE_M = 0.001
 """Largest distance in m of an omitted vertex from the reduced hull."""
@@ -141,7 +141,7 @@ def reduce_hull_vertices(mesh: Mesh) -> Array:
 
     Returns all vertices if they are few or lie in a plane.
     """
-    if len(mesh.vertices) <= MAX_HULL_VERTICES:
+    if len(mesh.vertices) <= MAX_UNREDUCED_VERTICES:
         return mesh.vertices
     from scipy.spatial import ConvexHull, QhullError
 

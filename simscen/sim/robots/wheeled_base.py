@@ -28,7 +28,7 @@ HULL_LINK_MASS_KG = 0.001
 
 
 class WheeledBase:
-    """Hull and casters on wheels, for all drives except omnidirectional and mecanum.
+    """Hull with wheels and casters, for all drives except omnidirectional and mecanum.
 
     Wheels are spheres that touch only the ground. Hull and casters collide with obstacles. Casters have no friction.
     """

@@ -86,9 +86,9 @@ def test_summary_counts_robots_that_were_tracked_or_found_in_time() -> None:
     assert row.shares["unknown"].count == 2
     assert row.shares["kidnapped"] == SuccessRate(0, 1, None)
     assert row.median == pytest.approx(0.1)
-    clean = row.sure["clean"]
+    clean = row.consistency["clean"]
     assert clean.anees_by_time == [3.0] * len(CHECK_TIMES_S)
     assert (clean.anees, clean.bounds, clean.inside) == (3.0, (3.0, 3.0), 1.0)
-    assert row.sure["outdated"].bounds is None
-    assert "half" not in row.sure
+    assert row.consistency["outdated"].bounds is None
+    assert "half" not in row.consistency
     assert set(PARAMETER_SETS) >= {"amcl", "scan_matching_amcl", "scan_matching_amcl, consistent"}

@@ -5,7 +5,7 @@ from scipy.spatial import ConvexHull
 
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Body, Cylinder, Mesh, Solid
-from simscen.sim.body.outline import HULL_TOLERANCE_M, MAX_HULL_VERTICES, reduce_hull_vertices
+from simscen.sim.body.outline import HULL_TOLERANCE_M, MAX_UNREDUCED_VERTICES, reduce_hull_vertices
 
 
 def mesh(made):
@@ -36,7 +36,7 @@ def test_removed_vertices_are_within_a_millimeter_of_the_hull(shape):
 
 def test_hull_with_few_corners_keeps_its_volume():
     box = trimesh.creation.box((1, 2, 3)).subdivide().subdivide().subdivide()
-    assert len(box.vertices) > MAX_HULL_VERTICES
+    assert len(box.vertices) > MAX_UNREDUCED_VERTICES
     assert ConvexHull(reduce_hull_vertices(mesh(box))).volume == pytest.approx(6.0)
     assert len(reduce_hull_vertices(mesh(box))) < 100
 
