@@ -108,11 +108,22 @@ def _perform_plugin_action(action: Action, stage: Stage, origin: str) -> Effect:
 
 
 class _ObservedStage:
-    """Wrapper of a stage. `changed` becomes true when a member that is not read-only is used."""
+    """Wrapper of a stage, and of the stages of other robots that it returns.
+
+    `changed` becomes true when a member of any of them is used that is not read-only.
+    """
 
     def __init__(self, stage: Stage) -> None:
-        self._stage, self.changed = stage, False
+        self._stage, self._others, self._used = stage, list[_ObservedStage](), False
+
+    @property
+    def changed(self) -> bool:
+        return self._used or any(other.changed for other in self._others)
+
+    def of(self, robot: str) -> Stage:
+        self._others.append(_ObservedStage(self._stage.of(robot)))
+        return cast(Stage, self._others[-1])
 
     def __getattr__(self, name: str) -> Any:
-        self.changed = self.changed or name not in _READ_ONLY_MEMBERS
+        self._used = self._used or name not in _READ_ONLY_MEMBERS
         return getattr(self._stage, name)

@@ -27,8 +27,8 @@ class GoalOutcome:
     """Outcome of one goal, as reported by the robot.
 
     `accepted` is the tick at which the robot accepted the goal; None if it did not. `end` is the event that ended the
-    goal; None if the goal did not end. `expected_failure` is the failure that the scenario expects: "failed", or the name of an
-    error code; "" if no failure is expected.
+    goal; None if the goal did not end. `expected_failure` is the failure that the scenario expects: "failed", or the
+    name of an error code; "" if no failure is expected.
     """
 
     goal: Goal

@@ -27,10 +27,7 @@ class RobotSize:
     height: float
     """Height of the top of the hull above the floor."""
     underside: float | None = None
-    """Height of the underside of the hull above the floor; None for a robot that can climb low obstacles.
-
-    Only omnidirectional and mecanum bases cannot climb.
-    """
+    """Height of the underside of an omnidirectional or mecanum base above the floor; None for bases that climb."""
 
     @property
     def inscribed(self) -> float:

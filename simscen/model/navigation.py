@@ -49,7 +49,7 @@ def expected_failure_name(expected: "Expectation") -> str:
 
 
 class OnReached(Spec):
-    """Action of the robot at a goal before it continues.
+    """What the robot does at a goal before it continues.
 
     Example: `on_reached: {wait: 5 s}`
     """

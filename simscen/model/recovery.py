@@ -107,8 +107,8 @@ Behavior = Annotated[str | BehaviorSpec, ExtensibleUnion("behavior", allows_name
 class Recovery(Spec):
     """Recovery behaviors, as in Nav2's default behavior tree.
 
-    If planning fails, the global costmap is cleared; if control fails, the local one. If the next attempt fails as well,
-    the next behavior runs.
+    If planning fails, the global costmap is cleared; if control fails, the local one. If the next attempt fails as
+    well, the next behavior runs.
     """
 
     number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
@@ -126,10 +126,11 @@ class Recovery(Spec):
     behaviors: Annotated[list[Behavior], Field(max_length=20)] = ["clear_costmap", "spin", "wait", "backup"]
     """Behaviors in the order of their use, by name or with parameters."""
     clear_entirely: bool = True
-    """Whether `clear_costmap`, and the clearing after a planner error, cover the entire global costmap, as in Nav2. With
-    false, only the area of the local costmap is cleared, so that known dead ends are kept. Exception: after planner
-    errors, the entire global costmap is cleared the first time, again when the robot is one meter nearer to its goal, and
-    otherwise at increasing intervals (10 s, 20 s, 40 s, …)."""
+    """Whether `clear_costmap`, and the clearing after a planner error, cover the entire global costmap, as in Nav2.
+
+    With false, only the area of the local costmap is cleared, so that known dead ends are kept. Exception: after
+    planner errors, the entire global costmap is cleared the first time, again when the robot is one meter nearer to its
+    goal, and otherwise at increasing intervals (10 s, 20 s, 40 s, …)."""
     spin_dist: Angle = 1.57
     """Angle of `spin`."""
     wait_duration: Duration = 5.0
@@ -141,7 +142,8 @@ class Recovery(Spec):
     backup_partial: bool = False
     """Whether `backup` drives a shorter distance if there is not enough room. Nav2 fails instead."""
     retrace_dist: NonNegativeLength = 1.0
-    """Maximum distance of `retrace`, with which the advanced stack drives back along its own path. After `backup_dist`, it ends as soon as there is room to turn in place."""
+    """Maximum distance of `retrace`, with which the advanced stack drives back along its own path. After `backup_dist`,
+    it ends as soon as there is room to turn in place."""
     simulate_ahead_time: Duration = 2.0
     """Time for which the motions of `spin` and `backup` are checked for collisions; 0 = no check."""
     max_rotational_vel: PositiveAngularSpeed = 1.0

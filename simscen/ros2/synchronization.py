@@ -39,7 +39,7 @@ class LockstepSynchronization:
         """Set limits: extra rounds in step 3 (0 = one per node), wall time of step 4, and wall time of step 5."""
         self._graph, self._barrier, self._actions = graph, barrier, actions
         self._extra_rounds, self._wait, self._limit = rounds, wait_s, limit_s
-        self.counters: Dict[str, Any] = {"beats": 0, "without_command": 0, "late_commands": 0}
+        self.counters: Dict[str, Any] = {"control_periods": 0, "without_command": 0, "late_commands": 0}
 
     def step(
         self, now: int, messages: Sequence[Message], is_command_due: bool, is_driving: bool
@@ -85,7 +85,7 @@ class LockstepSynchronization:
 
     def _count(self, now: int, command: Optional[ReceivedMessage]) -> None:
         """Update the counters and the tracked actions at the end of a control period."""
-        self.counters["beats"] += 1
+        self.counters["control_periods"] += 1
         if command is None:
             self.counters["without_command"] += 1
             return
@@ -100,7 +100,7 @@ class PacedSynchronization:
     def __init__(self, graph: Graph, factor: float) -> None:
         self._graph, self._factor = graph, factor
         self._start: Optional[float] = None
-        self.counters: Dict[str, Any] = {"beats": 0, "without_command": 0}
+        self.counters: Dict[str, Any] = {"control_periods": 0, "without_command": 0}
 
     def step(
         self, now: int, messages: Sequence[Message], is_command_due: bool, is_driving: bool
@@ -120,7 +120,7 @@ class PacedSynchronization:
             self._graph.publish(topic, data)
         self._graph.receive_all()
         if is_command_due:
-            self.counters["beats"] += 1
+            self.counters["control_periods"] += 1
             self.counters["without_command"] += _last_command(self._graph.inbox) is None
         return _take_inbox(self._graph)
 

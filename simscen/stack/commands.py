@@ -15,7 +15,7 @@ class VelocitySmoother:
     """Limits velocity and acceleration of commands, like nav2_velocity_smoother with OPEN_LOOP feedback."""
 
     def __init__(self, spec: SmootherSpec, robot: RobotModel, period: float) -> None:
-        """Use the speed limits of the specification and, for each acceleration limit, the lower value of it and the robot.
+        """Use the speed limits of the specification and, for each acceleration limit, the lower value of both.
 
         `period` is the controller period in s.
         """
@@ -71,7 +71,7 @@ class VelocitySmoother:
 
 
 class CommandPipeline:
-    """Passes commands through velocity smoother and collision monitor, delayed by the latency of controller and monitor."""
+    """Passes commands through velocity smoother and collision monitor, with the latency of controller and monitor."""
 
     def __init__(
         self, smoother: VelocitySmoother, monitor: CollisionMonitor, period: int, latency: tuple[int, int]

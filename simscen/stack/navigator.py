@@ -4,8 +4,8 @@ After a planning failure, the global costmap is cleared and planning is retried 
 costmap is cleared and control is retried once. If the retry fails too, the next recovery behavior runs. Then planning
 and control can each be retried again. After `number_of_retries` behaviors, the goal fails with the last error code.
 
-The goal fails at once after a planner error that is not in `planner_codes`. After GOAL_OCCUPIED, it fails after the first
-retry if the robot does not fit on the map at the goal or at a via pose.
+The goal fails at once after a planner error that is not in `planner_codes`. After GOAL_OCCUPIED, it fails after the
+first retry if the robot does not fit on the map at the goal or at a via pose.
 """
 
 from typing import NamedTuple

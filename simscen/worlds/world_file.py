@@ -19,7 +19,10 @@ Point = tuple[float, float]
 """(x, y) in m."""
 
 MIN_MITER_COSINE = -0.5
-"""Cosine of the sharpest turn (120°) with a miter. At sharper turns, a miter would be longer than the wall is thick."""
+"""Cosine of the sharpest turn (120°) with a miter.
+
+At sharper turns, the tip of a miter would be farther from the corner of the center line than the wall is thick.
+"""
 _WEDGE_FACES = (0, 1, 3), (0, 3, 2), (0, 4, 5), (0, 5, 1), (2, 3, 5), (2, 5, 4), (0, 2, 4), (1, 5, 3)
 """Corners of each face of a ramp (see `ramp_solid`), counterclockwise as seen from outside.
 

@@ -55,7 +55,7 @@ def test_nav2_reaches_a_goal_in_lockstep(run, nav2) -> None:
     assert "Traceback" not in ended.stack_log
     assert processes(str(nav2.params)) == []
     # No command is due before the first path, after the goal, or while the tree plans.
-    assert about["without_command"] < 0.2 * about["beats"]
+    assert about["without_command"] < 0.2 * about["control_periods"]
 
 
 def test_the_log_contains_what_nav2_computed(run) -> None:

@@ -1,4 +1,4 @@
-"""Planner of the advanced stack: BIT* on samples of the medial axis and optimization of the path; RRT-Connect for cars."""
+"""Planner of the advanced stack: BIT* on samples of the medial axis, and RRT-Connect for cars."""
 
 from collections.abc import Iterator
 
@@ -45,7 +45,7 @@ class MedialAxisPlanner:
         self._costs: TraversalCosts | None = None
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return poses in the map frame, at most SPACING_M apart. Tries a straight path, with a detour near the start, first.
+        """Return poses in the map frame, at most SPACING_M apart. A straight path is tried first.
 
         Raises NavigationFailure if there is no path.
         """

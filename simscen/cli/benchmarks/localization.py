@@ -43,10 +43,11 @@ def command(
 
     The buildings are asymmetric office floors of 40 m and more with people, moved furniture, and glass. The robot has a
     lidar of 181 or 361 beams over 180° and wheels that slip. Each building has eleven logs: five with a known start;
-    two without people and with the furniture of the map, one of them also without slip; one with an unknown start; one in which half of the
-    floor was rebuilt after mapping; one with a map of only half of the floor; and one of a kidnapped robot. Each log is
-    evaluated with several sets of parameters, including Nav2's and simscen's defaults. Intervals are by bootstrap over
-    buildings. Lost robots are listed on standard error. Takes a few minutes on two cores.
+    two without people and with the furniture of the map, one of them also without slip; one with an unknown start; one
+    in which half of the floor was rebuilt after mapping; one with a map of only half of the floor; and one of a
+    kidnapped robot. Each log is evaluated with several sets of parameters, including Nav2's and simscen's defaults.
+    Intervals are by bootstrap over buildings. Lost robots are listed on standard error. Takes a few minutes on two
+    cores.
 
     With --sparse, variants of AMCL are compared on logs with scans 1 m or 0.5 rad apart, as in many public data sets.
     The table has a row for each kind of log and a column for each variant. Each cell shows the number of lost runs, the
@@ -160,4 +161,7 @@ def _consistency_lines(row: "ParameterSetResults") -> list[str]:
             f"    {moments}; with normal errors and independent logs: {low:.2f} … {high:.2f} (95 %)",
         ]
 
-    return [row.parameters, *(line for name, consistency in row.consistency.items() for line in lines(name, consistency))]
+    return [
+        row.parameters,
+        *(line for name, consistency in row.consistency.items() for line in lines(name, consistency)),
+    ]

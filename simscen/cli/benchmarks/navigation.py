@@ -34,10 +34,14 @@ def command(
     ] = 1,
     seeds: Annotated[
         int | None,
-        typer.Option(min=1, max=1000, help="Number of seeds of each scenario; default: 5 for BARN, otherwise 20."),
+        typer.Option(
+            min=1,
+            max=1000,
+            help="Number of seeds of BARN (default: 5), Nav2's system test, corner cases, and localization (20).",
+        ),
     ] = None,
     fields: Annotated[
-        int, typer.Option(min=0, max=10_000, help="Number of generated obstacle fields; half as many narrow fields.")
+        int, typer.Option(min=0, max=10_000, help="Number of generated obstacle fields; narrow fields: half of it.")
     ] = 50,
     dynamic: Annotated[
         int, typer.Option(min=0, max=10_000, help="Number of fields of moving cylinders at each speed.")
@@ -47,13 +51,16 @@ def command(
         typer.Option(
             min=1,
             max=10_000,
-            help="Number of random goals in each shipped world, of generated buildings, of ramps, and of corridors.",
+            help="Number of random goals in each shipped world, and number of generated buildings, ramps, and "
+            "corridors; degraded sensing: a quarter of it.",
         ),
     ] = 20,
     lost: Annotated[
         int,
         typer.Option(
-            min=0, max=10_000, help="Number of drives each with a wrong start, an unknown start, and a kidnapping."
+            min=0,
+            max=10_000,
+            help="Number of drives with a wrong start, of drives with an unknown start, and of kidnappings.",
         ),
     ] = 50,
     stack: Annotated[
@@ -72,14 +79,14 @@ def command(
 ) -> None:
     """Measure the navigation of the reference stack, and print one line per experiment.
 
-    The experiments are: BARN and similar fields; narrow fields; fields of moving cylinders; random goals in shipped
-    worlds and generated buildings; degraded sensing; ramps; two robots in a corridor; Nav2's system test; corner cases;
-    and localization. Intervals are by bootstrap over worlds. The worlds of BARN and Nav2 are not included; pass their
-    folders as options. Experiments without data are skipped with a message. Failed runs are printed on standard error,
-    each with a command to repeat the run. An interrupted session prints its results so far; use --resume with the same
-    options to continue.
+    The experiments are: BARN; generated fields, which are similar; narrow fields; dynamic fields (moving cylinders);
+    random goals in shipped worlds and generated buildings; degraded sensing; ramps; two robots in a corridor;
+    tb3_sandbox (Nav2's system test); corner cases; and localization. Intervals are by bootstrap over worlds. The worlds
+    of BARN and Nav2 are not included; pass their folders as options. Experiments without data are skipped with a
+    message. Failed runs are printed on standard error, each with a command to repeat the run. An interrupted session
+    prints its results so far; use --resume with the same options to continue.
 
-    Exit code 0: all runs were completed; 3: a run could not be completed.
+    Exit code 0: all runs were completed; 3: a run could not be completed; 5: no experiment matches --only.
     """
     from simscen.bench.navigation.summary import compare_experiment
     from simscen.cli.benchmarks.navigation_experiments import Sizes, experiment_groups

@@ -36,11 +36,11 @@ class Sizes:
     """Sizes of the experiments: the options of `simscen bench nav` with the same names.
 
     first:    number of the first field, building, drive, and seed
-    seeds:    number of seeds of each scenario; None for the default of each experiment
+    seeds:    number of seeds of BARN, Nav2's system test, corner cases, and localization; None for their defaults
     fields:   number of generated obstacle fields; there are half as many narrow fields
     dynamic:  number of fields of moving cylinders at each speed
     goals:    number of random goals in each shipped world, of generated buildings, of ramps, and of corridors
-    lost:     number of drives each with a wrong start, an unknown start, and a kidnapping
+    lost:     number of drives with a wrong start, of drives with an unknown start, and of kidnappings
     """
 
     first: int = 1

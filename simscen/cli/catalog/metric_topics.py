@@ -21,18 +21,19 @@ METRICS_CAVEATS = """\
   They apply to a mean over runs at a fixed time, as computed by `simscen bench nav`."""
 
 SESSION_METRICS_TEXT = """\
-A session reports these numbers in results.json under `suite`, and `simscen report DIR` prints them. With several
-`--stack`, `suites` contains them for each stack:
+A session reports these numbers in results.json under `suite`, and `simscen report DIR` prints most of them. With
+several `--stack`, `suites` contains them for each stack:
 
 - `runs`: number of runs, without skipped runs and the second runs of `--check-determinism`.
 - `success_rate`: share of successful runs in all runs, including errors, with its 95 % Wilson interval.
-- `spl`, `soft_spl`: means over the runs that have these metrics. `spl_runs` is their number.
+- `spl`, `soft_spl`: means over all robots that have these metrics. `spl_runs` is the number of values of `spl`.
 - `collisions_per_km`, `collisions_per_hour`: collisions per driven kilometer and per simulated hour. `measured_runs` is
-  the number of completed runs, and `kilometers` and `hours` are their sums.
+  the number of completed runs, and `kilometres` and `hours` are their sums.
 
 In a run with several robots, each robot has its own distance, collisions, and SPL. The run succeeds if all robots do.
 
-With several `--stack`, `comparison` compares each stack with the first one (`baseline`):
+With several `--stack`, `comparison.against` has an entry for each stack that is compared with the first one
+(`comparison.baseline`):
 
 - `pairs`: number of pairs of runs with the same scenario and seed. `left_out` counts the `broken_pairs`, in which a run
   was not completed, and the `runs_without_partner`.
@@ -41,8 +42,8 @@ With several `--stack`, `comparison` compares each stack with the first one (`ba
   (for collisions, over all pairs), its 95 % bootstrap `interval` (from five pairs on), and `p` from Wilcoxon's
   signed-rank test.
 
-The compared metrics are time, path length, clearance, jerk, standing time, replans, recoveries, collisions (of each
-robot: `a/collisions`), and those of installed packages."""
+The compared metrics are `time_to_goal`, `path_length`, `min_clearance`, `mean_jerk`, `time_not_moving`, `replans`,
+`recoveries`, and `collisions` (of each robot: `a/collisions`), and those of installed packages."""
 
 
 def metric_topics(installed: bool = False) -> list[Topic]:

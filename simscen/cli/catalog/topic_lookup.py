@@ -1,4 +1,4 @@
-"""Lookup of topics of `simscen explain` by name, or by the path of a key, such as `goals.pose`."""
+"""Topics of `simscen explain`, their names, and their lookup by the path of a key, such as `goals.pose`."""
 
 from collections.abc import Iterator, Sequence
 
@@ -16,7 +16,7 @@ from simscen.spec.choice import Choice
 
 
 def all_topics() -> list[Topic]:
-    """Return all topics in the order of the overview, without problem codes, such as SC012."""
+    """Return all topics in the order of the overview. Problem codes, such as SC012, are no topics."""
     return [*topics(installed=True), *signal_topics(), *metric_topics(installed=True), *code_topics()]
 
 
@@ -31,7 +31,7 @@ def known_names(keys: bool = False) -> list[str]:
 def key_topics(path: str, known: Sequence[Topic]) -> list[Topic]:
     """Return a topic for each key with a path such as `goals.pose` or `stack.localizer.alpha1`.
 
-    A path starts at one of the topics `known`, or at the top of a file. A path of one key is searched in all topics.
+    A path starts at one of the topics `known`, or at the top of a file. A path of one key is searched in all of them.
     """
     parts = path.split(".")
     if len(parts) == 1:
@@ -61,7 +61,7 @@ def _path_starts(parts: list[str], known: Sequence[Topic]) -> Iterator[tuple[typ
 
 
 def _keys_below(model: type[BaseModel], keys: list[str], path: str) -> Iterator[Topic]:
-    """Yield a topic for the value at the nested `keys` of a model. If the value is a mapping, list its keys."""
+    """Yield a topic for the value at the nested `keys` of a model. A topic for a mapping lists its keys."""
     *parents, key = keys
     for parent in models_at(model, _with_indices(model, parents)):
         for field in fields_of(parent):

@@ -48,8 +48,9 @@ def command(
 
     - the wall time per cycle for which a run waits for an external stack
 
-    All times are CPU times unless the output says otherwise. Takes less than a minute on an idle machine; the subcommands take longer. --compare
-    compares the result with an earlier result of --format json, and the subcommand `compare` compares two such results.
+    All times are CPU times unless the output says otherwise. Takes less than a minute on an idle machine; the
+    subcommands take longer. --compare compares the result with an earlier result of --format json, and the subcommand
+    `compare` compares two such results.
     """
     if ctx.invoked_subcommand is not None:
         return

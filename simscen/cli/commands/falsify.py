@@ -51,7 +51,7 @@ def command(
         typer.Option(
             min=1e-6,
             max=0.5,
-            help="With --method random: stop when a higher rate of failures is ruled out with 95 % confidence.",
+            help="With --method random: stop when the failure rate is at most this value with 95 % confidence.",
         ),
     ] = None,
     search_seed: Annotated[
@@ -77,8 +77,8 @@ def command(
 
     With `tpe`, the search prefers values for which the criteria have small margins. It writes each new kind of failure
     beside the file as a scenario NAME.failure-N.scenario.yaml. Two failures are of different kinds if they differ in
-    the failed criteria, in the triggered events and faults, or in their position. The result does not depend on the
-    number of parallel runs.
+    the failed criteria, in the triggered events and faults, or in the place of the failure. The result does not depend
+    on the number of parallel runs.
 
     Exit code 0: no failure was found; 1: a failure was found; 2: an invalid scenario; 3: a run could not be completed;
     5: the scenario is skipped; 129, 130, and 143: interrupted.

@@ -94,7 +94,7 @@ def _lines(runs: list[tuple[str, RunFinished]], has_same_criteria: bool) -> list
 def _document(runs: list[RunFinished], options: list[str]) -> str:
     """Return the JSON text: result.json for one log, results.json for several logs.
 
-    `options` are options of the command under the key `again`, which evaluates a log again.
+    The value of `again` is the command that evaluates the log again; `options` are its options.
     """
     document = {**result_data(runs[0].result)} if len(runs) == 1 else as_document(runs)
     logs = [run.artifacts.mcap for run in in_order(runs)]

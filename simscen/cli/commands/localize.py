@@ -33,7 +33,10 @@ def command(
     map_: Annotated[Path, typer.Option("--map", help="The ROS map (yaml) of the robot.")],
     robot: Annotated[str, typer.Option(help="A robot file, or the name of a shipped robot.")],
     scenario: Annotated[
-        Path | None, typer.Option(help="Scenario or criteria file whose `stack:` is used; default: the default stack.")
+        Path | None,
+        typer.Option(
+            help="Scenario, or file for `simscen judge --scenario`, with a `stack:`; default: the default stack."
+        ),
     ] = None,
     reference: Annotated[
         str | None,

@@ -42,7 +42,9 @@ def find_logs(paths: Sequence[Path]) -> list[Path]:
         found.update(dict.fromkeys(inside))
     if not found:
         where = ", ".join(quoted(str(path)) for path in paths)
-        raise NothingSelected(f"no logs found in {where}; a folder is searched for *.mcap, *.db3, *.bag, and rosbag2 folders")
+        raise NothingSelected(
+            f"no logs found in {where}; a folder is searched for *.mcap, *.db3, *.bag, and rosbag2 folders"
+        )
     return list(found)
 
 
@@ -91,8 +93,8 @@ def recorded_result(log: Log, file: Path) -> RunResult:
 def evaluate_recorded_criteria(log: Log, file: Path, path: str) -> RunResult:
     """Return the result of a log according to the criteria of the scenario in the log.
 
-    `file` is the path of the log in messages. `path` becomes `path` of the result: the ID of the scenario, or the path of
-    the log.
+    `file` is the path of the log in messages. `path` becomes `path` of the result: the ID of the scenario, or the path
+    of the log.
     """
     header = log.header
 

@@ -29,11 +29,11 @@ class EventKind(str, Enum):
     FAULT_TOOK_EFFECT = "fault.took_effect"  # label, at the first message or command it changed; entry
     FAULT_ENDED = "fault.ended"  # label; entry, touched (how many messages and commands it changed)
     EVENT_STARTED = "event.started"  # the scenario's event; entry (number of the event, from 0), actions
-    EVENT_ENDED = "event.ended"  # the scenario's event; entry, effects (happened, what: of each action)
+    EVENT_ENDED = "event.ended"  # the scenario's event; entry, effects (of each action: happened, what)
     OBJECT_SPAWNED = "object.spawned"  # object; its pose, mass, shape, parts (outlines in its own frame), person, …
     OBJECT_REMOVED = "object.removed"  # object
     OBJECT_MOVED = "object.moved"  # object; waypoints (x, y, yaw), times, repeat, ease, start, phase
-    OBJECT_PLACED = "object.placed"  # object; x, y, yaw; its script has ended
+    OBJECT_PLACED = "object.placed"  # object; x, y, yaw; it no longer follows a path
     OBJECT_PUSHED = "object.pushed"  # object; impulse (N s), seconds (duration; absent for one tick)
     PEDESTRIAN_REACHED = "pedestrian.reached"  # pedestrian; goal (its number, from 1)
     PEDESTRIAN_REACTED = "pedestrian.reacted"  # pedestrian; behavior, robot ("" for a single one)
@@ -43,7 +43,7 @@ class EventKind(str, Enum):
     ZONE_SWITCHED = "zone.switched"  # region, or "" for a mask; filter (keepout, speed), enabled, speed_limit (m/s)
     FLOOR_CHANGED = "floor.changed"  # region or patch; outline, friction, until (s; absent if permanent)
     MARK = "mark"  # the mark; note
-    RUN_ENDED = "run.ended"  # why: navigation ended, time limit
+    RUN_ENDED = "run.ended"  # why: navigation ended, time limit, or (log of another recorder) the recording ends
 
     def __str__(self) -> str:
         """Return the value, as it is written in logs."""

@@ -162,7 +162,7 @@ class Whenever(Windowed):
     For a response within some seconds, write `then: {eventually: {…, within: 2 s}}`.
 
     What is measured: the distance of each signal from its bound, at each sample of the truth. The margin is the
-        smallest margin of the response at all samples at which the premise was true.
+        smallest value over all samples of the larger margin of the response and of the negated premise.
     When it fails: at a sample, the premise was true and the response was false.
     Why this: a robot that is lost, blind, or too close to something must react in time, and each time.
     Source: the bounded response pattern of Dwyer, Avrunin and Corbett 1999; robust semantics of Donzé and Maler 2010.

@@ -1,6 +1,6 @@
 """True motion of the robot in a trace: pose, speed, clearance, and driven path.
 
-Functions raise InvalidTrace if a value of the trace is not finite, except an infinite clearance.
+Functions raise InvalidTrace if a value of the trace is not finite, except a clearance of inf.
 """
 
 from __future__ import annotations

@@ -15,8 +15,8 @@ def read_edits(request: Any, text: str, kind: str) -> list[Edit]:
     """Return the edits of `text` for a list of changes in `request`. `kind` is "scenario" or "world".
 
     A change is a mapping with the operation `op`, the path `keys`, and further arguments. The operations `set`, `add`,
-    and `remove` change any value. `pose` and `keyframe` set a position in m and, if given, a heading in rad; `point` sets
-    a position. Raises EditRefused for a malformed request.
+    and `remove` change any value. `pose` and `keyframe` set a position in m and, if given, a heading in rad; `point`
+    sets a position. Raises EditRefused for a malformed request.
     """
     if not isinstance(request, list):
         raise EditRefused("the request has no list of edits")

@@ -66,7 +66,7 @@ METRICS: dict[str, Metric] = {
     ),
     "path_irregularity": Metric(
         "rad",
-        "heading_change beyond that of the first plan to each goal; never negative.",
+        "heading_change minus the heading changes of the first plan to each goal; at least 0.",
         "SEAN",
         evidence=_PATH | _GOALS | {Evidence.PLANNING},
     ),

@@ -19,7 +19,7 @@ LOOSE_SPEED_RATIO = 1.2
 LOOSE_PATH_RATIO = 10.0
 """Bounds on the path length above this multiple of the shortest path are loose."""
 LOOSE_COLLISION_COUNT = 1000
-"""Bounds on the number of collisions of at least this number are loose."""
+"""A bound on the number of collisions is loose if it is at least this number."""
 TIME_BOUNDS = {
     "goals_reached": "within",
     "time_to_goal": "max",
@@ -42,8 +42,8 @@ def undecidable_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 
 @MEANING.check("SC036")
-def runs_without_motion(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find time limits before the second sample of the ground truth, with which no motion can be judged."""
+def too_short_time_limits(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find time limits before the second sample of the ground truth. Without it, no motion can be judged."""
     period = 1.0 / loaded.spec.physics.truth_rate
     if loaded.spec.time_limit < period:
         message = f"nothing can be judged: the second sample of the ground truth is at t = {period:g} s"
@@ -126,7 +126,7 @@ def loose_bounds(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 
 def _loose_bounds_of(loaded: LoadedScenario, kind: str, criterion: Any) -> Iterator[tuple[str, str]]:
-    """Yield the key and the reason of each loose bound of a criterion, except of bounds beyond the time limit."""
+    """Yield the key and the reason of each loose bound of a criterion; without the keys in TIME_BOUNDS."""
     robot = loaded.robot.spec
     match kind:
         case "speed" if robot is not None:

@@ -6,8 +6,8 @@ A check is a generator function that yields problems. It is registered for a sta
     def impossible_triggers(loaded: LoadedScenario) -> Iterator[CheckProblem]: ...
 
 The stages run in the order of the table. If a stage finds errors, later stages do not run, but NAMES runs even if
-WORLD_FILE finds errors. If names come from a ROS map, an SDF file, or a URDF, NAMES and MEANING run again with the built
-world. A view is the part of a scenario that concerns one robot.
+WORLD_FILE finds errors. If names come from a ROS map, an SDF file, or a URDF, NAMES and MEANING run again with the
+built world. A view is the part of a scenario that concerns one robot.
 
 | stage | subject | finds, for example | needs |
 |---|---|---|---|

@@ -1,4 +1,4 @@
-"""Checks of a robot's geometry: dimensions that contradict the URDF, and wheels, casters, or parts at a wrong height."""
+"""Checks of a robot's geometry: dimensions that contradict the URDF, and parts at a wrong height."""
 
 from collections.abc import Iterator
 from pathlib import Path

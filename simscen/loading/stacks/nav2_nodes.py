@@ -66,10 +66,10 @@ def _note_unused_plugins(parameters: Parameters, kind: str, chosen: str) -> Iter
 def _translate_plugin(
     parameters: Parameters, section: str, default: str, types: Mapping[str, str]
 ) -> Iterator[Translation]:
-    """Translate the type and the parameters of the first controller or planner, which is `section`.
+    """Translate the type and the parameters of the first controller or planner.
 
-    `default` is the name of the plugin if the file lists none. `types` are the types in simscen, by class in Nav2. For
-    a rotation shim controller, only its primary controller is translated.
+    `section` is "controller" or "planner". `default` is the name of the plugin if the file lists none. `types` are the
+    types in simscen, by class in Nav2. For a rotation shim controller, only its primary controller is translated.
     """
     name = _first_plugin(parameters, section, default)
     yield from _note_unused_plugins(parameters, section, name)
@@ -105,7 +105,7 @@ def _translate_plugin(
 
 
 def _has_no_effect(kind: str, model: str, name: str, value: Any) -> bool:
-    """Return whether Nav2 ignores a parameter with this value, which simscen does not accept.
+    """Return whether Nav2 ignores this value of a parameter, which simscen would reject as out of range.
 
     `kind` is the type of controller or planner in simscen, and `model` is the motion model of an "mppi" controller.
     """
@@ -117,7 +117,7 @@ def _has_no_effect(kind: str, model: str, name: str, value: Any) -> bool:
 
 
 def _motion_model(parameters: Parameters, prefix: str) -> str:
-    """Return the motion model of MPPI, such as "DiffDrive". `prefix` is the name of the controller."""
+    """Return the motion model of MPPI, such as "DiffDrive". `prefix` is the key of the controller."""
     written = parameters.get(f"{prefix}.motion_model", "DiffDrive")
     return class_of(parameters.get(f"{prefix}.{written}.plugin", written)).removesuffix("MotionModel")
 
@@ -125,7 +125,7 @@ def _motion_model(parameters: Parameters, prefix: str) -> str:
 def _translate_critics(name: str, written: Any, kind: str) -> Iterator[Translation]:
     """Translate the list of critics `written` of an "mppi" or "dwb" controller. Unknown critics get a note.
 
-    MPPI gets the list. DWB gets the weight 0 for each critic that is not in the list.
+    MPPI gets the supported critics of the list. DWB gets the weight 0 for each critic that is not in the list.
     """
     listed = strings(written)
     supported = MPPI_CRITICS if kind == "mppi" else (*DWB_CRITICS, *DWB_CRITICS_WITHOUT_WEIGHT)
@@ -146,7 +146,8 @@ def _translate_critics(name: str, written: Any, kind: str) -> Iterator[Translati
 def _translate_velocity_smoother(parameters: Parameters) -> Iterator[Translation]:
     """Translate the limits of velocity and acceleration.
 
-    In simscen, lateral and backward motion have the limits of forward motion. Different limits get a note.
+    In simscen, lateral and backward motion have the limits of forward motion, and turning has one limit for
+    acceleration and deceleration. Different limits get a note.
     """
     turning_names = {"max_velocity": "max_angular_velocity", "max_accel": "max_angular_accel", "max_decel": ""}
     for name, turning in turning_names.items():

@@ -17,10 +17,11 @@ from simscen.reconstruction.drive.recorded_drive import Mask
 from simscen.reconstruction.reasons import FoundFault, Reason, Window, windows
 
 MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR = 0.012, 0.8
-"""Minimum reported excess over the nominal noise: the larger of a distance and a multiple of the nominal noise."""
+"""Noise of a lidar with only typical values is reported if it exceeds the nominal noise by the larger of a distance and
+a multiple of the nominal noise. Rain is reported if the noise exceeds the nominal noise by the distance."""
 KNOWN_NOISE_FACTOR, MIN_KNOWN_EXTRA_NOISE_M = 1.2, 0.002
-"""Minimum reported noise for a lidar with known noise: the larger of a multiple of this noise, and this noise plus a
-distance."""
+"""Noise of a lidar with known noise is reported if it exceeds the larger of a multiple of the known noise, and the
+known noise plus a distance."""
 MIN_NOISE_S = 2.0
 """Minimum duration of reported noise."""
 MIN_INVALID_SCANS = 2
@@ -30,7 +31,7 @@ MAX_INVALID_HIT_FRACTION, MIN_EXPECTED_HIT_FRACTION = 0.1, 0.3
 MIN_NAN_FRACTION = 0.03
 """Minimum fraction of nan ranges in a scan with missing beams."""
 BLIND_FRACTION = 0.95
-"""Minimum fraction of scans in which a blind beam returns nan."""
+"""Minimum fraction of scans in which a blind beam returns nan. If as many beams are blind, they are no sector."""
 MIN_SECTOR_BEAMS = 3
 """Minimum number of neighboring beams of a sector."""
 MIN_MISSING_FRACTION, MAX_NEAR_FRACTION = 0.03, 0.1
@@ -48,7 +49,7 @@ HEAVY_RAIN_MM_H = 25.0
 
 
 def invalid_scans(compared: ComparedScans) -> Mask:
-    """Return a mask (n,) of invalid scans: scans with a wrong number of beams, or with hardly any valid range."""
+    """Return a mask (n,) of invalid scans: scans with a wrong number of beams, or with hardly any hit."""
     hits = compared.is_hit.mean(axis=1)
     expected = np.isfinite(compared.expected).mean(axis=1)
     result: Mask = compared.scans.is_malformed | (
@@ -133,9 +134,9 @@ def mask_runs(mask: Mask) -> list[tuple[int, int]]:
 
 
 def range_faults(compared: ComparedScans, end: float, nominal_noise: float) -> Iterator[FoundFault]:
-    """Yield faults for far objects without a return: rain if the noise exceeds the nominal noise, else a range limit.
+    """Yield faults for far objects without a return: rain or a range limit.
 
-    `nominal_noise` is a standard deviation in m.
+    It is rain if the noise exceeds `nominal_noise`, a standard deviation in m, by MIN_EXTRA_NOISE_M.
     """
     usable = ~invalid_scans(compared)
     near = np.isfinite(compared.expected) & (compared.expected < 0.97 * compared.scans.range_max)

@@ -22,7 +22,7 @@ def divergence_reason(body_name: str, x: float, y: float, z: float, finite_sum: 
     ):
         return None
     if not math.isfinite(x + y + z + finite_sum):
-        return f"{body_name} has a pose that is not finite"
+        return f"{body_name} has a pose or velocity that is not finite"
     if z < -MAX_SUNK_DEPTH_M:
         return f"{body_name} is below the floor, at z = {z:.2f} m"
     return f"{body_name} has left the world, to ({x:.4g}, {y:.4g}, {z:.4g})"

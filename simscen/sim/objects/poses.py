@@ -32,7 +32,10 @@ class ActorPoses:
         self._poses: Mapping[str, Pose3] = {}
         self._tick: int | None = None
         self.resting_since: int | None = None
-        """Tick of the last motion of any pushable actor; None after a push, before the motion."""
+        """Tick of the last query at which a pushable actor moved.
+
+        None if one may be pushed before the next query, and before the first query.
+        """
         self._ticks_until_asleep = math.ceil(2 * engine.SLEEP_DELAY_S * tick_rate)
         self._moved = list(self._pushable)
         """Pushable actors that have moved since the last check for divergence."""

@@ -100,7 +100,7 @@ class Robot:
         return self._truth(tick, state, period)
 
     def compute_deferred(self) -> None:
-        """Compute the clearances of all deferred samples: their distances to the static world."""
+        """Compute the clearances of all deferred samples: distances to the static world, which is nearest."""
         deferred, self._deferred = self._deferred, []
         for sample in deferred:
             state = sample.state
@@ -171,7 +171,10 @@ class Robot:
         return self._placements
 
     def touching(self) -> bool:
-        """Return whether the robot touches anything besides the ground, or did so less than 0.1 s ago."""
+        """Return whether the robot touches anything, or did so less than 0.1 s ago.
+
+        Wheels and casters on the ground do not count.
+        """
         tick = self._scene.tick
         return self._collisions.is_colliding or (tick == self._placed_tick and self.clearance.measure(tick) <= 0.0)
 
@@ -194,7 +197,7 @@ class Robot:
         self.set_pose(pose)
 
     def set_pose(self, pose: Pose2) -> None:
-        """Place the robot at rest at `pose`, as if it had always been there."""
+        """Place the robot at rest at `pose`. Unlike `place`, this is no teleportation, and ends no collisions."""
         self.base.place(pose)
         self._state_tick = -1
         self._drive.rest()
@@ -224,7 +227,7 @@ class Robot:
         return math.dist(self._query_point, self.state().pose[:3])
 
     def make_query(self) -> ProximityQuery:
-        """Return a query for the deferred actors near the robot."""
+        """Return the position and the search radii of the robot, to find deferred actors near it."""
         self._query_point = self.state().pose.position
         return ProximityQuery(self._query_point, self.clearance.contact_radius, self.clearance.distance_radius)
 
@@ -259,7 +262,10 @@ class Robot:
         self._collisions.update(tick, contacts, motion, motions)
 
     def contacts(self) -> list[ContactPoint]:
-        """Return the current contacts, one for each touched object, sorted by name; without the ground."""
+        """Return the current contacts, one for each touched object, sorted by name.
+
+        Wheels and casters on the ground do not count.
+        """
         scene, names, ground_links = self._scene, self._names, self.base.ground_links
         tick_seconds = 1 / scene.tick_rate
         found: dict[str, ContactPoint] = {}
@@ -276,6 +282,6 @@ class Robot:
         return [found[name] for name in sorted(found)]
 
     def close(self) -> None:
-        """Compute the deferred samples, and release the engine clients."""
+        """Compute the deferred samples, and release the engine clients that measure the clearance."""
         self.compute_deferred()
         self.clearance.close()

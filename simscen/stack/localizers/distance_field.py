@@ -85,7 +85,7 @@ class DistanceField:
         return row
 
     def endpoint_cells(self, poses: Array, points: ComplexPoints) -> TableIndices:
-        """Return the table indices (n, b) of `points` (b,) at `poses` (n, 3), as described in `Field`."""
+        """Return the table indices (n, b) of `points` (b,), given in the base frame of each of the `poses` (n, 3)."""
         positions, heading = self.coordinates(poses)
         count = len(heading)
         ends = np.ones((3, len(points)), dtype=np.float32)

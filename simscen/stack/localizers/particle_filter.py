@@ -46,7 +46,7 @@ class ParticleFilter:
             spec, motion, sensor, free_space, rng,
         )  # fmt: skip
         self._bound = KldBound(spec.pf_err, spec.pf_z, spec.min_particles, spec.max_particles)
-        self._has_small_bound = bool(self._bound.samples(MAX_COMPACT_BINS) <= self._bound.min_samples)
+        self._compact_needs_minimum = bool(self._bound.samples(MAX_COMPACT_BINS) <= self._bound.min_samples)
         self.reset(Estimate(None))
 
     def reset(self, estimate: Estimate) -> None:
@@ -122,7 +122,8 @@ class ParticleFilter:
             return
         if self._spec.selective_resampling and self.particles.effective_count > len(self.particles.weights) / 2:
             return
-        if self._has_small_bound and self._augmented_mcl.random_fraction == 0 and are_compact(self.particles):
+        # Compact particles lie in so few bins that KLD sampling would draw the minimum number, too.
+        if self._compact_needs_minimum and self._augmented_mcl.random_fraction == 0 and are_compact(self.particles):
             chosen = systematic_resampling(self.particles.weights, self._bound.min_samples, self._rng)
             self.particles = Particles.with_equal_weights(self.particles.poses.T.take(chosen, axis=1).T)
             self._descendants = None

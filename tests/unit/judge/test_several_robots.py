@@ -105,13 +105,13 @@ def test_a_missing_event_of_the_world_is_reported_once_and_a_fault_for_its_robot
 
 
 def test_world_events_count_once_and_robot_events_for_each_robot() -> None:
-    shared = [[1, "object.moved", "cart", {}], [1, "object.spawned", "b", {}]]
+    shared = [[1, "object.moved", "cart", {}], [1, "object.spawned", "b", {}], [1, "floor.changed", "oil", {}]]
     traces = {
         "a": trace(*shared, [2, "plan.made", "", {}]),
         "b": trace(*shared, [2, "plan.made", "", {}], [3, "plan.made", "", {}]),
     }
     counted = combine_robots({"a": result(), "b": result()}, traces).events
-    assert counted == {"object.moved": 1, "plan.made": 3, "run.ended": 1}
+    assert counted == {"floor.changed": 1, "object.moved": 1, "plan.made": 3, "run.ended": 1}
     assert list(counted) == sorted(counted)
 
 
