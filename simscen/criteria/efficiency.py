@@ -73,7 +73,7 @@ class TimeToGoal(Spec, Criterion):
         if start is None:
             if outcome.end is None and has_ended(trace):
                 return missed(what, "never reached", expected, (trace, trace.end), detail)
-            return undecided(what, "the acceptance of its goal was not recorded", expected)
+            return undecided(what, "the acceptance of the goal was not recorded", expected)
         if outcome.reached is not None:
             return at_most(what, trace.seconds(outcome.reached - start), self.max, "s", at=(trace, outcome.reached))
         if outcome.was_preempted:

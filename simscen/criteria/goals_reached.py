@@ -165,7 +165,7 @@ def _judge_time(trace: Trace, outcome: GoalOutcome, within: float) -> Finding:
     """Return the finding for the time from the acceptance of a goal to the report that it is reached."""
     what = f"goal {outcome.goal.name} time"
     if outcome.accepted is None or outcome.reached is None:
-        return undecided(what, "its acceptance was not recorded", f"≤ {within:.2f} s")
+        return undecided(what, "the acceptance of the goal was not recorded", f"≤ {within:.2f} s")
     elapsed = trace.seconds(outcome.reached - outcome.accepted)
     return at_most(what, elapsed, within, "s", at=(trace, outcome.reached))
 

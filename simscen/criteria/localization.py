@@ -226,7 +226,7 @@ class LocalizationConsistency(Spec, Criterion):
         mean, context = float(values.mean()), f"(mean of {len(values)} NEES, {DIMENSIONS} when consistent)"
         findings = [at_most("localization_consistency", mean, high, "", at=at, context=context)]
         if low is not None:
-            findings.append(at_least("localization_consistency doubt", mean, low, "", context=context))
+            findings.append(at_least("localization_consistency lower bound", mean, low, "", context=context))
         return [if_complete(trace, finding) for finding in findings]
 
     def _bounds(self, count: int) -> tuple[float | None, float]:

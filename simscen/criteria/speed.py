@@ -105,7 +105,7 @@ class Speed(Spec, Criterion):
                 return undecided(what, NEVER_ENABLED, limit_text)
             inside &= np.any([(first <= signal.ticks) & (signal.ticks <= last) for first, last in spans], axis=0)
         if not inside.any():
-            because = f"the robot never was in `{self.in_}`{' while it was on' * self.while_on}"
+            because = f"the robot was never in `{self.in_}`{' while it was on' * self.while_on}"
             return undecided(what, because, limit_text)
         k = int(np.flatnonzero(inside)[np.argmax(signal.values[inside, 0])])
         context = "" if self.in_ is None else f"in {self.in_}"
@@ -126,7 +126,7 @@ class Speed(Spec, Criterion):
         highest = _sliding_maximum(local_limits, signal.ticks, round(self.grace * trace.tick_rate))
         limited = inside & np.isfinite(highest)
         if not limited.any():
-            because = f"the robot never was in a limited part of the mask for longer than {2 * self.grace:g} s"
+            because = f"the robot was never in a limited part of the mask for longer than {2 * self.grace:g} s"
             return undecided("speed", because, limit_text)
         excess = np.where(limited, signal.values[:, 0] - highest, -np.inf)
         k = int(np.argmax(excess))
