@@ -139,7 +139,8 @@ class NoFalseSuccess(Spec, Criterion):
             return [undecided("no_false_success", "the robot reported nothing that could be false")]
         findings = [self._judge_goal(trace, outcome, outcomes) for outcome in outcomes if outcome.reached is not None]
         findings += [
-            undecided(f"goal {event.name}", "reported as reached, but the scenario has no such goal") for event in unknown
+            undecided(f"goal {event.name}", "reported as reached, but the scenario has no such goal")
+            for event in unknown
         ]
         findings += [finding for k in range(len(ended)) if (finding := _judge_success(trace, case, outcomes, ended, k))]
         return findings or [held("no_false_success", "no success was claimed", "no false success")]

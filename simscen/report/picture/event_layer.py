@@ -108,9 +108,9 @@ def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 _STAR = [(r * math.cos(a), r * math.sin(a)) for k in range(16) for r, a in [((16, 7)[k % 2], k * math.pi / 8)]]
 _CROSS = [(1.6, 0), (5.4, 3.8), (3.8, 5.4), (0, 1.6), (-3.8, 5.4), (-5.4, 3.8), (-1.6, 0)]
 _CROSS += [(-5.4, -3.8), (-3.8, -5.4), (0, -1.6), (3.8, -5.4), (5.4, -3.8)]
-_FLAG = [(0, 0), (0, -18), (12, -13), (1.5, -9), (1.5, 0)]
+FLAG = [(0, 0), (0, -18), (12, -13), (1.5, -9), (1.5, 0)]
 _BOLT = [(1, -10), (-6, 2), (-1, 2), (-2, 10), (6, -3), (1, -3)]
-_DIAMOND = [(0, -6), (6, 0), (0, 6), (-6, 0)]
+DIAMOND, SMALL_DIAMOND = ([(0, -r), (r, 0), (0, r), (-r, 0)] for r in (6, 4))
 """Corners of the symbols in pixels from the center, x right and y down."""
 
 
@@ -158,7 +158,7 @@ def draw_events(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     events += [(e.tick, f"new goal {e.name}") for e in trace.of_kind(EventKind.GOAL_ACCEPTED) if e.name in sent]
     for tick, name in events:
         x, y = trace.place(tick)
-        canvas.symbol(x, y, _DIAMOND, palette.INK)
+        canvas.symbol(x, y, DIAMOND, palette.INK)
         canvas.add_part(f"event {scene.label(name)}", [(x, y)])
         yield Label(3, x, y, printable(scene.label(f"{name}, {trace.seconds(tick):.1f} s")), palette.INK, 12, 7.0)
 
@@ -167,7 +167,7 @@ def draw_marks(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """Draw a flag where the robot was when an action `mark` recorded a name."""
     for event in scene.trace.of_kind(EventKind.MARK):
         x, y = scene.trace.place(event.tick)
-        canvas.symbol(x, y, _FLAG, palette.AMBER)
+        canvas.symbol(x, y, FLAG, palette.AMBER)
         canvas.add_part(f"mark {scene.label(event.name)}", [(x, y)])
         yield Label(3, x, y, printable(event.name), palette.AMBER, 12, 10.0)
 
@@ -205,6 +205,6 @@ def draw_places(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     goal_positions = {(round(pose.x, 3), round(pose.y, 3)) for pose in goals}
     for name, pose in sorted(scene.scenery.places.items()):
         if (round(pose.x, 3), round(pose.y, 3)) not in goal_positions and canvas.shows(pose.x, pose.y):
-            canvas.symbol(pose.x, pose.y, [(0, -4), (4, 0), (0, 4), (-4, 0)], palette.PLACE)
+            canvas.symbol(pose.x, pose.y, SMALL_DIAMOND, palette.PLACE)
             canvas.add_part(f"place {name}", np.array([(pose.x, pose.y)]))
             yield Label(9, pose.x, pose.y, printable(name), palette.FAINT_INK, 11, 5.0, is_optional=True)

@@ -10,6 +10,7 @@ from simscen.core.records.verdict import Status
 from simscen.judge.finding_text import comparison, subject, time_and_place
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import TextItem, draw_text, font, printable
+from simscen.report.picture.event_layer import DIAMOND, FLAG, SMALL_DIAMOND
 from simscen.report.picture.palette import Color
 from simscen.report.picture.path_layer import round_time_step
 from simscen.report.picture.scene import Scene
@@ -147,7 +148,9 @@ def _legend(step: float) -> list[tuple[str, str, DrawSymbol]]:
         ("ground", "ramp or sill; chevrons point uphill", _block_symbol(palette.GROUND)),
         ("floor", "floor with different friction", _block_symbol(palette.SLIPPERY)),
         ("fault", "start of a fault; band: fault active", _draw_fault_symbol),
-        ("event", "robot at an event", _draw_event_symbol),
+        ("event", "robot at an event", _polygon_symbol(DIAMOND, palette.INK)),
+        ("mark", "robot at a mark", _polygon_symbol([(x, y + 9) for x, y in FLAG], palette.AMBER)),
+        ("place", "named place", _polygon_symbol(SMALL_DIAMOND, palette.PLACE)),
         ("collision", "collision", lambda d, x, y: d.regular_polygon((x + 12, y, 7), 5, fill=palette.RED)),
         ("violation", "violated criterion", lambda d, x, y: _draw_cross(d, x + 12, y, palette.RED)),
     ]
@@ -219,8 +222,11 @@ def _draw_fault_symbol(draw: Pen, x: float, y: float) -> None:
                  fill=palette.AMBER)  # fmt: skip
 
 
-def _draw_event_symbol(draw: Pen, x: float, y: float) -> None:
-    draw.polygon([(x + 12, y - 6), (x + 18, y), (x + 12, y + 6), (x + 6, y)], fill=palette.INK)
+def _polygon_symbol(offsets: Sequence[tuple[float, float]], color: Color) -> DrawSymbol:
+    def draw_symbol(draw: Pen, x: float, y: float) -> None:
+        draw.polygon([(x + 12 + dx, y + dy) for dx, dy in offsets], fill=color)
+
+    return draw_symbol
 
 
 def _draw_time_bar(draw: Pen, scene: Scene, y: float) -> None:

@@ -216,6 +216,13 @@ def test_reasons_beside_the_map_are_not_truncated():
     assert draw_map_picture(tall).height > draw_map_picture(scene).height + 400
 
 
+def test_legend_explains_each_symbol_of_the_map(monkeypatch):
+    texts = []
+    monkeypatch.setattr(sidebar, "draw_text", lambda draw, item: texts.append(item.text))
+    draw_map_picture(everything())
+    assert {"robot at an event", "robot at a mark", "named place", "collision", "violated criterion"} <= set(texts)
+
+
 def test_each_of_several_robots_is_drawn_with_its_name():
     one = everything()
     names = {
