@@ -17,6 +17,7 @@ OBSTACLE_RANGE_M = 1.2
 SIGHT_CELL_M = 0.1
 """Minimum cell size of the visibility grid. Cells are larger if the grid would have more than MAX_SIGHT_CELLS."""
 MAX_SIGHT_CELLS = 4_000_000
+"""Approximate maximum number of cells of the visibility grid."""
 SIGHT_MARGIN_M = 0.3
 """Distance from both ends of a line of sight within which walls do not block it."""
 
@@ -117,8 +118,9 @@ class _SightGrid:
     """Grid whose cells block lines of sight if an opaque wall segment passes through them."""
 
     def __init__(self, segments: Array) -> None:
-        self._low = segments.reshape(-1, 2).min(axis=0, initial=0.0) - SIGHT_CELL_M
-        size = segments.reshape(-1, 2).max(axis=0, initial=0.0) + SIGHT_CELL_M - self._low
+        ends = segments.reshape(-1, 2) if len(segments) else np.zeros((1, 2))
+        self._low = ends.min(axis=0) - SIGHT_CELL_M
+        size = ends.max(axis=0) + SIGHT_CELL_M - self._low
         self._cell = max(SIGHT_CELL_M, math.sqrt(float(size[0] * size[1]) / MAX_SIGHT_CELLS))
         self._opaque = np.zeros(np.ceil(size / self._cell).astype(np.int64) + 1, dtype=np.bool_)
         steps = 1 + np.ceil(np.hypot(*(segments[:, 1] - segments[:, 0]).T) / (self._cell / 4)).astype(np.int64)
@@ -138,7 +140,8 @@ class _SightGrid:
         line = np.repeat(np.arange(len(viewers)), samples)
         number = np.arange(len(line)) - np.repeat(np.cumsum(samples) - samples, samples)
         ratio = (SIGHT_MARGIN_M + number * self._cell) / distance[line]
-        cells = ((viewers[line] - self._low + offset[line] * ratio[:, np.newaxis]) / self._cell).astype(np.int64)
+        points = viewers[line] - self._low + offset[line] * ratio[:, np.newaxis]
+        cells = np.floor(points / self._cell).astype(np.int64)
         inside = ((cells >= 0) & (cells < self._opaque.shape)).all(axis=1)
         blocked = line[inside][self._opaque[cells[inside, 0], cells[inside, 1]]]
         is_clear = np.ones(len(viewers), dtype=np.bool_)

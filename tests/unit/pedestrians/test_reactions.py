@@ -116,3 +116,11 @@ def test_pedestrians_walk_around_objects():
         track.append(crowd.poses()["anna"][:2])
     gap = np.hypot(*np.maximum(np.abs(np.array(track)) - 0.3, 0.0).T) - 0.25
     assert gap.min() >= -1e-9
+
+
+@pytest.mark.parametrize("offset", [0.0, 5000.0])
+def test_a_wall_hides_only_what_is_behind_it_also_far_from_the_origin(offset):
+    around = walls([[offset, offset], [offset + 4, offset]])
+    viewer, beside, behind = (np.array([[offset + x, offset + y]]) for x, y in ((0.5, 0.6), (3.5, 0.6), (2.0, -1.0)))
+    assert around.visible(viewer, beside).all()
+    assert not around.visible(viewer, behind).any()
