@@ -126,15 +126,16 @@ def _with_steering(tree: LinkTree, wheel: WheelJoint, steering_joints: Sequence[
 
 
 def select_wheels(tree: LinkTree, drive: Drive) -> list[WheelJoint]:
-    """Return the wheels on the joints that the drive names, or else all wheels in the URDF. Raises InvalidInput.
+    """Return the wheels on the joints that the drive names. Without names, find the wheels. Raises InvalidInput.
 
-    Swiveling wheels are left out for a differential drive that names no joints. An omnidirectional drive has no wheels.
+    The left wheels, the right wheels, and the steered wheels of a car can be named independently. An omnidirectional
+    drive has no wheels.
     """
     if isinstance(drive, Omnidirectional):
         return []
     steering = drive.steering if isinstance(drive, Ackermann) else None
-    rolling = [*(drive.left or []), *(drive.right or [])]
-    named = [*rolling, *(steering or [])]
+    sides = drive.left, drive.right
+    named = [name for names in (*sides, steering) for name in names or []]
     unknown = [name for name in named if name not in tree.joints]
     if unknown:
         problem = tree.element.problem(
@@ -145,13 +146,20 @@ def select_wheels(tree: LinkTree, drive: Drive) -> list[WheelJoint]:
     if not named:
         # A wheel that swivels is a caster of a differential drive, not a steered wheel: it becomes part of the hull.
         return [w for w in wheels if not w.is_steered] if isinstance(drive, Differential) else wheels
-    turned = _steered_links(tree, [tree.joints[name] for name in steering or []])
-    given = []
-    for joint in (tree.joints[name] for name in rolling):
-        is_steered, center = joint.child in turned, tree.poses[joint.child].position
-        specified = WheelJoint(joint, center, drive.wheel_radius, drive.wheel_width, is_steered)
-        given.append(_measure_wheel(tree, joint, is_steered) or specified)
-    return given + [w for w in wheels if w.joint.name not in rolling and w.joint.child in turned]
+    if steering is None and isinstance(drive, Ackermann):
+        steered_links = {wheel.joint.child for wheel in wheels if wheel.is_steered}
+    else:
+        steered_links = _steered_links(tree, [tree.joints[name] for name in steering or []])
+    others = [w for w in wheels if not (w.is_steered or w.joint.child in steered_links or w.joint.name in named)]
+    selected = []
+    for names, is_left in zip(sides, (True, False), strict=True):
+        if names is None:
+            selected += [wheel for wheel in others if wheel.is_left is is_left]
+        for joint in (tree.joints[name] for name in names or []):
+            is_steered, center = joint.child in steered_links, tree.poses[joint.child].position
+            specified = WheelJoint(joint, center, drive.wheel_radius, drive.wheel_width, is_steered)
+            selected.append(_measure_wheel(tree, joint, is_steered) or specified)
+    return selected + [w for w in wheels if w.joint.name not in named and w.joint.child in steered_links]
 
 
 def _steered_links(tree: LinkTree, steering_joints: Sequence[Joint]) -> set[str]:

@@ -331,8 +331,9 @@ def test_a_urdf_outside_the_root_is_refused(tmp_path):
         build_robot_body(spec(urdf="../robot.urdf"), tmp_path / "in/cart.robot.yaml", [tmp_path / "in"])
 
 
+@pytest.mark.parametrize("named", [(), ("left",), ("left", "right"), ("steering",), ("left", "right", "steering")])
 @pytest.mark.parametrize("front", [{"left": 0.2, "right": -0.2}, {"middle": 0.0}])
-def test_car_is_steered_by_the_wheels_below_vertical_joints(load, front):
+def test_car_is_steered_by_the_wheels_below_vertical_joints(load, front, named):
     steering = "".join(
         f"""
   <link name="knuckle_{side}"/>
@@ -342,7 +343,8 @@ def test_car_is_steered_by_the_wheels_below_vertical_joints(load, front):
         for side, y in front.items()
     )
     drive = {"type": "ackermann", "wheel_radius": 0.05, "wheel_separation": 0.4, "wheel_base": 0.4, "max_steering": 0.5}
-    body = load(robot(extra=steering), drive=drive)
+    names = {"left": ["left_joint"], "right": ["right_joint"], "steering": [f"steer_{side}" for side in front]}
+    body = load(robot(extra=steering), drive={**drive, **{key: names[key] for key in named}})
     assert [(w.is_steered, w.is_driven, round(w.x, 3)) for w in body.wheels] == [
         (False, True, 0.0), (False, True, 0.0), *[(True, False, 0.4)] * len(front)]  # fmt: skip
     simulation = SingleRobotSimulation(body)
