@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -112,6 +113,7 @@ def enclosed_volume(mesh: Mesh | TriangleMesh) -> float:
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
 
+@lru_cache(maxsize=32)  # worlds repeat few sizes, and several steps of the import triangulate each solid
 def _ellipsoid(radii: tuple[float, float, float]) -> Mesh:
     # Facets of a sphere are chords in two directions, so each direction may use half of the tolerance.
     count = facet_count(max(radii), MAX_SAGITTA_M / 2)
@@ -120,6 +122,7 @@ def _ellipsoid(radii: tuple[float, float, float]) -> Mesh:
     return Mesh(unit_sphere.vertices * radii, unit_sphere.faces)
 
 
+@lru_cache(maxsize=32)
 def _capsule(radius: float, length: float) -> Mesh:
     count = facet_count(radius, MAX_SAGITTA_M / 2)
     quarter = np.linspace(0.0, math.pi / 2, count // 4 + 1)

@@ -1,6 +1,7 @@
 """Find the height of the floor of an SDF world. The floor on which robots drive can be a slab above z = 0."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -33,8 +34,8 @@ MAX_UNCOVERED_WIDTH_M = 1.0
 SAMPLES_PER_SIDE = 64
 """Number of rows and columns of the grid on which the covered area is measured."""
 
-FaceMask = npt.NDArray[np.bool_]
-"""Mask (m,) of the faces of a mesh."""
+FaceIndices = npt.NDArray[np.int64]
+"""Indices (n,) of faces of a mesh."""
 
 
 def floor_height(placed: Sequence[Solid], static_count: int, bounds: Bounds, has_ground: bool) -> float:
@@ -49,11 +50,13 @@ def floor_height(placed: Sequence[Solid], static_count: int, bounds: Bounds, has
     geometry in a world without a ground plane.
     """
     mesh = merge_solids(placed)
-    top, is_level = mesh.vertices[mesh.faces, 2].max(axis=1), face_normals(mesh)[:, 2] >= MIN_LEVEL_NORMAL_Z
-    heights_mm = np.round(top * 1000).astype(np.int64)
-    is_candidate = is_level & (top > MIN_FLOOR_HEIGHT_M) & (top <= MAX_FLOOR_HEIGHT_M) & (mesh.owners < static_count)
-    for height_mm in np.unique(heights_mm[is_candidate])[::-1]:
-        faces = is_candidate & (heights_mm == height_mm)
+    top = mesh.vertices[mesh.faces, 2].max(axis=1)
+    is_low = (top > MIN_FLOOR_HEIGHT_M) & (top <= MAX_FLOOR_HEIGHT_M) & (mesh.owners < static_count)
+    low = np.flatnonzero(is_low)
+    level = low[face_normals(replace(mesh, faces=mesh.faces[low]))[:, 2] >= MIN_LEVEL_NORMAL_Z]
+    heights_mm = np.round(top[level] * 1000).astype(np.int64)
+    for height_mm in np.unique(heights_mm)[::-1]:
+        faces = level[heights_mm == height_mm]
         if _is_floor(mesh, faces, bounds, has_ground):
             return float(top[faces].max())
     return 0.0
@@ -65,8 +68,8 @@ def could_be_floor(solid: Solid) -> bool:
     return min(right - left, top - bottom) >= MIN_COVERING_WIDTH_M and top_height(solid) <= MAX_FLOOR_HEIGHT_M
 
 
-def _is_floor(mesh: TriangleMesh, faces: FaceMask, bounds: Bounds, has_ground: bool) -> bool:
-    """Return whether the level faces in a mask, all at one height, are the floor of the world; see `floor_height`."""
+def _is_floor(mesh: TriangleMesh, faces: FaceIndices, bounds: Bounds, has_ground: bool) -> bool:
+    """Return whether level `faces`, all at one height, are the floor of the world; see `floor_height`."""
     corners: Array = mesh.vertices[mesh.faces[faces]]
     height = corners[..., 2].max()
     low, high = corners[..., :2].min(axis=(0, 1)), corners[..., :2].max(axis=(0, 1))
