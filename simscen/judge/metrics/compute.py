@@ -1,7 +1,7 @@
-"""Computation of the metrics of a run: all metrics of the catalog, and the plugin metrics that a scenario requests."""
+"""Computation of the metrics of a run: all metrics of the catalog, and the plug-in metrics that a scenario requests."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import cache
 from itertools import accumulate
@@ -77,7 +77,7 @@ def compute_metrics(trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_C
     found: Values = {}
     for names, compute in groups:
         found |= _compute_or_explain(names, compute)
-    found |= {name: reason for name in METRICS if (reason := _missing_evidence(name, coverage))}
+    found |= {name: reason for name in METRICS if (reason := _insufficient_evidence(METRICS[name].evidence, coverage))}
     return _metric_values({name: found[name] for name in METRICS})
 
 
@@ -94,9 +94,8 @@ def _compute_or_explain(names: Sequence[str], compute: Callable[[], Values]) -> 
         return dict.fromkeys(names, str(reason))
 
 
-def _missing_evidence(name: str, coverage: LogCoverage) -> str:
-    """Return as text which evidence of a metric the log lacks for a part of the run; "" if it has all."""
-    required = METRICS[name].evidence
+def _insufficient_evidence(required: Set[Evidence], coverage: LogCoverage) -> str:
+    """Return as text which required evidence the log lacks for the run or a part of it; "" if nothing is missing."""
     return missing_evidence_reason(required, coverage) or partial_evidence_reason(required, coverage)
 
 
@@ -233,24 +232,24 @@ def person_metrics(trace: Trace, case: Case) -> Values:
 def add_plugin_metrics(
     computed: MetricValues, metrics: Sequence[AnyMeasure], trace: Trace, case: Case, coverage: LogCoverage
 ) -> MetricValues:
-    """Return the `computed` metrics and the plugin metrics that a scenario requests.
+    """Return the `computed` metrics and the plug-in metrics that a scenario requests.
 
-    Raises InvalidTrace if a plugin metric raises an exception or is not finite.
+    Raises InvalidTrace if a plug-in metric raises an exception or is not finite.
     """
     added = _metric_values({entry.kind: _value(entry, trace, case, coverage) for entry in metrics})
     return MetricValues({**computed.values, **added.values}, {**computed.undefined, **added.undefined})
 
 
 def _value(entry: AnyMeasure, trace: Trace, case: Case, coverage: LogCoverage) -> float | str:
-    """Return the value of a plugin metric, or the reason why it is undefined. Raises InvalidTrace."""
+    """Return the value of a plug-in metric, or the reason why it is undefined. Raises InvalidTrace."""
     required = entry.measure.evidence
-    if reason := missing_evidence_reason(frozenset(Evidence) if required is None else required, coverage):
+    if reason := _insufficient_evidence(frozenset(Evidence) if required is None else required, coverage):
         return reason
     try:
         found = entry.measure.measure(trace, case)
     except MissingEvidence as missing:
         return str(missing)
-    except Exception as error:  # a plugin can raise anything
+    except Exception as error:  # a plug-in can raise anything
         raise InvalidTrace(f"metric {entry.kind}: {type(error).__name__}: {error}{entry.plugin_suffix}") from error
     if isinstance(found, str) and found:
         return found

@@ -81,6 +81,14 @@ def test_missing_evidence_is_a_reason_if_the_metric_needs_it() -> None:
     assert only == "the log lacks the times of the scans"
 
 
+def test_evidence_for_a_part_of_the_run_is_not_sufficient() -> None:
+    coverage = replace(COMPLETE_COVERAGE, partial={Evidence.TRUTH: "the truth has no sample from 1 s to 3 s"})
+    for evidence in (None, frozenset({Evidence.TRUTH})):
+        found = add(PluginMetric(1.0, evidence), coverage)
+        assert (found.values["mine"], found.undefined["mine"]) == (None, "the truth has no sample from 1 s to 3 s")
+    assert add(PluginMetric(1.0, frozenset({Evidence.COMMANDS})), coverage).values["mine"] == 1.0
+
+
 def zones(monkeypatch: pytest.MonkeyPatch, gaps: list[float], trace: Trace = TRACE) -> dict[str, float | str]:
     whole = np.full(len(trace.truth.ticks), gaps[-1])
     whole[: len(gaps)] = gaps
