@@ -83,43 +83,55 @@ def check_robot(body: RobotBody) -> RobotCheckResult:
 def _checks(body: RobotBody, rest: RestingState, trials: dict[str, Trial]) -> Iterator[DriveCheck]:
     limits = SKID_STEER_LIMITS if isinstance(body.drive, SkidSteer) else ROLLING_LIMITS
     yield DriveCheck(
-        "at rest: leans", math.degrees(rest.tilt), math.degrees(MAX_REST_TILT_RAD), "deg", "its wheels do not carry it"
+        "at rest: tilt", math.degrees(rest.tilt), math.degrees(MAX_REST_TILT_RAD), "deg", "its wheels do not carry it"
     )
-    yield DriveCheck("at rest: off its wheels' ground", 1e3 * abs(rest.height), 1e3 * MAX_REST_HEIGHT_M, "mm")
-    yield DriveCheck("at rest: creeps in a second", 1e3 * rest.drift, 1e3 * MAX_REST_DRIFT_M, "mm")
+    yield DriveCheck("at rest: height above the ground", 1e3 * abs(rest.height), 1e3 * MAX_REST_HEIGHT_M, "mm")
+    yield DriveCheck("at rest: motion within a second", 1e3 * rest.drift, 1e3 * MAX_REST_DRIFT_M, "mm")
     line = trials["line"]
-    yield _deviation_check("line: driven, from commanded", line.truth.driven, line.command.driven, MAX_DISTANCE_ERROR)
+    yield _deviation_check(
+        "line: true distance against command", line.truth.driven, line.command.driven, MAX_DISTANCE_ERROR
+    )
     heading = abs(math.degrees(line.truth.end.yaw))
     yield DriveCheck("line: heading at its end", heading, math.degrees(MAX_HEADING_RAD), "deg")
     advice = _wheel_radius_advice(body.drive, line)
     yield _deviation_check(
-        "line: odometry, from true distance", line.odometry.driven, line.truth.driven, MAX_ODOMETRY_ERROR, advice
+        "line: odometry against true distance", line.odometry.driven, line.truth.driven, MAX_ODOMETRY_ERROR, advice
     )
     turn = trials.get("turn") or trials["circle"]
     advice = _track_width_advice(body.drive, turn, line) or advice
     yield _deviation_check(
-        f"{turn.name}: turned, from commanded", turn.truth.turned, turn.command.turned, limits.angle, advice
+        f"{turn.name}: true angle against command", turn.truth.turned, turn.command.turned, limits.angle, advice
     )
     yield _deviation_check(
-        f"{turn.name}: odometry, from true angle", turn.odometry.turned, turn.truth.turned, limits.odometry, advice
+        f"{turn.name}: odometry against true angle", turn.odometry.turned, turn.truth.turned, limits.odometry, advice
     )
     if turn.name == "turn":
         offset = max(math.hypot(pose.x, pose.y) for pose in turn.truth.path)
         yield DriveCheck(
-            "turn: off the spot", offset, limits.offset * body.circumscribed_radius, "m", _offset_advice(body)
+            "turn: distance from the start",
+            offset,
+            limits.offset * body.circumscribed_radius,
+            "m",
+            _offset_advice(body),
         )
     if sideways := trials.get("sideways"):
         yield _deviation_check(
-            "sideways: driven, from commanded", sideways.truth.driven, sideways.command.driven, MAX_DISTANCE_ERROR
+            "sideways: true distance against command",
+            sideways.truth.driven,
+            sideways.command.driven,
+            MAX_DISTANCE_ERROR,
         )
         yield _deviation_check(
-            "sideways: odometry, from true", sideways.odometry.driven, sideways.truth.driven, MAX_ODOMETRY_ERROR
+            "sideways: odometry against true distance",
+            sideways.odometry.driven,
+            sideways.truth.driven,
+            MAX_ODOMETRY_ERROR,
         )
     square = trials["square"]
     gap = square.odometry.end.distance(square.truth.end)
-    yield DriveCheck("square: odometry's end from the true", gap, limits.square_end * square.command.driven, "m")
+    yield DriveCheck("square: error of odometry at the end", gap, limits.square_end * square.command.driven, "m")
     tilt, max_tilt = math.degrees(max(trial.tilt for trial in trials.values())), math.degrees(MAX_DRIVING_TILT_RAD)
-    yield DriveCheck("driving: leans at most", tilt, max_tilt, "deg", "lower its mass, or its limits")
+    yield DriveCheck("driving: tilt", tilt, max_tilt, "deg", "lower its mass, or its limits")
 
 
 def _deviation_check(name: str, value: float, expected: float, limit: float, advice: str = "") -> DriveCheck:

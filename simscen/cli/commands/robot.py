@@ -120,7 +120,7 @@ def _drive_line(trial: "Trial") -> str:
 def _check_line(check: "DriveCheck") -> str:
     """Return the line of one check; after a failed check, also a line with its advice."""
     verdict = "ok" if check.passed else "FAILED"
-    line = f"  {verdict:7} {check.name:36} {check.value:9.3f}, at most {check.limit:.3g} {check.unit}"
+    line = f"  {verdict:7} {check.name:41} {check.value:9.3f}, at most {check.limit:.3g} {check.unit}"
     return line if check.passed or not check.advice else f"{line}\n          {check.advice}"
 
 

@@ -210,7 +210,7 @@ def test_inferred_skid_steer_robot_turns_as_commanded(figures, axles):
     """Regression: robots with four wheels turned up to 31 % too little, and those with six up to twice as far."""
     parts = [wheels(x=x, r=0.1, half=0.25, name=f"axle_{index}_") for index, x in enumerate(axles)]
     found = figures("cart.urdf", cart_urdf=urdf(*parts, size="0.6 0.4 0.2", mass=20, z=0.2, i=0.8))
-    turn = next(check for check in found["checks"] if check["name"] == "turn: turned, from commanded")
+    turn = next(check for check in found["checks"] if check["name"] == "turn: true angle against command")
     assert turn["value"] < 5
 
 
@@ -218,7 +218,7 @@ def test_drifting_skid_steered_base_is_reported(check):
     four = wheels(x=-0.25, r=0.16, half=0.28, name="rear_") + wheels(x=0.25, r=0.16, half=0.28, name="front_")
     code, output, _ = check("cart.urdf", cart_urdf=urdf(four, size="0.7 0.4 0.2", mass=45, z=0.25, i=1.5, x=-0.1))
     assert code == 1
-    assert "FAILED  turn: off the spot" in output
+    assert "FAILED  turn: distance from the start" in output
     assert "behind the center of its wheels" in output
 
 
