@@ -39,7 +39,7 @@ def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> Diagnosis:
 
 
 def _current_goal(trace: Trace, case: Case, tick: int) -> GoalOutcome | None:
-    """Return the outcome of the last goal that was accepted until `tick`; None if there is none or if it is over."""
+    """Return the outcome of the last goal that was accepted until `tick`; None if it was reached or canceled."""
     started = [outcome for outcome in goal_outcomes(trace, case) if outcome_start(outcome) <= tick]
     if not started:
         return None

@@ -16,7 +16,7 @@ def evaluate_claim(claim: PassRate, results: Sequence[RunResult]) -> ClaimResult
     """Return the result of a claim. `results` are in the order of their seeds.
 
     A sequential test ends at the first run that decides the claim; later runs do not count. A crash or timeout of the
-    stack under test counts as a failed run. Other errors block the claim.
+    stack under test counts as a failed run. Any other error blocks the claim, also in a run that does not count.
     """
     outcomes = [result.outcome is Outcome.PASSED for result in results if is_counted(result)]
     errors = len(results) - len(outcomes)

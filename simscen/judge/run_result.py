@@ -39,7 +39,7 @@ def judge_run(
     path:      scenario file
     lines:     line of each criterion in the scenario file; () if the criteria come from another file
     coverage:  evidence that the log contains, and for which part of the run
-    metrics:   additional metrics of plugins
+    metrics:   additional metrics of plug-ins
     expected:  expected failure of the run; None to expect success
     """
     coverage = replace(coverage, partial={**time_gaps(trace), **coverage.partial})

@@ -3,7 +3,7 @@
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
@@ -180,10 +180,7 @@ def _effects(
             if effect is not None:
                 found.append(ParameterEffect(path, criterion, *effect[:2], len(keys), effect[2]))
     adjusted = holm([one.p for one in found])
-    effects = [
-        ParameterEffect(one.path, one.criterion, one.effect, p, one.runs, one.is_ordered)
-        for one, p in zip(found, adjusted, strict=True)
-    ]
+    effects = [replace(one, p=p) for one, p in zip(found, adjusted, strict=True)]
     return tuple(sorted(effects, key=lambda one: (one.p, -abs(one.effect), one.path, one.criterion)))
 
 

@@ -4,7 +4,7 @@ A tick is one physics step. A beat is a tick at which a sensor, a stack, or a sa
 of the loop processes one beat:
 
 1. observe: sample the true states, and collect new collisions
-2. direct: start and end events and faults
+2. direct: start events, and start and end faults
 3. decide: read the sensors, apply faults, and request a command from each stack
 4. record: append the beat to the logs
 5. drive: send the commands to the wheels, and simulate until the next beat
@@ -158,7 +158,6 @@ class RunSetup:
     simulation: Simulation
     robots: Sequence[RobotUnderTest]
     directors: Sequence[Director]
-    """Directors, which start and end events and faults."""
 
 
 def run_lockstep(setup: RunSetup) -> Event:

@@ -30,7 +30,7 @@ def software_versions() -> dict[str, str]:
 
 
 def cpu_flags() -> list[str]:
-    """Return the instruction sets of this machine that affect results; empty if /proc/cpuinfo cannot be read."""
+    """Return the instruction sets of this machine that affect results; empty if it is not an x86 machine with Linux."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -158,7 +158,7 @@ def _chosen_stacks(loaded: LoadedScenario) -> dict[str, object]:
 def referenced_files(loaded: LoadedScenario) -> list[Path]:
     """Return the map images, SDF files, and URDF files of a scenario."""
     views = list(loaded.robot_views.values())
-    maps = [loaded.world.map, *(view.map for view in views if view.map != "none")]
+    maps = [loaded.world.map, *(view.map for view in views)]
     return [
         *(found.image for found in maps if isinstance(found, LoadedMap)),
         *(file for file in (loaded.world.sdf, *(view.robot.urdf for view in views)) if file),

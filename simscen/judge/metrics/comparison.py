@@ -19,7 +19,7 @@ COMPARED_METRICS = (
     *("time_to_goal", "path_length", "min_clearance", "mean_jerk", "time_not_moving", "replans", "recoveries"),
     "collisions",
 )
-"""Metrics that are compared, in the order of the table. Metrics of plugins follow."""
+"""Metrics that are compared, in the order of the table. Metrics of plug-ins follow."""
 HIGHER_IS_BETTER = frozenset({"min_clearance"})
 """Metrics for which a higher value is better. For all other COMPARED_METRICS, a lower value is better."""
 METRICS_OF_ALL_PAIRS = frozenset({"collisions"})
@@ -177,7 +177,7 @@ def _metric_unit(name: str) -> str:
 
 
 def _compared_names(pairs: Sequence[Pair]) -> list[str]:
-    """Return the names of the COMPARED_METRICS of the runs, grouped by robot, and then those of metrics of plugins."""
+    """Return the names of the COMPARED_METRICS of the runs, grouped by robot, and then those of metrics of plug-ins."""
     names = {name for pair in pairs for run in pair for name in run.metrics}
     compared = [name for name in names if _base_name(name) in COMPARED_METRICS]
     compared.sort(key=lambda name: (name.rpartition("/")[0], COMPARED_METRICS.index(_base_name(name))))

@@ -66,7 +66,9 @@ def _goal_mark(outcome: GoalOutcome, scene: Scene) -> GoalMark:
             verdicts = [v for v in scene.result.verdicts if v.criterion == "goals_reached" and v.id.startswith(own)]
             findings = [finding for verdict in verdicts for finding in verdict.findings]
             if any(f.status is Status.FAIL and f.what == f"goal {outcome.goal.name}" for f in findings):
-                return GoalMark("failed", palette.RED, "reached unexpectedly" if outcome.expected_failure else "not there")
+                return GoalMark(
+                    "failed", palette.RED, "reached unexpectedly" if outcome.expected_failure else "not there"
+                )
             return GoalMark("reached", palette.GREEN)
 
 

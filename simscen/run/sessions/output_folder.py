@@ -40,7 +40,7 @@ def run_folder(folder: Path, key: RunKey) -> Path:
 
 
 def probe_writable(path: Path) -> None:
-    """Raise OSError unless a regular file can be written at `path`. Does not change the file system."""
+    """Raise OSError unless a regular file can be written at `path`. Leaves no new file."""
     require_regular_file(path)
     existed = path.exists()
     with path.open("ab"):

@@ -129,7 +129,7 @@ def run_session(
                     if options.against is not None:
                         run = compare_with_session(run, options.against)
                     if options.keep_logs is KeptLogs.FAILED and run.outcome.is_good:
-                        run = delete_log(run)
+                        run = delete_all_but_result(run)
                     report(job, run)
     except Interrupted as interrupted:
         stopped = Exit(128 + interrupted.number)
@@ -139,7 +139,7 @@ def run_session(
     return results, stopped
 
 
-def delete_log(run: RunFinished) -> RunFinished:
+def delete_all_but_result(run: RunFinished) -> RunFinished:
     """Delete all files of a run except its result.json; return the run without paths of deleted files."""
     kept = Path(run.artifacts.result)
     for file in Path(run.artifacts.folder).iterdir():
