@@ -116,6 +116,7 @@ def main() -> None:
     for plugin_path in plugin_paths:
         apply_plugin_path(plugin_path)
     ForkServer(0, int(replies), _warm_up, _execute).serve()
+    os._exit(0)  # skips the teardown of the interpreter, for which the supervisor would wait
 
 
 def _warm_up(job: Job) -> None:
