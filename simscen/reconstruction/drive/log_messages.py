@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from simscen.record import topics
 from simscen.record.foreign.decoded_messages import DECODERS, Decoders
 from simscen.record.foreign.options import TOPICS
-from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
+from simscen.record.foreign.raw_messages import RawMessage, open_messages
 from simscen.record.frame_names import RobotFrames
 from simscen.record.messages import decode
 from simscen.record.messages.decode import MessageReader
@@ -88,12 +88,13 @@ _DECODERS: dict[str, Decoders] = {
 class LogMessages:
     """Messages of a log by role, in order of log time, and message types by topic.
 
-    `is_complete` is false for a truncated log.
+    `is_complete` is false for a truncated log. `notes` are sentences for the user.
     """
 
     by_role: dict[str, list[LoggedMessage]] = field(default_factory=dict)
     topics: dict[str, str] = field(default_factory=dict)
     is_complete: bool = True
+    notes: list[str] = field(default_factory=list)
 
     def of(self, role: str) -> list[LoggedMessage]:
         """Return the messages of a role; [] if the log has none."""
@@ -104,14 +105,14 @@ def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, 
     """Read the messages of an MCAP file or a rosbag2 folder. Raises UnusableLog if it cannot be read.
 
     `renamed` maps roles to topics that differ from the defaults. `truth` is the topic of the ground truth; None for no
-    ground truth. If the default scan topic has no messages, the scans of another topic are used. In a simscen log with
+    ground truth. If the scan topic has no messages, the scans of another topic are used. In a simscen log with
     several robots, only the messages of `robot` are read, without the name of the robot in topics and frames.
     """
     prefix = f"/{robot}" if robot else ""
-    names = {**TOPICS, **EXTRA_TOPICS, **renamed}
-    roles = {prefix + names[role].removeprefix(prefix): role for role in sorted(names)}
-    if truth:
-        roles[prefix + truth.removeprefix(prefix)] = "truth"
+    namespace = f"{prefix}/" if robot else ""
+    names = {**TOPICS, **EXTRA_TOPICS, **renamed, **({"truth": truth} if truth else {})}
+    absolute = {role: topic if topic.startswith(namespace) else prefix + topic for role, topic in names.items()}
+    roles = {absolute[role]: role for role in sorted(names)}
     stream = open_messages(path, _TopicsToRead(roles) if path.is_dir() else roles)
     messages = LogMessages()
     other_scans: dict[str, list[LoggedMessage]] = {}
@@ -119,11 +120,13 @@ def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, 
         role = roles.get(raw.topic)
         if role is not None and raw.type in _DECODERS[role]:
             messages.by_role.setdefault(role, []).append(_without_robot(_decode(raw, role), robot))
-        elif role is None and raw.type == topics.SCAN_TYPE and raw.topic.startswith(f"{prefix}/" if robot else ""):
+        elif role is None and raw.type == topics.SCAN_TYPE and raw.topic.startswith(namespace):
             other_scans.setdefault(raw.topic, []).append(_without_robot(_decode(raw, "scan"), robot))
     if not messages.of("scan") and other_scans:
-        messages.by_role["scan"] = other_scans[min(other_scans)]
-    robot_topics = {name: kind for name, kind in stream.topics.items() if not robot or name.startswith(f"{prefix}/")}
+        topic = min(other_scans)
+        messages.by_role["scan"] = other_scans[topic]
+        messages.notes.append(f"scans on {names['scan']}; those on {topic} are used, see --topic scan=/TOPIC")
+    robot_topics = {name: kind for name, kind in stream.topics.items() if name.startswith(namespace)}
     messages.topics = {name.removeprefix(prefix): kind for name, kind in robot_topics.items()}
     messages.is_complete = stream.complete
     for role_messages in messages.by_role.values():
@@ -143,8 +146,6 @@ class _TopicsToRead:
 
 def _decode(raw: RawMessage, role: str) -> LoggedMessage:
     """Decode a message of a topic with a role. Raises UnusableLog if this is impossible."""
-    if raw.encoding != "cdr":
-        raise UnusableLog(f"{raw.topic} is encoded as {raw.encoding or 'something unknown'}, not as CDR")
     message = raw.decode(_DECODERS[role][raw.type])
     return LoggedMessage(raw.time, _stamp(message), message)
 

@@ -73,7 +73,7 @@ class _DriveReader:
 
     def __init__(self, path: Path, messages: LogMessages) -> None:
         self._path, self._messages = path, messages
-        self._notes: list[str] = []
+        self._notes: list[str] = [*messages.notes]
         moving = [message for role, logged in messages.by_role.items() if role not in _LATCHED for message in logged]
         if not moving:
             names = ", ".join(sorted(messages.topics)[:12]) or "none"

@@ -46,7 +46,9 @@ class RawMessage(NamedTuple):
     data: bytes
 
     def decode(self, decoder: Callable[[MessageReader], T]) -> T:
-        """Return the message, decoded by a function of `messages.decode`. Raises UnusableLog if it is invalid."""
+        """Return the message, decoded by a function of `messages.decode`. Raises UnusableLog if this is impossible."""
+        if self.encoding != "cdr":
+            raise UnusableLog(f"{self.topic} is encoded as {self.encoding or 'something unknown'}, not as CDR")
         try:
             return decode_checked(decoder, self.data)
         except (ValueError, OverflowError) as error:

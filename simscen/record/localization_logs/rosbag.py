@@ -135,8 +135,6 @@ def _collect_messages(path: Path, odometry: str, scan: str, truth: str) -> _Mess
 
 
 def _decode(raw: RawMessage, decoders: Decoders) -> Any:
-    if raw.encoding != "cdr":
-        raise UnusableLog(f"{raw.topic} is encoded as {raw.encoding or 'something unknown'}, not as CDR")
     if raw.type not in decoders:
         raise UnusableLog(f"{raw.topic} is a {raw.type or 'type without a name'}, expected {' or '.join(decoders)}")
     return raw.decode(decoders[raw.type])

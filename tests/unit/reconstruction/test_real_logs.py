@@ -186,6 +186,13 @@ def test_the_mount_of_the_lidar_can_be_on_tf(tmp_path):
     assert not any("mount" in note for note in drive.notes)
 
 
+def test_scans_of_another_topic_are_used_with_a_note(tmp_path):
+    said = [replace(one, topic="/front/scan") if one.topic == "/scan" else one for one in messages()]
+    drive = read_drive(logs.write_bag(tmp_path / "bag", said))
+    assert len(drive.scans) > 50
+    assert "scans on /scan; those on /front/scan are used, see --topic scan=/TOPIC" in drive.notes
+
+
 def upside_down(said):
     if said.topic == "/tf_static":
         said.message.transforms[0].transform.rotation = logs.T["geometry_msgs/msg/Quaternion"](

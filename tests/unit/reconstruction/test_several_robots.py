@@ -1,9 +1,14 @@
 """A log of simscen with several robots gives a scenario with one of them; the others become moving objects."""
 
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "record"))
+import foreign_logs as logs
 
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2
@@ -69,3 +74,12 @@ def test_a_robot_without_a_lidar_does_not_get_the_scans_of_another_one(log):
     own = collect_messages(log, renamed, None, "blue").of("scan")
     assert {message.content.frame for message in own} == {"lidar"}
     assert collect_messages(log, renamed, None, "blu").of("scan") == []
+
+
+@pytest.mark.parametrize("robot", ["a", "s", "robot"])
+def test_topics_are_those_of_the_robot_whatever_its_name(robot, tmp_path):
+    said = [replace(one, topic=f"/{robot}{one.topic}") for one in logs.drive(2.0)]
+    read = collect_messages(logs.write_mcap(tmp_path / "log.mcap", said), {}, "/mocap", robot)
+    assert {role for role in ("odom", "amcl_pose", "scan", "cmd_vel", "truth") if not read.of(role)} == set()
+    named = collect_messages(tmp_path / "log.mcap", {"odom": f"/{robot}/odom"}, f"/{robot}/mocap", robot)
+    assert named.of("odom") and named.of("truth")
