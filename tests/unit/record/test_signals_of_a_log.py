@@ -43,4 +43,6 @@ def test_most_signals_are_in_the_log(both: tuple[Trace, Trace]) -> None:
     answers = [
         _bits(name, log, {key: NAMES[key] for key in s.alternative_arguments[:1]}) for name, s in SIGNALS.items()
     ]
-    assert sum(isinstance(answer, bytes) for answer in answers) >= len(SIGNALS) - 1
+    missing = [name for name, answer in zip(SIGNALS, answers, strict=True) if not isinstance(answer, bytes)]
+    # The moments have no people, and plans without the events that state their reasons.
+    assert missing == ["person_distance", "replan_count"]
