@@ -54,7 +54,8 @@ def _caster_warnings(tree: LinkTree, wheels: list[WheelJoint], ground: float, ne
             message = (
                 f"link {name!r} reaches {-1e3 * gap:.1f} mm below the wheels, which would lose contact with the ground"
             )
-            hint = f"raise it by {-gap:.4g} m; simscen uses frictionless spheres as casters instead"
+            substitute = "uses frictionless spheres as casters instead" if needs_caster else "leaves it out of the hull"
+            hint = f"raise it by {-gap:.4g} m; simscen {substitute}"
             yield tree.links[name].element.problem(message, hint)
     nearest = min(gaps, key=lambda name: gaps[name], default=None)
     if not needs_caster or nearest is None:

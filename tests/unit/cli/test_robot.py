@@ -89,6 +89,9 @@ def test_low_caster_is_reported_at_its_line(check):
     assert code == 0
     line = text[: text.index('<link name="caster"')].count("\n") + 1
     assert f"cart.urdf:{line}:3: warning[SC405] link 'caster' reaches 1.0 mm below the wheels" in output
+    assert "simscen uses frictionless spheres as casters instead" in output
+    four = wheels(x=-0.15, name="rear_") + wheels(x=0.15, name="front_")
+    assert "simscen leaves it out of the hull" in check("cart.urdf", cart_urdf=urdf(four, CASTER.format(z=0.019)))[1]
 
 
 def test_caster_above_the_ground_is_reported(check):
