@@ -42,10 +42,9 @@ def outlines_of_event(event: Event) -> Outlines:
 
 
 def spawn_pose(event: Event) -> Pose2:
-    """Return the pose of the object in an object.spawned event."""
-    x, y, yaw = (event.data.get(key, 0.0) for key in ("x", "y", "yaw"))
-    assert isinstance(x, int | float) and isinstance(y, int | float) and isinstance(yaw, int | float)
-    return Pose2(float(x), float(y), float(yaw))
+    """Return the pose of the object in an object.spawned event. Missing values are 0."""
+    values = (event.data.get(key) for key in ("x", "y", "yaw"))
+    return Pose2(*(float(value) if isinstance(value, int | float) else 0.0 for value in values))
 
 
 def _floats(data: Mapping[str, object], key: str) -> list[float]:

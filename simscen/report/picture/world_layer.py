@@ -59,7 +59,8 @@ def draw_floors(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         yield from _draw_floor(canvas, floor.region, np.array(floor.outline), f"friction {floor.friction:g}")
     for event in scene.per_robot[0].trace.of_kind(EventKind.FLOOR_CHANGED):
         outline, friction = event.data.get("outline"), event.data.get("friction")
-        assert isinstance(outline, list) and isinstance(friction, int | float)
+        if not isinstance(outline, list) or not isinstance(friction, int | float):
+            continue  # plug-ins can record any data
         text = f"friction {friction:g} from {scene.trace.seconds(event.tick):.1f} s"
         until = event.data.get("until")
         text += f" to {until:.1f} s" if isinstance(until, int | float) else ""
@@ -104,7 +105,7 @@ def _active_zones(scene: Scene) -> Iterator[tuple[FilterZone, str]]:
     initial = {(str(zone.filter), zone.region): zone for zone in scene.scenery.zones if zone.robot == scene.robot_name}
     switched: dict[tuple[str, str], list[Event]] = {}
     for event in scene.trace.of_kind(EventKind.ZONE_SWITCHED):
-        switched.setdefault((str(event.data["filter"]), event.name), []).append(event)
+        switched.setdefault((str(event.data.get("filter")), event.name), []).append(event)
     for key in dict.fromkeys((*initial, *switched)):
         zone = initial.get(key)
         if zone is None and (outline := scene.case.regions.get(key[1])):  # a zone that was added during the run
@@ -122,7 +123,7 @@ def _zone_text(scene: Scene, zone: FilterZone, events: list[Event]) -> str:
     limit = next((value for value in reversed(limits) if isinstance(value, int | float) and value), 0.0)
     slow = f"at most {limit:g} m/s" if limit else "slow zone"
     rule = "keep out" if zone.filter == "keepout" else slow
-    changes = [f"{'on' if e.data['enabled'] else 'off'} at {scene.trace.seconds(e.tick):.1f} s" for e in events]
+    changes = [f"{'on' if e.data.get('enabled') else 'off'} at {scene.trace.seconds(e.tick):.1f} s" for e in events]
     return f"{zone.region}: {', '.join([rule, *changes])}" if zone.region else ", ".join([f"{rule} (mask)", *changes])
 
 

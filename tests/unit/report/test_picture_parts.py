@@ -177,6 +177,11 @@ def test_log_without_true_poses_is_drawn():
     assert {"belief", "goal shelf failed"} <= {name for name, _ in parts}
 
 
+@pytest.mark.parametrize("kind", ["floor.changed", "zone.switched", "object.spawned"])
+def test_events_without_data_are_tolerated(kind):
+    assert of(everything(events=[[1, kind, "odd", {"x": "far"}]]), "path")
+
+
 def test_samples_that_are_not_finite_are_outside_of_the_picture():
     scene = everything()
     values = scene.trace.truth.values.copy()
