@@ -188,7 +188,7 @@ class Release(Window):
 
 def _dimension_of(value: Any) -> str:
     """Return the dimension of the unit at the end of a text, e.g. "length" for "2 m"; "" if the unit is unknown."""
-    unit = str(value).split(maxsplit=1)[-1]
+    *_, unit = ("", *str(value).split(maxsplit=1))
     return next((dimension for dimension, units in UNITS.items() if unit in units), "")
 
 

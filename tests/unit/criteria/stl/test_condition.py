@@ -49,6 +49,7 @@ def refused(words):
         ({"signal": "localized", "scale": 1}, "`localized` is yes or no: write it alone, or below `not`"),
         ({"signal": "speed", "op": ">"}, "`speed` needs `op` and `value`"),
         ({"signal": "speed", "value": 1}, "`speed` needs `op` and `value`"),
+        ({"op": "<", "value": ""}, "Input should be a valid number"),
         ({**FAST, "scale": 0}, "`scale` must be greater than 0"),
         ({**FAST, "scale": -0.5}, "`scale` must be greater than 0"),
         ({**FAST, "op": "=="}, "`==` is unsuitable for measured values; use `<=` and `>=` around the value"),
