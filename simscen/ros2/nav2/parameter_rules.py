@@ -91,6 +91,14 @@ class _Node(NamedTuple):
         """Return the value of a parameter; None if it is not set."""
         return self.parameters.get(key)
 
+    def items(self, key: str) -> List[Any]:
+        """Return the items of a parameter that is a list; [] if it is not set. Adds a problem for another type."""
+        value = self.get(key)
+        if value is None or isinstance(value, list):
+            return value or []
+        self.add_problem(key, f"is {value!r}; expected a list of names")
+        return []
+
     def add_problem(self, key: str, message: str, is_severe: bool = True) -> None:
         """Add a problem of the parameter `key`."""
         self.problems.append(ParameterProblem(self.name, key, f"{key} {message}", is_severe))
@@ -129,7 +137,7 @@ def _check_amcl(node: _Node) -> None:
 def _check_costmap(node: _Node) -> None:
     node.check_base("robot_base_frame")
     node.check_frame("global_frame", MAP, ODOM)
-    for layer in node.get("plugins") or ():
+    for layer in node.items("plugins"):
         sources = node.get(f"{layer}.observation_sources")
         for source in sources.split() if isinstance(sources, str) else ():
             _check_source(node, f"{layer}.{source}")
@@ -164,7 +172,7 @@ def _check_behavior_server(node: _Node) -> None:
 def _check_collision_monitor(node: _Node) -> None:
     node.check_base("base_frame_id")
     node.check_frame("odom_frame_id", ODOM)
-    for source in node.get("observation_sources") or ():
+    for source in node.items("observation_sources"):
         _check_source(node, str(source))
 
 

@@ -212,3 +212,10 @@ local_costmap:
     for line in said.split("\n"):
         place, code, message = line.split(" ", 2)
         assert f"nav2_params.yaml:{place}: error[{code}] {message}\n" in page
+
+
+@pytest.mark.parametrize(("node", "key"), [("local_costmap", "plugins"), ("collision_monitor", "observation_sources")])
+@pytest.mark.parametrize("value", [5, True, "scan"])
+def test_a_list_of_names_of_another_type_is_a_problem(node: str, key: str, value: object) -> None:
+    (problem,) = found(node, **{key: value})
+    assert problem == ParameterProblem(node, key, f"{key} is {value!r}; expected a list of names")
