@@ -17,7 +17,7 @@ from simscen.ros2.launch import LaunchedCommand
 from simscen.ros2.nav2.filter_info import MASK_TOPICS, FilterInfo
 from simscen.ros2.nav2.report import ROSOUT
 from simscen.ros2.options import AdapterError, BringUpAborted, Options
-from simscen.ros2.ros_domain import claim_domain, ros_environment
+from simscen.ros2.ros_domain import claim_domain, ros_environment, user_domain
 
 EVENTS = "/simscen/events"
 DEFAULT_MODE = "navigate_to_pose"
@@ -228,7 +228,7 @@ class AdapterRun:
         options, environment = self._options, dict(os.environ)
         requested = options.domain
         if requested is None and not options.launch:
-            requested = int(environment.get("ROS_DOMAIN_ID") or 0)
+            requested = user_domain(environment)
         domain = claim_domain(requested, environment)
         self._cleanup.callback(domain.release)
         logs = tempfile.mkdtemp(prefix="simscen-ros-logs-")

@@ -29,6 +29,14 @@ class Domain(NamedTuple):
         self.lock.close()
 
 
+def user_domain(environment: Mapping[str, str]) -> int:
+    """Return the domain of the user's nodes: ROS_DOMAIN_ID, or 0. Raises AdapterError if it is not a number."""
+    text = environment.get("ROS_DOMAIN_ID") or "0"
+    if not (text.isascii() and text.isdecimal()):
+        raise AdapterError(f"ROS_DOMAIN_ID is {text!r}, not a number")
+    return int(text)
+
+
 def claim_domain(requested: Optional[int], environment: Mapping[str, str]) -> Domain:
     """Reserve the domain `requested`; None reserves the first free domain. Raises AdapterError if it is in use."""
     folder = _lock_folder(environment)

@@ -19,7 +19,7 @@ from simscen.ros2 import messages
 from simscen.ros2.graph_names import TopicNames
 from simscen.ros2.launch import LaunchedCommand
 from simscen.ros2.options import AdapterError
-from simscen.ros2.ros_domain import claim_domain, ros_environment
+from simscen.ros2.ros_domain import claim_domain, ros_environment, user_domain
 
 FOLDER = Path(simscen.ros2.__file__).parent
 
@@ -189,3 +189,15 @@ def test_all_stamps_of_a_plan_and_of_transforms_are_shifted() -> None:
     assert messages.shift_stamps(type_name, transforms((3, 0), (4, 5)), -2 * 10**9) == transforms((1, 0), (2, 5))
     early = messages.shift_stamps(type_name, transforms((1, 0), (4, 5)), -2 * 10**9)
     assert early == transforms((0, 0), (2, 5)), "stamps do not become negative"
+
+
+@pytest.mark.parametrize(("text", "number"), [("", 0), ("7", 7)])
+def test_the_domain_of_the_user_is_ros_domain_id(text: str, number: int) -> None:
+    assert user_domain({"ROS_DOMAIN_ID": text}) == number
+    assert user_domain({}) == 0
+
+
+@pytest.mark.parametrize("text", ["x", "-1", "1.5", "²"])
+def test_a_domain_that_is_not_a_number_is_refused(text: str) -> None:
+    with pytest.raises(AdapterError, match=r"ROS_DOMAIN_ID is '.*', not a number"):
+        user_domain({"ROS_DOMAIN_ID": text})
