@@ -58,7 +58,8 @@ class DiskCache:
                 if not stat.S_ISREG(status.st_mode) or status.st_size > MAX_ENTRY_BYTES:
                     return None
                 data = file.read(MAX_ENTRY_BYTES)
-                os.utime(descriptor)
+                with contextlib.suppress(OSError):  # a read-only file system
+                    os.utime(descriptor)
         except OSError:  # missing or unreadable: the caller computes it again
             return None
         content = data[_DIGEST_BYTES:]

@@ -1,5 +1,6 @@
 """Files of the cache between sessions: only valid ones, only of this user, and a limited number."""
 
+import errno
 import os
 import threading
 from pathlib import Path
@@ -103,3 +104,13 @@ def test_an_unwritable_folder_disables_the_cache(tmp_path: Path) -> None:
     kept = DiskCache(tmp_path / "file" / "c")
     kept.put(KEY, b"content")
     assert kept.get(KEY) is None
+
+
+def test_an_entry_on_a_read_only_file_system_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    DiskCache(tmp_path).put(KEY, b"content")
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(os, "utime", refuse)
+    assert DiskCache(tmp_path).get(KEY) == b"content"
