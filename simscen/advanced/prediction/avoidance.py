@@ -143,7 +143,7 @@ class Avoidance:
             number = int(batch[cost == lowest].min())
             if (lowest, number) < best:
                 best, first_command = (lowest, number), fan.commands[number]
-        return Twist(float(first_command[0]), 0.0, float(first_command[1]))
+        return Twist(*first_command.tolist())
 
     def _cost(
         self,
@@ -212,8 +212,8 @@ class Avoidance:
         return np.asarray(np.maximum(-vx / self._speed, 0.0).mean(axis=1))
 
     def _change_costs(self, commands: Array) -> Array:
-        """Return the costs (n,) of the difference between commands (n, 2: vx, wz) and the previous command."""
+        """Return the costs (n,) of the difference between commands (n, 3: vx, vy, wz) and the previous command."""
         if self._last is None:
             return np.zeros(len(commands))
         change = np.abs(commands[:, 0] - self._last.vx) / self._speed
-        return np.asarray(CHANGE_WEIGHT * (change + np.abs(commands[:, 1] - self._last.wz) / 3.0))
+        return np.asarray(CHANGE_WEIGHT * (change + np.abs(commands[:, 2] - self._last.wz) / 3.0))

@@ -68,7 +68,7 @@ class FollowedPath:
         x = np.interp(arc_lengths, along, self._x) + (pose.x - self._x[nearest]) * decay
         y = np.interp(arc_lengths, along, self._y) + (pose.y - self._y[nearest]) * decay
         yaw = self._headings(arc_lengths, nearest, command.vx < 0.0) if with_headings else np.zeros_like(x)
-        return Rollouts(x, y, yaw, vx, scale * (command.vx, command.wz))
+        return Rollouts(x, y, yaw, vx, scale * np.array(command))
 
     def position_over_time(
         self, pose: Pose2, twist: Twist, command: Twist, robot: RobotModel

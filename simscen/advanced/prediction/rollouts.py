@@ -28,7 +28,10 @@ TIMES: Array = np.arange(1, round(HORIZON_S / STEP_S) + 1, dtype=np.float64) * S
 
 @dataclass(frozen=True, eq=False)
 class Rollouts:
-    """Trajectories: positions, headings, and speeds at TIMES, each (n, times), and first commands (n, 2: vx, wz)."""
+    """Trajectories: positions, headings, and forward speeds `vx` at TIMES, each (n, times), and first commands.
+
+    `commands` (n, 3) are vx, vy, wz.
+    """
 
     x: Array
     y: Array
@@ -59,8 +62,8 @@ class TrajectorySampler:
                 np.abs(sequences[:, 3]) >= np.abs(sequences[:, 4]) * robot.turning_radius
             )
             sequences = sequences[is_possible]
-        self.commands: Array = sequences[:, :2]
-        """First command (n, 2: vx, wz) of each trajectory."""
+        self.commands: Array = np.insert(sequences[:, :2], 1, 0.0, axis=1)
+        """First command (n, 3: vx, vy, wz) of each trajectory. Sampled trajectories have no lateral motion."""
         self._speeds, self._speed_profile = np.unique(sequences[:, (0, 2, 3)], axis=0, return_inverse=True)
         self._turns, self._turn_profile = np.unique(sequences[:, (1, 2, 4)], axis=0, return_inverse=True)
 
@@ -85,7 +88,7 @@ class TrajectoryFan:
     yaw (m, times):               headings of the turn profiles
     cosine, sine (m, times):      cosine and sine of the headings in the middle of each time step
     speed_profile, turn_profile:  indices (n,) of the profiles of each trajectory
-    commands (n, 2):              first command (vx, wz) of each trajectory
+    commands (n, 3):              first command (vx, vy, wz) of each trajectory
     """
 
     pose: Pose2
@@ -128,9 +131,10 @@ def _ramp(now: float, first: Array, duration: Array, then: Array, acceleration: 
 def arc_rollouts(pose: Pose2, command: Twist, fractions: tuple[float, ...]) -> Rollouts:
     """Return the trajectories of a constant command at `fractions` of its velocity, for a robot without a path."""
     scale = np.array(fractions)[:, None]
-    vx, wz = scale * command.vx + 0.0 * TIMES, scale * command.wz + 0.0 * TIMES
+    vx, vy, wz = (scale * velocity + 0.0 * TIMES for velocity in command)
     yaw = pose.yaw + wz * TIMES
     middle = yaw - 0.5 * STEP_S * wz
-    x = pose.x + np.cumsum(vx * np.cos(middle), axis=1) * STEP_S
-    y = pose.y + np.cumsum(vx * np.sin(middle), axis=1) * STEP_S
-    return Rollouts(x, y, yaw, vx, np.column_stack((scale * command.vx, scale * command.wz)))
+    cosine, sine = np.cos(middle), np.sin(middle)
+    x = pose.x + np.cumsum(vx * cosine - vy * sine, axis=1) * STEP_S
+    y = pose.y + np.cumsum(vx * sine + vy * cosine, axis=1) * STEP_S
+    return Rollouts(x, y, yaw, vx, scale * np.array(command))

@@ -1,7 +1,9 @@
 """Tests of whole drives among moving obstacles."""
 
+import cmath
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -166,3 +168,23 @@ def test_the_collision_monitor_brakes_by_the_relative_velocity_and_only_where_br
     assert allowed_speed(-1.0, 0.0, 1.5, 0.0) == 1.0  # approaches from behind, so braking would be worse
     assert allowed_speed(1.0, 0.0, -4.0, 0.0) < 0.5  # reaches a stopped robot as early, but at a greater distance
     assert allowed_speed(0.0, 0.9, 0.0, -1.5) == 1.0  # approaches from the side, so braking does not help
+
+
+@pytest.mark.parametrize("heading", [0.0, 90.0, 180.0])
+def test_a_command_is_as_risky_sideways_as_forward(heading: float) -> None:
+    """The obstacle crosses the path of the robot, and misses a robot at rest."""
+    turn = cmath.rect(1.0, math.radians(heading))
+    obstacle = MovingObstacle(turn * (1.4 + 1.0j), turn * -0.5j, 0.3, 1e-4, 0.0, 1e-3)
+    moving = MovingObstacles([obstacle], Prediction().acceleration)
+    costmap = CostmapView(np.zeros((200, 200), np.uint8), np.full((200, 200), 2.0, np.float32), 0.05, (-5.0, -5.0))
+    robot = replace(box_robot(), max_lateral=0.6)
+    commands = {"forward": Twist(0.5, 0.0, 0.0), "sideways": Twist(0.0, 0.5, 0.0), "rest": STOP}
+    yaw = {"forward": 0.0, "sideways": -math.pi / 2, "rest": 0.0}
+    kept = {
+        name: Avoidance(Prediction(enabled=True), robot, 0.6).steer(
+            command, Pose2(0.0, 0.0, math.radians(heading) + yaw[name]), command, moving, costmap, None
+        )
+        is command
+        for name, command in commands.items()
+    }
+    assert kept == {"forward": False, "sideways": False, "rest": True}
