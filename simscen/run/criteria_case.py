@@ -1,8 +1,5 @@
 """Case of a criteria file: the facts that criteria need besides the log of a real robot."""
 
-from collections.abc import Sequence
-from pathlib import Path
-
 from simscen.core.geometry import Pose2
 from simscen.core.records.case import Case
 from simscen.loading.builders import load_criterion_masks, robot_from_file, world_from_file
@@ -13,19 +10,19 @@ from simscen.model.world import WorldSpec
 from simscen.worlds.world_file import world_from_spec
 
 
-def case_from_criteria(criteria: LoadedCriteria, world_path: Sequence[Path] = ()) -> Case:
+def case_from_criteria(criteria: LoadedCriteria) -> Case:
     """Return the case of a criteria file. Raises InvalidInput.
 
     The case has no footprint if the file names no robot.
     """
     loaded_world, loaded_robot = criteria.load_world_and_robot()
-    root = criteria.library.sandbox.root
+    sandbox = criteria.library.sandbox
     world = (
         world_from_spec(WorldSpec(simscen=1), "")
         if loaded_world is None
-        else world_from_file(loaded_world, root, world_path)
+        else world_from_file(loaded_world, sandbox.root, sandbox.world_path)
     )
-    folders = (root, *criteria.library.sandbox.world_path)
+    folders = (sandbox.root, *sandbox.world_path)
     body = None if loaded_robot is None else robot_from_file(loaded_robot, folders)[1]
     goals = scenario_goals(criteria.spec)
     return Case(

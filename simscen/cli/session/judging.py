@@ -47,7 +47,7 @@ class LogJudge:
         """
         self.notes: list[str] = []
         self.foreign_count = 0
-        self._options, self._scenario, self._world_path = options, scenario, world_path
+        self._options, self._scenario = options, scenario
         self._case: Case | None = None
         self._file_masks: Mapping[str, MaskBlocks] | None = None
         self._criteria: LoadedCriteria | None = None
@@ -165,7 +165,7 @@ class LogJudge:
             from simscen.run.criteria_case import case_from_criteria
 
             with _scenario_errors(self._criteria):
-                self._case = case_from_criteria(self._criteria, self._world_path)
+                self._case = case_from_criteria(self._criteria)
         return self._case
 
     def _judge_by_file(
