@@ -154,7 +154,7 @@ class ScenarioCache:
             self._worlds[digest] = load_world(loaded)
         world = with_stops_in_bounds(self._worlds[digest], loaded)
         key = digest, height, map_resolution(loaded, world)
-        if world is not self._worlds[digest]:  # the map belongs to the stops of this scenario
+        if world is not self._worlds[digest]:  # enlarged for the stops of this scenario
             return self._builder.build(world, *key[1:])
         if key not in self._built:
             self._built[key] = self._builder.build(world, *key[1:])

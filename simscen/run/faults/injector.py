@@ -32,14 +32,14 @@ MAX_ROUNDING_ERROR = 1e-9
 
 @dataclass
 class _ActiveFault:
-    """A fault that is active, or that has ended but still holds delayed messages.
+    """A fault that is active, or that has ended but still has an effect: delayed messages, or an error of odometry.
 
     index:          index of the fault in the scenario
     sensor:         name of the target (the affected sensor or actuator)
     kind:           kind of the target: class of its readings, such as "Scan", or COMMAND, WHEELS, BELIEF, or MAP
     effect:         implementation of the fault
     changed_count:  number of messages that the fault has changed or withheld
-    has_ended:      whether only delayed messages remain
+    has_ended:      whether the fault has ended
     """
 
     index: int
@@ -80,7 +80,7 @@ class FaultInjector:
         self.has_faults = bool(faults)
         """Whether the robot has any fault."""
         self._activations: Counter[int] = Counter()
-        # By index of the fault and count of its activations, because an ended activation can still hold delayed data.
+        # By index of the fault and count of its activations, because an ended activation can still have an effect.
         self.active: dict[tuple[int, int], _ActiveFault] = {}
         self._affects_commands = False
         self._last_belief: tuple[int, Belief, Belief] | None = None
@@ -99,7 +99,7 @@ class FaultInjector:
         return setting.kind
 
     def end(self, index: int) -> int:
-        """End a fault, and return the number of messages that it changed. Delayed messages still arrive later."""
+        """End a fault, and return the number of messages that it changed. Messages that it has delayed arrive later."""
         key = index, self._activations[index]
         active = self.active.pop(key)
         if remaining := active.effect.end():

@@ -50,7 +50,7 @@ class CostmapFilters:
         return f"`{order.region}` was {state} already" if on == order.enabled and same else ""
 
     def switch(self, order: ZoneSwitch) -> tuple[str, ...]:
-        """Execute an order without a `rejection_reason`; return the names of the switched regions ("" is the mask)."""
+        """Execute an order that has an effect, and return the names of the switched regions ("" is the mask)."""
         target = self._filters[order.filter]
         if order.region is None:
             target.enabled = order.enabled
