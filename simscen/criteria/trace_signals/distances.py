@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 _MIN_SQUARED_LENGTH_M2 = sys.float_info.min
 """Lower limit for squared lengths of segments, to avoid a division by zero."""
+_MAX_BATCH_PAIRS = 1 << 22
+"""Approximate number of pairs of a point and a segment that are compared at once, to limit the memory."""
 
 
 def distance_to(query: SignalQuery) -> Array:
@@ -144,12 +146,14 @@ def _nearest_step(points: Array, begins: Array, steps: Array) -> Array:
 
     Segment k begins at `begins[k]` and ends at `begins[k] + steps[k]`; both arrays are (m, 2).
     """
-    along = points @ steps.T - (begins * steps).sum(axis=1)
     squared = np.maximum((steps**2).sum(axis=1), _MIN_SQUARED_LENGTH_M2)
-    share = np.clip(along / squared, 0.0, 1.0)
-    squared_offset = (begins**2).sum(axis=1) - 2.0 * (points @ begins.T)  # and |point|^2, the same for all steps
-    nearest: Array = (squared_offset + share * (share * squared - 2.0 * along)).argmin(axis=1)
-    return nearest
+    nearest = []
+    for batch in np.array_split(points, 1 + len(points) * len(steps) // _MAX_BATCH_PAIRS):
+        along = batch @ steps.T - (begins * steps).sum(axis=1)
+        share = np.clip(along / squared, 0.0, 1.0)
+        squared_offset = (begins**2).sum(axis=1) - 2.0 * (batch @ begins.T)  # and |point|^2, the same for all steps
+        nearest.append((squared_offset + share * (share * squared - 2.0 * along)).argmin(axis=1))
+    return np.concatenate(nearest)
 
 
 INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M = 0.45, 1.2, 3.6

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import tracemalloc
 from dataclasses import replace
 from typing import get_args
 
@@ -369,3 +370,15 @@ def test_object_that_is_spawned_again_is_at_its_new_position_at_once():
     box = Samples(np.array([6, 486], dtype=np.int64), np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]]))
     values = read_signal("distance_to", replace(trace, objects={"box": box}), synthetic_case({}), {"object": "box"})
     assert [at(values, seconds) for seconds in (0, 0.5, 1.5, 2, 3)] == [0, 0, math.inf, 5, 5]
+
+
+def test_deviation_from_a_long_plan_needs_little_memory():
+    plan = [[x, math.sin(x)] for x in np.arange(0.0, 100.0, 0.05).tolist()]
+    words = {"seconds": 200, "truth": [[0, 0, 0], [200, 99, 0]], "plans": [[0, plan]]}
+    tracemalloc.start()
+    values = signal("plan_deviation", words)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    expected = shapely.distance(shapely.LineString(plan), shapely.points(np.linspace(0, 99, 8001), 0.0))
+    assert values == pytest.approx(expected, abs=1e-6)
+    assert peak < 250e6
