@@ -100,6 +100,10 @@ def _is_convex(corners: Sequence[Corner]) -> bool:
     return turns < 1.5
 
 
+MAX_BATCH_POSES = 1024
+"""Maximum number of poses for which `separation` computes distances at once, to limit the memory."""
+
+
 def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) -> Array:
     """Return the signed distance (n,) in m of the polygon `moving`, placed at `poses` (n, 3), from the polygon `fixed`.
 
@@ -113,8 +117,10 @@ def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) 
         middle = other.mean(axis=0)
         reach = np.hypot(*piece.T).max() + np.hypot(*(other - middle).T).max()
         near = np.flatnonzero(np.hypot(*(poses[:, :2] - middle).T) - reach < found)
-        still = np.broadcast_to(other, (len(near), *other.shape))
-        found[near] = np.minimum(found[near], _convex_separation(_transformed_corners(poses[near], piece), still))
+        for batch in np.array_split(near, 1 + len(near) // MAX_BATCH_POSES):
+            placed = _transformed_corners(poses[batch], piece)
+            still = np.broadcast_to(other, (len(batch), *other.shape))
+            found[batch] = np.minimum(found[batch], _convex_separation(placed, still))
     return found
 
 

@@ -1,12 +1,15 @@
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
 import shapely
+import shapely.affinity
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simscen.core.geometry.polygon_separation import convex_pieces
+from simscen.core.environment.world_model import disc_outline
+from simscen.core.geometry.polygon_separation import convex_pieces, separation
 from simscen.core.geometry.polygons import polygon_defect
 
 L = ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))
@@ -35,3 +38,15 @@ def test_convex_ring_is_a_single_piece():
     ring = tuple((float(np.cos(a)), float(np.sin(a))) for a in angles)
     assert convex_pieces(ring) == [ring]
     assert len(convex_pieces(L)) == 2
+
+
+def test_distances_at_many_poses_need_little_memory():
+    moving, fixed = disc_outline((0.0, 0.0), 0.3), disc_outline((20.0, 5.0), 2.0)
+    poses = np.column_stack((np.linspace(0, 50, 12_000), np.zeros((12_000, 2))))
+    tracemalloc.start()
+    distances = separation(poses, moving, fixed)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    expected = shapely.Polygon(fixed).distance(shapely.affinity.translate(shapely.Polygon(moving), 10.0))
+    assert np.interp(10.0, poses[:, 0], distances) == pytest.approx(expected, abs=1e-3)
+    assert peak < 150e6
