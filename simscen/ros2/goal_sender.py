@@ -1,6 +1,7 @@
 """Send goals to the nodes, by a Nav2 action or a pose on /goal_pose, and observe their outcomes."""
 
 import math
+from functools import partial
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Union
 
 from rclpy.action import ActionClient
@@ -150,7 +151,7 @@ class ActionSender:
             request.poses = poses
         self._goals, self._passed, self._reported, self.recoveries = goals, 0, 0, 0
         self._result = None
-        answer = self._client.send_goal_async(request, feedback_callback=self._process_feedback)
+        answer = self._client.send_goal_async(request, feedback_callback=partial(self._process_feedback, goals))
         barrier.wait(answer, f"{self.name} has not accepted or rejected the goal")
         self._handle = answer.result()
         if not self._handle.accepted:
@@ -159,8 +160,10 @@ class ActionSender:
         self._result = self._handle.get_result_async()
         return None
 
-    def _process_feedback(self, message: Any) -> None:
-        """Update the number of passed goals and of recoveries."""
+    def _process_feedback(self, goals: Sequence[Goal], message: Any) -> None:
+        """Update the number of passed goals and of recoveries. Late feedback on earlier `goals` is ignored."""
+        if goals is not self._goals:
+            return
         feedback = message.feedback
         self.recoveries = getattr(feedback, "number_of_recoveries", 0)
         if self.action == "navigate_through_poses":
