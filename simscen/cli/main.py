@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 
 from simscen.cli.process import (
     COMPLETION_VARIABLE,
+    INACCESSIBLE_PATH_ERRNOS,
     OUTPUT_LOST_ERRNOS,
     PYDANTIC_PLUGINS_VARIABLE,
     flush_output,
@@ -20,7 +21,7 @@ from simscen.cli.process import (
     report_lost_output,
     require_working_directory,
 )
-from simscen.core.errors import Exit, InvalidInput, SimscenError
+from simscen.core.errors import Exit, InvalidInput, SimscenError, UsageError
 
 
 class _LazyModule(ModuleType):
@@ -197,8 +198,11 @@ def _run_command() -> int:
     except BrokenPipeError:
         return Exit.INCOMPLETE
     except OSError as error:
-        lost = error.errno in OUTPUT_LOST_ERRNOS and not error.filename
-        return report_lost_output(error) if lost else _print_internal_error()
+        if error.errno in OUTPUT_LOST_ERRNOS and not error.filename:
+            return report_lost_output(error)
+        if error.errno in INACCESSIBLE_PATH_ERRNOS and error.filename:
+            return _print_error(UsageError(f"cannot access {error.filename}: {error.strerror}"))
+        return _print_internal_error()
     except Exception:
         return _print_internal_error()
     except BaseException as error:

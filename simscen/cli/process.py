@@ -14,6 +14,9 @@ from simscen.core.files import expand_home
 OUTPUT_LOST_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO})
 """Error numbers with which output to stdout or stderr is lost: disk full, quota exceeded, terminal closed."""
 
+INACCESSIBLE_PATH_ERRNOS = frozenset({errno.EACCES, errno.EPERM, errno.ENAMETOOLONG})
+"""Error numbers of a path that cannot be accessed: permission denied, or a name that is too long."""
+
 PYDANTIC_PLUGINS_VARIABLE = "PYDANTIC_DISABLE_PLUGINS"
 """Environment variable that disables plug-ins of pydantic."""
 COMPLETION_VARIABLE = "_SIMSCEN_COMPLETE"

@@ -86,7 +86,7 @@ class PlannerContract(ComponentContract):
     @promise
     def points_are_at_most_a_tenth_of_a_meter_apart(self) -> None:
         """Given a path then consecutive points are at most 0.1 m apart."""
-        widest = float(np.hypot(*np.diff(self.plan(self.build(), self.view(), 1)[:, :2], axis=0).T).max())
+        widest = float(np.hypot(*np.diff(self.plan(self.build(), self.view(), 1)[:, :2], axis=0).T).max(initial=0.0))
         require(widest <= MAX_POINT_SPACING_M + 1e-9, f"two points are {widest:.3f} m apart")
 
     @promise

@@ -60,6 +60,28 @@ def test_errors_become_messages_and_exit_codes(
     assert simscen()[0::2] == (code, expected_text)
 
 
+LONG = "a" * 300
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run", "good.scenario.yaml", "--stack", f"x={LONG}.yaml"),
+        ("run", "good.scenario.yaml", "--out", LONG),
+        ("shrink", LONG),
+        ("edit", LONG),
+        ("robot", "check", LONG),
+        ("world", "inspect", f"{LONG}.sdf"),
+        ("report", LONG),
+        ("compare", LONG, LONG),
+    ],
+)
+def test_a_path_that_cannot_be_accessed_is_a_usage_error(simscen, arguments: tuple[str, ...]) -> None:
+    ended = simscen(*arguments)
+    assert ended.code == 2
+    assert "File name too long" in ended.err and "Traceback" not in ended.err
+
+
 def test_unexpected_exception_is_an_internal_error(simscen, monkeypatch) -> None:
     def broken() -> None:
         raise ZeroDivisionError
