@@ -88,7 +88,7 @@ _DECODERS: dict[str, Decoders] = {
 class LogMessages:
     """Messages of a log by role, in order of log time, and message types by topic.
 
-    `is_complete` is false for a truncated log. `notes` are sentences for the user.
+    `is_complete` is false for a truncated log. `notes` are as in RecordedDrive.
     """
 
     by_role: dict[str, list[LoggedMessage]] = field(default_factory=dict)

@@ -83,7 +83,7 @@ class _DriveReader:
         self._stamp_start = self._start + self._clock_offset()
         self._end = max(message.log_time for message in moving)
         if not messages.is_complete:
-            self._notes.append("the log is truncated; the scenario covers what it holds")
+            self._notes.append("what happened after its end, because it is truncated")
 
     def drive(self) -> RecordedDrive:
         """Return the entire drive."""
@@ -125,7 +125,7 @@ class _DriveReader:
         offset = max(differences)
         if abs(offset) <= MAX_CLOCK_DIFFERENCE_NS:
             return 0
-        self._notes.append("stamps and log times are of different clocks; delays are relative to the smallest delay")
+        self._notes.append("the smallest delay of messages, because stamps and log times are of different clocks")
         return int(offset)
 
     def _seconds(self, logged: int) -> float:
@@ -157,7 +157,7 @@ class _DriveReader:
         values = np.array(rows, dtype=np.float64).reshape(len(messages), columns)
         is_valid: Mask = np.all(np.abs(values) < MAX_COORDINATE_M, axis=1)  # also false for nan
         if not is_valid.all():
-            self._notes.append(f"{int((~is_valid).sum())} messages of `{role}` have invalid numbers, and are ignored")
+            self._notes.append(f"valid numbers in {int((~is_valid).sum())} messages of `{role}`, which are ignored")
         order = np.argsort(times, kind="stable")
         order = order[is_valid[order]]
         return TimedValues(times[order], values[order], arrivals[order])
@@ -176,7 +176,7 @@ class _DriveReader:
         if len(belief) >= MIN_POSES:
             return TimedValues(belief.times, belief.values[:, :3], belief.arrivals), "/amcl_pose", False
         if len(odometry) >= MIN_POSES:
-            self._notes.append("the log has no poses in a map; the odometry is used, and the map is built along it")
+            self._notes.append("poses in a map; the odometry is used, and the map is built along it")
             return TimedValues(odometry.times, odometry.values[:, :3], odometry.arrivals), "odometry", False
         for base in BASE_FRAMES:
             poses = self._poses_of_tf("odom", base)
@@ -193,7 +193,7 @@ class _DriveReader:
         except UnknownTransform:
             return None
         except UnusableLog as error:
-            self._notes.append(f"tf {outer}:{inner} is not used: {error}")
+            self._notes.append(f"usable poses on tf {outer}:{inner}: {error}")
             return None
         if len(poses) < MIN_POSES:
             return None
@@ -226,7 +226,7 @@ class _DriveReader:
         first: ScanMessage = next(message.content for message in messages if len(message.content.ranges) == beams)
         layout = first.angle_min, first.angle_increment, first.range_min, first.range_max
         if beams < 2 or not first.angle_increment or not np.isfinite(layout[:3]).all() or not first.range_max > 0.0:
-            self._notes.append(f"the scans of `{frame}` have invalid angles or range limits, and are ignored")
+            self._notes.append(f"usable scans of `{frame}`, because their angles or range limits are invalid")
             return None
         ranges = np.full((len(messages), beams), np.nan)
         is_malformed = np.zeros(len(messages), dtype=bool)
@@ -257,10 +257,8 @@ class _DriveReader:
         )
         mount = lidar_mount(frame, base, links)
         if mount is None:
-            self._notes.append(f"the mount of the lidar `{frame}` is unknown; it is assumed at the base")
+            self._notes.append(f"the mount of the lidar `{frame}`; the lidar is assumed at the base")
             return Pose2(0.0, 0.0, 0.0), DEFAULT_LIDAR_HEIGHT_M, False
-        if is_upside_down(mount):
-            self._notes.append(f"the lidar `{frame}` is mounted upside down")
         return mount.plane, max(mount.z, MIN_LIDAR_HEIGHT_M), is_upside_down(mount)
 
     def _map(self) -> OccupancyGrid | None:
@@ -271,7 +269,7 @@ class _DriveReader:
             return None
         is_valid = MIN_RESOLUTION_M <= grid.resolution < np.inf and np.isfinite(grid.origin).all()
         if not is_valid or not grid.cells.size:
-            self._notes.append("the map has no cells, or an invalid resolution or origin, and is ignored")
+            self._notes.append("a usable map, because its map has no cells, or an invalid resolution or origin")
             return None
         # The message rounds the resolution to single precision.
         return OccupancyGrid(grid.cells, round(grid.resolution, 6), grid.origin)

@@ -153,7 +153,7 @@ class RecordedDrive:
         map: Last map in the log; None without a map.
         goals: Goals in the order in which they were sent.
         footprint: Corners (x, y) of the robot's footprint in the base frame; () if unknown.
-        notes: Sentences for the user about missing data and assumptions.
+        notes: Phrases for the user that complete the sentence "The log does not show …".
         begin: Time in s from the start of the log to the start of the drive.
     """
 

@@ -353,14 +353,14 @@ def without_resolution(said):
 @pytest.mark.parametrize(
     ("topic", "change", "changes_all", "text"),
     [
-        ("/odom", with_nan, False, "1 messages of `odom` have invalid numbers, and are ignored"),
-        ("/amcl_pose", with_nan, True, "messages of `amcl_pose` have invalid numbers, and are ignored"),
+        ("/odom", with_nan, False, "valid numbers in 1 messages of `odom`, which are ignored"),
+        ("/amcl_pose", with_nan, True, "messages of `amcl_pose`, which are ignored"),
         ("/odom", without_stamp, False, ""),
-        ("/scan", without_beams, True, "the scans of `lidar` have invalid angles or range limits"),
-        ("/scan", with_one_direction, True, "the scans of `lidar` have invalid angles or range limits"),
-        ("/scan", with_nan_angles, True, "the scans of `lidar` have invalid angles or range limits"),
-        ("/scan", with_nan_limit, True, "the scans of `lidar` have invalid angles or range limits"),
-        ("/map", without_resolution, True, "the map has no cells, or an invalid resolution or origin"),
+        ("/scan", without_beams, True, "usable scans of `lidar`, because their angles"),
+        ("/scan", with_one_direction, True, "usable scans of `lidar`, because their angles"),
+        ("/scan", with_nan_angles, True, "usable scans of `lidar`, because their angles"),
+        ("/scan", with_nan_limit, True, "usable scans of `lidar`, because their angles"),
+        ("/map", without_resolution, True, "a usable map, because its map has no cells"),
     ],
 )
 def test_a_log_with_invalid_messages_gives_a_valid_scenario(topic, change, changes_all, text, tmp_path):
