@@ -16,7 +16,7 @@ class MovableObject:
 
     outlines:   corners (n, 2) in m of each part of the object in the world frame
     event:      name of the event that spawned or last moved the object; "" if no event did
-    since:      tick at which the object was spawned or last moved
+    since:      tick at which the object was spawned or last moved (placed, pushed, or sent along a path)
     was_moved:  whether the object was moved after it was spawned
     """
 
@@ -54,7 +54,7 @@ def movable_objects(trace: Trace, tick: int) -> list[MovableObject]:
                 current_event = ""
             case EventKind.OBJECT_SPAWNED:
                 spawned[event.name], last[event.name] = event, (current_event, event)
-            case EventKind.OBJECT_MOVED | EventKind.OBJECT_PLACED:
+            case EventKind.OBJECT_MOVED | EventKind.OBJECT_PLACED | EventKind.OBJECT_PUSHED:
                 last[event.name] = (current_event, event)
             case EventKind.OBJECT_REMOVED:
                 spawned.pop(event.name, None)

@@ -37,3 +37,11 @@ def test_teleportation_of_an_object_is_not_a_speed():
     assert why("collisions", [*box(0, "crate", 2, 4, 0.4, 0.4), *placed, hit], at=2, objects=trajectory) == [
         "why: crate: event `crate jumps` had moved it 0.10 s before, and ran into the robot"
     ]
+
+
+def test_event_that_pushed_the_object_is_named():
+    pushed = with_event("crate slides", 1, [1, "object.pushed", "crate", {"impulse": [0, -50]}])
+    trajectory = {"crate": [[0, 2, 4], [1, 2, 4], [2, 2, 0.5], [10, 2, 0.5]]}
+    assert why("collisions", [*box(0, "crate", 2, 4, 0.4, 0.4), *pushed, HIT], at=2, objects=trajectory) == [
+        "why: crate: event `crate slides` had moved it 1.00 s before, it moved at 3.50 m/s"
+    ]
