@@ -16,7 +16,7 @@ from simscen.pedestrians.surroundings import ObservedObject, ObservedRobot, Surr
 from simscen.sim.body.outline import footprint, outlines_in_z_range
 from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
-from simscen.worlds.geometry.cross_section import cross_section
+from simscen.worlds.geometry.cross_section import CrossSection, cross_section, winds_around
 from simscen.worlds.routes.shortest_paths import ShortestPaths, shortest_paths_in
 
 OBSTACLE_HEIGHTS_M = (0.15, 0.5, 0.95)
@@ -37,12 +37,21 @@ class PedestrianMap:
         self._planners: dict[float, ShortestPaths] = {}
 
     @cached_property
+    def _cuts(self) -> list[CrossSection]:
+        return [cross_section(self._built.mesh, height) for height in OBSTACLE_HEIGHTS_M]
+
+    @cached_property
     def walls(self) -> WallMap:
         """Walls that block pedestrians."""
-        cuts = [cross_section(self._built.mesh, height) for height in OBSTACLE_HEIGHTS_M]
+        cuts = self._cuts
         opaque = np.concatenate([np.full(len(cut.owners), cut is cuts[-1]) for cut in cuts])
         owners = np.concatenate([cut.owners for cut in cuts]).astype(np.int64)
         return WallMap(np.concatenate([cut.segments for cut in cuts]), owners, opaque)
+
+    def has_room(self, center: Point, radius: float) -> bool:
+        """Return whether a pedestrian of `radius` m at `center` neither touches a wall nor is inside a solid."""
+        is_inside = any(winds_around(cut.segments, center) for cut in self._cuts)
+        return not is_inside and self.walls.distance(center) >= radius
 
     def plan_path(self, start: Point, goal: Point, radius: float) -> list[Point]:
         """Return the corners of a path around walls, without `start`; only `goal` if there is no path.
@@ -112,8 +121,10 @@ class PedestrianSimulation:
 
         `walls_only` ignores objects, robots, and other pedestrians.
         """
-        if walls_only or self._map.walls.distance(center) < radius:
-            return self._map.walls.distance(center) >= radius
+        if not self._map.has_room(center, radius):
+            return False
+        if walls_only:
+            return True
         surroundings = self._surroundings()
         outlines = [outline for observed in surroundings.objects for outline in observed.outlines]
         outlines += [robot.pose.apply(robot.outline) for robot in surroundings.robots]

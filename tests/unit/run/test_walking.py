@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
+from simscen.core.environment.world_model import World
+from simscen.core.geometry import Pose3
+from simscen.core.geometry.shapes import Box, Solid
 from simscen.core.records.events import EventKind
+from simscen.run.live_world.pedestrians import PedestrianMap
+from simscen.worlds.built_world import build_world_and_map
 
 STANDING = {
     "stack": "{localizer: {type: ground_truth}}",
@@ -114,3 +119,11 @@ def test_only_blind_pedestrians_touch_the_robot(play):
 
     assert touched("") == touched(", behavior: impassive") == []
     assert touched(", blind_to: [robots]")[0] == ("collision.started", "anna")
+
+
+def test_pedestrians_have_no_room_inside_a_solid():
+    block = Solid(Box((5.0, 5.0, 2.0)), Pose3(z=1.0), "block")
+    world = World("w", (block,), bounds=(-2.5, -2.5, 2.5, 2.5))
+    walls = PedestrianMap(build_world_and_map(world, 0.2))
+    places = [(0.0, 0.0), (2.0, 0.0), (2.6, 0.0), (3.0, 0.0), (9.0, 9.0)]
+    assert [walls.has_room(place, 0.25) for place in places] == [False, False, False, True, True]
