@@ -66,7 +66,7 @@ class OmplPlanner(OmplParameters):
     only if there is no other path. The start and the goal may be closer to obstacles."""
     improving_iterations: Iterations = 500
     """Number of iterations after which planners that improve their path stop, or later with their first path. No effect
-    on `bit_star` (see `max_batches`) and on searches over poses."""
+    on `bit_star` (see `max_batches`)."""
     samples_per_batch: Annotated[int, Field(ge=1, le=100_000)] = 200
     """Number of samples per batch; `bit_star` only (OMPL: 100)."""
     max_batches: Annotated[int, Field(ge=1, le=1000)] = 2

@@ -62,8 +62,8 @@ class PlanManager:
         costmap: LayeredCostmap,
         plan_seed: Callable[[int], int],
         radius: float,
-        is_car: bool = False,
-        latency: int = 0,
+        is_car: bool,
+        latency: int,
     ) -> None:
         """Take the planner and the costmap to plan on.
 

@@ -234,7 +234,9 @@ class ReferenceStack:
     def _process_odometry(self, reading: Odometry) -> None:
         """Filter an odometry reading, pass it to the localizer, and add the pose to the odometry history."""
         if reading.sensor == TRUTH:
-            self._process_true_pose(reading)
+            self._localizer.on_odometry(reading)
+            if not self._wheel_sensor:  # without wheel odometry, the true pose is the odometry, too
+                self._record_motion(reading, reading.pose, reading.twist)
             return
         if not self._wheel_sensor:
             self._wheel_sensor = reading.sensor
@@ -244,9 +246,13 @@ class ReferenceStack:
             return
         self._localizer.on_odometry(odometry)
         pose = self._believed_pose() if self._fuses_odometry else odometry.pose
+        self._record_motion(reading, pose, odometry.twist)
+
+    def _record_motion(self, reading: Odometry, pose: Pose2, twist: Twist) -> None:
+        """Add the pose in the odom frame to the odometry history, and store the velocity, if both are plausible."""
         self._on_odometry_step(reading.pose, pose)
-        if is_plausible(odometry.twist) and self._odometry.add(reading.tick, pose):
-            self._twist = odometry.twist
+        if is_plausible(twist) and self._odometry.add(reading.tick, pose):
+            self._twist = twist
             self._on_motion(reading)
 
     def _filtered_odometry(self, reading: Odometry) -> Odometry | None:
@@ -262,16 +268,6 @@ class ReferenceStack:
         if odometry is not None:
             self._filtered.append(odometry)
         return odometry
-
-    def _process_true_pose(self, reading: Odometry) -> None:
-        """Pass the true pose to the localizer. Without wheel odometry, use the true pose as odometry, too."""
-        self._localizer.on_odometry(reading)
-        if self._wheel_sensor:
-            return
-        self._on_odometry_step(reading.pose, reading.pose)
-        if is_plausible(reading.twist) and self._odometry.add(reading.tick, reading.pose):
-            self._twist = reading.twist
-            self._on_motion(reading)
 
     def _believed_pose(self) -> Pose2:
         """Return the localizer's estimate of the pose in the map frame."""

@@ -66,6 +66,7 @@ class PosePlanner:
         self._spec, self._robot, self._footprint, self._space = spec, robot, footprint, space
         self._inscribed = robot.inscribed_radius
         self._type = "rrt_connect" if spec.type in POSITION_PLANNERS else spec.type
+        self._improving_iterations = spec.improving_iterations if isinstance(spec, PlannerSpec) else 0
         self._turning_radius = spec.minimum_turning_radius or max(
             TURNING_RADIUS_RATIO * robot.turning_radius, MIN_TURNING_RADIUS_M
         )
@@ -89,7 +90,7 @@ class PosePlanner:
                 seed += 1
                 poses = search_poses(
                     self._type, self._space, self._turning_radius, attempt.bounds, free_start, goal, valid, seed,
-                    iterations, attempt.spacing, self._configure,
+                    iterations, attempt.spacing, self._configure, self._improving_iterations,
                 )  # fmt: skip
                 if poses is None:
                     break

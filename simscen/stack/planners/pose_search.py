@@ -12,7 +12,7 @@ from ompl import util as ou
 
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.planners.endpoints import MAX_ESCAPE_M
-from simscen.stack.planners.ompl_search import PLANNERS, stop_after
+from simscen.stack.planners.ompl_search import FIRST_PATH_PLANNERS, PLANNERS, stop_after
 from simscen.stack.protocols import CostmapView
 
 Space = Literal["se2", "dubins", "reeds_shepp"]
@@ -42,6 +42,7 @@ def search_poses(
     iterations: int,
     check_spacing: float = POSE_SPACING_M,
     configure: Callable[[Any], None] = lambda _: None,
+    improving_iterations: int = 0,
 ) -> list[Pose2] | None:
     """Return poses from start to goal, at most POSE_SPACING_M apart; None if no path is found in `iterations`.
 
@@ -51,6 +52,8 @@ def search_poses(
     bounds:          (min x, min y, max x, max y) in m
     valid:           check of single poses, called every `check_spacing` m
     configure:       sets the parameters of OMPL's planner
+
+    A planner that improves its path stops after `improving_iterations`, or later with its first path.
     """
     ou.RNG.setSeed(seed)
     states = _make_space(space, turning_radius)
@@ -72,7 +75,10 @@ def search_poses(
     configure(planner)
     planner.setProblemDefinition(problem)
     planner.setup()
-    planner.solve(ob.PlannerTerminationCondition(stop_after(iterations)))
+    termination = stop_after(iterations)
+    if planner_type not in FIRST_PATH_PLANNERS:
+        termination = stop_after(iterations, lambda: math.isfinite(planner.bestCost().value()), improving_iterations)
+    planner.solve(ob.PlannerTerminationCondition(termination))
     if not problem.hasExactSolution():
         return None
     path = problem.getSolutionPath()

@@ -92,7 +92,7 @@ class CheckedPlugin:
             self.raise_invalid(f"{prefix} {pose!r}, which is not a finite pose")
         return pose
 
-    def checked_belief(self, belief: object, before: Belief | None = None) -> Belief:
+    def checked_belief(self, belief: object, before: Belief | None) -> Belief:
         """Return the belief if it is finite and has the right shapes; otherwise raise RunError.
 
         `before` is the previous valid belief: shared `map_from_odom` and read-only particles are not checked again.

@@ -102,7 +102,7 @@ def apply_model_delay(velocities: Floats, sent: Floats, steps: tuple[int, ...]) 
     """
     for axis, earlier, delay in zip(velocities, sent, steps, strict=False):
         if delay:
-            axis[delay:] = axis[1 : len(axis) - delay + 1].copy()
+            axis[delay:] = axis[1 : max(1, len(axis) - delay + 1)].copy()
             axis[1:delay] = earlier[-delay:][1 : len(axis), None]
 
 

@@ -122,6 +122,14 @@ def test_pending_commands_precede_the_sampled_ones() -> None:
     assert velocities[1, :, 0].tolist() == [5.0, 6.0, 7.0, 8.0, 9.0]
 
 
+@pytest.mark.parametrize("delay", range(1, 12))
+def test_all_steps_of_a_sample_shorter_than_the_delay_are_pending_commands(delay: int) -> None:
+    velocities, sent = np.arange(1.0, 6.0, dtype=np.float32).reshape(1, 5, 1), np.arange(-12.0, 0.0)
+    apply_model_delay(velocities, sent[None].astype(np.float32), (delay,))
+    undelayed = [*sent.tolist(), 2.0, 3.0, 4.0, 5.0]
+    assert velocities[0, 1:, 0].tolist() == undelayed[12 - delay + 1 : 12 - delay + 5]
+
+
 def test_savitzky_golay_filter_keeps_parabolas_and_reduces_noise() -> None:
     steps = np.arange(-4.0, 30.0)
     parabola = (0.01 * steps**2).astype(np.float32)

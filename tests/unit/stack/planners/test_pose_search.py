@@ -48,3 +48,23 @@ def test_no_arc_is_tighter_than_the_turning_radius_and_dubins_never_goes_back(sp
     assert (np.hypot(step[:, 0], step[:, 1]) >= chord - 1e-3).mean() > 0.95  # but where a piece ends within a step
     ahead = step[:, 0] * np.cos(points[:-1, 2]) + step[:, 1] * np.sin(points[:-1, 2])
     assert (ahead < -0.01).any() == (space == "reeds_shepp")
+
+
+@pytest.mark.parametrize("planner", ["rrt_star", "informed_rrt_star"])
+def test_planner_that_improves_its_path_stops_before_the_maximum_of_iterations(planner: str) -> None:
+    checked = list[float]()
+
+    def is_free(x: float, y: float, yaw: float) -> bool:
+        checked.append(x)
+        return True
+
+    def checks(iterations: int, improving: int) -> int:
+        checked.clear()
+        poses = search_poses(
+            planner, "reeds_shepp", 0.8, BOUNDS, Pose2(0, 0), Pose2(1, 1), is_free, 1, iterations,
+            improving_iterations=improving,
+        )  # fmt: skip
+        assert poses is not None
+        return len(checked)
+
+    assert max(checks(100_000, 200), checks(1000, 200)) < 0.5 * checks(1000, 1000)
