@@ -46,10 +46,10 @@ def load_scenario(
     if (found := next((scenario for scenario in loaded if scenario.variation == variation), None)) is not None:
         return found
     names = [scenario.variation for scenario in loaded if scenario.variation]
-    if not names:
+    if loaded and not names:
         raise UsageError(f"{path} has no variations, so not {quoted(variation)} either")
     reason = f"has no variation {quoted(variation)}" if variation else f"has {len(names)} variations: choose one"
-    raise UsageError(f"{path} {reason}; {suggestion(variation, names)}")
+    raise UsageError(f"{path} {reason}; {suggestion(variation, names)}".removesuffix("; "))
 
 
 def try_variations(

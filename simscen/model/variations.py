@@ -111,8 +111,9 @@ class VariationBlock(Spec):
     """Random values."""
     require: Annotated[list[Annotated[str, StringConstraints(max_length=1000)]], Field(max_length=50)] = []
     """Conditions that all variations meet, such as `goals[0].pose.x > robot.pose.x + 1`. Other combinations are left
-    out, and random values are drawn again. Paths may also lead to values that are not varied. Numbers are in SI units;
-    quantities with a unit are written in quotes: `time_limit < '2 min'`."""
+    out; independent random values alone are drawn until `count` variations meet the conditions. Paths may also lead to
+    values that are not varied. Numbers are in SI units; quantities with a unit are written in quotes:
+    `time_limit < '2 min'`."""
 
     @model_validator(mode="after")
     def _check_not_empty(self) -> "VariationBlock":

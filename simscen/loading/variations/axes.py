@@ -20,7 +20,7 @@ from simscen.loading.variations.conditions import (
     written_value,
 )
 from simscen.loading.variations.covering_arrays import Row, covering_array
-from simscen.loading.variations.naming import NAME_HINT, name_error
+from simscen.loading.variations.naming import NAME_HINT, name_error, number_of
 from simscen.loading.variations.options import Axis, Change, Option, RandomOptions, typical_options, value_node
 from simscen.loading.variations.paths import PathError, Target, resolve_path
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, child, entries_of, items_of, node_at
@@ -141,7 +141,7 @@ class AxisBuilder:
         return found
 
     def _item_name(self, item: Node) -> str:
-        """Return the `name` of an item of `list`; "" for none. Report invalid and repeated names."""
+        """Return the `name` of an item of `list`; "" for none. Report invalid, reserved, and repeated names."""
         node = child(item, "name")
         if node is None:
             return ""
@@ -149,6 +149,9 @@ class AxisBuilder:
         name = value if isinstance(value, str) else str(value) if isinstance(value, int | float) else ""
         if (error := name_error(name)) is not None:
             self.add_problem(position, "SC017", error, NAME_HINT)
+        if number_of(name) is not None:
+            message = f"{quoted(name)} is reserved for the variation with this number"
+            self.add_problem(position, "SC017", message, "choose another name")
         first = self._names.setdefault(name.casefold(), position)
         if first != position:
             self.add_problem(position, "SC033", f"the variation at line {first.line} is also called {quoted(name)}")

@@ -53,7 +53,7 @@ class Condition:
         """
         try:
             result = _evaluate(self.expression, values)
-        except (TypeError, ZeroDivisionError, OverflowError) as error:
+        except (TypeError, ValueError, ArithmeticError, RecursionError) as error:
             raise ConditionError(f"`{self.text}` cannot be evaluated: {error}") from error
         if not isinstance(result, bool):
             raise ConditionError(f"`{self.text}` is {result!r} instead of true or false")
@@ -62,12 +62,14 @@ class Condition:
 
 def parse_condition(text: str) -> Condition:
     """Return the condition in a text. Raises ConditionError if it is invalid."""
+    paths: dict[str, None] = {}
     try:
         expression = ast.parse(text.strip(), mode="eval").body
+        _collect_paths(expression, text, paths)
+    except ConditionError:
+        raise
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         raise ConditionError(f"`{text}` is not a condition") from None
-    paths: dict[str, None] = {}
-    _collect_paths(expression, text, paths)
     return Condition(text, expression, tuple(paths))
 
 
@@ -118,7 +120,7 @@ def _path_text(node: ast.expr, text: str) -> str:
 def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> Any:
     """Return the value of an expression: a number in SI units, a text, or a boolean. `values` are values by path.
 
-    Raises TypeError, ZeroDivisionError, or OverflowError if the expression cannot be evaluated.
+    Raises TypeError, ValueError, ArithmeticError, or RecursionError if the expression cannot be evaluated.
     """
     match node:
         case ast.BoolOp(op=ast.And(), values=parts):
@@ -128,9 +130,9 @@ def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> Any:
         case ast.UnaryOp(op=ast.Not(), operand=operand):
             return not _evaluate_boolean(operand, values)
         case ast.UnaryOp(operand=operand):
-            return -_evaluate(operand, values)
+            return -_evaluate_number(operand, values)
         case ast.BinOp(left=left, op=op, right=right):
-            return _OPERATORS[type(op)](_evaluate(left, values), _evaluate(right, values))
+            return _OPERATORS[type(op)](_evaluate_number(left, values), _evaluate_number(right, values))
         case ast.Compare(left=left, ops=ops, comparators=others):
             numbers = [_evaluate(part, values) for part in (left, *others)]
             return all(_COMPARISONS[type(op)](a, b) for op, a, b in zip(ops, numbers, numbers[1:], strict=False))
@@ -148,6 +150,14 @@ def _evaluate_boolean(node: ast.expr, values: Mapping[str, Any]) -> bool:
     result = _evaluate(node, values)
     if not isinstance(result, bool):
         raise TypeError(f"`{ast.unparse(node)}` is {result!r} instead of true or false")
+    return result
+
+
+def _evaluate_number(node: ast.expr, values: Mapping[str, Any]) -> float:
+    """Return the number that an expression has as its value. Raises the errors of `_evaluate`."""
+    result = _evaluate(node, values)
+    if isinstance(result, bool) or not isinstance(result, int | float):
+        raise TypeError(f"`{ast.unparse(node)}` is {result!r} instead of a number")
     return result
 
 

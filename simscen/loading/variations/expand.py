@@ -186,7 +186,7 @@ def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -
         found = space.named_variations()
     except ConditionError as error:
         return [Problem(*_position_of_require(tree), "SC016", str(error), "")]
-    if not found and space.count:
+    if not found and space.blocks:
         return [Problem(*_position_of_require(tree), "SC016", "no variation meets the conditions", "")]
     return found or [Variation("", space.tree)]
 
@@ -224,7 +224,9 @@ def _too_many_problem(space: VariationSpace, position: Position) -> Problem | No
         return Problem(
             *position, "SC017", message, "run them with `simscen study`, or use `sampled` to draw some of them"
         )
-    sizes = (sum(max(map(_option_size, typical_options(axis))) for axis in block.axes) for block in space.blocks)
+    sizes = (
+        sum(max(map(_option_size, typical_options(axis)), default=0) for axis in block.axes) for block in space.blocks
+    )
     values = _node_size(space.tree) + max(sizes, default=0)
     if space.count * values > MAX_TOTAL_VALUES:
         message = (

@@ -1,14 +1,17 @@
 """From `variations:` to scenarios."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from simscen.core.errors import UsageError
 from simscen.loading.scenario import load_scenario, try_variations
 from simscen.loading.variations.expand import Variation, expand_variations
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.tree import MappingNode
 
+Write = Callable[[str, str], Path]
 BASE = "stack: {controller: {desired_linear_vel: 0.3}}\nrobot: {pose: {x: 1, y: 1}}\ngoals: [{pose: desk}]\n"
 
 
@@ -165,3 +168,20 @@ def test_a_file_that_is_extended_may_hold_the_variations(write, scenario: str) -
     assert [one.variation for one in try_variations(file, Path(file).parent)] == ["seed=3", "seed=4"]  # type: ignore[union-attr]
     file = write("b.scenario.yaml", "extends: base.yaml\nvariations: []\n")
     assert [one.variation for one in try_variations(file, Path(file).parent)] == [""]  # type: ignore[union-attr]
+
+
+def test_conditions_that_exclude_all_pairs_are_an_error() -> None:
+    block = "  pairwise: {robot.pose.x: [1, 2], robot.pose.y: [3, 4]}\n  require: [robot.pose.x > 5]"
+    assert wrong(block) == ["6:12 no variation meets the conditions"]
+
+
+def test_the_name_of_a_numbered_variation_is_reserved() -> None:
+    assert wrong("  list: [{name: variation-2, tags: [a]}, {tags: [b]}]") == [
+        "5:17 `variation-2` is reserved for the variation with this number"
+    ]
+
+
+def test_a_number_without_a_variation_is_not_a_file_without_variations(write: Write, scenario: str) -> None:
+    path = write("a.scenario.yaml", f"{scenario}variations: {{grid: {{time_limit: [50, 60]}}}}\n")
+    with pytest.raises(UsageError, match=r"has no variation `variation-9`$"):
+        load_scenario(path, path.parent, variation="variation-9")
