@@ -6,6 +6,7 @@ from os.path import commonpath, relpath
 from pathlib import Path
 
 from simscen.core.errors import UsageError
+from simscen.loading.files.paths import is_file
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario_text import unexpanded_text
 from simscen.loading.yaml.parser import parse_yaml
@@ -63,7 +64,7 @@ def _existing_file(leaf: ScalarNode, folders: set[Path]) -> Path | None:
     """Return the existing file that the scalar `leaf` names relative to one of `folders`; None if there is none."""
     if not isinstance(leaf.value, str) or "." not in leaf.value or "\n" in leaf.value or len(leaf.value) > 4096:
         return None
-    return next((file for folder in sorted(folders) if (file := (folder / leaf.value).resolve()).is_file()), None)
+    return next((path.resolve() for folder in sorted(folders) if is_file(path := folder / leaf.value)), None)
 
 
 def _with_dependencies(file: Path, known: frozenset[Path] = frozenset()) -> Iterator[Path]:

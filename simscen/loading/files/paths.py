@@ -100,6 +100,11 @@ def exists(path: Path) -> bool:
     return os.path.exists(path)  # noqa: PTH110
 
 
+def is_file(path: Path) -> bool:
+    """Return whether a path is a regular file. Returns False for an invalid path, for which Path.is_file raises."""
+    return os.path.isfile(path)  # noqa: PTH113
+
+
 def is_folder(path: Path) -> bool:
     """Return whether a path is a folder. Returns False for an invalid path, for which Path.is_dir raises an error."""
     return os.path.isdir(path)  # noqa: PTH112

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.files.assets import Assets, shipped_robots
-from simscen.loading.files.paths import PathSandbox
+from simscen.loading.files.paths import PathSandbox, exists, is_file, is_folder
 from simscen.loading.loaded import LoadedRobot, LoadedWorld
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.yaml.library import Library
@@ -33,12 +33,12 @@ def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -
     """
     shipped = shipped_robots()
     library = Library(PathSandbox.around(root, world_path))
-    use_shipped = written in shipped and not Path(written).exists()
+    use_shipped = written in shipped and not exists(Path(written))
     path = shipped[written] if use_shipped else library.sandbox.resolve_argument(Path(written))
     if isinstance(path, Problem):
         raise InvalidInput([path])
-    if not path.is_file():
-        message = "not a regular file" if path.exists() else f"no such file or shipped robot: {quoted(written)}"
+    if not is_file(path):
+        message = "not a regular file" if exists(path) else f"no such file or shipped robot: {quoted(written)}"
         raise InvalidInput([Problem(written, 0, 0, "SC001", message, suggestion(written, shipped))])
     assets = Assets(library)
     robot = assets.robot_file(path)
@@ -59,8 +59,8 @@ def load_world_file(
     file = library.sandbox.resolve_argument(path)
     if isinstance(file, Problem):
         raise InvalidInput([file])
-    if not file.exists() or file.is_dir():
-        message = "not a regular file" if file.is_dir() else "no such file or directory"
+    if not exists(file) or is_folder(file):
+        message = "not a regular file" if is_folder(file) else "no such file or directory"
         raise InvalidInput([Problem(str(path), 0, 0, "SC001", message)])
     assets = Assets(library)
     world = assets.world_file(file)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from simscen.core.external_command import ANSWER_TIMEOUT_S, START_TIMEOUT_S, ExternalCommand, split_command
 from simscen.core.files import expand_home
-from simscen.loading.files.paths import exists
+from simscen.loading.files.paths import exists, is_file, is_folder
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
 
@@ -103,7 +103,7 @@ def _digest(argv: Sequence[str], own_variables: Mapping[str, str], env: Mapping[
     found = shutil.which(argv[0], path=_absolute_search_path(env, folder)) if "/" not in argv[0] else None
     for word in (found or argv[0], *argv[1:]):
         file = folder / word
-        if len(word) < 4096 and "\0" not in word and file.is_file() and os.access(file, os.R_OK):
+        if is_file(file) and os.access(file, os.R_OK):
             with file.open("rb") as stream:
                 while data := stream.read(CHUNK_BYTES):
                     sha.update(data)
@@ -118,12 +118,10 @@ def _source_folders(argv: Sequence[str], folder: Path) -> list[Path]:
     """Return the folders of the Python scripts and modules (`-m`) in the arguments, relative to `folder`."""
     source_folders: set[Path] = set()
     for before, word in itertools.pairwise(("", *argv)):
-        if len(word) >= 4096 or "\0" in word:
-            continue
         module = folder / word.replace(".", "/")
-        if before == "-m" and (module.is_dir() or module.with_suffix(".py").is_file()):
-            source_folders.add(module if module.is_dir() else module.parent)
-        elif word.endswith(".py") and (folder / word).is_file():
+        if before == "-m" and (is_folder(module) or is_file(module.with_suffix(".py"))):
+            source_folders.add(module if is_folder(module) else module.parent)
+        elif word.endswith(".py") and is_file(folder / word):
             source_folders.add((folder / word).parent)
     return sorted(source_folders)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.external_command import ExternalCommand
 from simscen.core.files import expand_home
-from simscen.loading.files.paths import PathSandbox, exists
+from simscen.loading.files.paths import PathSandbox, exists, is_folder
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.multirobot import external_stack_name
 from simscen.loading.schema.messages import did_you_mean, quoted
@@ -39,7 +39,7 @@ class UserConfig:
             return None
         stack = self.spec.stacks[name]
         working_folder = folder if stack.cwd is None else expand_home(stack.cwd)
-        if not working_folder.is_dir():
+        if not is_folder(working_folder):
             raise self._invalid((name, "cwd"), "no such folder", "")
         try:
             return parse_command(

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import InvalidInput
-from simscen.loading.files.single_files import load_world_file
+from simscen.loading.files.single_files import load_robot_file, load_world_file
 from simscen.loading.yaml.writing import world_text
 
 WORLDS = sorted((Path(__file__).parents[4] / "worlds").glob("*.world.yaml"))
@@ -57,3 +57,10 @@ def test_invalid_world_is_reported(tmp_path: Path, name: str, told: str) -> None
     (tmp_path / "root/hall.model").write_text("\n<?xml version='1.0'?><sdf version='1.6'/>")
     with pytest.raises(InvalidInput, match=told):
         load_world_file(tmp_path / "root" / name, tmp_path / "root")
+
+
+def test_a_name_that_is_too_long_for_a_file_is_reported(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match="no such file or shipped robot"):
+        load_robot_file("a" * 300, Path.cwd())
+    with pytest.raises(InvalidInput, match="no such file or directory"):
+        load_world_file(tmp_path / ("a" * 300), tmp_path)
