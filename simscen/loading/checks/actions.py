@@ -7,6 +7,10 @@ from simscen.loading.checks.registry import MEANING, CheckProblem
 from simscen.loading.known_names import pedestrian_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import Keys
+from simscen.model.disturbances import SequenceStep
+
+DOOR_MOVES = frozenset({"open", "close", "move", "teleport"})
+"""Kinds of actions that can move a door."""
 
 
 @MEANING.check("SC050")
@@ -18,13 +22,13 @@ def timed_stops_of_pedestrians(loaded: LoadedScenario) -> Iterator[CheckProblem]
             stop: Any = action.chosen
             if action.kind == "stop" and stop.for_ is not None and stop.name in pedestrians:
                 message = f"`{step.name}` can never happen: pedestrian `{stop.name}` does not walk on after a stop"
-                yield CheckProblem((*keys, "stop", "for"), message, "remove `for`")
+                yield CheckProblem((*keys, "stop", "for"), message, "remove `for`", warning=not step.required)
 
 
-def _zone_actions(loaded: LoadedScenario) -> list[tuple[str, Keys, Any]]:
-    """Return the event name, the keys, and the specification of each action that enables or disables a zone."""
+def _zone_actions(loaded: LoadedScenario) -> list[tuple[SequenceStep, Keys, Any]]:
+    """Return the step, the keys, and the specification of each action that enables or disables a zone."""
     return [
-        (step.name, (*keys, action.kind), action.chosen)
+        (step, (*keys, action.kind), action.chosen)
         for step in loaded.spec.steps
         for keys, action in step.located_actions()
         if action.kind in ("keepout", "speed_zone") and loaded.includes_robot(action.robot)
@@ -37,10 +41,11 @@ def speed_zones_without_limit(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     actions = _zone_actions(loaded)
     limited = [zone.region for zone in loaded.spec.stack.speed_zones]
     limited += [action.region for _, _, action in actions if getattr(action, "speed_limit", None)]
-    for name, keys, action in actions:
+    for step, keys, action in actions:
         if _limits_speed(keys, action) and action.region not in limited:
-            message = f"`{name}` can never happen: region `{action.region}` has no speed limit"
-            yield CheckProblem((*keys, "region"), message, "add a limit: `speed_limit: 0.3 m/s`")
+            message = f"`{step.name}` can never happen: region `{action.region}` has no speed limit"
+            hint = "add a limit: `speed_limit: 0.3 m/s`"
+            yield CheckProblem((*keys, "region"), message, hint, warning=not step.required)
 
 
 @MEANING.check("SC055", severity="warning")
@@ -86,16 +91,13 @@ def pushes_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC055", severity="warning")
 def doors_already_in_state(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find actions that open a door that is never closed, or close a door that is never opened."""
-    located_actions = [located for step in loaded.spec.steps for located in step.located_actions()]
+    """Find actions that open or close a door that is in this state from the start, and that nothing else moves."""
     if loaded.world.spec is None or loaded.may_do():
         return
-    kinds = {(action.kind, getattr(action.chosen, "name", "")) for _, action in located_actions}
-    closed = {door.name: door.closed for door in loaded.world.spec.doors}
-    for keys, action in located_actions:
-        name, is_full = getattr(action.chosen, "name", ""), getattr(action.chosen, "to", 1) == 1
-        for kind, opposite, state in (("open", "close", False), ("close", "open", True)):
-            if action.kind == kind and is_full and closed.get(name) is state and (opposite, name) not in kinds:
-                initial = "closed" if state else "open"
-                message = f"door `{name}` is {initial} from the start, and no event {opposite}s it"
-                yield CheckProblem((*keys, kind, "name"), message)
+    located = [found for step in loaded.spec.steps for found in step.located_actions() if found[1].kind in DOOR_MOVES]
+    for door in loaded.world.spec.doors:
+        kind, opposite, state = ("close", "open", "closed") if door.closed else ("open", "close", "open")
+        own = [(keys, action) for keys, action in located if getattr(action.chosen, "name", "") == door.name]
+        if all(action.kind == kind and getattr(action.chosen, "to", 1) == 1 for _, action in own):
+            message = f"door `{door.name}` is {state} from the start, and no event {opposite}s it"
+            yield from (CheckProblem((*keys, kind, "name"), message) for keys, _ in own)

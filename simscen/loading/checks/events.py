@@ -50,4 +50,4 @@ def impossible_steps(loaded: LoadedScenario) -> Iterator[CheckProblem]:
             name = getattr(part.event, "name", None)
             if name in run.earlier_steps(step):
                 message = f"`{step.name}` waits for `{name}`, which has already happened; a step waits for new events"
-                yield CheckProblem(keys, message)
+                yield CheckProblem(keys, message, warning=not step.required)

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from simscen.core.messages.goals import matches_goal_name
+from simscen.core.records.disturbances import BELIEF, KIND_BY_TARGET_NAME
 from simscen.loading.known_names import listed_goal_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import Keys
@@ -180,7 +181,10 @@ class PossibleRun:
 
     def _why_never_localization_error(self, error: Any) -> str | None:
         stack = self.loaded.spec.stack
-        gets_truth = isinstance(stack, StackSpec) and stack.gets_ground_truth
+        is_displaced = self.may_do("kidnap") or any(
+            KIND_BY_TARGET_NAME.get(fault.sensor) == BELIEF for fault in self.loaded.spec.faults
+        )
+        gets_truth = isinstance(stack, StackSpec) and stack.gets_ground_truth and not is_displaced
         too_large = getattr(error, "root", error) >= MAX_TRUTH_ERROR_M
         return "the localizer gets the true pose" if gets_truth and too_large else None
 

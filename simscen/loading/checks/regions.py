@@ -23,17 +23,21 @@ def _start_is_blocked(scene: Scene) -> bool:
 
 @WORLD.check("SC050")
 def unreachable_triggers(scene: Scene) -> Iterator[CheckProblem]:
-    """Find events and faults that wait for the robot in an area that it cannot reach within the time limit."""
+    """Find events and faults that wait for the robot in an area that it cannot reach within the time limit.
+
+    With `required: false`, the problem is only a warning.
+    """
     if _start_is_blocked(scene) or scene.loaded.may_do():  # actions of installed packages may take the robot anywhere
         return
     starts, robot, limit = scene.start_poses, scene.loaded.robot.spec, scene.loaded.spec.time_limit
-    for keys, name, what, corners, distance in scene.cached(trigger_areas):
+    for keys, name, what, corners, distance, required in scene.cached(trigger_areas):
         center = Pose2(*(sum(values) / len(corners) for values in zip(*corners, strict=True)))
         if not scene.cached(robot_routes).can_enter(starts, center, distance):
-            yield CheckProblem(keys, f"`{name}` can never happen: no route leads the robot to {what}")
+            message = f"`{name}` can never happen: no route leads the robot to {what}"
+            yield CheckProblem(keys, message, warning=not required)
         elif robot is not None and min(map(distance, starts)) > MAX_SPEED_RATIO * robot.top_speed * limit:
             reason = f"at {robot.top_speed:g} m/s, its top speed, the robot does not reach {what} within the time limit"
-            yield CheckProblem(keys, f"`{name}` can never happen: {reason}")
+            yield CheckProblem(keys, f"`{name}` can never happen: {reason}", warning=not required)
 
 
 @WORLD.check("SC051")

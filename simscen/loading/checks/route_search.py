@@ -102,18 +102,22 @@ class TriggerArea(NamedTuple):
     """Corners (x, y) in m of the region, or the center of a circle."""
     distance: Callable[[Pose2], float]
     """Function that returns the distance in m of a pose from the area, at most 0 inside."""
+    required: bool = True
+    """Whether the run fails if the event or fault never happens."""
 
 
 def trigger_areas(scene: Scene) -> list[TriggerArea]:
     """Return the areas that the triggers of events and faults wait for."""
     spec = scene.loaded.spec
-    conditions: list[tuple[Keys, str, AnyCondition | None]] = [
-        ((*step.keys, "when"), step.name, step.when) for step in spec.steps
+    conditions: list[tuple[Keys, str, AnyCondition | None, bool]] = [
+        ((*step.keys, "when"), step.name, step.when, step.required) for step in spec.steps
     ]
-    conditions += [(("faults", k, "when"), fault.label, fault.when) for k, fault in enumerate(spec.faults)]
+    conditions += [
+        (("faults", k, "when"), fault.label, fault.when, fault.required) for k, fault in enumerate(spec.faults)
+    ]
     return [
-        area
-        for keys, name, condition in conditions
+        area._replace(required=required)
+        for keys, name, condition, required in conditions
         if condition is not None
         for area in _required_areas(scene, condition, keys, name)
     ]

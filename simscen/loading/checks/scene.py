@@ -31,8 +31,8 @@ MIN_HULL_OVERLAP_M = 0.002
 TOUCH_M = 1e-6
 """Distance below which a point counts as inside a solid."""
 START = ("robot", "pose")
-MOVING_ACTIONS = frozenset({"open", "close", "move", "remove", "teleport", "push"})
-"""Kinds of actions that can move or remove a body."""
+MOVING_ACTIONS = frozenset({"open", "close", "move", "remove", "spawn", "teleport", "push"})
+"""Kinds of actions that can move, remove, or replace a body."""
 
 T = TypeVar("T")
 
