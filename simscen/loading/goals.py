@@ -86,8 +86,9 @@ def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
     if any(matches_goal_name(goal, name) and expected_failure_name(entry.expect) for name, entry in entries):
         return True
     results = [entry.chosen for entry in spec.pass_ if entry.severity == "fail"]
-    failing = any(isinstance(result, Result) and result.status == "FAILED" for result in results)
-    return failing or any(code != ErrorCode.NONE and name in (None, goal) for code, name in _required_codes(spec))
+    if any(isinstance(result, Result) and result.status == "FAILED" for result in results):
+        return True
+    return any(code != ErrorCode.NONE and matches_goal_name(goal, name) for code, name in _required_codes(spec))
 
 
 def expects_start_failure(spec: ScenarioSpec) -> bool:

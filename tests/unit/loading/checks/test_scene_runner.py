@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from simscen.loading.checks.scene_runner import check_in_world
+from simscen.loading.goals import expects_failure
 from simscen.loading.scenario import load_scenario
 
 SCENARIO = """
@@ -110,3 +111,15 @@ def test_hint_for_a_new_goal_in_an_obstacle_makes_the_scenario_valid(tmp_path):
     (criterion,) = re.findall(r"`(result: .*)`", problem.hint)
     file.write_text(file.read_text().replace("goals_reached: {}", criterion))
     assert check_in_world(load_scenario(file, tmp_path)) == []
+
+
+def test_an_error_code_of_a_goal_applies_to_the_goal_in_every_loop(tmp_path: Path) -> None:
+    file = tmp_path / "a.scenario.yaml"
+    file.write_text(SCENARIO.format(criteria="{error_code: {code: GOAL_OCCUPIED, goal: crate}}", start=1, events=""))
+    spec = load_scenario(file, tmp_path).spec
+    assert [expects_failure(spec, name) for name in ("crate", "crate#2", "free", "free#2")] == [
+        True,
+        True,
+        False,
+        False,
+    ]
