@@ -38,7 +38,8 @@ class Spawn(ShapedObject, Action):
     """Distance ahead of the robot along its plan, at most to the end of the plan. Without a plan, the object is placed
     at this distance straight ahead, and the event counts as failed."""
     yaw: Angle = 0.0
-    """Rotation relative to the heading of the robot (`ahead`) or the direction of the plan (`on_plan`)."""
+    """Rotation relative to the heading of the robot (`ahead`) or the direction of the plan (`on_plan`); not valid with
+    `pose`."""
     mass: Mass = 0.0
     """Mass in kg; 0 = cannot be pushed."""
 
@@ -46,6 +47,8 @@ class Spawn(ShapedObject, Action):
     def _check_place(self) -> Spawn:
         if sum(place is not None for place in (self.pose, self.ahead, self.on_plan)) != 1:
             raise ValueError("expected exactly one of: pose, ahead, on_plan")
+        if self.pose is not None and self.yaw:
+            raise ValueError("`yaw` has no effect with `pose`; write the heading in the pose")
         return self
 
     @property
@@ -76,13 +79,16 @@ def pose_on_plan(plan: Path, robot: Pose2, distance: float) -> Pose2:
     """
     points = plan.points[:, :2]
     steps = np.hypot(*np.diff(points, axis=0).T)
+    if not steps.all():  # repeated points have no direction
+        points, steps = points[np.append(True, steps > 0)], steps[steps > 0]
+    if not len(steps):
+        return Pose2(*plan.points[0].tolist())
     lengths = np.concatenate(([0.0], np.cumsum(steps)))
     nearest = int(np.argmin(np.hypot(points[:, 0] - robot.x, points[:, 1] - robot.y)))
     target = min(lengths[nearest] + distance, lengths[-1])
     segment = min(int(np.searchsorted(lengths, target, side="right")) - 1, len(steps) - 1)
     direction = points[segment + 1] - points[segment]
-    fraction = (target - lengths[segment]) / steps[segment] if steps[segment] else 0.0
-    x, y = points[segment] + fraction * direction
+    x, y = points[segment] + (target - lengths[segment]) / steps[segment] * direction
     return Pose2(float(x), float(y), float(np.arctan2(direction[1], direction[0])))
 
 

@@ -157,24 +157,21 @@ class Crowd(_WalkSettings, WorldAction):
         return [f"{self.name}-{number}" for number in range(1, self.count + 1)]
 
     def perform(self, stage: Stage) -> Effect:
-        """Add the people. If the free space is not enough for all, add fewer; the effect then counts as failed."""
-        added = 0
+        """Add the people. If a region has too little free space, add fewer; the effect then counts as failed."""
         group_start: Point | None = None  # of the first member of the current group
         for index in range(self.count):
             if index % self.group_size == 0:
                 group_start = None
             rng = stage.rng(f"person {self.names[index]}, start")
             start = _draw_point(stage, rng, stage.region(self.start), self.radius, near=group_start)
-            if start is None or not self._add(stage, index, start):
-                break
-            added += 1
+            full_region = self.start if start is None else self._add(stage, index, start)
+            if full_region is not None:
+                return Effect(False, f"added only {index} of {self.count} people: no more free space in {full_region}")
             group_start = group_start or start
-        if added < self.count:
-            return Effect(False, f"there was free space in {self.start} for only {added} of {self.count}")
-        return Effect(True, f"added {added} people in {self.start}")
+        return Effect(True, f"added {self.count} people in {self.start}")
 
-    def _add(self, stage: Stage, index: int, start: Point) -> bool:
-        """Add the person with this index at `start`; return False if a goal region has no free space."""
+    def _add(self, stage: Stage, index: int, start: Point) -> str | None:
+        """Add the person with this index at `start`; or return the name of a goal region that has no free space."""
         name, group = self.names[index], None
         if self.group_size > 1:
             group = f"{self.name} group {index // self.group_size + 1}"
@@ -183,13 +180,13 @@ class Crowd(_WalkSettings, WorldAction):
         for region in self.goals:
             goal = _draw_point(stage, rng, stage.region(region), self.radius, walls_only=True)
             if goal is None:
-                return False
+                return region
             goals.append(goal)
         yaw = float(rng.uniform(-math.pi, math.pi))
         if goals:
             yaw = math.atan2(goals[0][1] - start[1], goals[0][0] - start[0])
         stage.add_pedestrian(self.to_pedestrian(stage, name, Pose2(*start, yaw), tuple(goals), group))
-        return True
+        return None
 
 
 def _draw_point(

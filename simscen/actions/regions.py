@@ -33,7 +33,7 @@ class FrictionPatch(Spec, WorldAction):
     radius: PositiveLength | None = None
     """Radius of the disc."""
     name: PlaceName = "patch"
-    """Name of the disc, so that another action can replace it."""
+    """Name of the disc. It replaces an earlier disc of this name, so discs that exist together need different names."""
     value: Friction
     """Coefficient of friction between the floor and rubber wheels; 1 is dry concrete."""
     for_: PositiveDuration | None = Field(default=None, alias="for")
@@ -45,6 +45,8 @@ class FrictionPatch(Spec, WorldAction):
             raise ValueError("expected either region or at")
         if (self.at is None) != (self.radius is None):
             raise ValueError("a disc needs both `at` and `radius`")
+        if self.region is not None and "name" in self.model_fields_set:
+            raise ValueError("`name` is only for a disc; a patch in a region has the name of the region")
         return self
 
     def perform(self, stage: Stage) -> Effect:

@@ -2,13 +2,16 @@
 
 import math
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from simscen.actions.base import AnyAction
+from simscen.actions.objects import pose_on_plan
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.motion_paths import pose_at
 from simscen.core.geometry.shapes import MotionPath
+from simscen.core.messages.navigation import Path
 from simscen.core.records.events import Event, EventKind
 from simscen.testing.fakes import FakeStage
 
@@ -140,3 +143,38 @@ def test_mark_is_recorded():
     stage = FakeStage()
     perform(stage, mark={"name": "in the aisle", "note": "sees the rack"})
     assert stage.calls == [("record_world_event", Event(0, EventKind.MARK, "in the aisle", {"note": "sees the rack"}))]
+
+
+def test_a_repeated_point_at_the_end_of_a_plan_does_not_change_the_heading():
+    plan = Path(np.array([[0.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 2.0, 0.0]]))
+    assert pose_on_plan(plan, Pose2(0.0, 0.0), 5.0) == Pose2(0.0, 2.0, math.pi / 2)
+    assert pose_on_plan(Path(np.array([[1.0, 2.0, 3.0]] * 2)), Pose2(0.0, 0.0), 5.0) == Pose2(1.0, 2.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        {"spawn": {"name": "a", "box": [1.0, 1.0, 1.0], "pose": {"x": 0.0, "y": 0.0}, "yaw": 1.0}},
+        {"friction": {"region": "hall", "name": "oil", "value": 0.1}},
+    ],
+)
+def test_keys_that_would_be_ignored_are_errors(action):
+    with pytest.raises(ValidationError, match=r"has no effect with|is only for a disc"):
+        AnyAction.model_validate(action)
+
+
+class Crowded(FakeStage):
+    def region(self, name):
+        return ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+
+    def has_room(self, place, radius, walls_only=False):
+        return not walls_only
+
+    def rng(self, name):
+        return np.random.default_rng(1)
+
+
+def test_a_crowd_names_the_region_without_free_space():
+    effect = perform(Crowded(), crowd={"name": "guest", "count": 3, "start": "hall", "goals": ["kitchen"]})
+    assert not effect.happened
+    assert effect.what == "added only 0 of 3 people: no more free space in kitchen"
