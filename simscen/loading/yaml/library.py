@@ -117,7 +117,7 @@ class Library:
             names = " → ".join(self.sandbox.display_name(file) for file in (*chain[chain.index(base) :], base))
             return Problem(*position, "SC024", f"circular `extends`: {names}")
         if len(self.files) >= MAX_FILES:
-            return Problem(*position, "SC024", f"a scenario can extend at most {MAX_FILES} files")
+            return Problem(*position, "SC024", f"a scenario can consist of at most {MAX_FILES} YAML files")
         return base
 
 

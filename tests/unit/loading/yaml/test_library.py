@@ -80,7 +80,7 @@ def test_a_file_may_not_extend_itself(tmp_path: Path) -> None:
 def test_a_long_chain_is_refused(tmp_path: Path) -> None:
     files = {f"{i}.yaml": f"extends: {i + 1}.yaml" for i in range(40)}
     _, problems, _ = _read(tmp_path, files)
-    assert [p.message for p in problems] == ["a scenario can extend at most 32 files"]
+    assert [p.message for p in problems] == ["a scenario can consist of at most 32 YAML files"]
 
 
 def test_extends_names_one_file(tmp_path: Path) -> None:
