@@ -4,6 +4,7 @@ from simscen.cli.catalog.commands_page import EXIT_CODES
 from simscen.cli.catalog.topics import Topic
 from simscen.core.errors import BROKEN_COMPONENT
 from simscen.core.messages.navigation import ErrorCode
+from simscen.core.records.run_result import INTERRUPTED, NONDETERMINISTIC, NOT_RUN
 from simscen.run.external.protocol import CRASHED, FAILED, PROTOCOL, TIMEOUT
 
 NAV2_ERROR_CODES = {
@@ -50,12 +51,12 @@ JUNIT_ERROR_TYPES = {
     "timeout": "The run took longer than --wall-limit.",
     "out-of-memory": "The run needed more memory than available, or its process was killed for lack of memory.",
     "invalid": "The files of the run are invalid, or its log contains nothing to evaluate.",
-    "interrupted": "The session was interrupted during this run.",
-    "not-run": "The session ended before this run started: it was interrupted, or --fail-fast stopped it.",
+    INTERRUPTED: "The session was interrupted during this run.",
+    NOT_RUN: "The session ended before this run started: it was interrupted, or --fail-fast stopped it.",
     "internal": "A bug in simscen.",
     "diverged": "The physics simulation diverged to unrealistic positions or speeds.",
     "output": "The log or the result of the run could not be written.",
-    "nondeterministic": "Two runs that must be equal differ, with --check-determinism or --check-against.",
+    NONDETERMINISTIC: "Two runs that must be equal differ, with --check-determinism or --check-against.",
     CRASHED: "The process of an external stack ended, could not be started, or closed the connection.",
     TIMEOUT: "An external stack did not answer within its wall-clock limit.",
     PROTOCOL: "A message of an external stack violates the stack protocol.",
@@ -63,8 +64,6 @@ JUNIT_ERROR_TYPES = {
     BROKEN_COMPONENT: "A component of an installed package returned an invalid value.",
 }
 """Meaning of each type of the JUnit element `<error>`."""
-KINDS_WITHOUT_EXIT_CODE = frozenset({"interrupted", "not-run"})
-"""Error types of runs for which a signal or the failure of another run determines the exit code."""
 
 
 def code_topics() -> list[Topic]:
@@ -76,7 +75,8 @@ def code_topics() -> list[Topic]:
         text = f"Nav2's error code {number}.\n\n{meaning}{note}"
         found.append(Topic("error code", code.name, None, text, example, alias=number))
     for kind, meaning in JUNIT_ERROR_TYPES.items():
-        exit_code_text = "" if kind in KINDS_WITHOUT_EXIT_CODE else ", and exit code 3"
+        # The exit code of unfinished runs depends on the signal, or on the run for which --fail-fast ended the session.
+        exit_code_text = "" if kind in (INTERRUPTED, NOT_RUN) else ", and exit code 3"
         text = f"{meaning}\n\nThe run could not be completed: a JUnit `<error>`{exit_code_text}."
         found.append(Topic("error type", kind, None, text))
     for exit_code, meaning in EXIT_CODES.items():

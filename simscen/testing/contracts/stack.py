@@ -14,7 +14,7 @@ from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import Estimate
 from simscen.core.messages.sensor_data import Readings, Scan
 from simscen.core.random_streams import Streams
-from simscen.core.records.events import Event, EventKind
+from simscen.core.records.events import GOAL_END_KINDS, Event, EventKind
 from simscen.core.records.trace import Decision
 from simscen.stack.protocols import RobotModel, Stack, Surroundings
 from simscen.stack.setting import Setting
@@ -23,7 +23,6 @@ from simscen.testing.flatland import CONTROL_PERIOD_TICKS, TICK_RATE_HZ, Drive, 
 
 START_POSE, NEAR_GOAL, FAR_GOAL = Pose2(1, 2), Goal("near", Pose2(1.8, 2.0, 0.0)), Goal("far", Pose2(5, 2, 0.0))
 SIDE_GOAL = Goal("aside", Pose2(1.5, 3.2, 1.5))
-GOAL_END_KINDS = {EventKind.GOAL_REACHED, EventKind.GOAL_PASSED, EventKind.GOAL_FAILED, EventKind.GOAL_CANCELED}
 
 
 def names_of_kind(drive: Drive, kind: str) -> list[str]:
