@@ -5,6 +5,8 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
+
 from simscen.core.environment.world_model import Patch
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, MotionPath, TriangleMesh
@@ -112,9 +114,14 @@ class Simulation:
             self._scene.actors.move(name, path, self.tick)
 
     def place(self, name: str, pose: Pose2) -> None:
-        """Place a body at rest at `pose`, and end its path; raises KeyError for an unknown name."""
+        """Place a body at rest at `pose`, and end its path. It keeps its initial height above the ground.
+
+        Raises KeyError for an unknown name.
+        """
+        before = self._scene.actors.bodies()[name].pose
+        old_ground, new_ground = self._scene.terrain.heights(np.array([before[:2], pose[:2]])).tolist()
         with self._stepper.change():
-            self._scene.actors.place(name, pose, self.tick)
+            self._scene.actors.place(name, Pose3.planar(pose, before.z - old_ground + new_ground), self.tick)
 
     def push_object(self, name: str, impulse: tuple[float, float], seconds: float = 0.0) -> None:
         """Apply an impulse (N s, world frame) to a body, spread over `seconds` from the next tick on.

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from simscen.core.geometry import Pose2, Pose3, Vector
+from simscen.core.geometry import Pose3, Vector
 from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.sim.bullet import engine, pybullet
 from simscen.sim.bullet.collision_shapes import Triangulate
@@ -123,10 +123,9 @@ class Actors:
         actor = self._actors[name]
         self.add(replace(actor.body, pose=self.poses.at(tick)[name], mass=0.0, path=path), tick)
 
-    def place(self, name: str, pose: Pose2, tick: int) -> None:
-        """Place a body upright and at rest at `pose`, and end its path."""
-        body = self._actors[name].body
-        self.add(replace(body, pose=Pose3.planar(pose, body.pose.z), path=None), tick)
+    def place(self, name: str, pose: Pose3, tick: int) -> None:
+        """Place a body at rest at `pose`, and end its path."""
+        self.add(replace(self._actors[name].body, pose=pose, path=None), tick)
 
     def follow(self, name: str, path: MotionPath, max_speed: float, tick: int) -> None:
         """Replace the path of a steered actor from `tick` on. The outline of the actor must be a circle.

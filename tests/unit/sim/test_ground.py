@@ -189,3 +189,12 @@ def test_imu_on_a_slope_measures_gravity_along_x(on_ground):
 def test_robot_that_tips_over_a_caster_climbs_no_slope():
     body = build_robot_body(robot_spec("turtlebot"))
     assert compute_climb_limits(add_payload(body, 100.0, (1.0, 0.0, 0.2))).slope == 0.0
+
+
+def test_object_is_placed_on_the_ground_at_its_new_position(on_ground):
+    platform = box("platform", 3.0, 0.0, 1.0, 1.0, 0.02)
+    crate = Body("crate", (box("crate", 0, 0, 0.3, 0.3, 0.3),), Pose3(0.0, 2.0, 0.1))
+    simulation = on_ground("turtlebot", [platform], bodies=[crate])
+    for place, height in (((3.0, 0.0), 0.12), ((3.2, 0.1), 0.12), ((0.0, -2.0), 0.1)):
+        simulation.place("crate", Pose2(*place, 0.5))
+        assert simulation.object_pose("crate").position == pytest.approx((*place, height), abs=1e-6)
