@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -20,7 +21,7 @@ from simscen.spec.quantities import Impulse
 
 if TYPE_CHECKING:
     from simscen.core.records.case import Case
-    from simscen.core.records.trace import Trace
+    from simscen.core.records.trace import Samples, Trace
 
 MOVING_SPEED_M_S = 0.1
 """Minimum speed of a robot that causes a contact, as in the CollisionTest of CARLA."""
@@ -69,7 +70,7 @@ class Collisions(Spec, Criterion):
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return findings for the number of collisions and, with `max_impulse`, for the largest impulse.
 
-        Raises MissingEvidence if `caused_by_robot` is set and the trace has no velocity.
+        Raises MissingEvidence if the cause of a contact matters (`caused_by_robot`) and the trace has no velocity.
         """
         if not len(trace.truth) and not trace.of_kind(EventKind.COLLISION_STARTED):
             return [undecided("collisions", "neither the robot's path nor its contacts were recorded")]
@@ -79,8 +80,9 @@ class Collisions(Spec, Criterion):
             if not radii:
                 return [undecided("collisions", "there were no people")]
             hits = [event for event in hits if event.name in radii]
-        if self.caused_by_robot:
-            hits = [event for event in hits if _is_caused_by_robot(trace, event, case)]
+        if self.caused_by_robot and hits:
+            speeds = _max_point_speed(trace, case)
+            hits = [event for event in hits if _is_caused_by_robot(trace, event, speeds)]
         limit = 0 if self.max is None and self.max_impulse is None else self.max
         details = [_describe_contact(trace, hit) for hit in hits[:MAX_DETAILS]]
         if len(hits) > MAX_DETAILS:
@@ -112,21 +114,24 @@ def _impulse(hit: Event) -> float:
     return float(value)
 
 
-def _is_caused_by_robot(trace: Trace, hit: Event, case: Case) -> bool:
-    """Return whether a point of the robot may have exceeded MOVING_SPEED_M_S within LOOKBACK_S before a contact.
+def _max_point_speed(trace: Trace, case: Case) -> Samples:
+    """Return an upper bound (n, 1) in m/s on the speed of all points of the robot: speed plus turn rate times radius.
 
-    Speed plus turn rate times radius is an upper bound on the speed of all points. Raises MissingEvidence.
+    Raises MissingEvidence if the trace has no velocity.
     """
     radius = max((math.hypot(x, y) for x, y in case.footprint), default=case.inscribed_radius)
     linear, turning = speed(trace), turn_rate(trace)
     if not len(linear):
         raise MissingEvidence("it is unknown who caused a contact, because the robot's true velocity was not recorded")
+    return replace(linear, values=linear.values + radius * turning.values)
+
+
+def _is_caused_by_robot(trace: Trace, hit: Event, speeds: Samples) -> bool:
+    """Return whether a point of the robot may have exceeded MOVING_SPEED_M_S within LOOKBACK_S before a contact."""
     # The newest sample before the window is included, because rare samples may leave the window empty.
     since = round(hit.tick - LOOKBACK_S * trace.tick_rate)
-    first, last = np.searchsorted(linear.ticks, (since, hit.tick), side="right").tolist()
-    window = slice(max(first - 1, 0), max(last, 1))
-    fastest = linear.values[window] + radius * turning.values[window]
-    return bool(fastest.max() > MOVING_SPEED_M_S)
+    first, last = np.searchsorted(speeds.ticks, (since, hit.tick), side="right").tolist()
+    return bool(speeds.values[max(first - 1, 0) : max(last, 1)].max() > MOVING_SPEED_M_S)
 
 
 def _describe_contact(trace: Trace, hit: Event) -> str:

@@ -7,7 +7,9 @@ import pytest
 
 from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import Status
+from simscen.criteria import collisions
 from simscen.criteria.registry import AnyCriterion
+from simscen.criteria.trace_signals.ground_truth import speed
 from simscen.judge.evaluation import judge
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
@@ -30,6 +32,15 @@ def sparse(trace, seconds):
 def test_newest_sample_before_contact_determines_the_fault(stops, status):
     trace = synthetic_trace({"seconds": 8, "truth": [[0, 0, 0], [stops, 2, 0], [8, 2, 0]], "events": HIT})
     assert verdict({"caused_by_robot": True}, sparse(trace, 1)).status is status
+
+
+def test_velocities_are_read_once_for_many_contacts(monkeypatch):
+    calls = []
+    monkeypatch.setattr(collisions, "speed", lambda trace: calls.append(trace) or speed(trace))
+    events = [[0.01 * k, *HIT[0][1:]] for k in range(100)]
+    trace = synthetic_trace({"seconds": 8, "truth": [[0, 0, 0], [8, 4, 0]], "events": events})
+    assert verdict({"caused_by_robot": True}, trace).status is Status.FAIL
+    assert len(calls) == 1
 
 
 def test_contact_before_the_first_sample_is_judged_by_that_sample():
