@@ -13,6 +13,7 @@ from simscen.core.messages.goals import matches_goal_name
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.verdict import Status
 from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes
+from simscen.criteria.timeline import spans
 from simscen.judge.finding_text import comparison, subject
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Canvas, printable
@@ -118,8 +119,9 @@ DIAMOND, SMALL_DIAMOND = ([(0, -r), (r, 0), (0, r), (-r, 0)] for r in (6, 4))
 
 def draw_fault_bands(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """Draw a wide band along the part of the path on which a fault was active."""
+    pieces = driven_segments(scene)
     for start, ended, name in _faults(scene):
-        for piece in driven_segments(scene):
+        for piece in pieces:
             is_active = (piece.ticks >= start) & (piece.ticks <= ended)
             canvas.line(piece.values[is_active, :2], palette.FAULTY, 11.0)
             if is_active.any():
@@ -142,14 +144,9 @@ def draw_faults(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 def _faults(scene: Scene) -> list[tuple[int, int, str]]:
     """Return the start tick, end tick, and name of each fault. A fault that does not end has the last tick."""
-    ended = list(scene.trace.of_kind(EventKind.FAULT_ENDED))
-    faults = []
-    for event in scene.trace.of_kind(EventKind.FAULT_STARTED):
-        matching = [end for end in ended if end.name == event.name and end.tick >= event.tick]
-        faults.append((event.tick, matching[0].tick if matching else scene.trace.end, event.name))
-        if matching:
-            ended.remove(matching[0])
-    return faults
+    names = dict.fromkeys(event.name for event in scene.trace.of_kind(EventKind.FAULT_STARTED))
+    faults = [(span.start, span.end, name) for name in names for span in spans(scene.trace, name)]
+    return sorted(faults, key=lambda fault: fault[0])
 
 
 def draw_events(canvas: Canvas, scene: Scene) -> Iterator[Label]:
