@@ -194,7 +194,7 @@ def test_suggested_turning_scale_passes_the_check(figures):
     """Skidding wheels turn a heavy base as with a larger wheel separation."""
     four = wheels(x=-0.25, r=0.16, half=0.28, name="rear_") + wheels(x=0.25, r=0.16, half=0.28, name="front_")
     files = {"cart_urdf": urdf(four, size="0.9 0.4 0.2", mass=45, z=0.25, i=1.5)}
-    name = "turn: odometry, from true angle"
+    name = "turn: odometry against true angle"
 
     def measured_turn(scale):
         found = figures("cart.robot.yaml", **files, cart_robot_yaml=robot_yaml(SKID.format(scale)))
