@@ -18,6 +18,7 @@ from simscen.reconstruction.estimators import run_estimators
 from simscen.reconstruction.objects.find_objects import object_of_robot
 from simscen.reconstruction.scenario.contents import EstimatedParts, GivenParts, ScenarioContents, scenario_contents
 from simscen.reconstruction.scenario.given_parts import GivenFiles, choose_world, prepare_given_parts, scenario_stem
+from simscen.reconstruction.scenario.new_files import NewFiles
 from simscen.reconstruction.scenario.robot_file import robot_properties
 from simscen.reconstruction.scenario.scenario_text import scenario_text
 from simscen.reconstruction.static_world import StaticWorld
@@ -130,15 +131,26 @@ def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> R
     """Write the scenario file `out` from a log, and next to it the map and robot files that the scenario needs.
 
     For a log with several robots, `options.files.robot` is the name of the robot to reconstruct. Raises InvalidInput
-    for an unusable log or file, and OSError if a file cannot be written.
+    for an unusable log or file, UsageError if a map or robot file to write exists, and OSError if a file cannot be
+    written. The map and robot files are then removed.
     """
+    new = NewFiles()
+    try:
+        return _reconstruct(log, out, options, new)
+    except BaseException:
+        new.remove()
+        raise
+
+
+def _reconstruct(log: Path, out: Path, options: ReconstructionOptions, new: NewFiles) -> Reconstruction:
+    """Write the scenario file `out`, and other files, which are added to `new`."""
     robot_of_log = choose_robot(log, options.files.robot)
     files = replace(options.files, robot="") if robot_of_log else options.files
     drive = read_drive(log, options.truth, options.topics, robot_of_log)
     described = read_description(log, options.root or Path.cwd(), robot_of_log)
-    choice = choose_world(drive, described, files, out)
+    choice = choose_world(drive, described, files, out, new)
     static_world = StaticWorld(choice.world, drive.lidar_height)
-    given = prepare_given_parts(drive, described, choice, files, out, static_world)
+    given = prepare_given_parts(drive, described, choice, files, out, static_world, new)
     is_known = bool(files.robot) or described.robot is not None
     robot = robot_properties(given.robot, out.parent, is_known)
     others = [
@@ -147,4 +159,4 @@ def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> R
     ]
     estimated = run_estimators(drive, static_world, robot, others, choice.is_built)
     contents = _write_valid(drive, given, estimated, log, out)
-    return Reconstruction(log, (out, *choice.files), drive, contents, static_world)
+    return Reconstruction(log, (out, *new.paths), drive, contents, static_world)

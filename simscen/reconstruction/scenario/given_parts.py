@@ -23,6 +23,7 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.drive.run_description import RunDescription
 from simscen.reconstruction.reasons import Reason
 from simscen.reconstruction.scenario.contents import GivenParts
+from simscen.reconstruction.scenario.new_files import NewFiles
 from simscen.reconstruction.scenario.robot_file import TYPICAL_ROBOT, observed_limits, write_robot_file
 from simscen.reconstruction.static_world import StaticWorld, map_from_scans, world_from_map
 from simscen.worlds.maps.ros_map import save_map
@@ -53,8 +54,7 @@ class WorldChoice:
     """World and map of the scenario, with reasons.
 
     `written` and `map` are the values of the keys `world` and `map` in the scenario. `is_built` states that the walls
-    were built from the scans. `unknowns` are phrases about missing information. `files` were written next to the
-    scenario.
+    were built from the scans. `unknowns` are phrases about missing information.
     """
 
     written: str | Mapping[str, Any]
@@ -64,37 +64,44 @@ class WorldChoice:
     map_reason: Reason | None = None
     is_built: bool = False
     unknowns: list[str] = field(default_factory=list)
-    files: list[Path] = field(default_factory=list)
 
 
-def choose_world(drive: RecordedDrive, described: RunDescription, files: GivenFiles, out: Path) -> WorldChoice:
-    """Return the world and the map for the scenario file `out`, and write new world and map files next to `out`.
+def choose_world(
+    drive: RecordedDrive, described: RunDescription, files: GivenFiles, out: Path, new: NewFiles
+) -> WorldChoice:
+    """Return the world and the map for the scenario file `out`, and write world and map files next to `out`.
 
-    Raises InvalidInput for an unusable file, and OSError if a file cannot be written.
+    The written files are added to `new`. Raises InvalidInput for an unusable file, UsageError if a file to write
+    exists, and OSError if it cannot be written.
     """
     if files.world is not None:
-        choice = _world_of_file(files.world, out, Reason("given with --world"))
+        choice = _world_of_file(files.world, out, Reason("given with --world"), new)
     elif isinstance(described.world, Path):
-        choice = _world_of_file(described.world, out, Reason("world file in the header of the log"))
+        choice = _world_of_file(described.world, out, Reason("world file in the header of the log"), new)
     elif isinstance(described.world, Mapping):
         spec = WorldSpec.model_validate(described.world)
         world = world_from_spec(spec, spec.name or "world")
         choice = WorldChoice(described.world, world, Reason("walls and obstacles in the header of the log"))
     else:
-        return _world_of_map(drive, files, out)
+        return _world_of_map(drive, files, out, new)
     if not described.has_map:
         choice.map, choice.map_reason = "none", Reason("the log has no map")
     elif files.map is not None:
         choice.map, choice.map_reason = relative_path(files.map, out), Reason("given with --map")
     elif drive.map is not None and _differs(drive.map, StaticWorld(choice.world, drive.lidar_height).grid):
-        file = out.with_name(f"{scenario_stem(out)}_map.yaml")
-        save_map(drive.map, file)
-        choice.files += [file, file.with_suffix(".pgm")]
+        file = _write_map(drive.map, out.with_name(f"{scenario_stem(out)}_map.yaml"), new)
         choice.map, choice.map_reason = file.name, Reason("the map on /map differs from the world", 0.0)
     return choice
 
 
-def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path) -> WorldChoice:
+def _write_map(grid: OccupancyGrid, file: Path, new: NewFiles) -> Path:
+    """Write a map to the YAML file `file` and its image, and return `file`."""
+    new.add(file, file.with_suffix(".pgm"))
+    save_map(grid, file)
+    return file
+
+
+def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path, new: NewFiles) -> WorldChoice:
     """Return a world with the walls of the given map, of the map in the log, or of a map built from the scans."""
     if files.map is not None:
         loaded = load_world_file(files.map, default_root([files.map]))
@@ -104,7 +111,6 @@ def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path) -> WorldCh
             )
         grid, written = load_map(loaded.map), relative_path(files.map, out)
         return WorldChoice(written, world_from_map(grid, scenario_stem(out)), Reason("given with --map"))
-    file = out.with_name(f"{scenario_stem(out)}_map.yaml")
     unknowns = ["walls and objects that no scan shows"]
     if drive.map is not None:
         grid, reason = drive.map, Reason("the walls are the occupied cells of /map", 0.0)
@@ -112,32 +118,31 @@ def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path) -> WorldCh
         grid = map_from_scans(drive)
         reason = Reason("built from the scans along the poses, because the log has no map", None, None, "medium")
         unknowns.append("which parts of the built map were on the robot's own map")
-    save_map(grid, file)
-    written_files = [file, file.with_suffix(".pgm")]
+    file = _write_map(grid, out.with_name(f"{scenario_stem(out)}_map.yaml"), new)
     return WorldChoice(
         file.name,
         world_from_map(grid, scenario_stem(out)),
         reason,
         is_built=drive.map is None,
         unknowns=unknowns,
-        files=written_files,
     )
 
 
-def _world_of_file(file: Path, out: Path, reason: Reason) -> WorldChoice:
+def _world_of_file(file: Path, out: Path, reason: Reason, new: NewFiles) -> WorldChoice:
     """Return the world in `file`, and copy the file next to `out` if it is outside of the scenario's root folder."""
     root = default_root([file])
     loaded = load_world_file(file, root)
     out_root = default_root([out])
-    written, copies = relative_path(file, out), list[Path]()
+    written = relative_path(file, out)
     if not file.resolve().is_relative_to(out_root.resolve()):
         copy = out.with_name(f"{scenario_stem(out)}{''.join(file.suffixes[-2:])}")
         if loaded.map is not None:
-            save_map(load_map(loaded.map), copy)
+            _write_map(load_map(loaded.map), copy, new)
         else:
+            new.add(copy)
             shutil.copyfile(file, copy)
-        written, copies = copy.name, [copy]
-    return WorldChoice(written, world_from_file(loaded, root), reason, files=copies)
+        written = copy.name
+    return WorldChoice(written, world_from_file(loaded, root), reason)
 
 
 def _differs(given: OccupancyGrid, drawn: OccupancyGrid) -> bool:
@@ -154,8 +159,12 @@ def prepare_given_parts(
     files: GivenFiles,
     out: Path,
     static_world: StaticWorld,
+    new: NewFiles,
 ) -> GivenParts:
-    """Return the parts of the scenario that are not estimated. Write a robot file if user and log name no robot."""
+    """Return the parts of the scenario that are not estimated. Write a robot file if user and log name no robot.
+
+    The robot file is added to `new`. Raises UsageError if the file exists, and OSError if it cannot be written.
+    """
     reasons = {"world": choice.reason}
     if choice.map_reason is not None:
         reasons["map"] = choice.map_reason
@@ -170,8 +179,8 @@ def prepare_given_parts(
     else:
         clearance = float(static_world.distance_to_walls(drive.poses.values[:, :2]).min()) - WALL_MARGIN_M
         file = out.with_name(f"{scenario_stem(out)}.robot.yaml")
+        new.add(file)
         written = write_robot_file(drive, file, _lidar_noise(drive, static_world), clearance)
-        choice.files.append(written.file)
         robot, unknowns = written.file.name, [*unknowns, *written.unknowns]
         reasons["robot"] = Reason(written.reason, None, None, "medium")
     if stack:

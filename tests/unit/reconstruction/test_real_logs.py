@@ -16,7 +16,7 @@ import foreign_logs as logs
 from rosbags.rosbag2 import StoragePlugin
 
 from simscen.cli.main import app
-from simscen.core.errors import InvalidInput
+from simscen.core.errors import InvalidInput, UsageError
 from simscen.loading.scenario import load_scenario
 from simscen.reconstruction import scenario_from_log as scenario_module
 from simscen.reconstruction.drive.goals import BEND_SOURCE, STOP_SOURCE, goals_from_motion
@@ -392,3 +392,26 @@ def test_a_drive_across_a_country_needs_a_map(tmp_path):
     bag = logs.write_bag(tmp_path / "bag", far)
     with pytest.raises(InvalidInput, match="too much to build a map"):
         scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
+
+
+@pytest.mark.parametrize("existing", ["site_map.yaml", "site_map.pgm", "site.robot.yaml"])
+def test_existing_files_are_never_overwritten(existing, tmp_path):
+    bag = logs.write_bag(tmp_path / "bag", messages(with_map=False))
+    (tmp_path / existing).write_text("mine")
+    arguments = ["new", "--from-log", str(bag), "--out", str(tmp_path / "site")]
+    result = CliRunner().invoke(app, arguments)
+    assert isinstance(result.exception, UsageError)
+    assert f"{existing} already exists" in str(result.exception)
+    assert (tmp_path / existing).read_text() == "mine"
+    assert sorted(file.name for file in tmp_path.iterdir()) == sorted(["bag", existing])
+
+
+def test_an_invalid_log_leaves_no_map_and_no_robot_file(tmp_path, monkeypatch):
+    def fail(*_):
+        raise InvalidInput([])
+
+    monkeypatch.setattr(scenario_module, "run_estimators", fail)
+    bag = logs.write_bag(tmp_path / "bag", messages(with_map=False))
+    with pytest.raises(InvalidInput):
+        scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
+    assert [file.name for file in tmp_path.iterdir()] == ["bag"]
