@@ -175,16 +175,20 @@ def _filtered_odometry(messages: MessagesByTopic, time: Clock, now: int) -> Iter
 
 
 def _path(messages: MessagesByTopic, name: str, tick: int, time: Clock) -> Path | None:
-    """Return the last path on the topic `name`, or None. A path that is only on the exact topic gets `tick`."""
+    """Return the last path on the topic `name`, or None.
+
+    The path was planned at its stamp, or at `tick` if the stamp is 0, is in the future, or is missing because the path
+    is only on the exact topic.
+    """
     message = _decode_last(messages, name, partial(decode_checked, decode.path))
     exact = _decode_last(messages, name + EXACT_SUFFIX, lambda data: _decode_table(data, 3))
     if message is None and exact is None:
         return None
-    plan_tick = tick if message is None else time.tick_at(message.stamp)
+    stamp_tick = 0 if message is None else time.tick_at(message.stamp)
     points = exact if exact is not None else to_planar(message.poses) if message is not None else np.empty((0, 3))
     if not np.isfinite(points).all():
         raise ProtocolViolation(f"a path on {name} that is not finite")
-    return Path(points, plan_tick)
+    return Path(points, stamp_tick if 0 < stamp_tick <= tick else tick)
 
 
 def _costmaps(messages: MessagesByTopic) -> Iterator[CostGrid]:

@@ -178,3 +178,11 @@ def test_particles_that_are_not_finite_are_refused(topic: str) -> None:
     data = messages.float64_array(particle) if "exact" in topic else messages.particle_cloud((1, 0), [particle])
     with pytest.raises(ProtocolViolation, match="a particle on /particle_cloud that is not finite"):
         understand(**{"/amcl_pose": EXAMPLES["/amcl_pose"], topic: data})
+
+
+@pytest.mark.parametrize(("stamp", "tick"), [((0, 500_000_000), 120), ((1, 0), 240), ((0, 0), 240), ((1, 1), 240)])
+def test_a_plan_without_a_valid_stamp_was_made_in_this_step(stamp: tuple[int, int], tick: int) -> None:
+    """Otherwise, criteria would compare the drive with another plan, or with none."""
+    plan = understand(**{"/plan": messages.path(stamp, [(1, 2, 3)])}).plan
+    assert plan is not None
+    assert plan.tick == tick
