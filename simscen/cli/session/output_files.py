@@ -68,7 +68,7 @@ class Reports:
         self._junit, self._junit_only = junit or folder / "junit.xml", junit_only
         self._family: Family = family
         self._used = used or {}
-        self._missing: frozenset[Path] = frozenset()
+        self._missing = frozenset({self.page, self._junit})
 
     def begin(self) -> None:
         """Write run.json before the first run. Raises UsageError if the folder is not writable."""
@@ -116,7 +116,7 @@ class Reports:
     ) -> SessionFinished:
         """Return the last event of a session. `wall` is its wall-clock duration in s.
 
-        The path of a report is empty if the report could not be written.
+        The path of a report is empty if the report was not written.
         """
         count, simulated = Counter[Outcome](), 0.0
         for finished in finished_runs:  # once, because a RunStore decompresses each run

@@ -263,6 +263,18 @@ def test_runs_before_an_error_or_a_signal_during_a_search_are_reported(tmp_path:
     assert len(runs_of(tmp_path / "out")) == 2
 
 
+def test_an_interrupted_search_without_runs_names_no_report(tmp_path: Path) -> None:
+    sampled = "variations: {sampled: {count: 4, values: {robot.motor_torque: {uniform: [50 %, 100 %]}}}}\n"
+    (tmp_path / "crates.scenario.yaml").write_text(SCENARIO + sampled)
+    program = BETWEEN_BATCHES.format(change="pass").replace(
+        "if self.finished_runs:", "os.kill(os.getpid(), signal.SIGTERM)\n    if self.finished_runs:"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=False, capture_output=True, text=True)
+    assert done.returncode == 143, done.stderr
+    assert "interrupted: 0 passed" in done.stdout
+    assert "report.html" not in done.stdout and not (tmp_path / "out/report.html").exists()
+
+
 def test_the_junit_report_of_a_search_does_not_replace_its_world(tmp_path: Path) -> None:
     world = "simscen: 1\nwalls: [{points: [[0, 0], [12, 0], [12, 12], [0, 12], [0, 0]]}]\n"
     (tmp_path / "hall.world.yaml").write_text(world)
