@@ -162,15 +162,13 @@ class PossibleRun:
 
     def _why_never_speed_above(self, speed: Any) -> str | None:
         top = self._top_speed
-        if top is None or speed.root <= MAX_SPEED_RATIO * top or self._may_be_pushed:
+        if top is None or speed.root <= MAX_SPEED_RATIO * top:
             return None
         return f"the robot's top speed is {top:g} m/s"
 
     def _why_never_turning_above(self, rate: Any) -> str | None:
         spec = self.loaded.robot.spec
-        if spec is None or self._may_be_pushed or self.may_do("push"):
-            return None
-        if rate.root <= MAX_SPEED_RATIO * spec.limits.angular:
+        if spec is None or self._may_be_pushed or rate.root <= MAX_SPEED_RATIO * spec.limits.angular:
             return None
         return f"the robot's maximum turn rate is {spec.limits.angular:g} rad/s"
 
@@ -228,18 +226,18 @@ class PossibleRun:
 
     @property
     def _top_speed(self) -> float | None:
-        """Top speed of the robot in m/s; None if it is unknown, or if an action can make the robot faster."""
+        """Top speed of the robot in m/s; None if it is unknown, or if something can make the robot faster."""
         spec = self.loaded.robot.spec
-        return None if spec is None or self.may_do("push", "kidnap") else spec.top_speed
+        return None if spec is None or self._may_be_pushed or self.may_do("kidnap") else spec.top_speed
 
     @property
     def _may_be_pushed(self) -> bool:
-        """Whether a moving object, pedestrian, or robot could push the robot."""
+        """Whether an action, a pedestrian, another robot, or an object that moves or appears could push the robot."""
         world = self.loaded.world
         if world.spec is None or world.sdf is not None or self.loaded.other_robots:
             return True
-        moving = self.may_do("move", "close", "open", "pedestrian", "crowd")
-        return moving or any(thing.move for thing in world.spec.objects)
+        pushing = self.may_do("push", "move", "close", "open", "pedestrian", "crowd", "spawn", "teleport")
+        return pushing or any(thing.move for thing in world.spec.objects)
 
 
 def stays_true(condition: AnyCondition) -> bool:

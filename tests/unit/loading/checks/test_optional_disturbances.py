@@ -60,6 +60,14 @@ def test_a_displaced_robot_or_estimate_has_an_error_with_the_true_pose_too(tmp_p
     assert not told(tmp_path, more.replace("EVENT", event), "SC050")
 
 
+@pytest.mark.parametrize("condition", ["speed_above: 5 m/s", "turning_above: 20 rad/s", "travelled: 1 km"])
+def test_an_object_that_appears_can_push_the_robot_beyond_its_limits(tmp_path: Path, condition: str) -> None:
+    event = f"{{when: {{{condition}}}, do: {{mark: {{name: fast}}}}}}"
+    spawn = "{when: {time: 1}, do: {spawn: {name: box, box: [1, 1, 1], pose: {x: 2.4, y: 3}}}}"
+    assert told(tmp_path, f"events: [{event}]\n", "SC050")
+    assert not told(tmp_path, f"events: [{spawn}, {event}]\n", "SC050")
+
+
 @pytest.mark.parametrize(
     ("earlier", "count"),
     [
