@@ -20,7 +20,7 @@ from simscen.loading.yaml.tree import (
     node_at,
     nodes_with_keys,
 )
-from simscen.spec.quantities import NUMBER_AND_UNIT_PATTERN
+from simscen.spec.quantities import NUMBER_AND_UNIT_PATTERN, UNITS
 
 REQUIRED_KEYS = frozenset({"simscen", "world", "robot", "robots", "seed", "pass", "time_limit"})
 """Top-level keys that are never removed."""
@@ -187,7 +187,7 @@ def _rounded(value: object, digits: int) -> str | float | int | None:
         short = float(f"{value:.{digits}g}")
         return None if short == value else int(short) if isinstance(value, int) else short
     match = NUMBER_AND_UNIT_PATTERN.fullmatch(value) if isinstance(value, str) else None
-    if match is None:
+    if match is None or not any(match[2] in units for units in UNITS.values()):
         return None
     number = float(match[1])
     short = float(f"{number:.{digits}g}")

@@ -113,3 +113,9 @@ def test_any_layout_is_written_with_the_right_content(text: str) -> None:
     content = parsed(text).plain
     for changed in (content, {**content, "goals": content["goals"][1:]}, {**content, "goals": [{"pose": "c"}]}):
         assert parsed(changed_text(text, "a.yaml", changed, "a comment\nof two lines")).plain == changed
+
+
+def test_names_that_begin_with_a_number_are_not_rounded() -> None:
+    tree, _ = parse_yaml("{events: [{name: 2024-11 pallet}], robot: {payload: {mass: 12345 g}}}", "a")
+    assert isinstance(tree, MappingNode)
+    assert [one.value for one in find_roundings(tree, 3)] == ["12300 g"]
