@@ -15,6 +15,8 @@ PACKAGE_SCHEMES = ("package://", "model://")
 """Schemes of ROS and Gazebo whose first path component is the name of a package or model."""
 SCHEMES = (*PACKAGE_SCHEMES, "file://")
 """Schemes of all supported URIs except Fuel URIs."""
+MAX_NAME_CHARS = 255
+"""Maximum length of the name of a package: the usual limit of file systems for the name of a folder."""
 MAX_MANIFEST_BYTES = 1 << 16
 """Number of bytes of a package.xml that are read to find the `<name>`."""
 _FUEL = re.compile(
@@ -153,8 +155,8 @@ def candidate_paths(
 
 
 def is_package_name(name: str) -> bool:
-    """Return whether a name consists of the characters of ROS package names (REP 144)."""
-    return name.replace("_", "").replace("-", "").isalnum()
+    """Return whether a name consists of the characters of ROS package names (REP 144), and fits into a file name."""
+    return len(name) <= MAX_NAME_CHARS and name.replace("_", "").replace("-", "").isalnum()
 
 
 def _package_folders(name: str, near: Path, tree: FolderTree) -> Iterator[Path]:

@@ -144,3 +144,8 @@ def test_missing_file_message_lists_similar_files(folders: AllowedFolders) -> No
     with pytest.raises(NoSuchFile) as caught:
         folders.find("hull.stl", root)
     assert caught.value.hint == f"looked in ., {models}; allow its folder with --world-path"
+
+
+def test_a_package_name_that_is_too_long_for_a_folder_is_refused(folders: AllowedFolders) -> None:
+    with pytest.raises(UnusableFile, match="is not the name of a package"):
+        folders.package_folder("a" * 300, folders.roots[0])
