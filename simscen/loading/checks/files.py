@@ -103,9 +103,9 @@ def _base_file_problems(file: Path, library: Library) -> list[Problem]:
         return library.with_source(problems)
     assets, renamed = Assets(library), tree
     if isinstance(tree, MappingNode):
-        appended = {key.removesuffix(APPEND_SUFFIX): entry for key, entry in tree.entries.items()}
-        unchanged = {key: entry for key, entry in tree.entries.items() if not key.endswith(APPEND_SUFFIX)}
-        renamed = MappingNode(tree.position, {**appended, **unchanged})  # with `pass` for `pass+`
+        names = {key: key.removesuffix(APPEND_SUFFIX) for key in tree.entries}
+        entries = {key if names[key] in tree.entries else names[key]: entry for key, entry in tree.entries.items()}
+        renamed = MappingNode(tree.position, entries)  # with `pass` for `pass+`, unless the file has both
         world, model = child(tree, "world"), node_at(tree, ("robot", "model"))
         if isinstance(world, ScalarNode) and isinstance(world.value, str):
             assets.world(world)
