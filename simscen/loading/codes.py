@@ -22,7 +22,7 @@ CODES = {
     "SC016": "Values contradict each other.",
     "SC017": "A text or list is too short, is too long, or contains characters that are not allowed.",
     "SC018": "A key has no value.",
-    "SC019": "A plugin of an installed package cannot be used, for example because its import fails.",
+    "SC019": "A type that a plug-in (installed package) adds cannot be used, for example because its import fails.",
     "SC020": "A path leads out of the root folder. Choose another with --root, or allow a folder with --world-path.",
     "SC021": "A path is absolute or a URL; paths are relative to the file they are written in.",
     "SC022": "Symbolic links form a loop.",

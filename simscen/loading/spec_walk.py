@@ -95,7 +95,7 @@ def _keys_by_field(model: type[BaseModel]) -> list[tuple[str, str]]:
 
 
 def angles_of(spec: BaseModel) -> Iterator[tuple[Keys, float]]:
-    """Yield the keys and values in rad of all angles."""
+    """Yield the keys and values in rad of all angles that are the value of a key. Keyframes are left out."""
     for keys, part in walk(spec):
         for name, key in _angle_fields(type(part)):
             if isinstance(value := getattr(part, name), int | float):
@@ -104,7 +104,7 @@ def angles_of(spec: BaseModel) -> Iterator[tuple[Keys, float]]:
 
 @cache
 def _angle_fields(model: type[BaseModel]) -> list[tuple[str, str]]:
-    """Return the name and the YAML key of each field that is an angle."""
+    """Return the name and the YAML key of each field that is an angle or contains one."""
     found = []
     for name, field in model.model_fields.items():
         annotations = (*field.metadata, *_annotations(field.annotation))

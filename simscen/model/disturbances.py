@@ -29,8 +29,8 @@ Actions = Annotated[
 class StepEntry(Spec):
     """Step of the sequence (`then`) of an event. It becomes active when the previous step has happened.
 
-    The trigger of a step measures `time`, `for`, and `travelled` from the previous step. Goals, replans, recoveries,
-    collisions, and events before the previous step do not count.
+    The trigger of a step measures `time`, `for`, and `travelled` from the previous step. Everything that was logged
+    before the previous step, such as goals, replans, and reactions of pedestrians, does not count.
     """
 
     name: Name | None = None

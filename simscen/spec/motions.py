@@ -48,8 +48,8 @@ class Motion(Spec):
     keyframe at time 0, the object starts there; otherwise, it moves from its current pose to the first keyframe. Turns
     take the shorter direction."""
     repeat: Literal["once", "loop", "back_and_forth"] = "once"
-    """Behavior at the end: stop, start over, or reverse. A loop through waypoints returns to its start; a loop of
-    keyframes must end at its first keyframe."""
+    """Behavior at the end: stop, start over, or move backward along the path. A loop through waypoints returns to its
+    start; a loop of keyframes must end at its first keyframe."""
     ease: Literal["linear", "smooth", "spline"] = "linear"
     """Velocity profile. `linear`: constant speed between waypoints or keyframes. `smooth`: a stop at each of them;
     after a fraction u of the time for a leg, the object has covered 3u² - 2u³ of its length (peak speed 1.5 times the

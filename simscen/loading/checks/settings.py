@@ -93,7 +93,7 @@ def late_timeouts(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC053", severity="warning")
 def degrees_as_radians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find angles without a unit that are larger than one turn in the scenario, its world, and its robot file."""
+    """Find keys of the scenario, its world, or its robot file with an angle above one turn and without a unit."""
     files: list[tuple[BaseModel | None, MappingNode | None]] = [
         (loaded.spec, loaded.tree),
         (loaded.world.spec, loaded.world.tree),
