@@ -10,7 +10,7 @@ from simscen.model.costmaps import Costmap, LocalCostmap
 from simscen.model.guards import CollisionMonitor, Prediction, VelocitySmoother
 from simscen.model.localizers import GroundTruth, Localizer, OdometryFilter
 from simscen.model.planners import Planner
-from simscen.model.profiles import PROFILES, Profile, apply_profile
+from simscen.model.profiles import Profile, apply_profile
 from simscen.model.recovery import Recovery
 from simscen.model.stack_base import Latency, StackBase
 from simscen.spec.base import Typed, by_default
@@ -74,8 +74,7 @@ class StackSpec(InProcessStack):
     @classmethod
     def _apply_profile(cls, parameters: Any) -> Any:
         """Complete the parameters by the values of the profile."""
-        has_profile = isinstance(parameters, Mapping) and parameters.get("profile") in PROFILES
-        return apply_profile(parameters) if has_profile else parameters
+        return apply_profile(parameters) if isinstance(parameters, Mapping) else parameters
 
     @property
     def builder(self) -> str:

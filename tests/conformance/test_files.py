@@ -95,6 +95,8 @@ def test_file_without_a_yaml_mapping_is_an_error(with_scenario, folder: Path, te
                      id="limit of planning"),
         pytest.param("seed: 7", "stack: {localizer: {min_particles: 3000}}", "2:36",
                      "`min_particles` 3000 is greater than `max_particles` 2000", id="a minimum above its maximum"),
+        pytest.param("seed: 7", "stack: {profile: [nav2]}", "2:18", "a list is not one of the choices",
+                     id="a list of profiles"),
         pytest.param("seed: 7", "stack: {local_costmap: {obstacle_min_range: 3}}", "2:24",
                      "`obstacle_min_range` 3 is greater than `obstacle_max_range` 2.5", id="a minimum above a default"),
         pytest.param("seed: 7", "physics: {tick_rate: 1}", "2:22", "must be at least 60", id="limit of rates"),
