@@ -72,9 +72,9 @@ class Terrain:
         return np.array([max(0.0, hit[3][2]) if hit[0] in self.names else 0.0 for hit in hits])
 
     def raise_to_ground(self, body: Body) -> Body:
-        """Return a body raised by the height of the ground below its origin."""
+        """Return a body, raised to the ground below its origin. A body that is already on or above it is unchanged."""
         height = float(self.heights(np.array([body.pose.position[:2]]))[0])
-        return replace(body, pose=body.pose._replace(z=body.pose.z + height)) if height else body
+        return replace(body, pose=body.pose._replace(z=height)) if 0.0 <= body.pose.z < height else body
 
     def standing_pose(self, pose: Pose2, supports: Array) -> Pose3:
         """Return the 3D pose of a robot that stands at `pose` on the ground, tilted like the ground below it.

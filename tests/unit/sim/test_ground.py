@@ -198,3 +198,11 @@ def test_object_is_placed_on_the_ground_at_its_new_position(on_ground):
     for place, height in (((3.0, 0.0), 0.12), ((3.2, 0.1), 0.12), ((0.0, -2.0), 0.1)):
         simulation.place("crate", Pose2(*place, 0.5))
         assert simulation.object_pose("crate").position == pytest.approx((*place, height), abs=1e-6)
+
+
+@pytest.mark.parametrize(("z", "height"), [(0.0, 0.02), (0.02, 0.02), (0.1, 0.1)])
+def test_object_that_stands_on_a_platform_is_not_raised_again(on_ground, z, height):
+    platform = box("platform", 3.0, 0.0, 1.0, 1.0, 0.02)
+    crate = Body("crate", (box("crate", 0, 0, 0.3, 0.3, 0.3),), Pose3(3.0, 0.0, z))
+    simulation = on_ground("turtlebot", [platform], bodies=[crate])
+    assert simulation.object_pose("crate").z == pytest.approx(height, abs=1e-6)
