@@ -1,15 +1,16 @@
 """Copying of a scenario, and of the files that it names, to another folder."""
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from os.path import commonpath, relpath
 from pathlib import Path
 
-from simscen.core.errors import UsageError
+from simscen.core.errors import Problem, UsageError
 from simscen.loading.files.paths import is_file
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario_text import unexpanded_text
 from simscen.loading.yaml.parser import parse_yaml
+from simscen.loading.yaml.textfile import read_text
 from simscen.loading.yaml.tree import Node, ScalarNode, nodes_with_keys
 
 _MODELINE = "# yaml-language-server:"
@@ -31,7 +32,7 @@ def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path
     folders = {file.parent for file in loaded.files.values()}
     named = {leaf: _existing_file(leaf, folders) for leaf in _scalars(tree)}
     files = {leaf: file for leaf, file in named.items() if file is not None}
-    needed = sorted({dependency for file in files.values() for dependency in _with_dependencies(file)})
+    needed = _with_dependencies(files.values())
     same_root = root == loaded.root
     common_folder = Path(commonpath([file.parent for file in needed])) if needed else loaded.root
     folder = target.parent / target.name.partition(".")[0]
@@ -67,22 +68,25 @@ def _existing_file(leaf: ScalarNode, folders: set[Path]) -> Path | None:
     return next((path.resolve() for folder in sorted(folders) if is_file(path := folder / leaf.value)), None)
 
 
-def _with_dependencies(file: Path, known: frozenset[Path] = frozenset()) -> Iterator[Path]:
-    """Yield a file and, recursively, the files that it names, except files in `known`.
+def _with_dependencies(files: Iterable[Path]) -> list[Path]:
+    """Return these files and, recursively, the files that they name, sorted.
 
     Raises UsageError for a file with one of _UNSEARCHED_SUFFIXES.
     """
-    if file in known:
-        return
-    if file.name.endswith(_UNSEARCHED_SUFFIXES):
-        raise UsageError(f"{file.name} may refer to models and meshes: copy its folder yourself")
-    yield file
-    if file.name.endswith(_SEARCHED_SUFFIXES):
-        tree, _ = parse_yaml(file.read_text(encoding="utf-8"), file.name)
-        for leaf in () if tree is None else _scalars(tree):
-            other = _existing_file(leaf, {file.parent})
-            if other is not None:
-                yield from _with_dependencies(other, known | {file})
+    found: set[Path] = set()
+    waiting = list(files)
+    while waiting:
+        file = waiting.pop(0)
+        if file in found:
+            continue
+        if file.name.endswith(_UNSEARCHED_SUFFIXES):
+            raise UsageError(f"{file.name} may refer to models and meshes: copy its folder yourself")
+        found.add(file)
+        text = read_text(file, file.name) if file.name.endswith(_SEARCHED_SUFFIXES) else ""
+        tree = None if isinstance(text, Problem) else parse_yaml(text, file.name)[0]
+        named = (_existing_file(leaf, {file.parent}) for leaf in (() if tree is None else _scalars(tree)))
+        waiting += [other for other in named if other is not None]
+    return sorted(found)
 
 
 def _with_path(text: str, leaf: ScalarNode, path: str) -> str:
