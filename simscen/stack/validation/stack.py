@@ -84,6 +84,14 @@ class CheckedStack(CheckedPlugin):
             self.checked_path(decision.plan, "returned in `Decision.plan`")
         if decision.local_plan is not None:
             self.checked_path(decision.local_plan, "returned in `Decision.local_plan`")
+        self._check_messages(decision, tick)
+        return decision
+
+    def _check_messages(self, decision: Decision, tick: int) -> None:
+        """Raise RunError if costmaps, filtered odometry, or events of a decision are invalid."""
+        for name in ("events", "lines", "costmaps", "odometry"):
+            if not isinstance(value := getattr(decision, name), tuple | list):
+                self.raise_invalid(f"returned {type(value).__name__} as `Decision.{name}` instead of a tuple")
         for costmap in decision.costmaps:
             self._check_costmap(costmap)
         for odometry in decision.odometry:
@@ -94,7 +102,6 @@ class CheckedStack(CheckedPlugin):
                 self.raise_invalid(f"reported {event!r}, which is not an Event")
             if event.tick != tick:
                 self.raise_invalid(f"reported `{event.kind}` of tick {event.tick} at tick {tick}")
-        return decision
 
     def _check_costmap(self, costmap: object) -> None:
         """Raise RunError if the name, the frame, or the cell type (int8) of a published costmap is wrong."""

@@ -13,10 +13,11 @@ from simscen.cli.catalog.json_schema import as_text, schema_of
 from simscen.core.clock import Clock
 from simscen.core.errors import InvalidInput, RunError
 from simscen.core.geometry import Pose2
-from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import Belief, ErrorCode
 from simscen.core.random_streams import Streams
+from simscen.core.records.trace import Decision
 from simscen.loading.scenario import load_scenario
 from simscen.model.stack import StackSpec
 from simscen.stack.build import build_stack
@@ -220,6 +221,17 @@ def test_stack_of_a_package_is_checked_at_each_tick(odd, tmp_path: Path) -> None
         stack.decide(60, ())
     with pytest.raises(RunError, match="returned NoneType instead of a Decision"):
         build_stack(spec, driven_setting(), Streams(1), Clock(TICK_RATE_HZ)).decide(120, ())
+
+
+@pytest.mark.parametrize("name", ["events", "lines", "costmaps", "odometry"])
+def test_a_decision_without_a_tuple_of_messages_is_an_error_of_the_stack(
+    odd, tmp_path: Path, monkeypatch, name
+) -> None:
+    spec = load_scenario(scenario(tmp_path, "{type: still, keepout: []}"), tmp_path).spec.stack
+    monkeypatch.setattr("odd.StillStack.decide", lambda *asked: Decision(STOP, **{name: None}))
+    stack = build_stack(spec, driven_setting(), Streams(1), Clock(TICK_RATE_HZ))
+    with pytest.raises(RunError, match=rf"stack `still` \(odd:StillStack\) returned NoneType as `Decision.{name}`"):
+        stack.decide(0, ())
 
 
 def test_stack_without_zone_support_is_detected_before_switching(odd, tmp_path: Path) -> None:
