@@ -13,10 +13,8 @@ import pytest
 from hypothesis import settings
 
 from simscen.core.cpu_kernels import pin_kernels
-from simscen.loading.schema import common_mistakes
-from simscen.spec import choice, registry
 
-pin_kernels()  # before the tests import NumPy, so that runs in this process are the same as on the command line
+pin_kernels()  # before NumPy is imported, so that runs in this process are the same as on the command line
 Install = Callable[..., Path]
 QUICK_EXAMPLES = 25
 """Examples of each property in `make test`; `make test-all` tries 100."""
@@ -124,6 +122,9 @@ def install_folder(folder: Path, site: Path) -> Path:
 
 def clear_package_caches() -> None:
     """Clear the caches of installed packages."""
+    from simscen.loading.schema import common_mistakes
+    from simscen.spec import choice, registry
+
     cached = (registry._all_installed_types, registry._load, choice.with_installed_choices)
     for known in (*cached, common_mistakes._mappings_below):
         known.cache_clear()

@@ -3,7 +3,6 @@
 import json
 import os
 import select
-import signal
 import socket
 import struct
 import subprocess
@@ -18,7 +17,7 @@ from simscen.core.errors import RunError
 from simscen.core.external_command import ExternalCommand
 from simscen.peer import wire
 from simscen.run.external import protocol
-from simscen.run.process.captured_output import READ_BYTES, TAIL_BYTES, CappedLog, output_tail
+from simscen.run.process.captured_output import READ_BYTES, TAIL_BYTES, CappedLog, output_tail, signal_name
 from simscen.run.process.isolation import clean_environment
 
 EXIT_TIMEOUT_S = 2.0
@@ -227,7 +226,7 @@ def _describe_exit(report: dict[str, Any]) -> str:
     if "failed" in report:
         return f"its process cannot be started: {report['failed']}"
     code = report["exit"]
-    return f"its process was killed ({signal.Signals(-code).name})" if code < 0 else f"its process exited {code}"
+    return f"its process was killed ({signal_name(-code)})" if code < 0 else f"its process exited {code}"
 
 
 def _error_message(body: bytes) -> str:

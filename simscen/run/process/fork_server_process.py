@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from tempfile import TemporaryFile
 from typing import NamedTuple
 
-from simscen.run.process.captured_output import TAIL_BYTES
+from simscen.run.process.captured_output import TAIL_BYTES, signal_name
 from simscen.run.process.isolation import clean_environment
 
 PIPE_BYTES = 1 << 16
@@ -110,7 +110,7 @@ class ForkServerProcess:
         size = os.fstat(self._output.fileno()).st_size
         output = os.pread(self._output.fileno(), TAIL_BYTES, max(0, size - TAIL_BYTES))
         code = self._process.returncode
-        description = f"was killed ({signal.Signals(-code).name})" if code < 0 else f"exited {code}"
+        description = f"was killed ({signal_name(-code)})" if code < 0 else f"exited {code}"
         return ProcessDeath(description, code, output.decode(errors="replace"))
 
     def _kill(self) -> None:
