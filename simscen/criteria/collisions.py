@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -37,14 +37,15 @@ class Collisions(Spec, Criterion):
     """The robot had at most the allowed number of collisions, and no collision was too hard.
 
     What is measured: the number of contacts that begin between the robot and anything but the ground, and the impulse
-        of each contact.
+        of each contact: the sum over all physics steps from its beginning to its end.
     When it fails: there are more contacts than `max`, or one has an impulse above `max_impulse`.
     Why this: the physics engine reports all contacts. Arena counts scans with ranges below the robot's radius instead,
         which misses everything that the lidar does not see.
     Source: Arena's get_collisions, which also counts beginning contacts; ScenarioRunner's CollisionTest for
         `caused_by_robot`.
 
-    With `people`, inconclusive if the run had no people.
+    With `people`, inconclusive if the run had no people. With `max_impulse`, inconclusive if a contact had not ended
+    and no impulse exceeds the limit.
 
     Example: `collisions: {max: 0}`
     """
@@ -52,7 +53,7 @@ class Collisions(Spec, Criterion):
     max: Annotated[int, Field(ge=0, le=100_000)] | None = None
     """Maximum number of contacts; default: 0, or any number if `max_impulse` is given."""
     max_impulse: Annotated[Impulse, Field(ge=0)] | None = None
-    """Maximum impulse of a contact in N s."""
+    """Maximum impulse of a contact, from its beginning to its end, in N s."""
     object: ObjectName | None = Field(default=None, alias="with")
     """Count only contacts with the object of this name."""
     people: bool = False
@@ -74,43 +75,76 @@ class Collisions(Spec, Criterion):
         """
         if not len(trace.truth) and not trace.of_kind(EventKind.COLLISION_STARTED):
             return [undecided("collisions", "neither the robot's path nor its contacts were recorded")]
-        hits = [event for event in trace.of_kind(EventKind.COLLISION_STARTED) if self.object in (None, event.name)]
+        contacts = [contact for contact in _contacts(trace) if self.object in (None, contact.start.name)]
         if self.people:
             radii = pedestrian_radii(trace)
             if not radii:
                 return [undecided("collisions", "there were no people")]
-            hits = [event for event in hits if event.name in radii]
-        if self.caused_by_robot and hits:
+            contacts = [contact for contact in contacts if contact.start.name in radii]
+        if self.caused_by_robot and contacts:
             speeds = _max_point_speed(trace, case)
-            hits = [event for event in hits if _is_caused_by_robot(trace, event, speeds)]
+            contacts = [contact for contact in contacts if _is_caused_by_robot(trace, contact.start, speeds)]
         limit = 0 if self.max is None and self.max_impulse is None else self.max
-        details = [_describe_contact(trace, hit) for hit in hits[:MAX_DETAILS]]
-        if len(hits) > MAX_DETAILS:
-            details.append(f"and {len(hits) - MAX_DETAILS} more")
-        decisive = (trace, hits[min(limit or 0, len(hits) - 1)].tick) if hits else None
-        findings = counted("collisions", len(hits), "collision", None, limit, at=decisive, detail=details)
+        details = [_describe_contact(trace, contact) for contact in contacts[:MAX_DETAILS]]
+        if len(contacts) > MAX_DETAILS:
+            details.append(f"and {len(contacts) - MAX_DETAILS} more")
+        decisive = (trace, contacts[min(limit or 0, len(contacts) - 1)].start.tick) if contacts else None
+        findings = counted("collisions", len(contacts), "collision", None, limit, at=decisive, detail=details)
         if self.max_impulse is not None:
-            findings.append(self._judge_impulse(trace, hits))
+            findings.append(self._judge_impulse(trace, contacts))
         return findings
 
-    def _judge_impulse(self, trace: Trace, hits: list[Event]) -> Finding:
+    def _judge_impulse(self, trace: Trace, contacts: list[_Contact]) -> Finding:
         assert self.max_impulse is not None
-        unknown = next((hit for hit in hits if "impulse" not in hit.data), None)
+        what, limit = "collision impulse", f"≤ {self.max_impulse:.2f} N s"
+        unknown = next((contact for contact in contacts if contact.impulse is None), None)
         if unknown is not None:
-            because = f"the impulse of the contact with {unknown.name or 'something'} was not recorded"
-            return undecided("collision impulse", because, f"≤ {self.max_impulse:.2f} N s")
-        hardest = max(hits, key=_impulse, default=None)
+            return undecided(what, f"the impulse of the contact with {unknown.name} was not recorded", limit)
+        hardest = max(contacts, key=_impulse, default=None)
         value = 0.0 if hardest is None else _impulse(hardest)
-        at = None if hardest is None else (trace, hardest.tick)
+        ongoing = next((contact for contact in contacts if contact.end is None), None)
+        if ongoing is not None and value <= self.max_impulse:
+            return undecided(what, f"the contact with {ongoing.name} had not ended", limit)
+        at = None if hardest is None else (trace, hardest.start.tick)
         details = [] if hardest is None else [_describe_contact(trace, hardest)]
-        return at_most("collision impulse", value, self.max_impulse, "N s", at=at, detail=details)
+        return at_most(what, value, self.max_impulse, "N s", at=at, detail=details)
 
 
-def _impulse(hit: Event) -> float:
+class _Contact(NamedTuple):
+    """Events of the start and the end of a contact; `end` is None if it was not recorded."""
+
+    start: Event
+    end: Event | None
+
+    @property
+    def name(self) -> str:
+        """Name of the touched object for messages."""
+        return self.start.name or "something"
+
+    @property
+    def impulse(self) -> object:
+        """Impulse as recorded, in N s; without an end, that of the first physics step. None if it was not recorded."""
+        return (self.start if self.end is None else self.end).data.get("impulse")
+
+
+def _contacts(trace: Trace) -> list[_Contact]:
+    """Return the contacts of a trace, sorted by their start."""
+    found: list[_Contact] = []
+    ongoing: dict[str, int] = {}
+    for event in trace.of_kind(EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED):
+        if event.kind == EventKind.COLLISION_STARTED:
+            ongoing[event.name] = len(found)
+            found.append(_Contact(event, None))
+        elif (index := ongoing.pop(event.name, None)) is not None:
+            found[index] = _Contact(found[index].start, event)
+    return found
+
+
+def _impulse(contact: _Contact) -> float:
     """Return the impulse of a contact in N s. Raises InvalidTrace if it is not a number."""
-    value = hit.data["impulse"]
+    value = contact.impulse
     if not isinstance(value, int | float) or math.isnan(value):
-        raise InvalidTrace(f"the impulse of the collision with {hit.name} is not a number")
+        raise InvalidTrace(f"the impulse of the collision with {contact.start.name} is not a number")
     return float(value)
 
 
@@ -134,10 +168,11 @@ def _is_caused_by_robot(trace: Trace, hit: Event, speeds: Samples) -> bool:
     return bool(speeds.values[max(first - 1, 0) : max(last, 1)].max() > MOVING_SPEED_M_S)
 
 
-def _describe_contact(trace: Trace, hit: Event) -> str:
+def _describe_contact(trace: Trace, contact: _Contact) -> str:
     """Return time, object, position, speed, and impulse of a contact as text."""
-    text = f"t = {trace.seconds(hit.tick):.2f} s: touched {hit.name or 'something'}"
-    x, y, speed_m_s, impulse = (hit.data.get(key) for key in ("x", "y", "speed", "impulse"))
+    text = f"t = {trace.seconds(contact.start.tick):.2f} s: touched {contact.name}"
+    x, y, speed_m_s = (contact.start.data.get(key) for key in ("x", "y", "speed"))
+    impulse = contact.impulse
     if isinstance(x, int | float) and isinstance(y, int | float):
         text += f" at ({x:.2f}, {y:.2f})"
     if isinstance(speed_m_s, int | float):
