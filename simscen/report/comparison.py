@@ -16,7 +16,7 @@ from simscen.report.display_text import Role, StyledLine, StyledText, number_wit
 MAX_FLIPS = 10
 """Maximum number of listed flips (pairs of runs with the same scenario and seed in which only one run passed)."""
 MAX_CHANGES = 10
-"""Maximum number of listed significant changes of a metric or pass rate in a scenario."""
+"""Maximum number of listed significant changes of a comparison, over all its scenarios."""
 MIN_NAME_COLUMNS = 24
 """Minimum width of the column of scenario names, in characters."""
 MAX_STACK_NAME_COLUMNS = 16

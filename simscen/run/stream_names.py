@@ -1,6 +1,7 @@
 """Names of the random streams (sequences of random numbers) of events and faults.
 
-A stream is named after its event or fault, so that a change of one entry does not affect the random numbers of others.
+A stream is named after its event or fault, so that a change of one entry does not affect the random numbers of others,
+except later ones with the same name or content.
 """
 
 import json

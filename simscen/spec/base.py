@@ -70,10 +70,13 @@ class Value(RootModel[T], Generic[T]):
 
 
 class Ranged(Spec):
-    """Base class of specifications with pairs of fields `min_x` and `max_x`. No minimum may exceed its maximum."""
+    """Base class of specifications with pairs of fields whose names differ in `min` and `max`, e.g. `laser_max_range`.
+
+    No minimum may exceed its maximum.
+    """
 
     unlimited_at_zero: ClassVar[tuple[str, ...]] = ()
-    """Names of the fields `max_x` in which 0 or less means "no limit"."""
+    """Names of the maximum fields in which 0 or less means "no limit"."""
 
     def range_problem(self) -> str:
         """Return a message about the first minimum that exceeds its maximum; "" if there is none."""
@@ -163,7 +166,7 @@ class Typed(Component):
 
 @dataclass(frozen=True)
 class LazySpec:
-    """Annotation of a field with a specification of the class `name` in `module`.
+    """Annotation of a field whose value is an instance of the specification class `name` in `module`.
 
     The module is imported when a value of the field is validated.
     """

@@ -15,7 +15,7 @@ class VelocitySmoother:
     """Limits velocity and acceleration of commands, like nav2_velocity_smoother with OPEN_LOOP feedback."""
 
     def __init__(self, spec: SmootherSpec, robot: RobotModel, period: float) -> None:
-        """Use the speed limits of the specification and, for each acceleration limit, the lower value of both.
+        """Use the speed limits of `spec` and, for each acceleration limit, the lower one of `spec` and `robot`.
 
         `period` is the controller period in s.
         """

@@ -1,7 +1,7 @@
 """Optimization of a path on traversal costs.
 
 It places stations along the path, and several points to the left and right of each station. Viterbi's algorithm finds
-the cheapest path through one point per station. The path stays on the same side of each obstacle.
+the cheapest path through one point per station. The path usually stays on the same side of each obstacle.
 """
 
 import math

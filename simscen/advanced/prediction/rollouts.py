@@ -20,7 +20,7 @@ TURN_RATIOS = (0.0, 0.1, 0.3, 0.6, 1.0)
 SECOND_SPEED_RATIOS = (0.0, 0.5, 1.0)
 """Second speeds relative to full speed. The second turn rate is 0 or the opposite of the first one."""
 MAX_TURN_RATE_RAD_S = 3.0
-"""Maximum turn rate of candidates."""
+"""Maximum turn rate of sampled trajectories."""
 
 TIMES: Array = np.arange(1, round(HORIZON_S / STEP_S) + 1, dtype=np.float64) * STEP_S
 """Times in s of the points of a trajectory."""

@@ -53,7 +53,10 @@ def explanation(name: str, width: int = 100) -> str:
 
 
 def _topics_named(name: str) -> list[Topic]:
-    """Return the topics with this name, ignoring case, or else of the keys with this path. Raises UsageError."""
+    """Return the topics with this name, or, if there are none, a topic for each key with this path.
+
+    Upper and lower case of the name are the same. Raises UsageError if nothing is found.
+    """
     known = all_topics()
     lowered = name.lower()
     found = [

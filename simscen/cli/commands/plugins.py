@@ -29,8 +29,9 @@ INDENT = 6
 def command(format_: Annotated[TextOrJson, typer.Option("--format", help="Output format.")] = TextOrJson.TEXT) -> None:
     """List the types that installed packages add.
 
-    Lists for each package the kind, the name used in files, the class, and the first paragraph of its documentation, or
-    why the type cannot be used. The command imports each type. Exit code 0: all types are usable; 3: one is not.
+    Lists the types by package, each with its kind, its name in files, its class, and the first paragraph of the
+    docstring, or why it cannot be used. The command imports each type. Exit code 0: all types are usable; 3: at least
+    one is not.
     """
     found = [entry for kind in GROUPS for entry in plugin_types(kind)]
     by_package = sorted([*found, *unknown_groups()], key=lambda one: (one.distribution.lower(), one.distribution))

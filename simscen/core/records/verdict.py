@@ -75,7 +75,8 @@ class Verdict:
 class ExpectedFailure:
     """Declaration in a scenario that its runs are expected to fail.
 
-    `criteria` contains the ids of the verdicts that must fail; empty if any verdict may fail. `line` is the line in the
+    `criteria` contains the ids of the verdicts of which none may pass and at least one must fail. If it is empty, at
+    least one verdict must fail. `line` is the line in the
     scenario file; 0 if unknown.
     """
 

@@ -52,7 +52,7 @@ def _irregularity(trace: Trace, total_turn: float) -> float | str:
     starts = [event.tick for event in trace.of_kind(EventKind.GOAL_ACCEPTED)]
     first = [next((plan for plan in trace.plans if plan.tick >= start), None) for start in starts]
     if not starts or None in first:
-        return "there is no plan to each goal to compare with"
+        return "no goal was accepted, or a goal has no plan to compare with"
     headings = [plan.points[:, 2] for plan in first if plan is not None]
     return max(0.0, total_turn - sum(float(np.abs(wrap_array(np.diff(yaw))).sum()) for yaw in headings))
 
@@ -64,7 +64,10 @@ def _slope_changes(segment: Array) -> float:
 
 
 def _curvature(segments: list[Array]) -> Values:
-    """Return the metrics on curvature. Curvature is 1 / radius of the circle through three consecutive points."""
+    """Return norm_curvature (the sum of curvature times length) and max_curvature.
+
+    The curvature is 1 / radius of the circle through three consecutive points.
+    """
     weighted, curvatures = 0.0, []
     for segment in segments:
         points = _resample(segment)

@@ -26,9 +26,9 @@ def draw_values(sampled: Sampled, path: str) -> list[Any]:
 
 
 def draw_value(sampled: Sampled, path: str, index: int) -> Any:
-    """Return the random value of a path with this index, from 0, which may exceed `sampled.count`.
+    """Return the value of a path in the variation with this index, from 0, for the method `random`.
 
-    Raises ValueError for an invalid distribution.
+    The index may exceed `sampled.count`.     Raises ValueError for an invalid distribution.
     """
     return quantile(sampled.values[path], _hashed_uniform(sampled.seed, path, "value", index))
 

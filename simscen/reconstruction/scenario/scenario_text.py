@@ -20,7 +20,7 @@ from simscen.reconstruction.reasons import FoundFault
 from simscen.reconstruction.scenario.contents import ScenarioContents
 
 MAX_COLUMNS = 118
-"""Maximum length of a line."""
+"""Length at which comments, the description, and the keys of a pedestrian are wrapped."""
 OBJECT_HEIGHT_M, PERSON_HEIGHT_M = 1.0, 1.7
 """Assumed heights of objects and people."""
 NO_BREAK_SPACE = "\x00"

@@ -100,7 +100,7 @@ class Robot:
         return self._truth(tick, state, period)
 
     def compute_deferred(self) -> None:
-        """Compute the clearances of all deferred samples: distances to the static world, which is nearest."""
+        """Compute the clearances of all deferred samples. In these samples, the static world is nearest."""
         deferred, self._deferred = self._deferred, []
         for sample in deferred:
             state = sample.state

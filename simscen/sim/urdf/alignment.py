@@ -16,9 +16,9 @@ ALIGNMENT_CODE = "SC405"
 HEIGHT_TOLERANCE_M = 0.0005
 """Largest difference in m between the heights of parts that stand on the ground."""
 MAX_CASTER_GAP_M = 0.003
-"""Largest gap in m below a caster without a warning."""
-MAX_CASTER_HEIGHT_M = 0.02
-"""Largest height in m above the ground of a small link that is probably meant to be a caster."""
+"""Largest gap in m between a caster and the ground that causes no warning."""
+MAX_INTENDED_CASTER_GAP_M = 0.02
+"""Gap in m from which on a small link above the ground is not meant to be a caster."""
 MAX_CASTER_SIZE_M = 0.1
 """Largest length and width in m of a link that is probably meant to be a caster."""
 
@@ -61,7 +61,7 @@ def _caster_warnings(tree: LinkTree, wheels: list[WheelJoint], ground: float, ne
     if not needs_caster or nearest is None:
         return
     size = np.ptp(points[nearest][:, :2], axis=0).max()
-    if MAX_CASTER_GAP_M < gaps[nearest] < MAX_CASTER_HEIGHT_M and size <= MAX_CASTER_SIZE_M:
+    if MAX_CASTER_GAP_M < gaps[nearest] < MAX_INTENDED_CASTER_GAP_M and size <= MAX_CASTER_SIZE_M:
         message = (
             f"link {nearest!r} is {1e3 * gaps[nearest]:.1f} mm above the ground, so that the robot would tip onto it"
         )

@@ -43,7 +43,7 @@ class StaticLayer:
 
 
 def static_layer(spec: CostmapSpec, surroundings: Surroundings, window: GridFrame, reach_cells: int) -> StaticLayer:
-    """Return the static layer of the map or, without a map, of an empty `window`, with keepout zones.
+    """Return the static layer of the map with keepout zones. Without a map, the cells of `window` are unknown or free.
 
     Distances are exact up to `reach_cells` cells.
     """

@@ -14,7 +14,7 @@ from simscen.worlds.maps.map_size import MAP_RESOLUTION_M, Bounds, map_size, map
 from simscen.worlds.maps.rasterization import CellMask, filled_cells, touched_cells
 
 MIN_OCCUPIED_VALUE = 65
-"""Minimum value of an occupied cell, for maps in mode scale or raw: Nav2's occupied_thresh in percent."""
+"""Minimum value of an occupied cell: Nav2's default of occupied_thresh in percent. Trinary maps have only 0 and 100."""
 WALLS_NAME = "map"
 """Name of the solid that represents all walls of a map."""
 MAX_EDGES = 500_000

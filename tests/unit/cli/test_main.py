@@ -70,8 +70,6 @@ LONG = "a" * 300
         ("run", "good.scenario.yaml", "--out", LONG),
         ("shrink", LONG),
         ("edit", LONG),
-        ("robot", "check", LONG),
-        ("world", "inspect", f"{LONG}.sdf"),
         ("report", LONG),
         ("compare", LONG, LONG),
     ],
@@ -80,6 +78,19 @@ def test_a_path_that_cannot_be_accessed_is_a_usage_error(simscen, arguments: tup
     ended = simscen(*arguments)
     assert ended.code == 2
     assert "File name too long" in ended.err and "Traceback" not in ended.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("robot", "check", LONG), "expected one of: amr, car,"),
+        (("world", "inspect", f"{LONG}.sdf"), "error[SC001] no such file or directory"),
+    ],
+)
+def test_a_file_whose_name_is_too_long_does_not_exist(simscen, arguments: tuple[str, ...], message: str) -> None:
+    ended = simscen(*arguments)
+    assert ended.code == 2
+    assert message in ended.err
 
 
 def test_unexpected_exception_is_an_internal_error(simscen, monkeypatch) -> None:

@@ -135,7 +135,7 @@ def test_irregularity_subtracts_the_first_plan_after_each_acceptance():
 
 
 def test_irregularity_is_undefined_without_a_plan_for_each_goal():
-    reason = "there is no plan to each goal to compare with"
+    reason = "no goal was accepted, or a goal has no plan to compare with"
     assert shape(*CORNER, plans=[plan(0, 0, 1)])["path_irregularity"] == reason
     twice = [accepted(0), accepted(2, "b")]
     assert shape(*CORNER, events=twice, plans=[plan(1, 0, 1)])["path_irregularity"] == reason
