@@ -23,7 +23,7 @@ class ShapedObject(Spec):
     polygon: Ring | None = None
     """Upright prism over a polygon with these corners."""
     height: PositiveLength = 1.0
-    """Height of the prism over `polygon`."""
+    """Height of the prism over `polygon`; not valid with `box` and `cylinder`."""
     z: NonNegativeLength = 0.0
     """Height of the underside above the ground."""
 
@@ -31,6 +31,8 @@ class ShapedObject(Spec):
     def _check_shape(self) -> ShapedObject:
         if sum(shape is not None for shape in (self.box, self.cylinder, self.polygon)) != 1:
             raise ValueError("expected exactly one of: box, cylinder, polygon")
+        if self.polygon is None and "height" in self.model_fields_set:
+            raise ValueError("`height` is only for `polygon`; the last number of `box` and `cylinder` is the height")
         return self
 
     @property
