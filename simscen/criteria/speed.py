@@ -35,7 +35,8 @@ class Speed(Spec, Criterion):
     Source: ScenarioRunner's MaxVelocityTest.
 
     Inconclusive if the robot was never in the region, or if no stay in limited cells of the mask was longer than twice
-    the `grace`. With `while_on`, also inconclusive if no event switched the zone.
+    the `grace`. With `while_on`, also inconclusive if the zone was never on for longer than `grace`, or the robot was
+    not in it then.
 
     Example: `speed: {max: 0.5 m/s}`
     """
@@ -47,7 +48,7 @@ class Speed(Spec, Criterion):
     in_: RegionName | None = Field(default=None, alias="in")
     """Check only while the robot's center is in the region with this name."""
     while_on: bool = False
-    """Check only while the action `speed_zone` has enabled the limit in the region, from `grace` after it was enabled.
+    """Check only while the limit in the region is enabled by the action `speed_zone`, but not in its first `grace`.
     Default: check the whole run."""
     mask: SpeedMask | None = None
     """Filter mask of speed limits: file, type, base and multiplier, as in `stack.speed_mask`.

@@ -125,7 +125,7 @@ class Gain(Spec, Fault):
 
 
 class Saturation(Spec, Fault):
-    """Speeds and accelerations have lower limits than normal: a motor that is too weak or too hot.
+    """The maximum speeds and accelerations are reduced: a motor that is too weak or too hot.
 
     On `wheels`, each side can be limited separately, so that the robot turns towards the weaker side at high speed.
     Odometry measures the actual motion.

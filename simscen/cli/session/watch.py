@@ -102,7 +102,7 @@ class WatchState:
 
     @property
     def failed(self) -> list[Path]:
-        """Scenarios with a run that did not pass in their last session."""
+        """Scenarios with a run that failed or had an error in their last session."""
         return sorted(self._not_passed & self._files.keys())
 
     @property

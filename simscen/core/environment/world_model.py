@@ -17,7 +17,7 @@ GRAVITY_M_S2 = 9.81
 
 @dataclass(frozen=True)
 class World:
-    """Everything in the world except the robots.
+    """Contents of a world, without robots and without pedestrians and objects that events add.
 
     Attributes:
         solids: Parts that never move.

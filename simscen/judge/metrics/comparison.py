@@ -23,7 +23,7 @@ COMPARED_METRICS = (
 HIGHER_IS_BETTER = frozenset({"min_clearance"})
 """Metrics for which a higher value is better. For all other COMPARED_METRICS, a lower value is better."""
 METRICS_OF_ALL_PAIRS = frozenset({"collisions"})
-"""Metrics that are compared in all pairs of runs. Others need pairs in which the same robots reach their last goals."""
+"""Metrics that are compared in all pairs without errors, also if different robots reach their last goals."""
 ALL_SCENARIOS = "all scenarios"
 """Name that stands for all scenarios together."""
 _SEED = 1
@@ -68,7 +68,7 @@ def comparison_key(key: RunKey, session: str) -> RunKey:
 
 
 def _compare(results: Iterable[RunResult], stacks: Mapping[str, str], significance: Significance) -> Comparison:
-    """Compare the first of the `stacks` with each other one. `stacks` are the given values or folders by stack name."""
+    """Compare the first stack or session with each other one. `stacks` are values or folders by name."""
     runs = {one.key: one for one in results if not one.key.is_repetition and one.outcome is not Outcome.SKIPPED}
     baseline, *others = stacks
     counts: dict[str, dict[str, Counter[Outcome]]] = {}
