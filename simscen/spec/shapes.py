@@ -31,7 +31,7 @@ class ShapedObject(Spec):
     def _check_shape(self) -> ShapedObject:
         if sum(shape is not None for shape in (self.box, self.cylinder, self.polygon)) != 1:
             raise ValueError("expected exactly one of: box, cylinder, polygon")
-        if self.polygon is None and "height" in self.model_fields_set:
+        if self.polygon is None and self.height != type(self).model_fields["height"].default:
             raise ValueError("`height` is only for `polygon`; the last number of `box` and `cylinder` is the height")
         return self
 
