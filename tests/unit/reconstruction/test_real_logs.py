@@ -257,14 +257,19 @@ def test_the_speed_limits_of_a_log_of_transforms_are_those_of_its_poses():
     assert turn_rate == 0.5
 
 
+def plan_and_statuses(begin: float, end: float) -> list[logs.Message]:
+    """Return a plan to GOAL, and the statuses of its action: executing at `begin`, succeeded at `end`, in s."""
+    goal = logs.T["geometry_msgs/msg/PoseStamped"](header=logs.header(logs.BEGIN, "map"), pose=logs.pose(*GOAL))
+    plan = logs.T["nav_msgs/msg/Path"](header=logs.header(logs.BEGIN, "map"), poses=[goal, goal])
+    first, last = (logs.BEGIN + round(time * logs.SECOND) for time in (begin, end))
+    topic = "/navigate_to_pose/_action/status"
+    statuses = [logs.Message(topic, at, logs.statuses((1, logs.BEGIN, s))) for at, s in ((first, 2), (last, 4))]
+    return [logs.Message("/plan", first, plan), *statuses]
+
+
 def test_goals_come_from_the_ends_of_plans_and_the_status_of_the_action(tmp_path):
     said = messages(with_goal=False)
-    end = logs.T["geometry_msgs/msg/PoseStamped"](header=logs.header(logs.BEGIN, "map"), pose=logs.pose(*GOAL))
-    plan = logs.T["nav_msgs/msg/Path"](header=logs.header(logs.BEGIN, "map"), poses=[end, end])
-    said.append(logs.Message("/plan", logs.BEGIN + 100_000_000, plan))
-    for time, status in ((0.1, 2), (11.0, 4)):
-        at = logs.BEGIN + round(time * logs.SECOND)
-        said.append(logs.Message("/navigate_to_pose/_action/status", at, logs.statuses((1, logs.BEGIN, status))))
+    said += plan_and_statuses(0.1, 11.0)
     drive = read_drive(logs.write_bag(tmp_path / "bag", sorted(said, key=lambda one: one.time)))
     (only,) = drive.goals
     assert math.dist(only.pose[:2], GOAL) < 0.01
@@ -274,12 +279,7 @@ def test_goals_come_from_the_ends_of_plans_and_the_status_of_the_action(tmp_path
 def test_a_drive_starts_when_its_first_plan_does_even_if_the_robot_is_stuck(tmp_path):
     """The robot has the goal 10 s before it moves."""
     said = messages(with_goal=False, idle=10.0)
-    end = logs.T["geometry_msgs/msg/PoseStamped"](header=logs.header(logs.BEGIN, "map"), pose=logs.pose(*GOAL))
-    plan = logs.T["nav_msgs/msg/Path"](header=logs.header(logs.BEGIN, "map"), poses=[end, end])
-    said.append(logs.Message("/plan", logs.BEGIN + 10_000_000, plan))
-    for time, status in ((0.01, 2), (21.0, 4)):
-        at = logs.BEGIN + round(time * logs.SECOND)
-        said.append(logs.Message("/navigate_to_pose/_action/status", at, logs.statuses((1, logs.BEGIN, status))))
+    said += plan_and_statuses(0.01, 21.0)
     drive = read_drive(logs.write_bag(tmp_path / "bag", sorted(said, key=lambda one: one.time)))
     assert drive.begin == 0.0
     assert drive.duration == pytest.approx(10.0 + drives.DURATION_S, abs=0.2)
