@@ -46,9 +46,9 @@ def import_lazily(name: str, *functions: str) -> None:
     if name in sys.modules:
         return
     module = _LazyModule(name)
-    if functions:
-        spec = importlib.util.find_spec(name)
-        module.__path__ = (spec and spec.submodule_search_locations) or []  # `from name import` needs it
+    module.__spec__ = importlib.util.find_spec(name)
+    if functions:  # `from name import` needs a path
+        module.__path__ = (module.__spec__ and module.__spec__.submodule_search_locations) or []
     for function in functions:
         setattr(module, function, _lazy_function(name, function))
     sys.modules[name] = module

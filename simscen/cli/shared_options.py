@@ -1,6 +1,7 @@
 """Command-line options that several commands share: options of runs, reports, and of reading logs."""
 
 from collections.abc import Collection
+from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +10,6 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped
-from simscen.cli.session.stacks import STACK_HELP
 from simscen.core.errors import UsageError
 from simscen.record.foreign.options import TOPICS, Clock, ForeignLogOptions
 
@@ -36,6 +36,12 @@ class JunitFamily(str, Enum):
     XUNIT2 = "xunit2"
 
 
+STACK_HELP = (
+    "Run every scenario with this stack instead of its own: a command that speaks the stack protocol, a *.stack.yaml "
+    "file, a Nav2 parameter file, `reference`, another type of stack, or a name in your configuration. With several "
+    "robots, it replaces the stack of each; but if a robot's stack is `external: NAME`, NAME='COMMAND' defines its "
+    "command, and the other robots keep their stacks. "
+)
 FormatOption = Annotated[Format, typer.Option("--format", help="Output format.")]
 OutOption = Annotated[Path | None, typer.Option(help="New or empty output folder; default: simscen-out/<session id>.")]
 JobsOption = Annotated[
@@ -61,6 +67,37 @@ WorldPathOption = Annotated[
     list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
 ]
 LenientOption = Annotated[bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")]
+
+
+class BackendName(str, Enum):
+    """Where runs are executed."""
+
+    LOCAL = "local"
+    RAY = "ray"
+
+
+BackendOption = Annotated[
+    BackendName,
+    typer.Option(help="local: this machine; ray: all nodes of a running Ray cluster (needs Ray: pip install ray)."),
+]
+AddressOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="HOST:PORT", help="Address of the Ray cluster; default: RAY_ADDRESS, or the cluster of this machine."
+    ),
+]
+
+
+@dataclass(frozen=True)
+class OutputOptions:
+    """Values of the options for the output of a session: --out, --resume, --junit, --junit-family, --format, --open."""
+
+    out: Path | None
+    resume: Path | None
+    junit: Path | None
+    junit_family: JunitFamily
+    format_: Format
+    open_: bool
 
 
 class TimeStamps(str, Enum):

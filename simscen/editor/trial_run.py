@@ -14,7 +14,8 @@ from simscen.core.records.run_result import RunResult
 from simscen.core.records.session_events import RunProgress, SessionEvent
 from simscen.loading.loaded import LoadedScenario
 from simscen.report.display_text import one_line
-from simscen.run.process.jobs import Backend, Job, ReplayMode
+from simscen.run.kept_files import ReplayMode
+from simscen.run.process.jobs import Backend, Job
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
 WALL_LIMIT_S = 300.0

@@ -15,8 +15,8 @@ from _pytest._code.code import ReprEntryNative, ReprExceptionInfo, ReprFileLocat
 
 import simscen
 from simscen.cli.diagnostics import as_text, relative_to_working_folder
-from simscen.cli.session.backends import FORK_SERVER
 from simscen.cli.session.file_checks import FileChecker
+from simscen.cli.session.fork_server_start import FORK_SERVER
 from simscen.cli.session.stacks import parse_stacks
 from simscen.core.errors import InvalidInput, Problem, SimscenError, UsageError
 from simscen.core.records.case import Run
@@ -30,7 +30,8 @@ from simscen.pytesting import OUT_OPTION, positive_number
 from simscen.report.display_text import plain_text
 from simscen.report.session_lines import violation_lines
 from simscen.report.violations import error_summary, reported_violations, scenario_file, short_run_name
-from simscen.run.process.jobs import Ended, Job, ReplayMode
+from simscen.run.kept_files import ReplayMode
+from simscen.run.process.jobs import Ended, Job
 from simscen.run.process.supervisor import Supervisor
 from simscen.run.sessions.output_folder import DEFAULT_FOLDER, run_folder
 from simscen.run.sessions.results import finished_run

@@ -19,7 +19,7 @@ SCRIPTED_FORK_SERVER = Path(__file__).parents[1] / "conformance" / "scripted_for
 SIMSCEN = f"""
 import simscen.cli.session.backends
 from simscen.cli.main import main
-simscen.cli.session.backends.FORK_SERVER = ({str(SCRIPTED_FORK_SERVER)!r},)
+simscen.cli.session.fork_server_start.FORK_SERVER = ({str(SCRIPTED_FORK_SERVER)!r},)
 main()
 """
 FAULTS = {

@@ -83,7 +83,7 @@ def test_86_87_log_does_not_depend_on_order_folder_hash_seed_or_load(reference, 
 
 
 def test_88_run_after_a_crash_has_the_same_log(reference, pair: Path, simscen, monkeypatch) -> None:
-    monkeypatch.setattr("simscen.cli.session.backends.FORK_SERVER", (SCRIPTED_FORK_SERVER,))
+    monkeypatch.setattr("simscen.cli.session.fork_server_start.FORK_SERVER", (SCRIPTED_FORK_SERVER,))
     text = (pair / "a.scenario.yaml").read_text()
     (pair / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [crash]"))
     assert simscen("run", ".", "-j", 1, "--out", "out").code == 3
@@ -94,7 +94,7 @@ def test_88_run_after_a_crash_has_the_same_log(reference, pair: Path, simscen, m
 
 @pytest.mark.slow
 def test_world_that_never_finishes_preparing_times_out_its_run_only(pair: Path, simscen, monkeypatch) -> None:
-    monkeypatch.setattr("simscen.cli.session.backends.FORK_SERVER", (SCRIPTED_FORK_SERVER,))
+    monkeypatch.setattr("simscen.cli.session.fork_server_start.FORK_SERVER", (SCRIPTED_FORK_SERVER,))
     text = (pair / "a.scenario.yaml").read_text()
     (pair / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [slow-to-prepare]"))
     assert simscen("run", ".", "-j", 1, "--out", "out", "--wall-limit", 3).code == 3

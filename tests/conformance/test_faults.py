@@ -18,7 +18,7 @@ WITH_FAULTS = f"""
 import sys
 import simscen.cli.session.backends
 from simscen.cli.main import main
-simscen.cli.session.backends.FORK_SERVER = ({str(SCRIPTED_FORK_SERVER)!r},)
+simscen.cli.session.fork_server_start.FORK_SERVER = ({str(SCRIPTED_FORK_SERVER)!r},)
 main()
 """
 WALL_LIMIT_S = 3

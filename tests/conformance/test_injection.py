@@ -193,7 +193,7 @@ def test_81_names_of_logs_stay_on_one_line(simscen, folder: Path) -> None:
 
 
 def test_82_output_of_a_crashed_worker_is_quoted(simscen, folder: Path, monkeypatch) -> None:
-    monkeypatch.setattr("simscen.cli.session.backends.FORK_SERVER", (SCRIPTED_FORK_SERVER,))
+    monkeypatch.setattr("simscen.cli.session.fork_server_start.FORK_SERVER", (SCRIPTED_FORK_SERVER,))
     text = (folder / "a.scenario.yaml").read_text()
     (folder / "a.scenario.yaml").write_text(text.replace("seed: 7", "tags: [chatter]"))
     for kind in ("text", "github"):
@@ -228,7 +228,7 @@ def test_84_code_next_to_scenarios_is_not_executed(folder: Path) -> None:
 
 
 def test_85_worker_environment_has_no_secrets(simscen, folder: Path, monkeypatch) -> None:
-    monkeypatch.setattr("simscen.cli.session.backends.FORK_SERVER", (SCRIPTED_FORK_SERVER,))
+    monkeypatch.setattr("simscen.cli.session.fork_server_start.FORK_SERVER", (SCRIPTED_FORK_SERVER,))
     for name in ("GITHUB_TOKEN", "AWS_SECRET_ACCESS_KEY", "LD_PRELOAD_SECRET", "PYTHONPATH_SECRET"):
         monkeypatch.setenv(name, "hunter2")
     text = (folder / "a.scenario.yaml").read_text()

@@ -19,7 +19,7 @@ SHORT_SILENCE = f"""
 import simscen.cli.session.backends
 from simscen.cli.main import main
 from simscen.run.process import supervisor
-simscen.cli.session.backends.FORK_SERVER = ({str(SCRIPTED_FORK_SERVER)!r},)
+simscen.cli.session.fork_server_start.FORK_SERVER = ({str(SCRIPTED_FORK_SERVER)!r},)
 supervisor.MAX_SILENCE_S = 5.0
 main()
 """

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.run.process.isolation import plugin_path_arguments
+from simscen.run.process.isolation import plugin_path
 from simscen.spec.registry import RegisteredType, installed_types
 
 ROOT = Path(__file__).parents[2]
@@ -28,12 +28,8 @@ def isolated(path: str, folder: Path) -> str:
     return done.stdout.strip()
 
 
-def test_no_package_folders_are_passed_without_package_types() -> None:
-    assert plugin_path_arguments([]) == ()
-
-
 def test_package_folders_are_appended_to_the_path(yardwork) -> None:
-    (argument,) = plugin_path_arguments(installed_types("criterion"))
+    argument = plugin_path(installed_types("criterion"))
     found, index = isolated(argument, yardwork).rsplit(" ", 1)
     assert found == "[('1.2', 'yardwork.dwell')]"
     assert int(index) > 2
@@ -66,7 +62,7 @@ def test_validated_version_of_a_package_is_used(tmp_path, packages) -> None:
 def test_working_folder_is_not_on_the_worker_path(yardwork, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [str(tmp_path), "", *sys.path])
-    (argument,) = plugin_path_arguments(
+    argument = plugin_path(
         [RegisteredType("criterion", "dwell", "yardwork.dwell:Dwell", "yardwork", "1.2", folder=str(yardwork))]
     )
     assert str(tmp_path) not in json.loads(argument)["path"]

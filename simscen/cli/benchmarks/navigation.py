@@ -92,7 +92,7 @@ def command(
     from simscen.cli.benchmarks.navigation_experiments import Sizes, experiment_groups
     from simscen.cli.benchmarks.navigation_runs import execute_experiments, finished_trials, summarize_experiment
     from simscen.cli.benchmarks.navigation_table import as_json, as_text
-    from simscen.cli.session.run_session import open_output_folder
+    from simscen.cli.session.scenario_session import open_output_folder
 
     folder, journal = open_output_folder(out, resume)
     generated = folder / "generated"

@@ -105,7 +105,7 @@ def suite_command(
 
     Exit code 0: all runs were completed; 3: a run was aborted.
     """
-    from simscen.cli.session.backends import FORK_SERVER
+    from simscen.cli.session.fork_server_start import FORK_SERVER
     from simscen.cli.session.selection import Selection, load_selection
 
     before = load_baseline(compare)

@@ -54,7 +54,7 @@ def command(
     """
     if ctx.invoked_subcommand is not None:
         return
-    from simscen.cli.session.backends import FORK_SERVER
+    from simscen.cli.session.fork_server_start import FORK_SERVER
 
     before = load_baseline(compare)
     with engine_output_on_stderr():

@@ -8,10 +8,12 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
-from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
+from simscen.cli.session.backends import workers_and_cluster
 from simscen.cli.session.falsification import FalsifyRequest, execute_search, summary_lines
-from simscen.cli.session.output_files import OutputOptions
 from simscen.cli.shared_options import (
+    AddressOption,
+    BackendName,
+    BackendOption,
     Format,
     FormatOption,
     JobsOption,
@@ -20,13 +22,14 @@ from simscen.cli.shared_options import (
     JunitOption,
     LenientOption,
     OutOption,
+    OutputOptions,
     RootOption,
     StackOption,
     WallLimitOption,
     WorldPathOption,
 )
 from simscen.core.errors import UsageError
-from simscen.run.process.jobs import ReplayMode
+from simscen.run.kept_files import ReplayMode
 from simscen.run.sessions.run_session import SessionOptions
 from simscen.run.sessions.search import SearchMethod
 

@@ -8,13 +8,12 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
-from simscen.cli.session.output_files import OutputOptions
-from simscen.cli.session.run_session import SessionRequest, execute_session
-from simscen.cli.session.selection import Selection, scenario_times, shard_of
-from simscen.cli.session.stacks import STACK_HELP
-from simscen.cli.session.watch import watch_session
+from simscen.cli.session.fork_server_start import early_fork_server
 from simscen.cli.shared_options import (
+    STACK_HELP,
+    AddressOption,
+    BackendName,
+    BackendOption,
     Format,
     FormatOption,
     JobsOption,
@@ -24,15 +23,14 @@ from simscen.cli.shared_options import (
     LenientOption,
     OpenOption,
     OutOption,
+    OutputOptions,
     ResumeOption,
     RootOption,
     WallLimitOption,
     WorldPathOption,
 )
 from simscen.core.errors import UsageError
-from simscen.report.journal_reader import JOURNAL_FILE
-from simscen.run.process.jobs import KeptLogs, ReplayMode
-from simscen.run.sessions.run_session import SessionOptions
+from simscen.run.kept_files import KeptLogs, ReplayMode
 
 
 def command(
@@ -133,34 +131,43 @@ def command(
     """
     if keep_logs is KeptLogs.FAILED and (check_determinism or check_against is not None):
         raise UsageError("--keep-logs failed excludes --check-determinism and --check-against, which compare logs")
-    if check_determinism and (earlier := [path for path in paths if (path / JOURNAL_FILE).is_file()]):
-        if len(earlier) > 1 or check_against is not None:
-            raise UsageError("--check-determinism compares with one earlier session only")
-        paths, check_determinism, check_against = [path for path in paths if path not in earlier], False, earlier[0]
-        if not paths:
-            raise UsageError(f"name the scenarios to compare with the earlier session {check_against}")
-    workers, cluster = workers_and_cluster(workers, backend, address)
-    request = SessionRequest(
-        paths,
-        Selection(keyword, tag or [], shard_of(shard, os.environ), variation or [], scenario_times(shard_by or [])),
-        SessionOptions(
-            workers,
-            seed,
-            repeat,
-            check_determinism,
-            fail_fast,
-            wall_limit,
-            check_against,
-            replay=replay,
-            keep_logs=keep_logs,
-            cluster=cluster,
-        ),
-        root,
-        world_path or [],
-        lenient,
-        stack or [],
-        OutputOptions(out, resume, junit, junit_family, format_, open_),
-        durations,
-        last_failed,
-    )
-    sys.exit(watch_session(request) if watch else execute_session(request))
+    # All further modules are imported, and the scenarios are loaded, while the fork server starts.
+    with early_fork_server(is_needed=backend is BackendName.LOCAL and not watch) as fork_server:
+        from simscen.cli.session.backends import workers_and_cluster
+        from simscen.cli.session.scenario_session import SessionRequest, execute_session
+        from simscen.cli.session.selection import Selection, scenario_times, shard_of
+        from simscen.cli.session.watch import watch_session
+        from simscen.report.journal_reader import JOURNAL_FILE
+        from simscen.run.sessions.run_session import SessionOptions
+
+        if check_determinism and (earlier := [path for path in paths if (path / JOURNAL_FILE).is_file()]):
+            if len(earlier) > 1 or check_against is not None:
+                raise UsageError("--check-determinism compares with one earlier session only")
+            paths, check_determinism, check_against = [path for path in paths if path not in earlier], False, earlier[0]
+            if not paths:
+                raise UsageError(f"name the scenarios to compare with the earlier session {check_against}")
+        workers, cluster = workers_and_cluster(workers, backend, address)
+        request = SessionRequest(
+            paths,
+            Selection(keyword, tag or [], shard_of(shard, os.environ), variation or [], scenario_times(shard_by or [])),
+            SessionOptions(
+                workers,
+                seed,
+                repeat,
+                check_determinism,
+                fail_fast,
+                wall_limit,
+                check_against,
+                replay=replay,
+                keep_logs=keep_logs,
+                cluster=cluster,
+            ),
+            root,
+            world_path or [],
+            lenient,
+            stack or [],
+            OutputOptions(out, resume, junit, junit_family, format_, open_),
+            durations,
+            last_failed,
+        )
+        sys.exit(watch_session(request) if watch else execute_session(request, unused_server=fork_server))

@@ -9,12 +9,15 @@ import typer
 
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, paths_from_working_folder, print_text
-from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, backend_of, workers_and_cluster
+from simscen.cli.session.backends import backend_of, workers_and_cluster
 from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.shrinking import BudgetSpent, CandidateRuns, Failure, Shrinker, Stopped, failure_of
 from simscen.cli.session.stacks import parse_stacks
 from simscen.cli.session.user_files import save
 from simscen.cli.shared_options import (
+    AddressOption,
+    BackendName,
+    BackendOption,
     JobsOption,
     LenientOption,
     RootOption,

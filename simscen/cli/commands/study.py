@@ -7,10 +7,12 @@ from typing import Annotated
 import typer
 
 from simscen.cli import completions
-from simscen.cli.session.backends import AddressOption, BackendName, BackendOption, workers_and_cluster
-from simscen.cli.session.output_files import OutputOptions
+from simscen.cli.session.backends import workers_and_cluster
 from simscen.cli.session.study_session import StudyRequest, execute_study
 from simscen.cli.shared_options import (
+    AddressOption,
+    BackendName,
+    BackendOption,
     Format,
     FormatOption,
     JobsOption,
@@ -20,13 +22,14 @@ from simscen.cli.shared_options import (
     LenientOption,
     OpenOption,
     OutOption,
+    OutputOptions,
     ResumeOption,
     RootOption,
     StackOption,
     WallLimitOption,
     WorldPathOption,
 )
-from simscen.run.process.jobs import KeptLogs, ReplayMode
+from simscen.run.kept_files import KeptLogs, ReplayMode
 from simscen.run.sessions.run_session import SessionOptions
 
 

@@ -5,13 +5,12 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from enum import Enum
 from types import FrameType
-from typing import Annotated
 
-import typer
-
+from simscen.cli.session import fork_server_start
+from simscen.cli.shared_options import BackendName
 from simscen.core.errors import UsageError
+from simscen.run.process.fork_server_process import ForkServerProcess
 from simscen.run.process.jobs import Backend
 from simscen.run.process.supervisor import Interrupted, Supervisor
 from simscen.run.sessions.run_session import SessionOptions
@@ -59,29 +58,6 @@ def _exit_at_once(number: int) -> None:
     os._exit(128 + number)
 
 
-FORK_SERVER = ("-m", "simscen.cli.session.fork_server_main")
-"""Arguments of Python that start the fork server, the process from which runs are forked."""
-
-
-class BackendName(str, Enum):
-    """Where runs are executed."""
-
-    LOCAL = "local"
-    RAY = "ray"
-
-
-BackendOption = Annotated[
-    BackendName,
-    typer.Option(help="local: this machine; ray: all nodes of a running Ray cluster (needs Ray: pip install ray)."),
-]
-AddressOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="HOST:PORT", help="Address of the Ray cluster; default: RAY_ADDRESS, or the cluster of this machine."
-    ),
-]
-
-
 def workers_and_cluster(jobs: int | None, backend: BackendName, address: str | None) -> tuple[int, str]:
     """Return the number of parallel runs, and the address of the Ray cluster ("" for local processes).
 
@@ -100,10 +76,13 @@ def workers_and_cluster(jobs: int | None, backend: BackendName, address: str | N
     return jobs or cluster_cpus(cluster), cluster
 
 
-def backend_of(options: SessionOptions) -> Backend:
-    """Return the backend that the options select. It starts its processes when its context is entered."""
+def backend_of(options: SessionOptions, unused_server: ForkServerProcess | None = None) -> Backend:
+    """Return the backend that the options select. It starts its processes when they are needed.
+
+    On this machine, it first uses `unused_server`, a fork server that was started before.
+    """
     if not options.cluster:
-        return Supervisor(options.workers, FORK_SERVER)
+        return Supervisor(options.workers, fork_server_start.FORK_SERVER, unused_server)
     from simscen.run.process.ray_backend import RayBackend
 
-    return RayBackend(options.cluster, options.workers, FORK_SERVER)
+    return RayBackend(options.cluster, options.workers, fork_server_start.FORK_SERVER)

@@ -10,12 +10,13 @@ from pathlib import Path
 from simscen.cli.diagnostics import paths_from_working_folder, relative_to_working_folder
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.file_checks import FileChecker
-from simscen.cli.session.output_files import OutputOptions, Reports, require_writable_junit
+from simscen.cli.session.output_files import Reports, require_writable_junit
 from simscen.cli.session.pending_runs import plan_runs
-from simscen.cli.session.run_session import finish_session, start_session
+from simscen.cli.session.scenario_session import finish_session, start_session
 from simscen.cli.session.selection import require_not_skipped
 from simscen.cli.session.stacks import parse_stacks
 from simscen.cli.session.terminal import Screen, open_screen
+from simscen.cli.shared_options import OutputOptions
 from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, UsageError
 from simscen.core.records.run_result import Outcome, RunResult
 from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted

@@ -1,7 +1,7 @@
 """Main module of the fork server, which prepares scenarios and forks a worker for each run.
 
-The supervisor starts it as `python -I -m simscen.cli.session.fork_server_main [PLUGIN_PATH] FD`, where FD is the file
-descriptor for replies. PLUGIN_PATH extends sys.path, so that plug-ins are found.
+The command starts it as `python -I -m simscen.cli.session.fork_server_main FD`, where FD is the file descriptor for
+replies.
 """
 
 import gc
@@ -31,11 +31,12 @@ from simscen.record.log_reader import read_run
 from simscen.report.picture.map_picture import write_picture
 from simscen.report.picture.scene import Scene, scene_with_robots
 from simscen.run.disk_cache import DiskCache, cache_folder
+from simscen.run.kept_files import ReplayMode
 from simscen.run.log_header import log_header, world_scenery
 from simscen.run.preparation import PreparedScenario
 from simscen.run.process.fork_server import ForkServer
-from simscen.run.process.isolation import MAX_MEMORY_BYTES, apply_plugin_path
-from simscen.run.process.jobs import Job, ReplayMode
+from simscen.run.process.isolation import MAX_MEMORY_BYTES
+from simscen.run.process.jobs import Job
 from simscen.run.process.worker import ProgressReporter
 from simscen.run.run_files import execute_run
 from simscen.run.scenario_cache import CachedWorldBuilder, ScenarioCache
@@ -112,10 +113,7 @@ Image.preinit()  # imports now instead of in every fork that writes a picture
 
 def main() -> None:
     """Process the requests of the supervisor until it closes the connection."""
-    *plugin_paths, replies = sys.argv[1:]
-    for plugin_path in plugin_paths:
-        apply_plugin_path(plugin_path)
-    ForkServer(0, int(replies), _warm_up, _execute).serve()
+    ForkServer(0, int(sys.argv[1]), _warm_up, _execute).serve()
     os._exit(0)  # skips the teardown of the interpreter, for which the supervisor would wait
 
 

@@ -7,13 +7,11 @@ import platform
 import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import datetime, timezone
 from functools import cached_property
 from pathlib import Path
 
 from simscen.cli.diagnostics import print_text
-from simscen.cli.shared_options import Format, JunitFamily
 from simscen.core.errors import UsageError
 from simscen.core.files import require_not_input
 from simscen.core.records.comparison import Comparison
@@ -32,18 +30,6 @@ PAGE = "report.html"
 """Name of the HTML report in the output folder."""
 RESERVED_NAMES = ("results.json", PAGE, "run.json", JOURNAL_FILE, RUNS_FOLDER)
 """Names in the output folder that `--junit` must not use."""
-
-
-@dataclass(frozen=True)
-class OutputOptions:
-    """Values of the options for the output of a session: --out, --resume, --junit, --junit-family, --format, --open."""
-
-    out: Path | None
-    resume: Path | None
-    junit: Path | None
-    junit_family: JunitFamily
-    format_: Format
-    open_: bool
 
 
 class Reports:

@@ -24,12 +24,6 @@ from simscen.model.stack_files import ExternalStackSpec
 from simscen.spec.registry import all_types, find_type
 
 YAML_SUFFIXES = (".yaml", ".yml")
-STACK_HELP = (
-    "Run every scenario with this stack instead of its own: a command that speaks the stack protocol, a *.stack.yaml "
-    "file, a Nav2 parameter file, `reference`, another type of stack, or a name in your configuration. With several "
-    "robots, it replaces the stack of each; but if a robot's stack is `external: NAME`, NAME='COMMAND' defines its "
-    "command, and the other robots keep their stacks. "
-)
 if TYPE_CHECKING:
     from simscen.loading.stacks.userconfig import UserConfig
 

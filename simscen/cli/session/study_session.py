@@ -15,7 +15,7 @@ from simscen.cli.diagnostics import as_text, paths_from_working_folder, print_te
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.exit_codes import exit_code
 from simscen.cli.session.live_page import LivePage
-from simscen.cli.session.output_files import OutputOptions, Reports
+from simscen.cli.session.output_files import Reports
 from simscen.cli.session.pending_runs import (
     divide_runs,
     plan_runs,
@@ -24,9 +24,10 @@ from simscen.cli.session.pending_runs import (
     warn_of_dropped_runs,
     write_reused,
 )
-from simscen.cli.session.run_session import finish_session, plugins_and_stacks, start_session
+from simscen.cli.session.scenario_session import finish_session, plugins_and_stacks, start_session
 from simscen.cli.session.selection import Selection, load_selection, require_not_skipped
 from simscen.cli.session.terminal import open_screen
+from simscen.cli.shared_options import OutputOptions
 from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, UsageError
 from simscen.core.random_streams import MAX_SEED
 from simscen.core.records.run_result import scenario_title

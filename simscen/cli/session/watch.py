@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from simscen.cli.diagnostics import print_text
-from simscen.cli.session.run_session import SessionRequest, execute_session
+from simscen.cli.session.scenario_session import SessionRequest, execute_session
 from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, UsageError
 from simscen.core.records.session_events import RunFinished, SessionEvent
 from simscen.loading.files.discovery import default_root, discover

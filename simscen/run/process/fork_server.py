@@ -1,7 +1,7 @@
 """Fork server: imports PyBullet and OMPL and builds worlds once, then forks a worker process for each run.
 
-The fork server receives pickled jobs from the supervisor over one pipe, and sends messages, one line of JSON each, over
-another pipe.
+The fork server receives pickled messages from the supervisor over one pipe: a plug-in path, if there are plug-ins, and
+jobs. It sends messages, one line of JSON each, over another pipe.
 """
 
 import faulthandler
@@ -17,8 +17,14 @@ from functools import partial
 from typing import Any
 
 from simscen.run.process.captured_output import READ_BYTES, CappedLog
-from simscen.run.process.isolation import adopt_orphans, die_with_parent, kill_children_except, limit_memory
-from simscen.run.process.jobs import Job, json_line, receive_job
+from simscen.run.process.isolation import (
+    adopt_orphans,
+    apply_plugin_path,
+    die_with_parent,
+    kill_children_except,
+    limit_memory,
+)
+from simscen.run.process.jobs import Job, json_line, receive_message
 from simscen.run.process.worker import ExecuteJob, run_worker
 from simscen.run.process.worker_handle import WorkerHandle
 
@@ -53,7 +59,7 @@ class ForkServer:
             deadlines = [child.deadline - time.monotonic() for child in self._children.values()]
             for key, _ in self._selector.select(max(0.0, min([HEARTBEAT_S, *deadlines]))):
                 if key.fileobj == self._jobs:
-                    if not self._start_job():
+                    if not self._process_message():
                         self._kill_all()
                         return
                 elif self._selector.get_map().get(key.fileobj) is key:  # no earlier event has closed the descriptor
@@ -63,11 +69,19 @@ class ForkServer:
                 if now >= child.deadline:
                     child.escalate()
 
-    def _start_job(self) -> bool:
-        """Receive a job, prepare its scenario, and fork its worker; return False at the end of the pipe."""
-        job = receive_job(self._jobs)
-        if job is None:
-            return False
+    def _process_message(self) -> bool:
+        """Receive a message and process it; return False at the end of the pipe."""
+        match receive_message(self._jobs):
+            case None:
+                return False
+            case str() as plugin_path:
+                apply_plugin_path(plugin_path)
+            case Job() as job:
+                self._start_job(job)
+        return True
+
+    def _start_job(self, job: Job) -> None:
+        """Prepare the scenario of a job, and fork its worker."""
         self._send({"started": job.number})
         log = CappedLog(job.folder / "worker.log")
         # An error occurs again in the worker, which reports it as the error of the run.
@@ -76,7 +90,6 @@ class ForkServer:
         log.append(_take_own_output())
         self._fork(job, log)
         self._send({"prepared": job.number})
-        return True
 
     def _fork(self, job: Job, log: CappedLog) -> None:
         """Fork the worker of a job, and watch its pipes and its exit."""

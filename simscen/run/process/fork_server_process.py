@@ -50,9 +50,11 @@ class ForkServerProcess:
         os.close(jobs)
         os.set_blocking(self._send_pipe, False)
         self._send_buffer, self._receive_buffer = bytearray(), bytearray()
+        self._is_used, self._is_closed = False, False
 
     def send(self, data: bytes) -> None:
         """Queue a message. `receive_line` sends it."""
+        self._is_used = True
         self._send_buffer += data
 
     def receive_line(self, timeout: float) -> bytes:
@@ -88,10 +90,16 @@ class ForkServerProcess:
             self._send_buffer.clear()
 
     def close(self) -> None:
-        """Let the fork server kill its workers and exit; kill it if it does not exit in time."""
+        """Let the fork server kill its workers and exit; kill it if it has no jobs, or does not exit in time.
+
+        Has no effect after the first call.
+        """
+        if self._is_closed:
+            return
+        self._is_closed = True
         os.close(self._send_pipe)
         try:
-            self._process.wait(timeout=5)
+            self._process.wait(timeout=5 if self._is_used else 0)
         except subprocess.TimeoutExpired:
             self._kill()
         os.close(self._receive_pipe)

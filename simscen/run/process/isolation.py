@@ -108,16 +108,12 @@ def _parent(pid: int) -> int:
         return 0
 
 
-def plugin_path_arguments(plugins: Iterable[RegisteredType]) -> tuple[str, ...]:
-    """Return the command-line argument for `apply_plugin_path` in a fork server; empty without plug-ins."""
+def plugin_path(plugins: Iterable[RegisteredType]) -> str:
+    """Return the argument of `apply_plugin_path` in a fork server that finds the plug-ins as this process does."""
     used = sorted({(entry.distribution, entry.folder) for entry in plugins})
-    if not used:
-        return ()
     user_site = site.getusersitepackages() if site.ENABLE_USER_SITE else ""
-    return (
-        json.dumps(
-            {"path": [str(Path(folder).absolute()) for folder in search_path()], "user": user_site, "used": used}
-        ),
+    return json.dumps(
+        {"path": [str(Path(folder).absolute()) for folder in search_path()], "user": user_site, "used": used}
     )
 
 

@@ -6,35 +6,16 @@ import pickle
 import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
 from typing import Any, Protocol
 
-from simscen.core.records.run_result import Outcome, RunKey
+from simscen.core.records.run_result import RunKey
 from simscen.loading.loaded import LoadedScenario
+from simscen.run.kept_files import ReplayMode
 from simscen.spec.registry import RegisteredType
 
 _LENGTH = struct.Struct("<I")
-"""Length in bytes of a pickled job, which precedes the job in a pipe."""
-
-
-class KeptLogs(str, Enum):
-    """Option: the runs that keep their log, picture, and other files besides result.json."""
-
-    ALL = "all"
-    FAILED = "failed"
-
-
-class ReplayMode(str, Enum):
-    """Option: the runs that get a replay page."""
-
-    NONE = "none"
-    FAILED = "failed"
-    ALL = "all"
-
-    def includes(self, outcome: Outcome) -> bool:
-        """Return whether a run with this outcome gets a replay page."""
-        return self is ReplayMode.ALL or (self is ReplayMode.FAILED and not outcome.is_good)
+"""Length in bytes of a pickled message, which precedes the message in a pipe."""
 
 
 @dataclass(frozen=True)
@@ -101,14 +82,14 @@ class ForkServerDeath:
     output: str
 
 
-def pack_job(job: Job) -> bytes:
-    """Return a job as bytes for `receive_job`."""
-    data = pickle.dumps(job)
+def pack_message(message: Job | str) -> bytes:
+    """Return a job, or the plug-in path that precedes the first job, as bytes for `receive_message`."""
+    data = pickle.dumps(message)
     return _LENGTH.pack(len(data)) + data
 
 
-def receive_job(pipe: int) -> Job | None:
-    """Read one job from a pipe; return None at the end of the pipe."""
+def receive_message(pipe: int) -> Job | str | None:
+    """Read one message from a pipe; return None at the end of the pipe."""
     head = _read_exactly(pipe, _LENGTH.size)
     if len(head) < _LENGTH.size:
         return None
@@ -116,9 +97,9 @@ def receive_job(pipe: int) -> Job | None:
     data = _read_exactly(pipe, length)
     if len(data) < length:
         return None
-    job = pickle.loads(data)
-    assert isinstance(job, Job)
-    return job
+    message = pickle.loads(data)
+    assert isinstance(message, Job | str)
+    return message
 
 
 def _read_exactly(pipe: int, size: int) -> bytes:

@@ -10,8 +10,17 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from simscen.run.process.fork_server_process import ForkServerProcess, ProcessDeath, Unresponsive
-from simscen.run.process.isolation import plugin_path_arguments
-from simscen.run.process.jobs import Ended, ForkServerDeath, Job, JobUpdate, ProcessEnd, Progressed, Started, pack_job
+from simscen.run.process.isolation import plugin_path
+from simscen.run.process.jobs import (
+    Ended,
+    ForkServerDeath,
+    Job,
+    JobUpdate,
+    ProcessEnd,
+    Progressed,
+    Started,
+    pack_message,
+)
 from simscen.spec.registry import RegisteredType
 
 MAX_SILENCE_S = 30.0
@@ -34,9 +43,12 @@ class Supervisor:
     alone, and fails if the fork server dies again meanwhile. If the fork server cannot start, all jobs fail.
     """
 
-    def __init__(self, workers: int, entry: Sequence[str]) -> None:
-        """`entry` are the Python arguments that start the fork server, such as `-m module`."""
-        self._workers, self._entry = workers, tuple(entry)
+    def __init__(self, workers: int, entry: Sequence[str], unused_server: ForkServerProcess | None = None) -> None:
+        """`entry` are the Python arguments that start a fork server, such as `-m module`.
+
+        `unused_server` is a fork server that was started before. It runs the first jobs.
+        """
+        self._workers, self._entry, self._unused_server = workers, tuple(entry), unused_server
         self._plugins: frozenset[RegisteredType] = frozenset()
         self._server: ForkServerProcess | None = None
         self._jobs: Iterator[Job] = iter(())
@@ -70,7 +82,10 @@ class Supervisor:
             while (job := self._next_job()) is not None:
                 if self._server is None:
                     self._responded = False
-                    self._server = ForkServerProcess((*self._entry, *plugin_path_arguments(self._plugins)))
+                    self._server = self._unused_server or ForkServerProcess(self._entry)
+                    self._unused_server = None
+                    if self._plugins:
+                        self._server.send(pack_message(plugin_path(self._plugins)))
                 yield from self._run_jobs(self._server, job)
         finally:
             if self._running:
@@ -91,7 +106,7 @@ class Supervisor:
             while True:
                 while job is not None:
                     self._running[job.number] = job
-                    server.send(pack_job(job))
+                    server.send(pack_message(job))
                     job = self._next_job()
                 if not self._running:
                     return

@@ -12,7 +12,8 @@ from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import Listener, RunFinished, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
-from simscen.run.process.jobs import Backend, Ended, Job, KeptLogs, Progressed, ReplayMode, Started
+from simscen.run.kept_files import KeptLogs, ReplayMode
+from simscen.run.process.jobs import Backend, Ended, Job, Progressed, Started
 from simscen.run.process.supervisor import Interrupted
 from simscen.run.sessions.log_comparison import compare_twins, compare_with_session
 from simscen.run.sessions.output_folder import run_folder

@@ -47,7 +47,7 @@ def test_live_page_opens_first_and_becomes_the_report(
 
     monkeypatch.setattr(live_page, "MIN_UPDATE_INTERVAL_S", 0.0)
     monkeypatch.setattr(live_page, "UPDATE_INTERVAL_FACTOR", 0)
-    monkeypatch.setattr("simscen.cli.session.run_session.LivePage", Watched)
+    monkeypatch.setattr("simscen.cli.session.scenario_session.LivePage", Watched)
     ended = simscen("run", "a.scenario.yaml", "--repeat", "2", "--out", "out", "--open", "-j", "1")
     assert (ended.code, ended.err) == (0, "")
     assert ["0 of 2 runs done" in page for page in pages] == [True]

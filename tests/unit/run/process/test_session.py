@@ -15,8 +15,11 @@ from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished, RunProgress, RunStarted
 from simscen.loading.scenario import load_scenario
 from simscen.run.process import supervisor
+from simscen.run.process.fork_server_process import ForkServerProcess
+from simscen.run.process.jobs import Ended
 from simscen.run.process.supervisor import Interrupted, Supervisor
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session
+from simscen.spec.registry import RegisteredType
 
 ENTRY = (str(Path(__file__).with_name("faulty_fork_server.py")),)
 SCENARIO = """
@@ -237,6 +240,22 @@ def test_a_supervisor_keeps_its_processes_between_two_sessions_until_it_is_close
     assert len(servers) == 2
     assert servers[0] == servers[1]
     assert servers[0] not in _children()
+
+
+def test_a_supervisor_uses_a_fork_server_that_was_started_before(tmp_path):
+    file = tmp_path / "fine.scenario.yaml"
+    file.write_text(SCENARIO.format(fault="fine"))
+    options = SessionOptions(wall_limit=20.0)
+    jobs = plan_jobs([load_scenario(file, tmp_path)], options, tmp_path / "out")
+    started = ForkServerProcess(ENTRY)
+    (server,) = _children()
+    plugin = RegisteredType("criterion", "dwell", "yardwork.dwell:Dwell", "yardwork", "1.2", folder=str(tmp_path))
+    with Supervisor(1, ENTRY, started) as backend:
+        ends = [update.end for update in backend.run(jobs, [plugin]) if isinstance(update, Ended)]
+        assert [end.code for end in ends] == [0]
+        assert _children() == [server]
+    assert not _children()
+    started.close()  # has no effect a second time
 
 
 def test_a_fork_server_that_dies_between_two_sessions_is_started_again(tmp_path):

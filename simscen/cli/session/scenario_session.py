@@ -10,11 +10,12 @@ from simscen.cli.diagnostics import as_text, print_text
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.exit_codes import exit_code
 from simscen.cli.session.live_page import LivePage
-from simscen.cli.session.output_files import OutputOptions, Reports, require_writable_junit
+from simscen.cli.session.output_files import Reports, require_writable_junit
 from simscen.cli.session.pending_runs import PendingRuns, failed_runs, plan_session
 from simscen.cli.session.selection import Selection, load_selection
 from simscen.cli.session.stacks import external_commands
 from simscen.cli.session.terminal import open_screen
+from simscen.cli.shared_options import OutputOptions
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.comparison import Comparison
 from simscen.core.records.run_store import RunStore
@@ -25,6 +26,7 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
 from simscen.report.journal import Journal, require_unlocked
 from simscen.report.journal_reader import JOURNAL_FILE, read_journal
+from simscen.run.process.fork_server_process import ForkServerProcess
 from simscen.run.reproducibility import plugin_packages
 from simscen.run.sessions.output_folder import RUNS_FOLDER, create_output_folder
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session, scenario_seeds
@@ -50,10 +52,12 @@ def execute_session(
     request: SessionRequest,
     on_loaded: Callable[[Sequence[LoadedScenario]], None] = lambda _: None,
     listeners: Sequence[Listener] = (),
+    unused_server: ForkServerProcess | None = None,
 ) -> Exit:
     """Run a session, write its reports, and return the exit code.
 
     `on_loaded` is called with the selected scenarios before the first run. `listeners` receive all events.
+    `unused_server` is a fork server that was started before.
     Raises InvalidInput, UsageError, and NothingSelected before the first run.
     """
     options, output = request.options, request.output
@@ -79,11 +83,17 @@ def execute_session(
     pending = plan_session(journal, jobs, options.workers, request.selection.shard)
     with open_screen(output.format_, request.durations) as screen:
         live = [LivePage(reports)] if output.open_ else []
-        code = _run(pending, options, reports, [screen, *listeners, *live])
+        code = _run(pending, options, reports, [screen, *listeners, *live], unused_server)
     return screen.exit_code(code)
 
 
-def _run(pending: PendingRuns, options: SessionOptions, reports: Reports, listeners: Sequence[Listener]) -> Exit:
+def _run(
+    pending: PendingRuns,
+    options: SessionOptions,
+    reports: Reports,
+    listeners: Sequence[Listener],
+    unused_server: ForkServerProcess | None,
+) -> Exit:
     """Execute the pending runs, write the reports, and return the exit code.
 
     `listeners` receive all events, including the events of reused results.
@@ -101,7 +111,7 @@ def _run(pending: PendingRuns, options: SessionOptions, reports: Reports, listen
     show(pending.started(reports.folder))
     for finished in pending.reused:
         show(finished)
-    with interrupt_on_signals(), backend_of(options) as backend:
+    with interrupt_on_signals(), backend_of(options, unused_server) as backend:
         done, stopped = run_session(pending.jobs, options, backend, listen)
     finished_runs = RunStore(pending.reused)
     finished_runs.extend(done)
