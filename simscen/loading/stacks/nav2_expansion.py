@@ -1,5 +1,6 @@
 """Expansion of `stack: {nav2_params: FILE}`: the translated parameters of the Nav2 file replace its path."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -101,12 +102,9 @@ def _clock(scenario: MappingNode) -> Clock:
 
 def _with_valid_frequency(translation: Translation, clock: Clock) -> Translation:
     """Return the translation. A controller frequency is replaced by the nearest one with a period of whole ticks."""
-    if (
-        translation.keys != ("controller_frequency",)
-        or not isinstance(translation.value, int | float)
-        or translation.value <= 0
-    ):
-        return translation
+    is_number = isinstance(translation.value, int | float) and 0 < translation.value < math.inf
+    if translation.keys != ("controller_frequency",) or not is_number:
+        return translation  # validation reports other values
     try:
         clock.period(translation.value)
     except ValueError as error:

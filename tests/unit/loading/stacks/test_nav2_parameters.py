@@ -387,6 +387,13 @@ def test_controller_frequency_is_the_nearest_possible_one(tmp_path: Path, physic
     assert notes == ([] if physics else [(6, expected)])
 
 
+@pytest.mark.parametrize("frequency", [".inf", ".nan", "-.inf", "0.0"])
+def test_controller_frequency_must_be_positive_and_finite(tmp_path: Path, frequency: str) -> None:
+    with pytest.raises(InvalidInput) as wrong:
+        loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", ACCEPTED.replace("50.0", frequency))
+    assert [(problem.code, problem.line) for problem in wrong.value.problems] == [("SC013", 6)]
+
+
 def test_a_minimum_above_its_maximum_is_reported_at_the_minimum(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput) as wrong:
         loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", ACCEPTED.replace("-1.44", "1.0"))
