@@ -139,7 +139,10 @@ def test_partial_yaml_block_is_valid(block: Block, tmp_path: Path) -> None:
     kind = "robot" if block.text.startswith("urdf:") else "base"
     file = tmp_path / f"a.{kind}.yaml"
     file.write_text(f"simscen: 1\n{block.text}" if kind == "robot" else block.text)
-    (tmp_path / "masks").mkdir()
+    for mask in ("keepout", "speed"):
+        (tmp_path / "masks").mkdir(exist_ok=True)
+        (tmp_path / "masks" / f"{mask}.pgm").touch()
+        (tmp_path / "masks" / f"{mask}.yaml").write_text(f"image: {mask}.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n")
     wrong = [str(problem) for problem in check_file(kind, file, tmp_path)]
     # Robots are shown in part, and refer to files of a manufacturer.
     assert [problem for problem in wrong if kind == "base" or not re.search("missing key|no such file", problem)] == []

@@ -15,12 +15,15 @@ from simscen.loading.files.discovery import (
     WORLD_SUFFIXES,
 )
 from simscen.loading.files.paths import PathSandbox
+from simscen.loading.loaded import KEEPOUT_MASK_KEYS, SPEED_MASK_KEYS
+from simscen.loading.multirobot import has_valid_robots, split_by_robot
 from simscen.loading.scenario import try_variations
 from simscen.loading.schema.validate import check_partial
+from simscen.loading.stacks.nav2_expansion import with_nav2_parameters
 from simscen.loading.stacks.stack_files import NAV2_FILE_KIND, STACK_FILE_KIND, read_stack_file, recognize_stack_file
 from simscen.loading.variations.variation_problems import VariationProblems, merge_problems
 from simscen.loading.yaml.library import APPEND_SUFFIX, DEFAULTS_FILE, Library
-from simscen.loading.yaml.tree import MappingNode, ScalarNode, child, entries_of, node_at
+from simscen.loading.yaml.tree import MappingNode, ScalarNode, child, entries_of, existing_keys, items_of, node_at
 from simscen.model.scenario import ScenarioSpec
 
 CHECKED_DRAWS = range(1, 21)
@@ -97,18 +100,37 @@ def file_kind(file: Path, root: Path) -> str:
 
 
 def _base_file_problems(file: Path, library: Library) -> list[Problem]:
-    """Return the problems of a file that scenarios extend, and of the world and robot that it names."""
+    """Return the problems of a file that scenarios extend, and of the files that it names."""
     tree, problems = library.read(file)
     if problems or tree is None:
         return library.with_source(problems)
-    assets, renamed = Assets(library), tree
-    if isinstance(tree, MappingNode):
-        names = {key: key.removesuffix(APPEND_SUFFIX) for key in tree.entries}
-        entries = {key if names[key] in tree.entries else names[key]: entry for key, entry in tree.entries.items()}
-        renamed = MappingNode(tree.position, entries)  # with `pass` for `pass+`, unless the file has both
-        world, model = child(tree, "world"), node_at(tree, ("robot", "model"))
-        if isinstance(world, ScalarNode) and isinstance(world.value, str):
-            assets.world(world)
-        if isinstance(model, ScalarNode) and isinstance(model.value, str):
-            assets.robot(model.value, model.position)
-    return library.with_source(sorted([*check_partial(ScenarioSpec, renamed), *assets.problems]))
+    if not isinstance(tree, MappingNode):
+        return library.with_source(check_partial(ScenarioSpec, tree))
+    names = {key: key.removesuffix(APPEND_SUFFIX) for key in tree.entries}
+    entries = {key if names[key] in tree.entries else names[key]: entry for key, entry in tree.entries.items()}
+    renamed = MappingNode(tree.position, entries)  # with `pass` for `pass+`, unless the file has both
+    expanded = with_nav2_parameters(renamed, library)
+    assets = Assets(library)
+    for part in split_by_robot(renamed).values() if has_valid_robots(renamed) else [renamed]:
+        _load_named_files(part, assets)
+    problems = [*check_partial(ScenarioSpec, expanded.tree), *expanded.problems, *expanded.notes, *assets.problems]
+    return library.with_source(sorted(set(problems)))
+
+
+def _load_named_files(tree: MappingNode, assets: Assets) -> None:
+    """Load all files that the incomplete scenario of one robot names. Problems are added to `assets`."""
+    masks = [
+        ("pass", index, *keys)
+        for index in range(len(items_of(child(tree, "pass"))))
+        for keys in (("keepout", "mask"), ("speed", "mask", "file"))
+    ]
+    for keys in (("world",), ("robot", "model"), ("map",), KEEPOUT_MASK_KEYS, SPEED_MASK_KEYS, *masks):
+        node = node_at(tree, keys)
+        if existing_keys(tree, keys) != keys or not isinstance(node, ScalarNode) or not isinstance(node.value, str):
+            continue  # validation reports values of a wrong type
+        if keys == ("world",):
+            assets.world(node)
+        elif keys == ("robot", "model"):
+            assets.robot(node.value, node.position)
+        elif keys != ("map",) or node.value != "none":
+            assets.map(node)

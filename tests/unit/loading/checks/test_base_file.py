@@ -40,6 +40,14 @@ def test_a_base_may_say_a_part_of_a_mapping(write) -> None:
         ("simscen: 2\n", "1:10 needs schema 2"),
         ("- a\n", "1:1 expected a mapping at top level"),
         ("extends: b.base.yaml\n", "1:10 no such file or directory"),
+        ("map: no.yaml\n", "1:6 no such file or directory"),
+        ("stack: {nav2_params: no.yaml}\n", "1:22 no such file or directory"),
+        ("stack: {keepout_mask: no.yaml}\n", "1:23 no such file or directory"),
+        ("stack: {speed_mask: {file: no.yaml}}\n", "1:28 no such file or directory"),
+        ("pass: [{keepout: {mask: no.yaml}}]\n", "1:25 no such file or directory"),
+        ("pass+: [{speed: {mask: {file: no.yaml}}}]\n", "1:31 no such file or directory"),
+        ("robots: {a: {model: no.robot.yaml}, b: {}}\n", "1:21 no such file or directory"),
+        ("robots: {a: {}, b: {stack: {nav2_params: no.yaml}}}\n", "1:42 no such file or directory"),
     ],
 )
 def test_content_of_a_base_is_checked(write, text: str, problem: str) -> None:
