@@ -65,6 +65,22 @@ def _limits_speed(keys: Keys, action: Any) -> bool:
     return keys[-1] == "speed_zone" and action.enabled and action.region is not None
 
 
+@MEANING.check("SC033", severity="warning")
+def replaced_friction_discs(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find discs of `friction` without a name that replace an earlier disc without a name at another place."""
+    first: tuple[Keys, Any] | None = None
+    for action_keys, action in (located for step in loaded.spec.steps for located in step.located_actions()):
+        disc: Any = action.chosen
+        if action.kind != "friction" or disc.at is None or "name" in disc.model_fields_set:
+            continue
+        keys = (*action_keys, "friction", "at")
+        first = first or (keys, disc.at)
+        if disc.at != first[1]:
+            position = loaded.position_of(*first[0])
+            message = f"this disc replaces the one at {position.line}:{position.col}: neither has a `name`"
+            yield CheckProblem(keys, message, "give each of them a `name`")
+
+
 @MEANING.check("SC055", severity="warning")
 def pushes_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find pushes of zero, pushes of objects without mass, and pushes of pedestrians."""
