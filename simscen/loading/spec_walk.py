@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
-from typing import Annotated, Any, NamedTuple, get_args, get_origin
+from types import UnionType
+from typing import Annotated, Any, NamedTuple, Union, get_args, get_origin
 
 from pydantic import BaseModel, RootModel
 
@@ -95,22 +96,35 @@ def _keys_by_field(model: type[BaseModel]) -> list[tuple[str, str]]:
 
 
 def angles_of(spec: BaseModel) -> Iterator[tuple[Keys, float]]:
-    """Yield the keys and values in rad of all angles that are the value of a key. Keyframes are left out."""
+    """Yield the keys and values in rad of all angles, including those in lists, such as the yaw of keyframes."""
     for keys, part in walk(spec):
-        for name, key in _angle_fields(type(part)):
-            if isinstance(value := getattr(part, name), int | float):
-                yield (*keys, key), value
+        for name, key, kind in _fields_with_angles(type(part)):
+            yield from _angles_in(getattr(part, name), kind, (*keys, key))
 
 
 @cache
-def _angle_fields(model: type[BaseModel]) -> list[tuple[str, str]]:
-    """Return the name and the YAML key of each field that is an angle or contains one."""
-    found = []
-    for name, field in model.model_fields.items():
-        annotations = (*field.metadata, *_annotations(field.annotation))
-        if any(isinstance(mark, Quantity) and mark.dimension == "angle" for mark in annotations):
-            found.append((name, field.alias or name))
-    return found
+def _fields_with_angles(model: type[BaseModel]) -> list[tuple[str, str, Any]]:
+    """Return the name, the YAML key, and the type of each field that is an angle or contains one."""
+    fields = [(name, field.alias or name, field.rebuild_annotation()) for name, field in model.model_fields.items()]
+    return [(name, key, kind) for name, key, kind in fields if any(map(_is_angle, _annotations(kind)))]
+
+
+def _is_angle(annotation: Any) -> bool:
+    return isinstance(annotation, Quantity) and annotation.dimension == "angle"
+
+
+def _angles_in(value: Any, kind: Any, keys: Keys) -> Iterator[tuple[Keys, float]]:
+    """Yield the keys and values in rad of all angles in a value of type `kind`, a number or nested lists."""
+    kind, *annotations = get_args(kind) if get_origin(kind) is Annotated else (kind,)
+    if isinstance(value, int | float) and any(map(_is_angle, annotations)):
+        yield keys, value
+    elif get_origin(kind) in (list, tuple) and isinstance(value, list | tuple):
+        kinds = get_args(kind) * (len(value) if get_origin(kind) is list else 1)
+        for index, (item, item_kind) in enumerate(zip(value, kinds, strict=True)):
+            yield from _angles_in(item, item_kind, (*keys, index))
+    elif get_origin(kind) in (Union, UnionType):
+        for member in get_args(kind):
+            yield from _angles_in(value, member, keys)
 
 
 def _annotations(kind: Any) -> Iterator[Any]:

@@ -10,7 +10,7 @@ from simscen.core.clock import Clock
 from simscen.loading.checks.registry import MEANING, NAMES, CheckProblem, NameScope
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.spec_walk import angles_of
-from simscen.loading.yaml.tree import Keys, MappingNode, ScalarNode, existing_keys, node_at
+from simscen.loading.yaml.tree import Keys, MappingNode, ScalarNode, dotted_path, existing_keys, node_at
 from simscen.model.localizers import Amcl
 from simscen.model.navigation import expected_failure_name
 from simscen.model.robot import RobotSpec
@@ -93,19 +93,23 @@ def late_timeouts(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC053", severity="warning")
 def degrees_as_radians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find keys of the scenario, its world, or its robot file with an angle above one turn and without a unit."""
+    """Find angles above one turn without a unit in the scenario, its world, or its robot file; one for each list."""
     files: list[tuple[BaseModel | None, MappingNode | None]] = [
         (loaded.spec, loaded.tree),
         (loaded.world.spec, loaded.world.tree),
         (loaded.robot.spec, loaded.robot.tree),
     ]
     for spec, tree in files:
+        found: set[Keys] = set()
         for keys, value in angles_of(spec) if spec is not None and tree is not None else ():
             node = node_at(tree or loaded.tree, keys)
             without_unit = isinstance(node, ScalarNode) and isinstance(node.value, int | float)
-            if without_unit and abs(value) > FULL_TURN_RAD + 1e-3:
+            key_count = max(number for number, key in enumerate(keys, start=1) if isinstance(key, str))
+            if without_unit and abs(value) > FULL_TURN_RAD + 1e-3 and keys[:key_count] not in found:
+                found.add(keys[:key_count])
+                written = f"{dotted_path(keys[key_count - 1 :])}: {value:g}"
                 turns = value / FULL_TURN_RAD
-                message = f"`{keys[-1]}: {value:g}` is {turns:.1f} turns: angles without a unit are in radians"
+                message = f"`{written}` is {turns:.1f} turns: angles without a unit are in radians"
                 yield CheckProblem(keys, message, f"did you mean `{value:g} deg`?", tree=tree)
 
 
