@@ -123,7 +123,7 @@ def _measure_parts(prepared: PreparedScenario, cpu: float) -> dict[str, float]:
     watch = Stopwatch()
     whole = time_run(prepared, watch).wall
     parts = {name: seconds * cpu / whole for name, seconds in watch.seconds.items()}
-    parts["lockstep, set-up, verdicts"] = cpu - sum(parts.values())
+    parts["lockstep, setup, verdicts"] = cpu - sum(parts.values())
     return parts
 
 

@@ -37,16 +37,15 @@ def command(
     Without a subcommand, simulates a patrol of 60 s on one core with all features enabled: 240 Hz physics, 360 beams at
     10 Hz, 500 to 2000 particles, and a full MCAP log. Prints:
 
-    - the speed relative to real time, and to PyBullet alone with the same steps and scans; and the share of CPU time of
-      each part of the simulation
+    - the speed relative to real time, and to PyBullet alone with the same steps and scans
 
-    - the overhead of a run: set-up and verdicts, its process, preparing a scenario, the start of a session,
-      `simscen validate`, and the memory of a worker
+    - the share of CPU time of each part of the simulation
 
-    - the time of a scan of 720 beams and of a physics step among obstacles, compared to PyBullet with one body for each
-      obstacle
+    - the overhead of a run: setup and verdicts, its process, preparing a scenario, the start of a session, and memory
 
-    - the wall time per cycle for which a run waits for an external stack
+    - the time of a scan of 720 beams, and of a physics step among obstacles, compared with PyBullet
+
+    - the CPU time of `simscen validate`, and the wall time per cycle for which a run waits for an external stack
 
     All times are CPU times unless the output says otherwise. Takes less than a minute on an idle machine; the
     subcommands take longer. --compare compares the result with an earlier result of --format json, and the subcommand
