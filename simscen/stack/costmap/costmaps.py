@@ -49,6 +49,7 @@ class Costmaps:
         self._zones = Zones(surroundings.keepout, (), surroundings.masks)
         self._odom_from_map: Pose2 | None = None
         """Transform with which the keepout zones were put into the local costmap; None if the zones have changed."""
+        self._has_readings = False
         self._has_local_zones = False
         """Whether the local costmap has or had keepout zones."""
         self.next: float = 0
@@ -56,6 +57,7 @@ class Costmaps:
 
     def add_reading(self, reading: Scan | Image) -> None:
         """Store a reading for the next update of each costmap. It replaces earlier readings of the same sensor."""
+        self._has_readings = True
         for schedule in (self._global_schedule, self._local_schedule):
             schedule.readings[reading.sensor] = reading
 
@@ -69,7 +71,14 @@ class Costmaps:
         self.global_costmap.set_zones(zones)
 
     def update(self, tick: int, frames: Frames, odometry: OdometryHistory) -> None:
-        """Update the costmaps that are due with the newest reading of each sensor."""
+        """Update the costmaps that are due with the newest reading of each sensor.
+
+        Without any reading so far, for example of a robot without a lidar, only windows and zones move with the robot.
+        """
+        if not self._has_readings:
+            self.global_costmap.follow(frames.pose)
+            self._update_local_zones(frames)
+            self.local_costmap.follow(frames.odometry)
         if tick >= self._global_schedule.next:
             for base, reading, _ in self._global_schedule.take(tick, frames, frames.pose, odometry):
                 self.global_costmap.update(base, reading)

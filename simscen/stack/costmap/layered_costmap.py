@@ -127,8 +127,7 @@ class LayeredCostmap:
 
     def update(self, base: Pose2, reading: Scan | Image) -> None:
         """Clear the cells that a sensor sees through, then mark its obstacles. `base` is the pose of the robot."""
-        if self._rolling and should_roll(self._frame, base, self._max_offset):
-            self._roll(base)
+        self.follow(base)
         self._latest_readings.pop(reading.sensor, None)  # so that the newest reading is the last one
         self._latest_readings[reading.sensor] = (base, reading)
         if isinstance(reading, Image):
@@ -142,6 +141,11 @@ class LayeredCostmap:
             self._mark_changed(*(self._whole if self._is_small else self._frame.extent(changed)), changed)
         if self._unknown is not None:
             self._update_unknown(base, reading, self._unknown)
+
+    def follow(self, base: Pose2) -> None:
+        """Move a rolling window if the robot at the pose `base` is too far from its center."""
+        if self._rolling and should_roll(self._frame, base, self._max_offset):
+            self._roll(base)
 
     def clear(self, clear_within: float = math.inf, unseen_margin: float = DISTANCE_MARGIN_M) -> None:
         """Clear the live obstacles within `clear_within` m along x and y, except those in the newest readings.

@@ -15,7 +15,9 @@ from simscen.model.costmaps import Costmap, LocalCostmap
 from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec
 from simscen.stack.costmap.costmaps import Costmaps
-from simscen.stack.protocols import CostmapView
+from simscen.stack.frames import Frames
+from simscen.stack.odometry_history import OdometryHistory
+from simscen.stack.protocols import CostmapView, Surroundings
 from simscen.testing.flatland import CONTROL_PERIOD_TICKS, TICK_RATE_HZ, Drive, Flatland, drive, round_robot
 
 TRUTH = GroundTruth(type="ground_truth")
@@ -136,3 +138,19 @@ def test_obstacles_behind_the_robot_outside_the_field_of_view_are_kept() -> None
     for forget in (kept.clear_local, kept.clear_around, kept.clear):
         forget()
         assert np.hypot(*(lethal(kept.local_costmap.view) - (2.0, 0.45)).T).min() < 0.1
+
+
+def test_windows_and_zones_follow_a_robot_without_a_lidar() -> None:
+    zone = ((4.0, -0.5), (5.0, -0.5), (5.0, 0.5), (4.0, 0.5))
+    costmaps = Costmaps(StackSpec(), Surroundings(round_robot(), None, TICK_RATE_HZ, keepout=(zone,)), 0.5)
+    odometry = OdometryHistory(TICK_RATE_HZ)
+    for tick, x in enumerate((0.0, 1.0, 2.0, 3.0)):
+        pose = Pose2(x, 0.0)
+        odometry.add(tick, pose)
+        costmaps.update(tick, Frames(pose, pose), odometry)
+        for view in (costmaps.global_costmap.view, costmaps.local_costmap.view):
+            half = view.costs.shape[1] * view.resolution / 2
+            assert abs(view.origin[0] + half - x) <= half / 4 + view.resolution
+    view = costmaps.local_costmap.view
+    lethal = np.argwhere(view.costs == 254)
+    assert lethal[:, 1].min() * view.resolution + view.origin[0] == pytest.approx(4.0, abs=0.06)
