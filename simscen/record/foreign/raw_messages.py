@@ -59,8 +59,8 @@ class McapMessages:
     """Iterable of the messages of an MCAP file.
 
     After the iteration, `complete` is False if the file is truncated, `count` is the number of messages, and `topics`
-    has the message types by topic. The iteration raises UnusableLog for ROS 1, for files that are not MCAP, and for
-    several concatenated files, and mcap exceptions for damaged files.
+    has the message types by absolute topic. The iteration raises UnusableLog for ROS 1, for files that are not MCAP,
+    and for several concatenated files, and mcap exceptions for damaged files.
     """
 
     def __init__(self, path: Path) -> None:
@@ -92,14 +92,19 @@ class McapMessages:
                 case records.Channel():
                     _reject_ros1(record.message_encoding)
                     channels[record.id] = record
-                    self.topics[record.topic] = types.get(record.schema_id, "")
+                    self.topics[_absolute(record.topic)] = types.get(record.schema_id, "")
                 case records.Message():
                     channel = channels[record.channel_id]
                     message_type, encoding = types.get(channel.schema_id, ""), channel.message_encoding
                     self.count += 1
-                    yield RawMessage(channel.topic, message_type, encoding, record.log_time, record.data)
+                    yield RawMessage(_absolute(channel.topic), message_type, encoding, record.log_time, record.data)
                 case _:
                     pass
+
+
+def _absolute(topic: str) -> str:
+    """Return a topic with a leading slash: recorders other than `ros2 bag record` may write topics without it."""
+    return f"/{topic.lstrip('/')}"
 
 
 def is_simscen_log(path: Path) -> bool:
@@ -183,11 +188,12 @@ class BagMessages:
         count = 0
         try:
             with Reader(self._folder) as reader:
-                self.topics = {connection.topic: connection.msgtype for connection in reader.connections}
-                selected = [connection for connection in reader.connections if connection.topic in self._topics]
+                names = {connection.topic: _absolute(connection.topic) for connection in reader.connections}
+                self.topics = {names[connection.topic]: connection.msgtype for connection in reader.connections}
+                selected = [connection for connection in reader.connections if names[connection.topic] in self._topics]
                 for connection, time, data in reader.messages(selected) if selected else ():
                     count += 1
-                    yield RawMessage(connection.topic, connection.msgtype, "cdr", time, bytes(data))
+                    yield RawMessage(names[connection.topic], connection.msgtype, "cdr", time, bytes(data))
                 self.complete = count == sum(connection.msgcount for connection in selected)
         except (UnusableLog, OSError):
             raise

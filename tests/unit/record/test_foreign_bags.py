@@ -1,5 +1,6 @@
 """Tests of rosbag2 folders whose metadata.yaml and storage disagree, and of other files that are not whole logs."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,15 @@ def test_files_of_a_split_bag_are_one_log(tmp_path: Path) -> None:
     log = read(split_bag(tmp_path / "bag", drive(), 12))
     assert len(log.trace.truth) == 201
     assert not log.notes
+
+
+@pytest.mark.parametrize("plugin", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
+def test_a_topic_without_a_slash_is_read_as_an_absolute_topic(tmp_path: Path, plugin: StoragePlugin) -> None:
+    """Bags that a program wrote often have such topics, for example those that are converted from ROS 1."""
+    relative = [replace(message, topic=message.topic[1:]) for message in drive()]
+    log = read(write_bag(tmp_path / "bag", relative, plugin))
+    assert len(log.trace.truth) == 201
+    assert len(log.trace.belief) == 21
 
 
 @pytest.mark.parametrize("part", [0, 1, 2])
