@@ -5,7 +5,7 @@ A role is the purpose of a topic, such as `odom` or `goal`. Each role has a defa
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from simscen.record import topics
 from simscen.record.foreign.decoded_messages import DECODERS, Decoders
 from simscen.record.foreign.options import TOPICS
-from simscen.record.foreign.raw_messages import RawMessage, open_messages
+from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
 from simscen.record.frame_names import RobotFrames
 from simscen.record.messages import decode
 from simscen.record.messages.decode import MessageReader
@@ -101,27 +101,37 @@ class LogMessages:
         return self.by_role.get(role, [])
 
 
-def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, robot: str = "") -> LogMessages:
-    """Read the messages of an MCAP file or a rosbag2 folder. Raises UnusableLog if it cannot be read.
+def collect_messages(path: Path, named: Mapping[str, str], has_truth: bool = False, robot: str = "") -> LogMessages:
+    """Read the messages of an MCAP file or a rosbag2 folder.
 
-    `renamed` maps roles to topics that differ from the defaults. `truth` is the topic of the ground truth; None for no
-    ground truth. If the scan topic has no messages, the scans of another topic are used. In a simscen log with
-    several robots, only the messages of `robot` are read, without the name of the robot in topics and frames.
+    If the default scan topic has no messages, the scans of another topic are used. Raises UnusableLog if the log cannot
+    be read, or if one of the `named` topics has no usable messages.
+
+    named:      topics by role, for roles whose topic is not the default, and for the role "truth"
+    has_truth:  whether the log may have simscen's own ground truth
+    robot:      the robot whose messages are read, without its name in topics and frames, in a simscen log with several
+        robots
     """
     prefix = f"/{robot}" if robot else ""
     namespace = f"{prefix}/" if robot else ""
-    names = {**TOPICS, **EXTRA_TOPICS, **renamed, **({"truth": truth} if truth else {})}
+    names = {**TOPICS, **EXTRA_TOPICS, **({"truth": topics.TRUTH.name} if has_truth else {}), **named}
     absolute = {role: topic if topic.startswith(namespace) else prefix + topic for role, topic in names.items()}
-    roles = {absolute[role]: role for role in sorted(names)}
+    roles: dict[str, list[str]] = {}
+    for role in sorted(names):
+        roles.setdefault(absolute[role], []).append(role)
     stream = open_messages(path, _TopicsToRead(roles) if path.is_dir() else roles)
     messages = LogMessages()
     other_scans: dict[str, list[LoggedMessage]] = {}
     for raw in stream:
-        role = roles.get(raw.topic)
-        if role is not None and raw.type in _DECODERS[role]:
-            messages.by_role.setdefault(role, []).append(_without_robot(_decode(raw, role), robot))
-        elif role is None and raw.type == topics.SCAN_TYPE and raw.topic.startswith(namespace):
+        for role in roles.get(raw.topic, ()):
+            if raw.type in _DECODERS[role]:
+                messages.by_role.setdefault(role, []).append(_without_robot(_decode(raw, role), robot))
+        if raw.topic not in roles and raw.type == topics.SCAN_TYPE and raw.topic.startswith(namespace):
             other_scans.setdefault(raw.topic, []).append(_without_robot(_decode(raw, "scan"), robot))
+    for role in named:
+        if not messages.of(role):
+            reason = _reason_missing(absolute[role], role, stream.topics)
+            raise UnusableLog(reason, f"its topics: {', '.join(sorted(stream.topics)[:12]) or 'none'}")
     if not messages.of("scan") and other_scans:
         topic = min(other_scans)
         messages.by_role["scan"] = other_scans[topic]
@@ -134,10 +144,19 @@ def collect_messages(path: Path, renamed: Mapping[str, str], truth: str | None, 
     return messages
 
 
+def _reason_missing(topic: str, role: str, types: Mapping[str, str]) -> str:
+    """Return why a topic has no usable messages for a role. `types` are the message types of all topics."""
+    if topic not in types:
+        return f"it has no topic {topic}"
+    if types[topic] not in _DECODERS[role]:
+        return f"{topic} is a {types[topic] or 'type without a name'}, expected {' or '.join(_DECODERS[role])}"
+    return f"{topic} has no messages"
+
+
 class _TopicsToRead:
     """Container of the topics to read: topics with a role, and topics with "scan" in their name."""
 
-    def __init__(self, roles: Mapping[str, str]) -> None:
+    def __init__(self, roles: Container[str]) -> None:
         self._roles = roles
 
     def __contains__(self, topic: object) -> bool:

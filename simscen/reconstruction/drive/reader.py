@@ -28,15 +28,16 @@ from simscen.reconstruction.drive.recorded_drive import (
 )
 from simscen.record import topics
 from simscen.record.foreign.raw_messages import UnusableLog, is_simscen_log, unusable_log_as_invalid_input
+from simscen.record.foreign.timebase import MIN_CLOCK_RATE, to_clock_of_stamps
 from simscen.record.foreign.transforms import TransformTree, UnknownTransform, is_upside_down, lidar_mount
 from simscen.record.messages.decode import ScanMessage, StampedPose
 
-BASE_FRAMES = ("base_link", "base_footprint")
-"""Usual names of the base frame, in the order in which they are tried."""
 NO_TRUTH = "none"
 """Value of `truth` to ignore the ground truth of a log."""
 MAX_CLOCK_DIFFERENCE_NS = 10 * NS_PER_SECOND
 """Maximum difference between the stamp and the log time of a message if both are from the same clock."""
+MAX_CLOCK_RATE_ERROR = 0.002
+"""Maximum deviation from 1 of the ratio between the rates of two clocks that measure the same time."""
 MIN_POSES = 2
 """Minimum number of poses of a topic or transform that is used as the source of poses."""
 MAX_COORDINATE_M = 1e6
@@ -62,9 +63,9 @@ def read_drive(
     robot:    robot whose messages are read, in a simscen log with several robots
     """
     with unusable_log_as_invalid_input(path):
-        if truth is None and not path.is_dir() and is_simscen_log(path):
-            truth = topics.TRUTH.name
-        messages = collect_messages(path, renamed, None if truth == NO_TRUTH else truth, robot)
+        has_truth = truth is None and not path.is_dir() and is_simscen_log(path)
+        named = renamed if truth in (None, NO_TRUTH) else {**renamed, "truth": truth}
+        messages = collect_messages(path, named, has_truth, robot)
         return trim_to_first_goal(_DriveReader(path, messages).drive())
 
 
@@ -74,6 +75,7 @@ class _DriveReader:
     def __init__(self, path: Path, messages: LogMessages) -> None:
         self._path, self._messages = path, messages
         self._notes: list[str] = [*messages.notes]
+        self._adjust_clock_rate()
         moving = [message for role, logged in messages.by_role.items() if role not in _LATCHED for message in logged]
         if not moving:
             names = ", ".join(sorted(messages.topics)[:12]) or "none"
@@ -97,7 +99,7 @@ class _DriveReader:
             pose_source=source,
             has_true_poses=is_truth,
             belief=belief,
-            corrections=self._poses_of_tf("map", "odom") or no_values(3),
+            corrections=self._poses_of_tf("map", self._odom_frame) or no_values(3),
             odometry=odometry,
             commands=self._signal("cmd_vel", 3, lambda twist: twist.values),
             turn_rates=self._signal("imu", 1, lambda imu: (imu.turn_rate,)),
@@ -112,11 +114,30 @@ class _DriveReader:
             notes=tuple(self._notes),
         )
 
+    def _adjust_clock_rate(self) -> None:
+        """Convert all log times to the clock of the stamps if its rate differs, as for a simulator in slow motion."""
+        by_role = ([message for message in self._messages.of(role) if message.stamp] for role in _STAMPED)
+        stamped = max(by_role, key=len)
+        if not stamped:
+            return
+        logged, stamps = (np.array([message[column] for message in stamped], dtype=np.int64) for column in (0, 1))
+        rate = float(np.ptp(stamps)) / max(1.0, float(np.ptp(logged)))
+        is_same_clock = np.median(np.abs(stamps - logged)) <= MAX_CLOCK_DIFFERENCE_NS
+        if is_same_clock or rate < MIN_CLOCK_RATE or abs(rate - 1.0) <= MAX_CLOCK_RATE_ERROR:
+            return
+        self._notes.append(f"delays of messages, because stamps advance {rate:.3f} s per second of log time")
+        for role, messages in self._messages.by_role.items():
+            times = np.array([message.log_time for message in messages], dtype=np.int64)
+            converted = to_clock_of_stamps(times, logged, stamps).tolist()
+            self._messages.by_role[role] = [
+                message._replace(log_time=time) for message, time in zip(messages, converted, strict=True)
+            ]
+
     def _clock_offset(self) -> int:
         """Return the difference in ns between the clock of the stamps and the clock of the log; 0 for one clock."""
         differences = [
             message.stamp - message.log_time
-            for role in ("scan", "odom", "amcl_pose", "truth")
+            for role in _STAMPED
             for message in self._messages.of(role)
             if message.stamp
         ]
@@ -167,7 +188,9 @@ class _DriveReader:
         truth = self._signal("truth", 3, lambda truth: Pose3(*truth.pose).plane)
         if len(truth):
             return truth, "ground truth", True
-        for base in BASE_FRAMES:
+        if self._messages.of("truth"):
+            raise UnusableLog(f"the ground truth has no pose with valid coordinates (below {MAX_COORDINATE_M:g} m)")
+        for base in self._base_frames:
             poses = self._poses_of_tf("map", base)
             if poses is not None:
                 return poses, f"transform from map to {base}", False
@@ -178,10 +201,10 @@ class _DriveReader:
         if len(odometry) >= MIN_POSES:
             self._notes.append("poses in a map; the odometry is used, and the map is built along it")
             return TimedValues(odometry.times, odometry.values[:, :3], odometry.arrivals), "odometry", False
-        for base in BASE_FRAMES:
-            poses = self._poses_of_tf("odom", base)
+        for base in self._base_frames:
+            poses = self._poses_of_tf(self._odom_frame, base)
             if poses is not None:
-                return poses, f"transform from odom to {base}", False
+                return poses, f"transform from {self._odom_frame} to {base}", False
         kinds = [name for name, kind in sorted(self._messages.topics.items()) if "Pose" in kind or "Odometry" in kind]
         listed = f"; topics with poses: {', '.join(kinds[:12])}" if kinds else ""
         raise UnusableLog("it has no poses of the robot", f"name a topic with --topic odom=/TOPIC{listed}")
@@ -252,10 +275,7 @@ class _DriveReader:
         for message in (*self._messages.of("tf_static"), *self._messages.of("tf")):
             for link in message.content:
                 links.setdefault(link.child, link)
-        base = next(
-            (message.content.child for message in self._messages.of("odom") if message.content.child), BASE_FRAMES[0]
-        )
-        mount = lidar_mount(frame, base, links)
+        mount = lidar_mount(frame, self._base_frames[0], links)
         if mount is None:
             self._notes.append(f"the mount of the lidar `{frame}`; the lidar is assumed at the base")
             return Pose2(0.0, 0.0, 0.0), DEFAULT_LIDAR_HEIGHT_M, False
@@ -284,7 +304,7 @@ class _DriveReader:
             return ()
         polygon: PolygonMessage = messages[0].content
         corners = np.array(polygon.corners, dtype=np.float64).reshape(-1, 2)
-        if not self._is_base(polygon.frame):
+        if polygon.frame not in self._base_frames:
             in_frame = self._poses_in(polygon.frame, odometry)
             x, y, yaw = (
                 (poses if in_frame is None else in_frame)
@@ -296,18 +316,27 @@ class _DriveReader:
             return ()
         return tuple((round(a, 3), round(b, 3)) for a, b in corners.tolist())
 
-    def _is_base(self, frame: str) -> bool:
-        """Return whether a frame is the base of the robot."""
-        return frame in BASE_FRAMES or any(message.content.child == frame for message in self._messages.of("odom")[:1])
+    @cached_property
+    def _odom_frame(self) -> str:
+        """Name of the frame of the odometry."""
+        return next((message.content.frame for message in self._messages.of("odom")), "odom")
+
+    @cached_property
+    def _base_frames(self) -> tuple[str, ...]:
+        """Names of the base frame, in the order in which they are tried: of the odometry, and usual names."""
+        of_odometry = (message.content.child for message in self._messages.of("odom") if message.content.child)
+        return tuple(dict.fromkeys((*of_odometry, "base_link", "base_footprint")))
 
     def _poses_in(self, frame: str, odometry: TimedValues) -> TimedValues | None:
         """Return the poses of the robot in the frame of the odometry or of /tf; None if they are unknown."""
-        if len(odometry) and self._messages.of("odom")[0].content.frame == frame:
+        if len(odometry) and frame == self._odom_frame:
             return odometry
-        found = (self._poses_of_tf(frame, base) for base in BASE_FRAMES)
+        found = (self._poses_of_tf(frame, base) for base in self._base_frames)
         return next((poses for poses in found if poses is not None), None)
 
 
+_STAMPED = ("scan", "odom", "amcl_pose", "truth")
+"""Roles whose stamps are compared with the log times."""
 _LATCHED = frozenset({"map", "tf_static", "footprint", "events"})
 """Roles whose messages can be logged at any time, so that they do not define the start and end of the drive."""
 

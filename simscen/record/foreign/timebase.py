@@ -163,16 +163,19 @@ class Timebase:
 
 
 def _header_times(logged: Ticks, anchor: StampedMessages | None) -> Ticks:
-    """Convert times of logging to the clock of the anchor's stamps, by interpolation between the anchor's messages.
+    return logged if anchor is None else to_clock_of_stamps(logged, anchor.logged, anchor.stamps)
 
-    Before and after these messages, the difference of the two clocks is constant.
+
+def to_clock_of_stamps(logged: Ticks, anchor_logged: Ticks, anchor_stamps: Ticks) -> Ticks:
+    """Convert times of logging to the clock of stamps, by interpolation between the messages of a topic (the anchor).
+
+    Before and after these messages, the difference of the two clocks is constant. All times are in ns. The messages of
+    the anchor are in the order of logging.
     """
-    if anchor is None:
-        return logged
-    stamps = np.maximum.accumulate(anchor.stamps)
-    first, start = int(anchor.logged[0]), int(stamps[0])
-    anchor_times = (anchor.logged - first).astype(np.float64)
+    stamps = np.maximum.accumulate(anchor_stamps)
+    first, start = int(anchor_logged[0]), int(stamps[0])
+    anchor_times = (anchor_logged - first).astype(np.float64)
     interpolated = np.interp((logged - first).astype(np.float64), anchor_times, (stamps - start).astype(np.float64))
-    outside = np.minimum(logged - first, 0) + np.maximum(logged - int(anchor.logged[-1]), 0)
+    outside = np.minimum(logged - first, 0) + np.maximum(logged - int(anchor_logged[-1]), 0)
     times: Ticks = start + np.rint(interpolated).astype(np.int64) + outside
     return times

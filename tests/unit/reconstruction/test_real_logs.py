@@ -107,6 +107,12 @@ def scan(time, ranges):
     )  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory):
+    """Return the bag of a drive with a map and a goal."""
+    return logs.write_bag(tmp_path_factory.mktemp("drive") / "bag", messages())
+
+
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("plugin", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
 def test_a_bag_becomes_a_scenario_with_its_goal_person_and_outage(plugin, tmp_path):
@@ -305,6 +311,70 @@ def test_log_without_scans_lists_what_could_not_be_reconstructed(tmp_path):
     made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
     assert made.contents.estimated.objects == []
     assert any("no scans" in unknown for unknown in made.contents.unknowns)
+
+
+@pytest.mark.parametrize(
+    ("truth", "topics", "text"),
+    [
+        ("/mocap", {}, "it has no topic /mocap"),
+        ("map:base_link", {}, "it has no topic map:base_link"),
+        ("/scan", {}, "/scan is a sensor_msgs/msg/LaserScan, expected nav_msgs/msg/Odometry or"),
+        (None, {"scan": "/front"}, "it has no topic /front"),
+        (None, {"odom": "/amcl_pose"}, "expected nav_msgs/msg/Odometry"),
+    ],
+)
+def test_topics_that_the_user_names_must_have_usable_messages(truth, topics, text, bag):
+    with pytest.raises(InvalidInput, match=text):
+        read_drive(bag, truth, topics)
+
+
+def test_a_ground_truth_far_from_the_origin_is_refused(tmp_path):
+    """UTM coordinates are up to 10,000 km."""
+    said = messages()
+    for one in said:
+        if one.topic == "/odom":
+            one.message.pose.pose.position.y += 3e6
+    with pytest.raises(InvalidInput, match="no pose with valid coordinates"):
+        read_drive(logs.write_bag(tmp_path / "bag", said), "/odom")
+
+
+def test_the_topic_of_the_ground_truth_can_have_another_role(bag):
+    drive = read_drive(bag, "/odom")
+    assert drive.has_true_poses
+    assert len(drive.odometry) == len(drive.poses) > 100
+
+
+def test_stamps_of_a_simulator_in_slow_motion_are_no_delays(tmp_path):
+    """The log times are of the wall clock. Five seconds of the wall clock are one second of simulated time."""
+    said = messages(with_goal=False)
+    slow = [
+        replace(one, time=10**18 + 5 * (one.time - logs.BEGIN))
+        for one in [*said, *(replace(one, topic="/cmd_vel", message=logs.twist(0.5)) for one in said[::10])]
+    ]
+    made = scenario_from_log(
+        logs.write_bag(tmp_path / "bag", sorted(slow, key=lambda one: one.time)),
+        tmp_path / "site.scenario.yaml",
+        ReconstructionOptions(),
+    )
+    assert made.drive.duration == pytest.approx(drives.DURATION_S, abs=0.1)
+    assert made.drive.commands.times[-1] == pytest.approx(drives.DURATION_S, abs=0.5)
+    assert {fault.kind for fault in made.contents.estimated.faults} == {"off"}
+    assert "delays of messages, because stamps advance 0.200 s per second of log time" in made.drive.notes
+
+
+def test_the_base_can_have_another_name(tmp_path):
+    """The poses of a mapper such as slam_toolbox are only on /tf, between frames that the odometry names."""
+    said = []
+    for one in messages():
+        if one.topic == "/odom":
+            at = one.message.pose.pose.position
+            one.message.header.frame_id, one.message.child_frame_id = "r1/odom", "r1/chassis"
+            said.append(replace(one, topic="/tf", message=logs.link(one.time, "r1/odom", "r1/chassis", at.x, at.y)))
+            said.append(replace(one, topic="/tf", message=logs.link(one.time, "map", "r1/odom", 1.0, 3.0)))
+        said.append(one)
+    drive = read_drive(logs.write_bag(tmp_path / "bag", [one for one in said if one.topic != "/amcl_pose"]))
+    assert drive.pose_source == "transform from map to r1/chassis"
+    assert len(drive.corrections) > 100
 
 
 @pytest.mark.parametrize(("name", "content"), [
