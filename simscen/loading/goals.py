@@ -1,16 +1,20 @@
 """Goals of a scenario, listed under `goals` or sent by events, and their expected failures."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from simscen.actions.robot import NewGoal
 from simscen.core.messages.goals import Goal, loop_goal_name, matches_goal_name
 from simscen.core.messages.navigation import ErrorCode
 from simscen.criteria.result import ErrorCodeIs, Result
+from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import Keys
 from simscen.model.navigation import expected_failure_name
 from simscen.model.scenario import GoalEntry, ScenarioSpec
+
+if TYPE_CHECKING:
+    from simscen.actions.robot import NewGoal
 
 START_FAILURES = ErrorCode.START_OCCUPIED, ErrorCode.START_OUTSIDE_MAP
 """Error codes of Nav2 for a failure because of the start pose."""
@@ -36,20 +40,12 @@ def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
     )
 
 
-def event_goals(spec: ScenarioSpec, includes_robot: Callable[[str | None], bool]) -> dict[Keys, Goal]:
-    """Return the goals that events send, by the keys of their `new_goal` actions in the scenario.
-
-    `includes_robot` selects actions: it is called with the robot that an action names, or None.
-    """
-    return {
-        (*keys, "new_goal"): _goal(action.chosen.name, action.chosen, spec)
-        for step in spec.steps
-        for keys, action in step.located_actions()
-        if isinstance(action.chosen, NewGoal) and includes_robot(action.robot)
-    }
+def event_goals(loaded: LoadedScenario) -> dict[Keys, Goal]:
+    """Return the goals that events send, by the keys of their `new_goal` actions in the scenario."""
+    return {one.keys: _goal(one.spec.name, one.spec, loaded.spec) for one in loaded.actions if one.kind == "new_goal"}
 
 
-def _goal(name: str, entry: GoalEntry | NewGoal, spec: ScenarioSpec) -> Goal:
+def _goal(name: str, entry: "GoalEntry | NewGoal", spec: ScenarioSpec) -> Goal:
     """Return a goal. Missing tolerances are taken from the goal checker of the stack."""
     checker = spec.stack.goal_checker
     return Goal(

@@ -105,20 +105,14 @@ def spawned_names(loaded: LoadedScenario) -> list[str]:
 
 def pedestrian_names(loaded: LoadedScenario) -> list[str]:
     """Return the names of the pedestrians that events add to the world, alone or in crowds."""
-    crowds = [
-        action.chosen.names
-        for step in loaded.spec.steps
-        for action in step.actions
-        if action.kind == "crowd" and hasattr(action.chosen, "names")
-    ]
+    crowds = [one.spec.names for step in loaded.spec.steps for one in step.actions if one.kind == "crowd"]
     return _names_in_actions(loaded, "pedestrian") + [name for crowd in crowds for name in crowd]
 
 
 def _names_in_actions(loaded: LoadedScenario, kind: str) -> list[str]:
     """Return the value of `name` in all actions of one kind, such as "spawn". Goals of other robots are left out."""
-    actions = [action for step in loaded.spec.steps for action in step.actions]
-    relevant = [action for action in actions if kind != "new_goal" or loaded.includes_robot(action.robot)]
-    return [str(getattr(action.chosen, "name", "")) for action in relevant if action.kind == kind]
+    actions = loaded.actions if kind == "new_goal" else [one for step in loaded.spec.steps for one in step.actions]
+    return [str(one.spec.name) for one in actions if one.kind == kind]
 
 
 def _movable_names(world: WorldSpec) -> list[str]:

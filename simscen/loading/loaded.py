@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from simscen.core.errors import Problem
 from simscen.core.external_command import ExternalCommand
@@ -15,6 +15,9 @@ from simscen.loading.yaml.tree import Key, Keys, MappingNode, Position, key_posi
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec
 from simscen.model.world import RosMapSpec, WorldSpec
+
+if TYPE_CHECKING:
+    from simscen.model.disturbances import LocatedAction
 
 KEEPOUT_MASK_KEYS: Keys = ("stack", "keepout_mask")
 """Keys that lead to the keepout mask of the stack in a scenario."""
@@ -154,7 +157,13 @@ class LoadedScenario:
 
         Actions of installed packages can have any effect. Without kinds, return whether there is such an action.
         """
-        return any(action.may_do(*kinds) for step in self.spec.steps for action in step.actions)
+        return any(one.action.may_do(*kinds) for step in self.spec.steps for one in step.actions)
+
+    @property
+    def actions(self) -> "list[LocatedAction]":
+        """Actions of all events that apply to this view, in order."""
+        actions = (one for step in self.spec.steps for one in step.actions)
+        return [one for one in actions if self.includes_robot(one.action.robot)]
 
     @property
     def title(self) -> str:

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from simscen.actions.robot import Kidnap
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2
 from simscen.loading.goals import event_goals, expects_failure, scenario_goals
@@ -28,12 +27,10 @@ def with_stops_in_bounds(world: World, loaded: LoadedScenario) -> World:
 def _stops(loaded: LoadedScenario) -> Iterator[Pose2]:
     spec = loaded.spec
     yield spec.only_robot.pose.pose
-    for goal in (*scenario_goals(spec), *event_goals(spec, loaded.includes_robot).values()):
+    for goal in (*scenario_goals(spec), *event_goals(loaded).values()):
         if not expects_failure(spec, goal.name):
             yield goal.pose
-    for _, action in (located for step in spec.steps for located in step.located_actions()):
-        if isinstance(action.chosen, Kidnap) and loaded.includes_robot(action.robot):
-            yield action.chosen.pose.pose
+    yield from (one.spec.pose.pose for one in loaded.actions if one.kind == "kidnap")
 
 
 def extend_bounds(bounds: Bounds, poses: list[Pose2]) -> Bounds:

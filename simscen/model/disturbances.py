@@ -1,8 +1,8 @@
 """Specifications of the events and faults of a scenario."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -95,16 +95,30 @@ class SequenceStep:
         return self.entry.when
 
     @property
-    def actions(self) -> list[AnyAction]:
+    def actions(self) -> list["LocatedAction"]:
         """Actions in order."""
-        return [action for _, action in self.located_actions()]
+        do, keys = self.entry.do, (*self.keys, "do")
+        if isinstance(do, list):
+            return [LocatedAction(self, (*keys, number, action.kind), action) for number, action in enumerate(do)]
+        return [] if do is None else [LocatedAction(self, (*keys, do.kind), do)]
 
-    def located_actions(self) -> Iterator[tuple[tuple[str | int, ...], AnyAction]]:
-        """Yield each action with the keys that lead to it in the scenario."""
-        if isinstance(self.entry.do, list):
-            yield from (((*self.keys, "do", number), action) for number, action in enumerate(self.entry.do))
-        elif self.entry.do is not None:
-            yield (*self.keys, "do"), self.entry.do
+
+class LocatedAction(NamedTuple):
+    """Action of an event or step. `keys` lead to its specification in the scenario: ("events", 0, "do", "spawn")."""
+
+    step: SequenceStep
+    keys: tuple[str | int, ...]
+    action: AnyAction
+
+    @property
+    def kind(self) -> str:
+        """Key of the action in YAML, e.g. "spawn"."""
+        return self.action.kind
+
+    @property
+    def spec(self) -> Any:
+        """Specification under this key."""
+        return self.action.chosen
 
 
 def steps_of(events: Sequence[EventEntry]) -> list[SequenceStep]:

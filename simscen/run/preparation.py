@@ -133,7 +133,7 @@ def _prepare_robot(
         start=start,
         goals=goals,
         expected=expected_failures(spec, goals),
-        sent=tuple(event_goals(spec, loaded.includes_robot).values()),
+        sent=tuple(event_goals(loaded).values()),
         regions=world.regions,
         footprint=body.footprint,
         inscribed_radius=inscribed_radius(body.radius, body.footprint),

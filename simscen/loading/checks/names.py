@@ -3,7 +3,7 @@
 from collections.abc import Container, Iterator
 from dataclasses import replace
 
-from simscen.actions.base import Action, AnyAction
+from simscen.actions.base import AnyAction
 from simscen.core.messages.goals import LOOP_GOAL_NAME
 from simscen.criteria.registry import verdict_names
 from simscen.loading.checks.registry import NAMES, ROBOT_NAMES, CheckProblem, NameScope, WrittenScenario
@@ -100,17 +100,15 @@ def duplicate_marks_and_new_goals(scope: NameScope) -> Iterator[CheckProblem]:
     loaded = scope.loaded
     disturbances = [*event_names(loaded), *(fault.label for fault in loaded.spec.faults)]
     goals = listed_goal_names(loaded)
-    for keys, action in (located for step in loaded.spec.steps for located in step.located_actions()):
-        name = getattr(action.chosen, "name", "")
-        if action.kind == "mark" and name in disturbances:
-            message = f"an event or a fault is also called {quoted(name)}; criteria cannot distinguish them"
-            yield CheckProblem((*keys, "mark", "name"), message, RENAME_HINT)
-        if action.kind != "new_goal" or not name or not loaded.includes_robot(action.robot):
-            continue
-        if name in goals:
-            message = f"another goal is also called {quoted(name)}; criteria cannot distinguish them"
-            yield CheckProblem((*keys, "new_goal", "name"), message, "choose another name")
-        goals.append(name)
+    for one in (one for step in loaded.spec.steps for one in step.actions):
+        if one.kind == "mark" and one.spec.name in disturbances:
+            message = f"an event or a fault is also called {quoted(one.spec.name)}; criteria cannot distinguish them"
+            yield CheckProblem((*one.keys, "name"), message, RENAME_HINT)
+        if one.kind == "new_goal" and loaded.includes_robot(one.action.robot):
+            if one.spec.name in goals:
+                message = f"another goal is also called {quoted(one.spec.name)}; criteria cannot distinguish them"
+                yield CheckProblem((*one.keys, "name"), message, "choose another name")
+            goals.append(one.spec.name)
 
 
 @NAMES.check("SC033")
@@ -127,16 +125,15 @@ def duplicate_pedestrians(scope: NameScope) -> Iterator[CheckProblem]:
     """Find pedestrians that have the same name as an object or another pedestrian."""
     loaded = scope.loaded
     used_names = dict.fromkeys(world_object_names(loaded, scope.world), "an object of the world")
-    for step in loaded.spec.steps:
-        for keys, action in step.located_actions():
-            if action.kind not in ("spawn", "pedestrian", "crowd"):
-                continue
-            names = getattr(action.chosen, "names", None) or [getattr(action.chosen, "name", "")]
-            repeated = [name for name in names if name in used_names]
-            if repeated and (action.kind != "spawn" or used_names[repeated[0]] == "a pedestrian"):
-                message = f"{used_names[repeated[0]]} is also called {quoted(repeated[0])}"
-                yield CheckProblem((*keys, action.kind, "name"), message, RENAME_HINT)
-            used_names.update(dict.fromkeys(names, "a spawned object" if action.kind == "spawn" else "a pedestrian"))
+    for one in (one for step in loaded.spec.steps for one in step.actions):
+        if one.kind not in ("spawn", "pedestrian", "crowd"):
+            continue
+        names = one.spec.names if one.kind == "crowd" else [one.spec.name]
+        repeated = [name for name in names if name in used_names]
+        if repeated and (one.kind != "spawn" or used_names[repeated[0]] == "a pedestrian"):
+            message = f"{used_names[repeated[0]]} is also called {quoted(repeated[0])}"
+            yield CheckProblem((*one.keys, "name"), message, RENAME_HINT)
+        used_names.update(dict.fromkeys(names, "a spawned object" if one.kind == "spawn" else "a pedestrian"))
 
 
 @NAMES.check("SC033")
@@ -174,18 +171,13 @@ def missing_robot_names(scenario: WrittenScenario) -> Iterator[CheckProblem]:
     hint = f"add {' or '.join(f'`robot: {name}`' for name in sorted(spec.robots))}"
     for step in spec.steps:
         unnamed = [] if step.when is None else list(_conditions_without_robot(step.when, (*step.keys, "when"), faults))
-        for keys, action in step.located_actions():
-            assert isinstance(action.chosen, Action)
-            if action.robot is None and action.chosen.is_robot_specific:
-                unnamed.append((keys, action.kind))
-        for keys, kind in unnamed:
-            yield CheckProblem((*keys, kind), f"`{kind}` must name one of the robots", hint, at_key=True)
+        unnamed += [one.keys for one in step.actions if one.action.robot is None and one.spec.is_robot_specific]
+        for keys in unnamed:
+            yield CheckProblem(keys, f"`{keys[-1]}` must name one of the robots", hint, at_key=True)
 
 
-def _conditions_without_robot(
-    condition: AnyCondition, keys: Keys, faults: Container[str]
-) -> Iterator[tuple[Keys, str]]:
-    """Yield the keys and the kind of each condition that must name a robot, but names none.
+def _conditions_without_robot(condition: AnyCondition, keys: Keys, faults: Container[str]) -> Iterator[Keys]:
+    """Yield the keys of each condition that must name a robot, but names none.
 
     These are conditions on the state of a robot, or on a fault. `faults` are the names of the faults of all robots.
     """
@@ -200,7 +192,7 @@ def _conditions_without_robot(
         chosen = condition.chosen
         assert isinstance(chosen, Condition)
         if chosen.is_robot_specific or (condition.kind == "event" and getattr(chosen, "name", "") in faults):
-            yield keys, condition.kind
+            yield *keys, condition.kind
 
 
 @ROBOT_NAMES.check("SC030")

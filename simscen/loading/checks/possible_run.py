@@ -14,7 +14,7 @@ from simscen.core.records.disturbances import BELIEF, KIND_BY_TARGET_NAME
 from simscen.loading.known_names import listed_goal_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import Keys
-from simscen.model.disturbances import SequenceStep
+from simscen.model.disturbances import LocatedAction, SequenceStep
 from simscen.model.stack import StackSpec
 from simscen.triggers.base import AnyCondition, Trigger
 
@@ -93,9 +93,8 @@ class PossibleRun:
     def next_possible(self) -> frozenset[str]:
         """Names of the events, faults, and marks that can happen if the ones in `possible` can happen."""
         happening = {name for keys, when, name, _ in self.triggers if when is None or not self.why_never(when, keys)}
-        actions = [action for step in self.steps if step.name in happening for action in step.actions]
-        marks = {getattr(action.chosen, "name", "") for action in actions if action.kind == "mark"}
-        return frozenset(happening | marks)
+        actions = (one for step in self.steps if step.name in happening for one in step.actions)
+        return frozenset(happening | {one.spec.name for one in actions if one.kind == "mark"})
 
     def why_never(self, trigger: Trigger, keys: Keys) -> LocatedReason | None:
         """Return the reason why the trigger at `keys` never fires; None if it can."""
@@ -130,23 +129,21 @@ class PossibleRun:
         reason = check(condition.chosen) if check else None
         return ((*keys, condition.kind), reason) if reason else None
 
+    @property
+    def _possible_actions(self) -> list[LocatedAction]:
+        return [one for step in self.steps if step.name in self.possible for one in step.actions]
+
     def may_do(self, *kinds: str) -> bool:
         """Return whether a possible step has an action of one of these kinds, or an action of a plug-in."""
-        return any(
-            action.may_do(*kinds) for step in self.steps if step.name in self.possible for action in step.actions
-        )
+        return any(one.action.may_do(*kinds) for one in self._possible_actions)
 
     def goal_count(self, goal: str | None) -> int:
         """Return how many goals with this name the robot can get. `goal` is None for any name."""
         listed = [name for name in listed_goal_names(self.loaded) if matches_goal_name(name, goal)]
         sent = sum(
-            1 if step.when is None else step.when.times
-            for step in self.steps
-            for action in step.actions
-            if step.name in self.possible
-            and action.kind == "new_goal"
-            and self.loaded.includes_robot(action.robot)
-            and goal in (None, getattr(action.chosen, "name", ""))
+            1 if one.step.when is None else one.step.when.times
+            for one in self._possible_actions
+            if one.kind == "new_goal" and self.loaded.includes_robot(one.action.robot) and goal in (None, one.spec.name)
         )
         return len(listed) + sent
 

@@ -148,15 +148,13 @@ class Scene:
         spec = self.loaded.spec
         first = scenario_goals(spec)[: len(spec.goals)]  # further loops lead to the same poses
         own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(first)}
-        goals = {**own, **event_goals(spec, self.loaded.includes_robot)}
+        goals = {**own, **event_goals(self.loaded)}
         return [((*keys, "pose"), goal) for keys, goal in goals.items() if not expects_failure(spec, goal.name)]
 
     @cached_property
     def actions(self) -> list[tuple[Keys, BaseModel]]:
         """Keys and specification of each action of an event that applies to this robot. The last key is the kind."""
-        located = [found for step in self.loaded.spec.steps for found in step.located_actions()]
-        relevant = [(keys, action) for keys, action in located if self.loaded.includes_robot(action.robot)]
-        return [((*keys, action.kind), action.chosen) for keys, action in relevant]
+        return [(one.keys, one.spec) for one in self.loaded.actions]
 
     def footprint_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
         """Return text such as "inside obstacle …" if the robot at a pose overlaps a solid; else None."""

@@ -34,10 +34,10 @@ def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, Scenario
         return SourceLines(), None
     names = verdict_names(spec.pass_)
     sent = {
-        action.chosen.name: _source_line(tree, *keys)
+        one.spec.name: _source_line(tree, *one.keys[:-1])
         for step in spec.steps
-        for keys, action in step.located_actions()
-        if action.kind == "new_goal" and hasattr(action.chosen, "name")
+        for one in step.actions
+        if one.kind == "new_goal"
     }
     return SourceLines(
         criteria={name: _source_line(tree, "pass", index) for index, name in enumerate(names)},

@@ -37,15 +37,13 @@ def switchable_zones(prepared: PreparedScenario) -> Zones:
     """Return the zones that events can switch during the run, with the speed limits of these events (0: none)."""
     keepout: list[Polygon] = []
     speed: list[tuple[Polygon, float]] = []
-    for step in prepared.spec.steps:
-        for _, action in step.located_actions():
-            chosen: Any = action.chosen
-            if not prepared.loaded.includes_robot(action.robot) or getattr(chosen, "region", None) is None:
-                continue
-            if action.kind == "keepout":
-                keepout.append(prepared.built.world.regions[chosen.region])
-            elif action.kind == "speed_zone":
-                speed.append((prepared.built.world.regions[chosen.region], chosen.speed_limit or 0.0))
+    for one in prepared.loaded.actions:
+        if one.kind in ("keepout", "speed_zone") and one.spec.region is not None:
+            region = prepared.built.world.regions[one.spec.region]
+            if one.kind == "keepout":
+                keepout.append(region)
+            else:
+                speed.append((region, one.spec.speed_limit or 0.0))
     return Zones(tuple(keepout), tuple(speed))
 
 

@@ -20,7 +20,7 @@ pass: [{collisions: {max: 0}}]
 def test_goals_without_tolerances_have_those_of_the_stack(tmp_path: Path) -> None:
     file = tmp_path / "a.scenario.yaml"
     file.write_text(SCENARIO)
-    spec = load_scenario(file, tmp_path).spec
-    goals = [*scenario_goals(spec), *event_goals(spec, lambda _robot: True).values()]
+    loaded = load_scenario(file, tmp_path)
+    goals = [*scenario_goals(loaded.spec), *event_goals(loaded).values()]
     found = [(goal.xy_tolerance, goal.yaw_tolerance) for goal in goals]
     assert found == [(0.31, 0.17), (0.1, 0.2), (0.31, 0.17)]
