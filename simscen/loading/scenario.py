@@ -6,7 +6,8 @@ from pathlib import Path
 
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.loading import multirobot
-from simscen.loading.checks.runner import check_robot_names, check_scenario
+from simscen.loading.checks.registry import ROBOT_NAMES
+from simscen.loading.checks.runner import check_scenario
 from simscen.loading.codes import UNSUPPORTED_BY_STACK
 from simscen.loading.files.assets import Assets, find_criterion_masks
 from simscen.loading.files.paths import PathSandbox, is_unusable_name, scenario_id
@@ -186,7 +187,7 @@ def _load_variation(
         if isinstance(world, ScalarNode) and isinstance(world.value, str):
             assets.world(world)  # reports also the problems of the world file
         return library.with_source(sorted([*spec, *assets.problems]))
-    if problems := check_robot_names(spec, tree):
+    if problems := ROBOT_NAMES.problems(tree, spec):
         return library.with_source(problems)
     loaded = (
         _load_multi_robot(spec, tree, library, file) if spec.robots else _load_single_robot(spec, tree, library, file)

@@ -2,16 +2,14 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
 
 from simscen.core.environment.world_model import World
 from simscen.core.errors import Problem
 from simscen.loading.checks.placement import motion_stops
-from simscen.loading.checks.registry import CheckProblem, CheckStage
+from simscen.loading.checks.registry import BUILT_WORLD, CheckProblem
 from simscen.loading.checks.scene import TOUCH_M
 from simscen.loading.loaded import LoadedWorld
 from simscen.loading.schema.messages import quoted
-from simscen.loading.yaml.tree import MappingNode
 from simscen.model.world import WorldSpec
 from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
@@ -21,30 +19,16 @@ RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_MAX_SLOPE_RAD, RAMP_ROBOT_MAX_STEP_M = 0.1
 """Wheel radius, maximum slope, and maximum step of an assumed robot that can climb typical ramps."""
 
 
-class BuiltWorldFile(NamedTuple):
-    """Specification and YAML tree of a world file, and the world that was built from it."""
-
-    world: World
-    spec: WorldSpec
-    tree: MappingNode
-
-
-BUILT_WORLD: CheckStage[BuiltWorldFile] = CheckStage()
-"""Checks of a world file in its built world."""
-
-
 def check_built_world(world: World, source: LoadedWorld) -> list[Problem]:
     """Return warnings about the world file `source`, without source lines; [] for a ROS map or SDF file."""
-    if source.spec is None or source.tree is None:
-        return []
-    return BUILT_WORLD.problems(BuiltWorldFile(world, source.spec, source.tree))
+    return [] if source.tree is None else BUILT_WORLD.problems(source.tree, world, source.spec)
 
 
 @BUILT_WORLD.check("SC314", severity="warning")
-def places_in_obstacles(built: BuiltWorldFile) -> Iterator[CheckProblem]:
+def places_in_obstacles(world: World, spec: WorldSpec) -> Iterator[CheckProblem]:
     """Find places inside obstacles."""
-    world = _without_platforms(built.world) if built.spec.ramps else built.world
-    for name, place in built.spec.places.items():
+    world = _without_platforms(world) if spec.ramps else world
+    for name, place in spec.places.items():
         solid = first_solid_in_disc(world.solids, (place.x, place.y), TOUCH_M, BLOCKING_HEIGHTS_M)
         if solid is not None:
             message = f'place {quoted(name)} is inside obstacle "{solid}"'
@@ -52,20 +36,20 @@ def places_in_obstacles(built: BuiltWorldFile) -> Iterator[CheckProblem]:
 
 
 @BUILT_WORLD.check("SC304", severity="warning")
-def motions_into_obstacles(built: BuiltWorldFile) -> Iterator[CheckProblem]:
+def motions_into_obstacles(world: World, spec: WorldSpec) -> Iterator[CheckProblem]:
     """Find motions of objects with keyframes or waypoints inside obstacles."""
-    for index, thing in enumerate(built.spec.objects):
+    for index, thing in enumerate(spec.objects):
         for keys, what, (x, y) in motion_stops(thing.move) if thing.move is not None else ():
-            if solid := first_solid_in_disc(built.world.solids, (x, y), TOUCH_M, BLOCKING_HEIGHTS_M):
+            if solid := first_solid_in_disc(world.solids, (x, y), TOUCH_M, BLOCKING_HEIGHTS_M):
                 message = f'{what} of {quoted(thing.name)} ({x:g}, {y:g}) is inside obstacle "{solid}"'
                 yield CheckProblem(("objects", index, "move", *keys), message)
 
 
 @BUILT_WORLD.check("SC315", severity="warning")
-def regions_outside_the_world(built: BuiltWorldFile) -> Iterator[CheckProblem]:
+def regions_outside_the_world(world: World, spec: WorldSpec) -> Iterator[CheckProblem]:
     """Find regions outside the bounds of the world."""
-    left, bottom, right, top = built.world.bounds
-    for name, corners in built.spec.regions.items():
+    left, bottom, right, top = world.bounds
+    for name, corners in spec.regions.items():
         xs, ys = [x for x, _ in corners], [y for _, y in corners]
         if max(xs) < left or min(xs) > right or max(ys) < bottom or min(ys) > top:
             message = f"region {quoted(name)} is outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"

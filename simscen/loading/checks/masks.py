@@ -12,13 +12,8 @@ from simscen.core.geometry.polygons import depth_inside_polygon
 from simscen.criteria.keepout import Keepout
 from simscen.criteria.speed import Speed
 from simscen.loading.builders import load_criterion_masks, load_masks
-from simscen.loading.checks.registry import CheckProblem
-from simscen.loading.checks.scene import (
-    WORLD,
-    Scene,
-    expected_failure_hint,
-    required_failure_hint,
-)
+from simscen.loading.checks.registry import WORLD, CheckProblem
+from simscen.loading.checks.scene import Scene, expected_failure_hint, required_failure_hint
 from simscen.loading.goals import expects_start_failure
 from simscen.loading.loaded import KEEPOUT_MASK_KEYS, SPEED_MASK_KEYS
 from simscen.loading.schema.messages import quoted

@@ -6,12 +6,13 @@ from dataclasses import replace
 from simscen.actions.base import AnyAction
 from simscen.core.messages.goals import LOOP_GOAL_NAME
 from simscen.criteria.registry import verdict_names
-from simscen.loading.checks.registry import NAMES, ROBOT_NAMES, CheckProblem, NameScope, WrittenScenario
+from simscen.loading.checks.registry import NAMES, ROBOT_NAMES, CheckProblem, NameScope
 from simscen.loading.known_names import KIND_NAMES, event_names, known_names, listed_goal_names, world_object_names
 from simscen.loading.multirobot import ROBOTS
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.spec_walk import Reference, references, walk
 from simscen.loading.yaml.tree import Keys
+from simscen.model.scenario import ScenarioSpec
 from simscen.triggers.base import AnyCondition, Condition
 
 RENAME_HINT = "rename one of them"
@@ -147,9 +148,8 @@ def robots_named_like_objects(scope: NameScope) -> Iterator[CheckProblem]:
 
 
 @ROBOT_NAMES.check("SC030")
-def unknown_robots(scenario: WrittenScenario) -> Iterator[CheckProblem]:
+def unknown_robots(spec: ScenarioSpec) -> Iterator[CheckProblem]:
     """Find triggers and actions that name a robot that does not exist."""
-    spec = scenario.spec
     robots = spec.robots or {}
     for keys, part in walk({"events": spec.events, "faults": spec.faults, ROBOTS: robots}):
         if not isinstance(part, AnyCondition | AnyAction) or part.robot is None or part.robot in robots:
@@ -161,9 +161,8 @@ def unknown_robots(scenario: WrittenScenario) -> Iterator[CheckProblem]:
 
 
 @ROBOT_NAMES.check("SC043")
-def missing_robot_names(scenario: WrittenScenario) -> Iterator[CheckProblem]:
+def missing_robot_names(spec: ScenarioSpec) -> Iterator[CheckProblem]:
     """In a scenario of several robots, find triggers and actions that concern one robot but do not name it."""
-    spec = scenario.spec
     if not spec.robots:
         return
     events = {step.name for step in spec.steps}
@@ -196,9 +195,8 @@ def _conditions_without_robot(condition: AnyCondition, keys: Keys, faults: Conta
 
 
 @ROBOT_NAMES.check("SC030")
-def unknown_expected_verdicts(scenario: WrittenScenario) -> Iterator[CheckProblem]:
+def unknown_expected_verdicts(spec: ScenarioSpec) -> Iterator[CheckProblem]:
     """In a scenario of several robots, find names under `expected.criteria` that belong to no verdict."""
-    spec = scenario.spec
     if not spec.robots:
         return
     known = [step.name for step in spec.steps]

@@ -13,15 +13,8 @@ from simscen.core.geometry import Polygon, Pose2, Pose3
 from simscen.core.geometry.motion_paths import MAX_STEP_M, largest_step, too_fast_message, top_speed
 from simscen.core.geometry.shapes import MotionPath, Solid
 from simscen.core.messages.goals import Goal
-from simscen.loading.checks.registry import CheckProblem
-from simscen.loading.checks.scene import (
-    SILL_M,
-    START,
-    TOUCH_M,
-    WORLD,
-    Scene,
-    expected_failure_hint,
-)
+from simscen.loading.checks.registry import WORLD, CheckProblem
+from simscen.loading.checks.scene import SILL_M, START, TOUCH_M, Scene, expected_failure_hint
 from simscen.loading.goals import expects_start_failure
 from simscen.loading.yaml.tree import Keys, MappingNode
 from simscen.sim.body.outline import radius_and_height

@@ -10,9 +10,9 @@ from simscen.criteria.keepout import Keepout
 from simscen.criteria.localization import LocalizationError
 from simscen.loading.checks.placement import blocked_poses
 from simscen.loading.checks.possible_run import MAX_SPEED_RATIO
-from simscen.loading.checks.registry import CheckProblem
+from simscen.loading.checks.registry import WORLD, CheckProblem
 from simscen.loading.checks.route_search import robot_routes, trigger_areas
-from simscen.loading.checks.scene import START, WORLD, Scene
+from simscen.loading.checks.scene import START, Scene
 from simscen.worlds.geometry.overlaps import place_polygon, polygons_overlap
 
 

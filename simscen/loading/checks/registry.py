@@ -9,27 +9,25 @@ The stages run in the order of the table. If a stage finds errors, later stages 
 WORLD_FILE finds errors. If names come from a ROS map, an SDF file, or a URDF, NAMES and MEANING run again with the
 built world. A view is the part of a scenario that concerns one robot.
 
-| stage | subject | finds, for example | needs |
-|---|---|---|---|
-| ROBOT_NAMES | the scenario as written | unknown robots | nothing |
-| WORLD_FILE | a world file | two objects with the same name | nothing |
-| NAMES | one robot's view of the scenario | unknown goals or sensors | the files that it names |
-| MEANING | one robot's view of the scenario | events that cannot happen | the files that it names |
-| BUILT_WORLD (`built_world.py`) | a world file | places inside obstacles | the built world |
-| WORLD (`scene.py`) | one robot's view of the scenario | goals without a route | the built world, the robot's size |
-| TIMING (`scene.py`) | one robot's view of the scenario | time limits that are too short | the same |
+| stage | subject | finds, for example |
+|---|---|---|
+| ROBOT_NAMES | ScenarioSpec of all robots | unknown robots |
+| WORLD_FILE | WorldSpec | two objects with the same name |
+| NAMES | NameScope | unknown goals or sensors |
+| MEANING | LoadedScenario: a view | events that cannot happen |
+| BUILT_WORLD | the built World, and its WorldSpec | places inside obstacles |
+| WORLD | Scene: a view in the built world | goals without a route |
+| TIMING | Scene | time limits that are too short |
 """
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from simscen.core.environment.world_model import World
 from simscen.core.errors import Problem
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import Keys, MappingNode, key_position, value_position
-from simscen.model.scenario import ScenarioSpec
-from simscen.model.world import WorldSpec
 
 
 class CheckProblem(NamedTuple):
@@ -44,34 +42,23 @@ class CheckProblem(NamedTuple):
     warning: bool = False
     """Whether this problem is a warning, although the check reports errors."""
     tree: MappingNode | None = None
-    """YAML tree that contains `keys`, such as the robot file; None for the tree of the subject."""
+    """YAML tree that contains `keys`, such as the robot file; None for the tree that the stage checks."""
 
     def problem(self, code: str, tree: MappingNode, severity: str = "error") -> Problem:
-        """Return the problem with its position, but without its source line. `tree` is the YAML tree of the subject."""
+        """Return the problem with its position in `tree`, but without its source line."""
         position_of = key_position if self.at_key else value_position
         position = position_of(self.tree or tree, self.keys)
         return Problem(*position, code, self.message, self.hint, "warning" if self.warning else severity)
 
 
-class Subject(Protocol):
-    """Object that the checks of a stage examine, such as a loaded scenario."""
-
-    @property
-    def tree(self) -> MappingNode:
-        """YAML tree in which problems are reported."""
-        ...
+CheckFunction = TypeVar("CheckFunction", bound=Callable[..., Iterable[CheckProblem]])
 
 
-AnySubject = TypeVar("AnySubject", bound=Subject)
-Check = Callable[[AnySubject], Iterable[CheckProblem]]
-CheckFunction = TypeVar("CheckFunction", bound=Callable[..., Any])
-
-
-@dataclass
-class CheckStage(Generic[AnySubject]):
+@dataclass(frozen=True)
+class CheckStage:
     """Checks that run together, in the order of their registration."""
 
-    checks: list[tuple[str, str, Check[AnySubject]]] = field(default_factory=list)
+    checks: list[tuple[str, str, Callable[..., Iterable[CheckProblem]]]] = field(default_factory=list)
     """Error code, severity, and function of each check."""
 
     def check(self, code: str, severity: str = "error") -> Callable[[CheckFunction], CheckFunction]:
@@ -83,27 +70,16 @@ class CheckStage(Generic[AnySubject]):
 
         return register
 
-    def problems(self, subject: AnySubject) -> list[Problem]:
-        """Return the problems of a subject, without source lines."""
+    def problems(self, tree: MappingNode, *subject: Any) -> list[Problem]:
+        """Return the problems of a subject, without source lines.
+
+        The checks are called with the arguments `subject`. Their problems are at keys of the YAML `tree`.
+        """
         return [
-            found.problem(code, subject.tree, severity)
+            found.problem(code, tree, severity)
             for code, severity, function in self.checks
-            for found in function(subject)
+            for found in function(*subject)
         ]
-
-
-class WrittenScenario(NamedTuple):
-    """Scenario with all its robots, before it is split into views."""
-
-    spec: ScenarioSpec
-    tree: MappingNode
-
-
-class WorldFile(NamedTuple):
-    """Specification of a world in a `*.world.yaml` or a scenario, and its YAML tree."""
-
-    spec: WorldSpec
-    tree: MappingNode
 
 
 class NameScope(NamedTuple):
@@ -112,14 +88,7 @@ class NameScope(NamedTuple):
     loaded: LoadedScenario
     world: World | None = None
 
-    @property
-    def tree(self) -> MappingNode:
-        """YAML tree of the view."""
-        return self.loaded.tree
 
-
-ROBOT_NAMES: CheckStage[WrittenScenario] = CheckStage()
-WORLD_FILE: CheckStage[WorldFile] = CheckStage()
-NAMES: CheckStage[NameScope] = CheckStage()
-MEANING: CheckStage[LoadedScenario] = CheckStage()
-"""Stages of the table above. The module `runner` runs them."""
+ROBOT_NAMES, WORLD_FILE, NAMES, MEANING = CheckStage(), CheckStage(), CheckStage(), CheckStage()
+BUILT_WORLD, WORLD, TIMING = CheckStage(), CheckStage(), CheckStage()
+"""Stages of the table above. The modules `runner` and `scene_runner` run them."""

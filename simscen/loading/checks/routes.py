@@ -12,9 +12,9 @@ from simscen.core.messages.goals import Goal
 from simscen.core.messages.goals import matches_goal_name as is_named
 from simscen.criteria.registry import AnyCriterion
 from simscen.loading.checks.placement import blocked_poses
-from simscen.loading.checks.registry import CheckProblem
+from simscen.loading.checks.registry import TIMING, WORLD, CheckProblem
 from simscen.loading.checks.route_search import robot_routes
-from simscen.loading.checks.scene import START, TIMING, WORLD, Scene, expected_failure_hint
+from simscen.loading.checks.scene import START, Scene, expected_failure_hint
 from simscen.loading.goals import expects_failure, scenario_goals
 from simscen.model.robot import RobotSpec
 from simscen.worlds.geometry.overlaps import first_solid_in_disc

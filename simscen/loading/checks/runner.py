@@ -5,18 +5,8 @@ from collections.abc import Iterable
 from simscen.core.environment.world_model import World
 from simscen.core.errors import Problem
 from simscen.loading.checks import actions, criteria, events, faults, names, settings, world_file
-from simscen.loading.checks.registry import (
-    MEANING,
-    NAMES,
-    ROBOT_NAMES,
-    WORLD_FILE,
-    NameScope,
-    WorldFile,
-    WrittenScenario,
-)
+from simscen.loading.checks.registry import MEANING, NAMES, WORLD_FILE, NameScope
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
-from simscen.loading.yaml.tree import MappingNode
-from simscen.model.scenario import ScenarioSpec
 
 MODULES = (actions, criteria, events, faults, names, settings, world_file)
 """Modules that register checks when they are imported."""
@@ -30,19 +20,16 @@ def check_scenario(
     `world` is the built world; it is only needed to check names in a world from a ROS map or SDF file. The result
     includes `unknown_places`, the problems that were found while the scenario was loaded.
     """
-    problems = [*unknown_places, *NAMES.problems(NameScope(loaded, world)), *check_world_file(loaded.world)]
+    problems = [
+        *unknown_places,
+        *NAMES.problems(loaded.tree, NameScope(loaded, world)),
+        *check_world_file(loaded.world),
+    ]
     if all(problem.severity == "warning" for problem in problems):
-        problems += MEANING.problems(loaded)
+        problems += MEANING.problems(loaded.tree, loaded)
     return [loaded.with_source_line(problem) for problem in problems]
 
 
 def check_world_file(world: LoadedWorld) -> list[Problem]:
     """Return the errors and warnings of a world file, without source lines; [] for a ROS map or SDF file."""
-    if world.spec is None or world.tree is None:
-        return []
-    return WORLD_FILE.problems(WorldFile(world.spec, world.tree))
-
-
-def check_robot_names(spec: ScenarioSpec, tree: MappingNode) -> list[Problem]:
-    """Return the problems with names of robots in a scenario, without source lines. `tree` is its YAML tree."""
-    return ROBOT_NAMES.problems(WrittenScenario(spec, tree))
+    return [] if world.tree is None else WORLD_FILE.problems(world.tree, world.spec)

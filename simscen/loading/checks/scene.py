@@ -15,12 +15,11 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import Body, Solid
 from simscen.core.messages.goals import Goal
 from simscen.loading.builders import load_map
-from simscen.loading.checks.registry import CheckStage
 from simscen.loading.goals import event_goals, expects_failure, scenario_goals
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.robot_size import RobotSize
 from simscen.loading.world_cache import WorldCache
-from simscen.loading.yaml.tree import Keys, MappingNode
+from simscen.loading.yaml.tree import Keys
 from simscen.worlds.geometry.overlaps import first_solid_in_disc, first_solid_in_footprint
 from simscen.worlds.geometry.prisms import upright_prism
 
@@ -56,11 +55,6 @@ class Scene:
             self._results[compute] = compute(self)
         result: T = self._results[compute]
         return result
-
-    @property
-    def tree(self) -> MappingNode:
-        """YAML tree of the scenario."""
-        return self.loaded.tree
 
     @property
     def z_range(self) -> tuple[float, float]:
@@ -178,12 +172,6 @@ def _at_initial_pose(bodies: Iterable[Body]) -> Iterator[Solid]:
     for body in bodies:
         for solid in body.solids:
             yield Solid(solid.shape, body.pose.compose(solid.pose), body.name)
-
-
-WORLD: CheckStage[Scene] = CheckStage()
-"""Checks of a scenario in its built world, except of time bounds."""
-TIMING: CheckStage[Scene] = CheckStage()
-"""Checks of time bounds. They run only if WORLD finds no errors."""
 
 
 def expected_failure_hint(keys: Keys, code: str) -> str:

@@ -13,8 +13,9 @@ from simscen.core.files import require_regular_file
 from simscen.loading.builders import load_robot, world_from_file
 from simscen.loading.checks import masks, placement, regions, routes
 from simscen.loading.checks.built_world import check_built_world
+from simscen.loading.checks.registry import TIMING, WORLD
 from simscen.loading.checks.runner import check_scenario
-from simscen.loading.checks.scene import TIMING, WORLD, Scene
+from simscen.loading.checks.scene import Scene
 from simscen.loading.files.paths import path_in_messages
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.loading.open_ground import with_stops_in_bounds
@@ -85,9 +86,9 @@ def _check_robot(loaded: LoadedScenario, world: World, cache: WorldCache, pictur
 
 def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
     """Return the problems that the stages WORLD and TIMING find. Their hints contain the path of a picture."""
-    problems = WORLD.problems(scene)
+    problems = WORLD.problems(scene.loaded.tree, scene)
     if not _has_errors(problems):
-        problems += TIMING.problems(scene)
+        problems += TIMING.problems(scene.loaded.tree, scene)
     problems = [scene.loaded.with_source_line(problem) for problem in sorted(problems)]
     if problems and pictures is not None:
         gaps = [gap.position for _, gap in scene.cached(routes.unreachable_goals)]

@@ -2,16 +2,15 @@
 
 from collections.abc import Iterator
 
-from simscen.loading.checks.registry import WORLD_FILE, CheckProblem, WorldFile
+from simscen.loading.checks.registry import WORLD_FILE, CheckProblem
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.yaml.tree import Keys
-from simscen.model.world import WorldObject
+from simscen.model.world import WorldObject, WorldSpec
 
 
 @WORLD_FILE.check("SC033")
-def duplicate_names_in_world(file: WorldFile) -> Iterator[CheckProblem]:
+def duplicate_names_in_world(spec: WorldSpec) -> Iterator[CheckProblem]:
     """Find obstacles and walls with the name of an object or door, and obstacles with the same name (a warning)."""
-    spec = file.spec
     moving = {world_object.name for world_object in spec.objects} | {door.name for door in spec.doors}
     seen: set[str] = set()
     for index, obstacle in enumerate(spec.obstacles):
@@ -30,9 +29,8 @@ def duplicate_names_in_world(file: WorldFile) -> Iterator[CheckProblem]:
 
 
 @WORLD_FILE.check("SC313")
-def zero_extents(file: WorldFile) -> Iterator[CheckProblem]:
+def zero_extents(spec: WorldSpec) -> Iterator[CheckProblem]:
     """Find walls, ramps, and doors of zero length, and motions that stay at one pose (a warning)."""
-    spec = file.spec
     for index, wall in enumerate(spec.walls):
         if all(point == wall.points[0] for point in wall.points):
             yield CheckProblem(("walls", index, "points"), "the wall has no length: all its points are the same")
@@ -49,9 +47,8 @@ def zero_extents(file: WorldFile) -> Iterator[CheckProblem]:
 
 
 @WORLD_FILE.check("SC054", severity="warning")
-def duplicate_shapes(file: WorldFile) -> Iterator[CheckProblem]:
+def duplicate_shapes(spec: WorldSpec) -> Iterator[CheckProblem]:
     """Find obstacles and objects with the same shape and pose as another obstacle or object."""
-    spec = file.spec
     things: list[tuple[Keys, WorldObject]] = [(("obstacles", k), thing) for k, thing in enumerate(spec.obstacles)]
     things += [(("objects", k), thing) for k, thing in enumerate(spec.objects)]
     seen: list[tuple[object, str]] = []
@@ -64,9 +61,8 @@ def duplicate_shapes(file: WorldFile) -> Iterator[CheckProblem]:
 
 
 @WORLD_FILE.check("SC030")
-def unknown_friction_regions(file: WorldFile) -> Iterator[CheckProblem]:
+def unknown_friction_regions(spec: WorldSpec) -> Iterator[CheckProblem]:
     """Find entries of `friction` for regions that do not exist."""
-    spec = file.spec
     for name in spec.friction:
         if name not in spec.regions:
             message, hint = f"no region is called {quoted(name)}", suggestion(name, spec.regions)
