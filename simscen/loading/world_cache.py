@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from simscen.core.environment.world_model import World
 from simscen.core.files import collect_read_files, record_read_file
@@ -16,6 +17,8 @@ from simscen.worlds.routes.simple_paths import SimplePaths, simple_paths_between
 if TYPE_CHECKING:
     from simscen.worlds.routes.shortest_paths import ShortestPaths
 
+Solids = tuple[Solid, ...]
+Paths = TypeVar("Paths")
 Bounds = tuple[float, float, float, float]
 """(min x, min y, max x, max y) in m."""
 
@@ -32,12 +35,8 @@ class WorldCache:
     """Largest number of worlds in the cache. The oldest worlds are discarded."""
     _worlds: list[tuple[LoadedWorld, World, set[Path]]] = field(default_factory=list)
     """Worlds, and the files from which they were built."""
-    _simple_paths: list[tuple[tuple[Solid, ...], float, tuple[float, float], SimplePaths | None]] = field(
-        default_factory=list
-    )
-    _shortest_paths: list[tuple[tuple[Solid, ...], Bounds, float, tuple[float, float], ShortestPaths]] = field(
-        default_factory=list
-    )
+    _simple_paths: list[tuple[Solids, object, SimplePaths | None]] = field(default_factory=list)
+    _shortest_paths: list[tuple[Solids, object, ShortestPaths]] = field(default_factory=list)
 
     def world(self, loaded: LoadedScenario) -> World:
         """Return the built world of a scenario. Raises InvalidInput.
@@ -54,30 +53,33 @@ class WorldCache:
             record_read_file(file)
         return known[1]
 
-    def simple_paths(
-        self, solids: tuple[Solid, ...], radius: float, z_range: tuple[float, float]
-    ) -> SimplePaths | None:
+    def simple_paths(self, solids: Solids, radius: float, z_range: tuple[float, float]) -> SimplePaths | None:
         """Return a fast path search, which can miss paths; None if a solid is too complex for it."""
-        for known in self._simple_paths:
-            if known[0] is solids and known[1:3] == (radius, z_range):
-                return known[3]
-        paths = simple_paths_between(solids, radius, z_range)
-        self._simple_paths = [*self._simple_paths[-7:], (solids, radius, z_range, paths)]
-        return paths
+        return _cached(
+            self._simple_paths, 8, solids, (radius, z_range), lambda: simple_paths_between(solids, radius, z_range)
+        )
 
     def shortest_paths(
-        self, solids: tuple[Solid, ...], bounds: Bounds, radius: float, z_range: tuple[float, float]
+        self, solids: Solids, bounds: Bounds, radius: float, z_range: tuple[float, float]
     ) -> ShortestPaths:
         """Return a slower path search within `bounds`, which always finds the shortest path."""
-        for known in self._shortest_paths:
-            if known[0] is solids and known[1:4] == (bounds, radius, z_range):
-                return known[4]
-        from simscen.worlds.geometry.triangulation import merge_solids
-        from simscen.worlds.routes.shortest_paths import ShortestPaths
 
-        paths = ShortestPaths(merge_solids(solids), bounds, radius, z_range)
-        self._shortest_paths = [
-            *self._shortest_paths[-3:],
-            (solids, bounds, radius, z_range, paths),
-        ]  # large objects: keep only the last four
-        return paths
+        def search() -> ShortestPaths:
+            from simscen.worlds.geometry.triangulation import merge_solids
+            from simscen.worlds.routes.shortest_paths import ShortestPaths
+
+            return ShortestPaths(merge_solids(solids), bounds, radius, z_range)
+
+        return _cached(self._shortest_paths, 4, solids, (bounds, radius, z_range), search)
+
+
+def _cached(
+    cache: list[tuple[Solids, object, Paths]], size: int, solids: Solids, key: object, search: Callable[[], Paths]
+) -> Paths:
+    """Return the path search for `solids` (compared by identity) and `key`. The cache keeps the last `size`."""
+    for known_solids, known_key, paths in cache:
+        if known_solids is solids and known_key == key:
+            return paths
+    cache.append((solids, key, search()))
+    del cache[:-size]
+    return cache[-1][2]

@@ -9,7 +9,6 @@ from pydantic import BaseModel
 
 from simscen.core.errors import Problem
 from simscen.core.version import PACKAGE
-from simscen.loading.files.paths import PathProblem
 from simscen.loading.loaded import CriterionMask, LoadedMap, LoadedRobot, LoadedWorld
 from simscen.loading.named_places import resolve_places, unknown_places
 from simscen.loading.schema.messages import did_you_mean, quoted, suggestion
@@ -109,7 +108,8 @@ class Assets:
         if written in shipped_files:
             return self._load_cached(self.robot_file, shipped_files[written])
         hint = f"{suggestion(written, shipped_files)} (or the path of a *.robot.yaml or .urdf file)"
-        self._add_problem(position, "SC023", f"no robot called {quoted(written)} ships with simscen", hint)
+        message = f"no robot called {quoted(written)} ships with simscen"
+        self.problems.append(Problem(*position, "SC023", message, hint))
         return None
 
     def robot_file(self, path: Path) -> LoadedRobot | None:
@@ -172,17 +172,13 @@ class Assets:
 
     def _find(self, written: str, position: Position, kind: str = "regular file") -> Path | None:
         """Return the existing file or folder with the path `written`. `kind` is "regular file" or "folder"."""
-        found = self.library.sandbox.find(written, self.library.folder_of(position))
-        if isinstance(found, PathProblem):
-            self._add_problem(position, found.code, found.message, found.hint)
-            return None
-        if not (found.is_dir() if kind == "folder" else found.is_file()):
-            self._add_problem(position, "SC001", f"not a {kind}: {quoted(written)}")
+        found = self.library.find(written, position)
+        if isinstance(found, Path) and not (found.is_dir() if kind == "folder" else found.is_file()):
+            found = Problem(*position, "SC001", f"not a {kind}: {quoted(written)}")
+        if isinstance(found, Problem):
+            self.problems.append(found)
             return None
         return found
-
-    def _add_problem(self, position: Position, code: str, message: str, hint: str = "") -> None:
-        self.problems.append(Problem(*position, code=code, message=message, hint=hint))
 
 
 def is_ros_map(tree: Node | None) -> bool:

@@ -13,6 +13,7 @@ from pathlib import Path, PurePosixPath
 from simscen.core.errors import Problem
 from simscen.loading.schema.messages import did_you_mean, quoted
 from simscen.loading.yaml.textfile import os_error_reason
+from simscen.loading.yaml.tree import Position
 
 MODEL_SCHEME = "model://"
 """Scheme of URIs for models in Gazebo."""
@@ -36,29 +37,32 @@ class PathSandbox:
         """Return the sandbox of these folders, as absolute paths with symbolic links resolved."""
         return cls(_resolved(root), tuple(_resolved(folder) for folder in world_path))
 
-    def find(self, written: str, folder: Path) -> "Path | PathProblem":
-        """Return the existing file or folder with the path `written`, or a problem.
+    def find(self, written: str, folder: Path, position: Position) -> Path | Problem:
+        """Return the existing file or folder with the path `written`, or a problem at `position`.
 
         The path is relative to `folder`, the folder of the YAML file that contains it. If it does not exist there or
         leads out of the sandbox, it is searched in the folders of `--world-path`. `model://name/…` is only searched in
         these folders.
         """
-        if problem := _invalid_form(written):
+        if problem := _form_problem(written, position):
             return problem
         if written.startswith(MODEL_SCHEME):
             message = f"{quoted(written)} was not found in any folder of --world-path"
-            missing = PathProblem("SC023", message, "" if self.world_path else "allow its folder with --world-path")
+            missing = Problem(
+                *position, "SC023", message, "" if self.world_path else "allow its folder with --world-path"
+            )
             return self._in_world_path(written.removeprefix(MODEL_SCHEME)) or missing
         path = _resolved(folder / written)
         if not self.contains(path):
             hint = "choose the root with --root, or allow a folder with --world-path"
-            outside = PathProblem("SC020", f"{quoted(written)} is outside the scenario root", hint)
+            outside = Problem(*position, "SC020", f"{quoted(written)} is outside the scenario root", hint)
             return self._in_world_path(written) or outside
         try:
             path.stat()
         except OSError as error:
             code = "SC022" if error.errno == errno.ELOOP else "SC023"
-            missing = PathProblem(code, f"{os_error_reason(error)}: {quoted(written)}", _similar_name_hint(path))
+            message = f"{os_error_reason(error)}: {quoted(written)}"
+            missing = Problem(*position, code, message, _similar_name_hint(path))
             return self._in_world_path(written) or missing
         return path
 
@@ -110,23 +114,14 @@ def is_folder(path: Path) -> bool:
     return os.path.isdir(path)  # noqa: PTH112
 
 
-@dataclass(frozen=True)
-class PathProblem:
-    """Problem with a path in a YAML file, without its position."""
-
-    code: str
-    message: str
-    hint: str = ""
-
-
-def _invalid_form(written: str) -> PathProblem | None:
+def _form_problem(written: str, position: Position) -> Problem | None:
     """Return a problem if a path is not relative or has control characters; else None."""
     if any(not c.isprintable() for c in written):
-        return PathProblem("SC017", f"control character in the path {quoted(written)}")
+        return Problem(*position, "SC017", f"control character in the path {quoted(written)}")
     if written.startswith(("/", "~")) or (len(written) > 1 and written[1] == ":"):
-        return PathProblem("SC021", f"{quoted(written)} is an absolute path", "write it relative to this file")
+        return Problem(*position, "SC021", f"{quoted(written)} is an absolute path", "write it relative to this file")
     if "://" in written and not written.startswith(MODEL_SCHEME):
-        return PathProblem("SC021", f"{quoted(written)} is a URL", "use a relative path or model://name")
+        return Problem(*position, "SC021", f"{quoted(written)} is a URL", "use a relative path or model://name")
     return None
 
 
@@ -162,8 +157,5 @@ def is_unusable_name(name: str) -> bool:
 
 def scenario_id(file: Path, root: Path) -> str:
     """Return the id of a scenario: its path relative to the root, without suffix; outside the root, its file name."""
-    display_name = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
-    return next(
-        (display_name.removesuffix(suffix) for suffix in _SCENARIO_SUFFIXES if display_name.endswith(suffix)),
-        display_name,
-    )
+    name = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
+    return next((name.removesuffix(suffix) for suffix in _SCENARIO_SUFFIXES if name.endswith(suffix)), name)

@@ -9,7 +9,6 @@ from pydantic import ValidationError
 
 from simscen.core.clock import Clock
 from simscen.core.errors import Problem
-from simscen.loading.files.paths import PathProblem
 from simscen.loading.stacks.nav2_mapping import Translation
 from simscen.loading.stacks.nav2_nodes import is_unknown, translate
 from simscen.loading.stacks.nav2_parameters import Nav2Parameters, ignored_note, read_nav2_parameters
@@ -65,9 +64,9 @@ def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree
     written, position = stack.entries[NAV2_PARAMS].value, value_position(stack, (NAV2_PARAMS,))
     if not isinstance(written, ScalarNode) or not isinstance(written.value, str):
         return stack  # validation reports the wrong type
-    file = library.sandbox.find(written.value, library.folder_of(position))
-    if isinstance(file, PathProblem):
-        result.problems.append(Problem(*position, file.code, file.message, file.hint))
+    file = library.find(written.value, position)
+    if isinstance(file, Problem):
+        result.problems.append(file)
         return stack
     display_name = library.sandbox.display_name(file)
     parameters = read_nav2_parameters(file, display_name)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.errors import Problem
-from simscen.loading.files.paths import PathProblem, PathSandbox
+from simscen.loading.files.paths import PathSandbox
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.textfile import read_text, with_source_line
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode, child
@@ -70,9 +70,9 @@ class Library:
         self.texts |= texts
         self.files |= files
 
-    def folder_of(self, position: Position) -> Path:
-        """Return the folder of the file that contains a position."""
-        return self.files[position.path].parent
+    def find(self, written: str, position: Position) -> Path | Problem:
+        """Return the existing file or folder with the path `written` at a position of a YAML file, or a problem."""
+        return self.sandbox.find(written, self.files[position.path].parent, position)
 
     def with_source(self, problems: list[Problem]) -> list[Problem]:
         """Return the problems with their source lines. Problems that have one are unchanged."""
@@ -110,9 +110,9 @@ class Library:
         position = extends.position
         if not isinstance(extends, ScalarNode) or not isinstance(extends.value, str):
             return Problem(*position, "SC011", f"`{EXTENDS}` must be the path of one file")
-        base = self.sandbox.find(extends.value, chain[-1].parent)
-        if isinstance(base, PathProblem):
-            return Problem(*position, base.code, base.message, base.hint)
+        base = self.find(extends.value, position)
+        if isinstance(base, Problem):
+            return base
         if base in chain:
             names = " → ".join(self.sandbox.display_name(file) for file in (*chain[chain.index(base) :], base))
             return Problem(*position, "SC024", f"circular `extends`: {names}")

@@ -3,7 +3,11 @@ from pathlib import Path
 
 import pytest
 
-from simscen.loading.files.paths import PathProblem, PathSandbox
+from simscen.core.errors import Problem
+from simscen.loading.files.paths import PathSandbox
+from simscen.loading.yaml.tree import Position
+
+POSITION = Position("a.yaml", 1, 1)
 
 
 @pytest.fixture
@@ -14,21 +18,21 @@ def sandbox(tmp_path: Path) -> PathSandbox:
     return PathSandbox.around(tmp_path / "root", [tmp_path / "allowed"])
 
 
-def _refusal(sandbox: PathSandbox, written: str) -> PathProblem:
-    found = sandbox.find(written, sandbox.root / "sub")
-    assert isinstance(found, PathProblem)
+def _refusal(sandbox: PathSandbox, written: str) -> Problem:
+    found = sandbox.find(written, sandbox.root / "sub", POSITION)
+    assert isinstance(found, Problem)
     return found
 
 
 def test_path_is_relative_to_the_file_that_contains_it(sandbox: PathSandbox) -> None:
-    assert sandbox.find("a.yaml", sandbox.root / "sub") == sandbox.root / "sub/a.yaml"
-    assert sandbox.find("../b.yaml", sandbox.root / "sub") == sandbox.root / "b.yaml"
+    assert sandbox.find("a.yaml", sandbox.root / "sub", POSITION) == sandbox.root / "sub/a.yaml"
+    assert sandbox.find("../b.yaml", sandbox.root / "sub", POSITION) == sandbox.root / "b.yaml"
 
 
 def test_models_and_bare_paths_are_found_in_the_world_path(sandbox: PathSandbox) -> None:
     expected = sandbox.world_path[0] / "model/m.yaml"
-    assert sandbox.find("model://model/m.yaml", sandbox.root) == expected
-    assert sandbox.find("model/m.yaml", sandbox.root) == expected
+    assert sandbox.find("model://model/m.yaml", sandbox.root, POSITION) == expected
+    assert sandbox.find("model/m.yaml", sandbox.root, POSITION) == expected
 
 
 @pytest.mark.parametrize("written", ["../../outside/secret.yaml", "../../outside/nothing.yaml", "../../../etc/passwd"])
@@ -57,7 +61,7 @@ def test_a_link_out_of_the_root_is_refused(sandbox: PathSandbox, tmp_path: Path)
 
 def test_a_link_inside_the_root_is_followed(sandbox: PathSandbox) -> None:
     (sandbox.root / "sub/link.yaml").symlink_to("../b.yaml")
-    assert sandbox.find("link.yaml", sandbox.root / "sub") == sandbox.root / "b.yaml"
+    assert sandbox.find("link.yaml", sandbox.root / "sub", POSITION) == sandbox.root / "b.yaml"
 
 
 def test_a_loop_of_links_is_reported(sandbox: PathSandbox) -> None:

@@ -63,7 +63,7 @@ def test_places_stay_in_the_file_they_were_written_in(tmp_path: Path) -> None:
     assert tree is not None
     place = tree.entries["world"].value.position  # type: ignore[union-attr]
     assert place == ("sub/b.yaml", 2, 8)
-    assert library.folder_of(place) == tmp_path / "sub"
+    assert library.find("b.yaml", place) == tmp_path / "sub/b.yaml"
 
 
 def test_a_circle_is_printed_as_a_chain(tmp_path: Path) -> None:
