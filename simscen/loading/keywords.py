@@ -62,7 +62,6 @@ class _Parser:
         return lambda text: all(part(text) for part in parts)
 
     def _parse_term(self, depth: int) -> Matcher:
-        """Parse a word, `not` with a term, or an expression in parentheses."""
         if depth > MAX_DEPTH:
             raise self.error(f"it is nested deeper than {MAX_DEPTH}")
         if self._take("not"):
@@ -79,7 +78,6 @@ class _Parser:
         return lambda text: word in text.casefold()
 
     def _take(self, token: str) -> bool:
-        """Remove the next token if it is `token`, and return whether it was."""
         if self.tokens and self.tokens[0] == token:
             self.tokens.pop(0)
             return True
@@ -91,7 +89,6 @@ class _Parser:
 
 
 def _no_match_message(candidates: Sequence[LoadedScenario], keyword: str, tags: Sequence[str]) -> str:
-    """Return the message that no scenario is selected, with a hint for an unknown tag."""
     known = sorted({tag for scenario in candidates for tag in scenario.spec.tags})
     unknown = [tag for tag in tags if tag not in known]
     if unknown:

@@ -75,7 +75,6 @@ def _circle(radius: float) -> Polygon:
 
 
 def _hull_heights(body: RobotBody) -> tuple[float, float]:
-    """Return the lowest and the highest z of the hull in m, in the base frame."""
     from simscen.sim.body.outline import hull_points
 
     heights = [solid.pose.apply(hull_points(solid.shape))[:, 2] for solid in body.hull]

@@ -49,7 +49,6 @@ class PassRate(Spec):
 
     @model_validator(mode="after")
     def _check_method(self) -> "PassRate":
-        """Raise ValueError if `target`, `power`, or `runs` do not fit the method or the claim."""
         if self.method == "sprt" and self.target is None:
             raise ValueError("`sprt` needs a `target`: the pass rate of a robot that should be accepted")
         if self.method != "sprt":

@@ -8,21 +8,15 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from simscen.actions.base import AnyAction
 from simscen.faults.base import AnyFault
-from simscen.spec.base import Spec
+from simscen.spec.base import Spec, one_or_several
 from simscen.spec.places import Name
 from simscen.spec.quantities import PositiveDuration
 from simscen.triggers.base import Trigger
 
-
-def _one_or_several(value: Any) -> str:
-    """Return the union tag of actions: "several" for a list, otherwise "one"."""
-    return "several" if isinstance(value, list) else "one"
-
-
 Actions = Annotated[
-    Annotated[AnyAction, Tag("one")]
-    | Annotated[Annotated[list[AnyAction], Field(min_length=1, max_length=50)], Tag("several")],
-    Discriminator(_one_or_several),
+    Annotated[AnyAction, Tag("one value")]
+    | Annotated[Annotated[list[AnyAction], Field(min_length=1, max_length=50)], Tag("several values")],
+    Discriminator(one_or_several),
 ]
 
 

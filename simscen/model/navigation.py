@@ -1,11 +1,11 @@
 """Specifications of the navigation mode, of the expected outcome of a goal, and of waiting at a goal."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
 from simscen.core.messages.goals import FAILED, Mode
-from simscen.spec.base import LazySpec, Spec
+from simscen.spec.base import LazySpec, Spec, text_or_mapping
 from simscen.spec.quantities import Duration, PositiveLength
 
 
@@ -27,14 +27,9 @@ class Navigation(Spec):
     `xy_tolerance` of a goal takes precedence."""
 
 
-def text_or_mapping(value: Any) -> str:
-    """Return the tag of a value in a union of a text and a mapping: "text" or "mapping"."""
-    return "text" if isinstance(value, str) else "mapping"
-
-
 Expectation = Annotated[
-    Annotated[Literal["succeeded", "failed"], Tag("text")]
-    | Annotated[Spec, LazySpec("simscen.criteria.error_codes", "ExpectedError"), Tag("mapping")],
+    Annotated[Literal["succeeded", "failed"], Tag("a text")]
+    | Annotated[Spec, LazySpec("simscen.criteria.error_codes", "ExpectedError"), Tag("a mapping")],
     Discriminator(text_or_mapping),
 ]
 """Expected outcome of a goal."""

@@ -187,7 +187,6 @@ class RobotSpec(Spec):
 
     @model_validator(mode="after")
     def _check_consistency(self) -> "RobotSpec":
-        """Raise ValueError for keys that are missing or exclude each other."""
         if unknown := sorted(self.latency.sensors.keys() - self.sensors.keys()):
             raise ValueError(f"`latency` names `{unknown[0]}`, which is not a sensor of the robot")
         if (self.urdf is None) == (self.body is None):

@@ -10,10 +10,10 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.random_streams import MAX_SEED
 from simscen.core.records.verdict import ExpectedFailure as DeclaredFailure
 from simscen.criteria.registry import AnyCriterion
-from simscen.model.navigation import Expectation, Navigation, OnReached, text_or_mapping
+from simscen.model.navigation import Expectation, Navigation, OnReached
 from simscen.model.stack_files import AnyStack
 from simscen.model.world import FilePath, WorldSpec
-from simscen.spec.base import LanguageVersion, LazySpec, Spec, by_default
+from simscen.spec.base import LanguageVersion, LazySpec, Spec, by_default, text_or_mapping
 from simscen.spec.places import (
     Name,
     PlaceAllowed,
@@ -52,8 +52,8 @@ else:
 
 
 WorldOrFile = Annotated[
-    Annotated[FilePath, Tag("text")]
-    | Annotated[WorldSpec, LazySpec("simscen.model.world", "WorldSpec"), Tag("mapping")],
+    Annotated[FilePath, Tag("a text")]
+    | Annotated[WorldSpec, LazySpec("simscen.model.world", "WorldSpec"), Tag("a mapping")],
     Discriminator(text_or_mapping),
 ]
 
@@ -164,7 +164,6 @@ MAX_ROBOTS = 20
 
 
 def _check_reason(reason: str) -> str:
-    """Return the reason. Raises ValueError if it is empty."""
     if not reason.strip():
         raise ValueError("the reason is empty")
     return reason
@@ -188,7 +187,6 @@ class ExpectedFailure(Spec):
     @model_validator(mode="before")
     @classmethod
     def _require_reason(cls, value: Any) -> Any:
-        """Raise ValueError for text, to explain how a reason is written."""
         if isinstance(value, str):
             raise ValueError("give the reason for the known failure as `{fail: REASON}`")
         return value
@@ -210,7 +208,6 @@ class Physics(Spec):
 
 
 def _check_unique(measures: list[AnyMeasure]) -> list[AnyMeasure]:
-    """Return the metrics. Raises ValueError if one of them is given twice."""
     kinds = [measure.kind for measure in measures]
     repeated = [kind for index, kind in enumerate(kinds) if kind in kinds[:index]]
     if repeated:

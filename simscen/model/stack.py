@@ -13,13 +13,13 @@ from simscen.model.planners import Planner
 from simscen.model.profiles import Profile, apply_profile
 from simscen.model.recovery import Recovery
 from simscen.model.stack_base import Latency, StackBase
-from simscen.spec.base import Typed, by_default
+from simscen.spec.base import Typed, by_default, text_or_mapping
 from simscen.spec.quantities import Quantity
 
 ParameterFile = Annotated[str, Field(min_length=1, max_length=4096)]
 _LatencyOrRobot = Annotated[
-    Annotated[Literal["robot"], Tag("a name")] | Annotated[Latency, Tag("durations")],
-    Discriminator(lambda value: "a name" if isinstance(value, str) else "durations"),
+    Annotated[Literal["robot"], Tag("a text")] | Annotated[Latency, Tag("a mapping")],
+    Discriminator(text_or_mapping),
 ]
 REFERENCE_BUILDER = "simscen.stack.build:StackBuilder"
 ADVANCED_BUILDER = "simscen.advanced.stack:AdvancedStackBuilder"
@@ -73,7 +73,6 @@ class StackSpec(InProcessStack):
     @model_validator(mode="before")
     @classmethod
     def _apply_profile(cls, parameters: Any) -> Any:
-        """Complete the parameters by the values of the profile."""
         return apply_profile(parameters) if isinstance(parameters, Mapping) else parameters
 
     @property

@@ -65,13 +65,11 @@ class StackFileSpec(Spec):
 
 
 def _check_command(text: str) -> str:
-    """Return the command line. Raises ValueError if it cannot be split into words."""
     split_command(text)
     return text
 
 
 def _check_absolute(folder: str) -> str:
-    """Return the folder. Raises ValueError unless it is absolute or below `~`."""
     if not folder.startswith(("/", "~")):
         raise ValueError(
             "expected an absolute folder or one below `~`, since this file applies to all working directories"

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, StringConstraints, Tag, model_validator
 
-from simscen.spec.base import Spec, Value
+from simscen.spec.base import Spec, Value, one_or_several
 from simscen.spec.choice import Choice
 from simscen.spec.quantities import AnyAmount
 
@@ -117,7 +117,6 @@ class VariationBlock(Spec):
 
     @model_validator(mode="after")
     def _check_not_empty(self) -> "VariationBlock":
-        """Raise ValueError unless there is at least one kind of values."""
         if all(values is None for values in (self.grid, self.pairwise, self.pairs, self.list_, self.sampled)):
             raise ValueError("expected one of: grid, pairwise, pairs, list, sampled")
         return self
@@ -137,9 +136,9 @@ class VariationBlock(Spec):
 class Variations(
     Value[
         Annotated[
-            Annotated[VariationBlock, Tag("one")]
-            | Annotated[Annotated[list[VariationBlock], Field(max_length=50)], Tag("several")],
-            Discriminator(lambda value: "several" if isinstance(value, list) else "one"),
+            Annotated[VariationBlock, Tag("one value")]
+            | Annotated[Annotated[list[VariationBlock], Field(max_length=50)], Tag("several values")],
+            Discriminator(one_or_several),
         ]
     ]
 ):

@@ -96,6 +96,16 @@ class Ranged(Spec):
         return self
 
 
+def text_or_mapping(value: Any) -> str:
+    """Return the tag of a value in a union of a text and a mapping: "a text" or "a mapping"."""
+    return "a text" if isinstance(value, str) else "a mapping"
+
+
+def one_or_several(value: Any) -> str:
+    """Return the tag of a value in a union of a value and a list of such values: "one value" or "several values"."""
+    return "several values" if isinstance(value, list) else "one value"
+
+
 def by_default() -> Any:
     """Return an optional pydantic field. Its default is the specification with default values."""
     # Creating the specification at import would cost every command 10 ms.
@@ -113,7 +123,6 @@ def field_docs(model: type) -> dict[str, str]:
 
 @cache
 def _docs_of_module(module: str) -> dict[str, dict[str, str]]:
-    """Return field docstrings by class name and field name; {} if the source of the module is not installed."""
     try:
         tree = ast.parse(inspect.getsource(sys.modules[module]))
     except OSError:

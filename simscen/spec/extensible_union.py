@@ -12,7 +12,7 @@ from pydantic import BaseModel, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, ValidationError, core_schema
 
 from simscen.core.messages.navigation import RecoveryBehavior
-from simscen.spec.base import LazySpec, Typed
+from simscen.spec.base import LazySpec, Typed, text_or_mapping
 from simscen.spec.registry import BrokenPlugin, RegisteredType, all_types, built_in_types, find_type
 
 GROUP_KEY = "simscen group"
@@ -54,8 +54,8 @@ class ExtensibleUnion:
         union: CoreSchema = core_schema.tagged_union_schema(members, self._tag)
         if self.allows_names:
             names = core_schema.literal_schema([entry.name for entry in built_in_types(self.group)])
-            options: dict[Hashable, CoreSchema] = {"a name": names, "a mapping": union}
-            union = core_schema.tagged_union_schema(options, _name_or_mapping)
+            options: dict[Hashable, CoreSchema] = {"a text": names, "a mapping": union}
+            union = core_schema.tagged_union_schema(options, text_or_mapping)
         metadata = {GROUP_KEY: self.group, NAMES_ALLOWED_KEY: self.allows_names, MAPPINGS_ALLOWED_KEY: True}
         serialization = core_schema.simple_ser_schema("any")  # specifications of plug-ins are no members of the union
         return core_schema.no_info_wrap_validator_function(
@@ -85,10 +85,6 @@ class ExtensibleUnion:
         raise ValidationError.from_exception_data("type", [details])
 
 
-def _name_or_mapping(value: Any) -> str:
-    return "a name" if isinstance(value, str) else "a mapping"
-
-
 @dataclass(frozen=True)
 class TypeName:
     """Annotation of a string that names a type of a registry group, built-in or from an installed package."""
@@ -115,7 +111,6 @@ def _built_in_names(group: str) -> frozenset[str]:
 
 
 def _find_or_raise(group: str, name: str) -> RegisteredType:
-    """Return the type of a group by name. Raises PydanticCustomError if there is none."""
     if (entry := find_type(group, name)) is None:
         raise _unknown_type_error(group, name)
     return entry
@@ -158,7 +153,6 @@ def validate_plugin_spec(entry: RegisteredType, value: Any) -> BaseModel:
 
 
 def _plugin_error(broken: BrokenPlugin) -> PydanticCustomError:
-    """Return the validation error for a plug-in that cannot be used."""
     return PydanticCustomError("plugin", "{problem}", {"problem": str(broken), "hint": broken.hint})
 
 

@@ -73,7 +73,6 @@ class Motion(Spec):
 
     @model_validator(mode="after")
     def _check_repeat(self) -> Motion:
-        """Raise ValueError if the keyframes do not fit `repeat` or `phase`."""
         if self.keyframes is None:
             return self
         first, last = self.keyframes[0], self.keyframes[-1]

@@ -14,7 +14,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.polygons import polygon_defect
-from simscen.spec.base import Spec
+from simscen.spec.base import Spec, text_or_mapping
 from simscen.spec.quantities import Angle, Length
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 
 def _reject_path(name: str) -> str:
-    """Return the name. Raises PydanticCustomError for a path such as `../x` or `/x`; `1 m/s` is valid."""
     if name[0] in "/\\" or not {".", ".."}.isdisjoint(name.replace("\\", "/").split("/")):
         raise PydanticCustomError("path_name", "must not be a path")
     return name
@@ -117,11 +116,6 @@ MaskFile = Annotated[str, Field(min_length=1, max_length=4096), ReferenceTo("mas
 PLACE_NAME_DESCRIPTION = "Name of a place in the world."
 
 
-def _union_tag(value: Any) -> str:
-    """Return the tag of a value in a union: "text" for the name of a place, otherwise "written out"."""
-    return "text" if isinstance(value, str) else "written out"
-
-
 @dataclass(frozen=True)
 class PlaceAllowed(ReferenceTo):
     """Annotation of a pose in the world frame that can also be given as the name of a place.
@@ -135,7 +129,7 @@ class PlaceAllowed(ReferenceTo):
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         field = Field(description=PLACE_NAME_DESCRIPTION, examples=list(self.keywords) or None)
         name = handler.generate_schema(Annotated[PlaceName, field])
-        return core_schema.tagged_union_schema({"text": name, "written out": handler(source)}, _union_tag)
+        return core_schema.tagged_union_schema({"a text": name, "a mapping": handler(source)}, text_or_mapping)
 
     def value_at(self, pose: PoseSpec) -> Any:
         """Return the value of the field for a place with this pose: the pose itself."""
@@ -161,7 +155,7 @@ class PlaceShorthand:
         mapping = handler(source)
         convert = core_schema.no_info_plain_validator_function(lambda place: {self.key: place})
         shorthand = core_schema.chain_schema([name, convert, mapping])
-        return core_schema.tagged_union_schema({"text": shorthand, "written out": mapping}, _union_tag)
+        return core_schema.tagged_union_schema({"a text": shorthand, "a mapping": mapping}, text_or_mapping)
 
 
 PlaceOrPose = Annotated[PoseSpec, PlaceAllowed()]

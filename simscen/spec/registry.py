@@ -275,7 +275,6 @@ def _type_problem(entry: RegisteredType, installed: list[RegisteredType]) -> str
 
 @cache
 def _load(entry: RegisteredType) -> type[BaseModel]:
-    """Import and return the specification class of a type. Raises BrokenPlugin."""
     module, _, name = entry.value.partition(":")
     try:
         # Output of a module during import must not get into output that programs read.
@@ -309,6 +308,5 @@ def _specification_problem(entry: RegisteredType, model: Any) -> str | None:
 
 
 def _import_address(address: str) -> Any:
-    """Import and return the object with the address "module:name"."""
     module, _, name = address.partition(":")
     return getattr(import_module(module), name)

@@ -45,7 +45,6 @@ def speed_zones_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]
 
 
 def _limits_speed(one: LocatedAction) -> bool:
-    """Return whether an action enables a speed zone."""
     return one.kind == "speed_zone" and one.spec.enabled and one.spec.region is not None
 
 

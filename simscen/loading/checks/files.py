@@ -118,7 +118,6 @@ def _base_file_problems(file: Path, library: Library) -> list[Problem]:
 
 
 def _load_named_files(tree: MappingNode, assets: Assets) -> None:
-    """Load all files that the incomplete scenario of one robot names. Problems are added to `assets`."""
     masks = [
         ("pass", index, *keys)
         for index in range(len(items_of(child(tree, "pass"))))

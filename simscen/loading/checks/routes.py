@@ -203,7 +203,6 @@ def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tu
 
 
 def _requires_success(entry: AnyCriterion) -> bool:
-    """Return whether a criterion fails the run unless all goals are reached."""
     if entry.kind == "result":
         requires = getattr(entry.chosen, "status", "") == "SUCCEEDED"
     else:

@@ -187,7 +187,6 @@ def is_ros_map(tree: Node | None) -> bool:
 
 
 def _ignored_key_warnings(tree: Node) -> list[Problem]:
-    """Return warnings about keys of a ROS map that map_server ignores."""
     warnings = []
     for key, entry in entries_of(tree).items():
         if key not in RosMapSpec.model_fields:

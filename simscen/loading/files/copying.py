@@ -90,7 +90,6 @@ def _with_dependencies(files: Iterable[Path]) -> list[Path]:
 
 
 def _with_path(text: str, leaf: ScalarNode, path: str) -> str:
-    """Return the YAML text with `path` instead of the scalar `leaf`."""
     lines = text.split("\n")
     line, start = lines[leaf.position.line - 1], leaf.position.col - 1
     quote = line[start] if line[start] in "'\"" else ""

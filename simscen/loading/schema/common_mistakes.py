@@ -113,7 +113,6 @@ def _scalar_for_mapping_hint(models: Iterable[type[BaseModel]], node: ScalarNode
 
 
 def _is_valid(model: type[BaseModel], value: dict[str, object]) -> bool:
-    """Return whether `value` is the YAML data of a valid specification of this model."""
     try:
         model.model_validate(value, by_alias=True, by_name=False)
     except ValidationError:

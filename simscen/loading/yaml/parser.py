@@ -154,7 +154,6 @@ class _Composer:
         return entries
 
     def _read_key(self, event: ev.Event) -> str:
-        """Return the key of a mapping as text. Raises _ParseError if it is not a scalar."""
         if not isinstance(event, ev.ScalarEvent):
             raise _ParseError(self._problem(event, "SC003", "a key must be text; it is a list, a mapping or an alias"))
         self._report_tag(event)
@@ -186,7 +185,6 @@ class _Composer:
             raise _ParseError(self._problem(event, "SC006", f"{subject} more than {MAX_VALUES} values"))
 
     def _report_tag(self, event: ev.Event) -> None:
-        """Add a problem if the node has a YAML tag such as `!!int`."""
         tag = getattr(event, "tag", None)
         if tag is not None:
             short = tag.replace("tag:yaml.org,2002:", "!!", 1)
@@ -195,7 +193,6 @@ class _Composer:
             )
 
     def _report_duplicate(self, event: ev.Event, key: str, first: Position) -> None:
-        """Add a problem or warning for a key that occurred at the position `first` before."""
         message = f"duplicate key `{key}` (first at {first.line}:{first.col})"
         if self.allow_duplicates:
             problem = self._problem(event, "SC007", message, "this one is used, as in ROS 2")

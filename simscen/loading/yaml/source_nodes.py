@@ -59,8 +59,6 @@ def source_at(node: SourceNode, keys: Sequence[Key]) -> SourceNode | None:
 
 
 class _Composer:
-    """Builds source nodes from PyYAML's events."""
-
     def __init__(self, text: str, events: Iterator[ev.Event]) -> None:
         self._text, self._events = text, events
 

@@ -30,7 +30,7 @@ def test_errors_in_lazy_fields_have_their_locations():
     with pytest.raises(ValidationError) as raised:
         Site.model_validate({"wall": {"points": [[0, 0], [1, "x"]], "color": 1}, "number": "one"})
     assert {error["loc"] for error in raised.value.errors()} == {
-        ("wall", "points", 1, "written out", 1),
+        ("wall", "points", 1, "a mapping", 1),
         ("wall", "color"),
         ("number",),
     }
