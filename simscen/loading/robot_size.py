@@ -56,29 +56,21 @@ def robot_size(loaded: LoadedScenario) -> RobotSize:
         and spec.drive.type != "mecanum"
     ):
         check_ground_clearance(spec, loaded.robot.path)
-        corners = (
-            tuple((x, y) for x, y in spec.footprint) if spec.footprint is not None else _circle(spec.radius or 0.0)
-        )
-        is_planar = spec.drive.type == "omnidirectional"
-        underside = min(part.z for part in spec.body) if is_planar else None
+        corners = _circle(spec.radius or 0.0) if spec.footprint is None else tuple((x, y) for x, y in spec.footprint)
+        underside = min(part.z for part in spec.body) if spec.drive.type == "omnidirectional" else None
         height = max(part.z + part.total_height for part in spec.body)
         return RobotSize(corners, spec.radius, height, underside)
+    from simscen.sim.body.outline import hull_points
+
     body = load_robot(loaded)[1]
-    low, high = _hull_heights(body)
-    is_planar = body.drive.type in ("omnidirectional", "mecanum")
-    return RobotSize(body.footprint, body.radius, high, low if is_planar else None)
+    heights = [solid.pose.apply(hull_points(solid.shape))[:, 2] for solid in body.hull]
+    underside = min(float(z.min()) for z in heights) if body.drive.type in ("omnidirectional", "mecanum") else None
+    return RobotSize(body.footprint, body.radius, max(float(z.max()) for z in heights), underside)
 
 
 def _circle(radius: float) -> Polygon:
     angles = [2 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS)]
     return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
-
-
-def _hull_heights(body: RobotBody) -> tuple[float, float]:
-    from simscen.sim.body.outline import hull_points
-
-    heights = [solid.pose.apply(hull_points(solid.shape))[:, 2] for solid in body.hull]
-    return min(float(z.min()) for z in heights), max(float(z.max()) for z in heights)
 
 
 def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, ...]:

@@ -1,6 +1,6 @@
 """Search of a specification for nested specifications, references by name, and angles, with their YAML keys."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from types import UnionType
 from typing import Annotated, Any, NamedTuple, Union, get_args, get_origin
@@ -10,6 +10,9 @@ from pydantic import BaseModel, RootModel
 from simscen.loading.yaml.tree import Key, Keys
 from simscen.spec.places import PlaceAllowed, ReferenceTo
 from simscen.spec.quantities import Quantity
+
+RobotFilter = Callable[[str], bool]
+"""Function that returns whether to search the parts that name a robot. Its argument is the name of the robot."""
 
 
 class Reference(NamedTuple):
@@ -25,31 +28,56 @@ class Reference(NamedTuple):
         return self.annotation.target
 
 
-RobotFilter = Callable[[str], bool]
-"""Function that returns whether to search the parts that name a robot. Its argument is the name of the robot."""
+def walk(spec: Any, includes_robot: RobotFilter | None = None, keys: Keys = ()) -> Iterator[tuple[Keys, BaseModel]]:
+    """Yield a specification and all specifications in it with their keys. `keys` are the keys of `spec`.
+
+    `spec` can also be a list or dict. Parts that name a robot are left out if `includes_robot` is false for it.
+    """
+    parts: list[tuple[Keys, Any]]
+    if isinstance(spec, BaseModel):
+        robot = getattr(spec, "robot", None)
+        if includes_robot is not None and isinstance(robot, str) and not includes_robot(robot):
+            return
+        yield keys, spec
+        parts = [(below, getattr(spec, name)) for name, below, _ in _fields(type(spec))]
+    else:
+        parts = [((key,), part) for key, part in _items(spec)]
+    for below, part in parts:
+        if isinstance(part, BaseModel | list | tuple | dict):
+            yield from walk(part, includes_robot, (*keys, *below))
+
+
+@cache
+def _fields(model: type[BaseModel]) -> list[tuple[str, Keys, Any]]:
+    """Return the name, the keys in YAML, and the type of each field. The field of a RootModel has no key."""
+    is_root = issubclass(model, RootModel)
+    return [
+        (name, () if is_root else (field.alias or name,), field.rebuild_annotation())
+        for name, field in model.model_fields.items()
+    ]
+
+
+def _items(value: list[Any] | tuple[Any, ...] | dict[str, Any]) -> Iterator[tuple[Key, Any]]:
+    yield from value.items() if isinstance(value, dict) else enumerate(value)
 
 
 def references(spec: BaseModel, includes_robot: RobotFilter | None = None) -> Iterator[Reference]:
-    """Yield all references in `spec`.
-
-    Parts that name a robot are left out if `includes_robot` is false for it; None includes all parts.
-    """
-    for keys, part in _walk_with_roots(spec, (), includes_robot):
-        for name, key, annotation in _reference_fields(type(part)):
-            below = keys if isinstance(part, RootModel) else (*keys, key)
-            for text_keys, text in _texts(getattr(part, name), below):
+    """Yield all references in `spec`. `includes_robot` selects parts as in `walk`."""
+    for keys, part in walk(spec, includes_robot):
+        for name, below, annotation in _reference_fields(type(part)):
+            for text_keys, text in _texts(getattr(part, name), (*keys, *below)):
                 if not isinstance(annotation, PlaceAllowed) or text not in annotation.keywords:
                     yield Reference(text_keys, annotation, text)
 
 
 @cache
-def _reference_fields(model: type[BaseModel]) -> list[tuple[str, str, ReferenceTo]]:
-    """Return the name, the YAML key, and the first ReferenceTo annotation of each field that has one."""
-    found: list[tuple[str, str, ReferenceTo]] = []
-    for name, field in model.model_fields.items():
-        annotations = (*field.metadata, *_annotations(field.annotation))
-        found += [(name, field.alias or name, mark) for mark in annotations if isinstance(mark, ReferenceTo)][:1]
-    return found
+def _reference_fields(model: type[BaseModel]) -> list[tuple[str, Keys, ReferenceTo]]:
+    """Return the name, the keys in YAML, and the first ReferenceTo annotation of each field that has one."""
+    return [
+        (name, keys, mark)
+        for name, keys, kind in _fields(model)
+        for mark in [mark for mark in _annotations(kind) if isinstance(mark, ReferenceTo)][:1]
+    ]
 
 
 def _texts(value: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
@@ -57,56 +85,21 @@ def _texts(value: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
     if isinstance(value, str):
         yield keys, value
     elif isinstance(value, list | dict):
-        for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+        for key, item in _items(value):
             yield from _texts(item, (*keys, key))
-
-
-def walk(
-    spec: BaseModel | dict[str, Any], includes_robot: RobotFilter | None = None
-) -> Iterator[tuple[Keys, BaseModel]]:
-    """Yield a specification and all specifications in it with their keys. A RootModel itself is not yielded.
-
-    Parts that name a robot are left out if `includes_robot` is false for it; None includes all parts.
-    """
-    parts = _walk_with_roots(spec, (), includes_robot)
-    return ((keys, part) for keys, part in parts if not isinstance(part, RootModel))
-
-
-def _walk_with_roots(spec: Any, keys: Keys, includes_robot: RobotFilter | None) -> Iterator[tuple[Keys, BaseModel]]:
-    """Yield the same as `walk`, and each RootModel. `keys` are the keys of `spec`."""
-    parts: Iterable[tuple[Key, Any]]
-    if isinstance(spec, BaseModel):
-        if includes_robot is not None:
-            robot = getattr(spec, "robot", None)
-            if isinstance(robot, str) and not includes_robot(robot):
-                return
-        yield keys, spec
-        parts = [(key, getattr(spec, name)) for name, key in _keys_by_field(type(spec))]
-    else:
-        parts = spec.items() if isinstance(spec, dict) else enumerate(spec)
-    for key, part in parts:
-        if isinstance(part, BaseModel | list | tuple | dict):
-            yield from _walk_with_roots(part, keys if isinstance(spec, RootModel) else (*keys, key), includes_robot)
-
-
-@cache
-def _keys_by_field(model: type[BaseModel]) -> list[tuple[str, str]]:
-    """Return the name and the YAML key of each field."""
-    return [(name, field.alias or name) for name, field in model.model_fields.items()]
 
 
 def angles_of(spec: BaseModel) -> Iterator[tuple[Keys, float]]:
     """Yield the keys and values in rad of all angles, including those in lists, such as the yaw of keyframes."""
     for keys, part in walk(spec):
-        for name, key, kind in _fields_with_angles(type(part)):
-            yield from _angles_in(getattr(part, name), kind, (*keys, key))
+        for name, below, kind in _fields_with_angles(type(part)):
+            yield from _angles_in(getattr(part, name), kind, (*keys, *below))
 
 
 @cache
-def _fields_with_angles(model: type[BaseModel]) -> list[tuple[str, str, Any]]:
-    """Return the name, the YAML key, and the type of each field that is an angle or contains one."""
-    fields = [(name, field.alias or name, field.rebuild_annotation()) for name, field in model.model_fields.items()]
-    return [(name, key, kind) for name, key, kind in fields if any(map(_is_angle, _annotations(kind)))]
+def _fields_with_angles(model: type[BaseModel]) -> list[tuple[str, Keys, Any]]:
+    """Return the name, the keys in YAML, and the type of each field that is an angle or contains one."""
+    return [found for found in _fields(model) if any(map(_is_angle, _annotations(found[2])))]
 
 
 def _is_angle(annotation: Any) -> bool:

@@ -165,8 +165,8 @@ def all_types(group: str) -> tuple[RegisteredType, ...]:
 
 def find_type(group: str, name: str) -> RegisteredType | None:
     """Return the type with this name; None if there is none. A built-in type has priority."""
-    own = next((entry for entry in built_in_types(group) if entry.name == name), None)
-    return own or next((entry for entry in installed_types(group) if entry.name == name), None)
+    types = (entry for types in (built_in_types, installed_types) for entry in types(group))
+    return next((entry for entry in types if entry.name == name), None)
 
 
 def unknown_groups() -> tuple[RegisteredType, ...]:
@@ -177,22 +177,12 @@ def unknown_groups() -> tuple[RegisteredType, ...]:
 def plugins_with_spec(spec: type) -> tuple[RegisteredType, ...]:
     """Return the types of installed packages whose specification is this class; () if simscen ships the class."""
     package = spec.__module__.partition(".")[0]
-    if package == "simscen":
-        return ()
-    same_package = [
-        entry
-        for entry in _all_installed_types()
-        if not entry.problem and entry.value.partition(".")[0].partition(":")[0] == package
-    ]
-    return tuple(entry for entry in same_package if _has_spec(entry, spec))
-
-
-def _has_spec(entry: RegisteredType, spec: type) -> bool:
-    """Return whether a type has this specification class; False if the type cannot be used."""
-    try:
-        return entry.load() is spec
-    except BrokenPlugin:
-        return False
+    found = []
+    for entry in () if package == "simscen" else _all_installed_types():
+        if re.split("[.:]", entry.value)[0] == package:
+            with contextlib.suppress(BrokenPlugin):
+                found += [entry] if entry.load() is spec else []
+    return tuple(found)
 
 
 @cache

@@ -28,7 +28,10 @@ def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path
     folder next to `target` with the name of `target` without suffixes. Raises UsageError if a file cannot be copied, or
     if a copy already exists.
     """
-    text, tree = _text_of(loaded)
+    lines = unexpanded_text(loaded).split("\n")
+    text = "\n".join(line for line in lines if not line.startswith(_MODELINE))
+    tree, _ = parse_yaml(text, loaded.path)
+    assert tree is not None
     folders = {file.parent for file in loaded.files.values()}
     named = {leaf: _existing_file(leaf, folders) for leaf in _scalars(tree)}
     files = {leaf: file for leaf, file in named.items() if file is not None}
@@ -46,15 +49,6 @@ def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path
         text = _with_path(text, leaf, relpath(copies.get(file, file), target.parent))
     target.write_text(text, encoding="utf-8")
     return [target, *copies.values()]
-
-
-def _text_of(loaded: LoadedScenario) -> tuple[str, Node]:
-    """Return the scenario as one YAML text without the comment for editors, and its tree."""
-    lines = unexpanded_text(loaded).split("\n")
-    text = "\n".join(line for line in lines if not line.startswith(_MODELINE))
-    tree, _ = parse_yaml(text, loaded.path)
-    assert tree is not None
-    return text, tree
 
 
 def _scalars(tree: Node) -> Iterator[ScalarNode]:

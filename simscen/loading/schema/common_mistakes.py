@@ -60,8 +60,9 @@ def hint_for_misplaced_key(model: type[BaseModel], tree: Node, loc: Sequence[Key
             return f"move it one level up, to `{above}`" if above else "move it to the top level of the file"
     starts = ((loc, models_at(model, loc)), ((), [model]))
     for start, models in starts[:1] if item else starts:
-        if (below := _find_key_below(models, key)) is not None:
-            return f"move it to `{dotted_path([*existing_keys(tree, start), *below])}`"
+        for below, valid_keys in _mappings_below(tuple(models)):
+            if key in valid_keys:
+                return f"move it to `{dotted_path([*existing_keys(tree, start), *below])}`"
     return ""
 
 
@@ -131,11 +132,6 @@ def _missing_colon_hint(models: Iterable[type[BaseModel]], word: str, in_list: b
         written = f"`{word}: {body}`" if in_list else f"`{{{word}: {body}}}`"
         return f"write {written}" + ("" if body == "{}" else f"; `simscen explain {word}` shows its keys")
     return ""
-
-
-def _find_key_below(models: Sequence[type[BaseModel]], key: str) -> tuple[str, ...] | None:
-    """Return the keys of the nearest mapping below `models` in which `key` is valid; None if there is none."""
-    return next((keys for keys, valid_keys in _mappings_below(tuple(models)) if key in valid_keys), None)
 
 
 @lru_cache(maxsize=64)  # a file of another kind has many unknown keys

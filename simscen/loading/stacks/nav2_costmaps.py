@@ -27,7 +27,9 @@ OBSERVATION_LAYERS = ("ObstacleLayer", "VoxelLayer")
 
 def translate_costmap(parameters: Parameters, section: str) -> Iterator[Translation]:
     """Translate the parameters of the global or local costmap and of its layers."""
-    layers = _layer_classes(parameters)
+    layers: Mapping[str, str] = DEFAULT_LAYERS
+    if isinstance(listed := parameters.get("plugins"), list):
+        layers = {layer: class_of(parameters.get(f"{layer}.plugin", "")) for layer in strings(listed)}
     handled = {*layers, *strings(parameters.get("filters"))}
     for name, value in parameters.items():
         layer, _, rest = name.partition(".")
@@ -48,12 +50,6 @@ def translate_costmap(parameters: Parameters, section: str) -> Iterator[Translat
     yield from _translate_observation_sources(parameters, layers, section)
     for zones in strings(parameters.get("filters")):
         yield Translation("filters", (), None, covers=f"{zones}.")  # the scenario defines zones
-
-
-def _layer_classes(parameters: Parameters) -> Mapping[str, str]:
-    if not isinstance(parameters.get("plugins"), list):
-        return DEFAULT_LAYERS
-    return {layer: class_of(parameters.get(f"{layer}.plugin", "")) for layer in strings(parameters["plugins"])}
 
 
 LASER_SCAN = "LaserScan"

@@ -77,13 +77,15 @@ def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree
     merged = MappingNode(position, {"profile": Entry(position, ScalarNode(position, "nav2"))})
     clock = _clock(result.tree)
     translations = {
-        node: [_with_valid_frequency(one, clock) for one in translate(node, own)]
-        for node, own in parameters.nodes.items()
+        node: [_with_valid_frequency(one, clock) for one in translate(node, values)]
+        for node, values in parameters.nodes.items()
     }
     for node, translated in translations.items():
         for one in translated:
             if one.keys:
-                merged = merge_mappings(merged, _translated_tree(one, parameters.positions[node, one.parameter]))
+                at = parameters.positions[node, one.parameter]
+                own = MappingNode(at, {}).with_value(one.keys, _parameter_node(one.value, at), at)
+                merged = merge_mappings(merged, own)
     result.notes += sorted({*parameters.notes, *_notes(translations, parameters)})
     return merge_mappings(stack, merged)
 
@@ -110,12 +112,6 @@ def _with_valid_frequency(translation: Translation, clock: Clock) -> Translation
         hint = "the nearest is used; write `stack: {controller_frequency: …}` in the scenario for another one"
         return replace(translation, value=clock.nearest_rate(translation.value), note=str(error), hint=hint)
     return translation
-
-
-def _translated_tree(translation: Translation, position: Position) -> MappingNode:
-    """Return the YAML tree of a section `stack` with one parameter. All nodes have the position of the parameter."""
-    value = _parameter_node(translation.value, position)
-    return MappingNode(position, {}).with_value(translation.keys, value, position)
 
 
 def _parameter_node(value: Any, position: Position) -> Node:

@@ -225,7 +225,8 @@ def _too_many_problem(space: VariationSpace, position: Position) -> Problem | No
             *position, "SC017", message, "run them with `simscen study`, or use `sampled` to draw some of them"
         )
     sizes = (
-        sum(max(map(_option_size, typical_options(axis)), default=0) for axis in block.axes) for block in space.blocks
+        sum(max((_option_size(option) for option in typical_options(axis)), default=0) for axis in block.axes)
+        for block in space.blocks
     )
     values = _node_size(space.tree) + max(sizes, default=0)
     if space.count * values > MAX_TOTAL_VALUES:
