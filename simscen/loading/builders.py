@@ -38,11 +38,10 @@ def load_world(loaded: LoadedScenario) -> World:
 
 
 def world_from_file(source: LoadedWorld, root: Path, world_path: Sequence[Path] = (), lenient: bool = False) -> World:
-    """Build the world from its loaded files.
+    """Build the world from its loaded files. Raises InvalidInput for an unusable map image or SDF file.
 
     Files that an SDF file refers to must lie in `root` or in a folder of `world_path`. With `lenient`, unsupported
-    elements of an SDF file become warnings in the `notes` of the world. Raises InvalidInput for an unusable map image
-    or SDF file.
+    elements of an SDF file become warnings in the `notes` of the world.
     """
     base, grid, notes = None, None, tuple[str, ...]()
     if source.sdf is not None:
@@ -105,10 +104,7 @@ def _with_payload_and_torque(loaded: LoadedScenario, body: RobotBody) -> RobotBo
 
 
 def robot_from_file(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotSpec, RobotBody]:
-    """Return the specification and the body of a robot. All its files, such as meshes, must lie in the folders `roots`.
-
-    Raises InvalidInput for unusable files.
-    """
+    """Return the specification and the body of a robot, whose files must lie in `roots`. Raises InvalidInput."""
     from simscen.sim.body.from_spec import build_robot_body
     from simscen.sim.urdf.xacro.expand import UnknownArgument
     from simscen.sim.urdf.xml_source import RobotFiles
@@ -146,10 +142,9 @@ def load_masks(loaded: LoadedScenario) -> FilterMasks:
 def load_criterion_masks(
     masks: Mapping[str, CriterionMask], tree: MappingNode, texts: Mapping[str, str]
 ) -> dict[str, MaskBlocks]:
-    """Load the filter masks of criteria, divided into rectangles of equal cells, by path as written in the scenario.
+    """Load the masks of criteria, divided into rectangles of equal cells, by path as written in the scenario.
 
-    `tree` is the YAML tree of the scenario, and `texts` are the texts of its files, by path as in messages. Raises
-    InvalidInput at the line of an unusable mask, and of a mask with too many rectangles.
+    `tree` and `texts` belong to the scenario. Raises InvalidInput at the line of an unusable or too complex mask.
     """
     found = {}
     for name, mask in masks.items():

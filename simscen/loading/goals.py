@@ -21,11 +21,7 @@ START_FAILURES = ErrorCode.START_OCCUPIED, ErrorCode.START_OUTSIDE_MAP
 
 
 def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
-    """Return the goals listed under `goals`, repeated for each loop of the navigation.
-
-    The names in the second loop end in `#2`, in the third in `#3`, and so on. Missing tolerances are taken from the
-    goal checker.
-    """
+    """Return the goals under `goals`, repeated for each loop of the navigation, with names such as `shelf#2`."""
     goals = []
     for number, (name, entry) in enumerate(zip(spec.goal_names, spec.goals, strict=True), start=1):
         goal = replace(_goal(name, entry, spec), wait=entry.on_reached.wait)
@@ -58,11 +54,7 @@ def _goal(name: str, entry: "GoalEntry | NewGoal", spec: ScenarioSpec) -> Goal:
 
 
 def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, str]:
-    """Return the expected failures, such as "NO_VALID_PATH", by name of the goals that are expected to fail.
-
-    `goals` is the result of `scenario_goals`. With navigate_through_poses, the expectation of the last goal applies to
-    all goals.
-    """
+    """Return the expected failures, such as "NO_VALID_PATH", by name of the goal, of the result of `scenario_goals`."""
     through = spec.navigation.mode == "navigate_through_poses"
     found = {}
     for number, goal in enumerate(goals):
@@ -73,10 +65,7 @@ def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, 
 
 
 def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
-    """Return whether a scenario expects that the goal with this name fails.
-
-    A scenario states this by `expect` at the goal, or by a criterion `result` or `error_code`.
-    """
+    """Return whether `expect` at the goal, or a criterion, states that the goal with this name fails."""
     through = spec.navigation.mode == "navigate_through_poses"
     entries = zip(spec.goal_names, [spec.goals[-1]] * len(spec.goals) if through else spec.goals, strict=True)
     if any(matches_goal_name(goal, name) and expected_failure_name(entry.expect) for name, entry in entries):

@@ -16,11 +16,10 @@ Matcher = Callable[[str], bool]
 
 
 def select(scenarios: Iterable[LoadedScenario], keyword: str, tags: Sequence[str]) -> list[LoadedScenario]:
-    """Return the scenarios whose title matches `keyword` and that have at least one of `tags`.
+    """Return the scenarios whose title matches `keyword`, and that have one of `tags` unless `tags` is empty.
 
-    `keyword` is an expression of parts of titles, `and`, `or`, `not`, and parentheses; "" matches all titles. Case is
-    ignored. Empty `tags` select all scenarios. Raises UsageError for an invalid expression, and NothingSelected if
-    nothing matches.
+    `keyword` is an expression of parts of titles, `and`, `or`, `not`, and parentheses; "" matches all titles.
+    Raises UsageError for an invalid expression, and NothingSelected if nothing matches.
     """
     candidates = list(scenarios)
     matches = keyword_matcher(keyword) if keyword.strip() else lambda _: True
@@ -40,10 +39,7 @@ def keyword_matcher(expression: str) -> Matcher:
 
 
 class _Parser:
-    """Recursive descent parser of keyword expressions. `not` binds tightest, then `and`, then `or`.
-
-    `tokens` are the tokens that are not parsed yet.
-    """
+    """Recursive descent parser of keyword expressions. `tokens` are the tokens that are not parsed yet."""
 
     def __init__(self, tokens: list[str], expression: str) -> None:
         self.tokens, self._expression = tokens, expression

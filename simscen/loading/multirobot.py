@@ -13,10 +13,7 @@ ROBOT_KEYS = ("goals", "faults")
 
 
 def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
-    """Return a scenario tree for each robot alone, sorted by name of the robot; {} without `robots`.
-
-    Nodes keep their positions in the file. The key `expected`, which applies to all robots together, is left out.
-    """
+    """Return a scenario tree for each robot alone, without `expected`, sorted by name; {} without `robots`."""
     robots = entries_of(child(tree, ROBOTS))
     return {name: _single_robot_tree(tree, robots[name]) for name in sorted(robots)}
 
@@ -30,10 +27,7 @@ def has_valid_robots(tree: MappingNode) -> bool:
 
 
 def _single_robot_tree(tree: MappingNode, entry: Entry) -> MappingNode:
-    """Return the scenario tree for one robot; `entry` is its entry under `robots`.
-
-    The keys of the robot override keys at top level, but its criteria are added to the criteria at top level.
-    """
+    """Return the tree of one robot. Its keys override keys at top level, but its criteria are added to those there."""
     own_tree, position = entry.value, entry.value.position
     assert isinstance(own_tree, MappingNode)
     robot = {key: value for key, value in own_tree.entries.items() if key in RobotEntry.model_fields}

@@ -36,10 +36,7 @@ def resolve_places(spec: Spec, places: Places) -> Spec:
 
 
 def resolve_criteria_places(plain: dict[str, Any], spec: BaseModel, places: Places) -> dict[str, Any]:
-    """Return YAML data of a scenario with poses and points instead of place names in its criteria.
-
-    `plain` is the YAML data, and `spec` the specification of the same scenario.
-    """
+    """Return the YAML data `plain` of the scenario `spec` with poses instead of place names in its criteria."""
     for reference, pose in _poses_of_references(spec, places):
         if "pass" in reference.keys[:3:2]:  # of the scenario, or of one of its robots
             written = pose.model_dump() if isinstance(pose, BaseModel) else pose
@@ -55,10 +52,7 @@ def place_references(spec: BaseModel) -> Iterator[Reference]:
 def unknown_places(
     spec: BaseModel, tree: Node, known: Iterable[str], empty_hint: str = NO_PLACES_HINT
 ) -> Iterator[Problem]:
-    """Yield a problem for each place name in a specification that is not in `known`.
-
-    `tree` is the YAML tree of the specification. `empty_hint` is the hint if `known` is empty.
-    """
+    """Yield a problem for each place name in `spec` that is not in `known`; `tree` is its YAML tree."""
     names = tuple(known)
     for reference in place_references(spec):
         if reference.name not in names:

@@ -1,7 +1,4 @@
-"""Search for the plug-in types that a scenario uses, and for plug-in types of a log that are not installed.
-
-A plug-in is an installed package that adds types, such as criteria. A RegisteredType describes a type.
-"""
+"""Search for the plug-in types that a scenario uses, and for plug-in types of a log that are not installed."""
 
 from collections.abc import Container, Iterable, Iterator, Mapping
 from typing import Any
@@ -41,10 +38,9 @@ def requirement_of(entry: RegisteredType) -> str:
 
 
 def missing_plugins(facts: Mapping[str, str], groups: Container[str]) -> list[Problem]:
-    """Return a problem for each type of a log whose package is not installed in the same version.
+    """Return a problem (with the path "") for each type of `groups` that is not installed in the version of a log.
 
-    `facts` are the header entries of the log. Only types of `groups`, e.g. "criterion", are checked. The path of the
-    problems is "".
+    `facts` are the header entries of the log.
     """
     missing: list[Problem] = []
     for key, recorded in sorted(facts.items()):
@@ -66,10 +62,7 @@ def _sorted(entries: Iterable[RegisteredType]) -> tuple[RegisteredType, ...]:
 
 
 def _plugin_types(keys: Keys, part: Any) -> Iterator[RegisteredType]:
-    """Yield the plug-in type of the part of a specification at `keys`; nothing if simscen ships its type.
-
-    If a package registers the same class under several names, yield the names that the part has as its `type` or key.
-    """
+    """Yield the plug-in types of a part; those with its `type` or key, if a package registers its class repeatedly."""
     if isinstance(part, Choice):
         entry = find_type(part.group, part.kind) if part.original_class is not None else None
         if entry is not None and not entry.is_shipped:

@@ -100,8 +100,8 @@ def with_seed(tree: MappingNode, seed: int) -> MappingNode:
 def with_only_criterion(tree: MappingNode, criterion: str, verdict_id: str, seed: int) -> MappingNode:
     """Return the scenario with this seed, only keys that affect a run, and only one criterion.
 
-    The criterion is the one with the id `verdict_id` of the kind `criterion`, e.g. "collisions". If no criterion of
-    this kind has this id, all criteria of this kind are kept; if there is none, or `criterion` is "", all criteria.
+    This is the criterion `criterion` (e.g. "collisions") with the id `verdict_id`, or else all of this kind, or
+    else all.
     """
     entries = {key: entry for key, entry in tree.entries.items() if key not in UNNEEDED_KEYS}
     criteria = tree.entries.get("pass")

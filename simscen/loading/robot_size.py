@@ -36,10 +36,7 @@ class RobotSize:
 
 
 def inscribed_radius(radius: float | None, footprint: Polygon) -> float:
-    """Return the radius in m of the largest circle around the origin that is inside a footprint.
-
-    `radius` is the radius of a round footprint; None for a polygon.
-    """
+    """Return the radius in m of the largest circle around the origin in a footprint: `radius` if it is round."""
     if radius is not None:
         return radius
     ends = (*footprint[1:], footprint[0])
@@ -85,10 +82,7 @@ def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, 
 
 
 def blocking_world(loaded: LoadedScenario, world: World) -> World:
-    """Return the world with only those fixed solids that block the robot of a scenario.
-
-    Raises InvalidInput for an unusable robot.
-    """
+    """Return the world with only the fixed solids that block the robot of a scenario. Raises InvalidInput."""
     spec = loaded.robot.spec
     radius = None if spec is None else getattr(spec.drive, "wheel_radius", 0.0)
     # Building the robot is slow, and not needed if no robot of its wheel size could drive over a solid.

@@ -34,11 +34,10 @@ def load_scenario(
     choice: StackChoice | None = None,
     variation: str = "",
 ) -> LoadedScenario:
-    """Load the scenario in the file `path`, or one of its variations.
+    """Load the scenario in the file `path`, or its variation with the name `variation`.
 
-    All its files must lie in `root` or in a folder of `world_path`. `choice` is a stack that replaces the stack of the
-    scenario. `variation` is the name of a variation; "" for a file without variations. Raises InvalidInput with all
-    problems of the files, and UsageError for a variation that is unknown or missing.
+    All files must lie in `root` or in a folder of `world_path`. `choice` replaces the stack of the scenario. Raises
+    InvalidInput with all problems of the files, and UsageError for a variation that is unknown or missing.
     """
     number = number_of(variation)
     loaded = try_variations(path, root, world_path, choice, None if number is None else [number])
@@ -63,9 +62,8 @@ def try_variations(
 ) -> tuple[LoadedScenario, ...] | list[Problem]:
     """Return all variations of the scenario in a file; or all problems if one of them has errors.
 
-    The result for a file without variations is one scenario. `numbers` selects variations, counted from 1; None selects
-    all. Unknown numbers are ignored. `unsaved` are texts that replace the content of files, such as unsaved texts of an
-    editor. The other parameters are those of `load_scenario`.
+    A file without variations has one. `numbers` selects variations from 1; unknown numbers are ignored. `unsaved`
+    are texts that replace the content of files. The other parameters are those of `load_scenario`.
     """
     library = Library(PathSandbox.around(root, world_path), unsaved=unsaved or {})
     read = _read(path, library, choice)
@@ -88,10 +86,7 @@ def try_variations(
 
 
 def read_variation_space(path: Path, root: Path, world_path: Sequence[Path] = ()) -> VariationSpace | None:
-    """Return the space of variations of the scenario in a file; None for a file without variations.
-
-    Raises InvalidInput if the file or its `variations` cannot be read.
-    """
+    """Return the variations of the scenario in a file; None if it has none. Raises InvalidInput."""
     library = Library(PathSandbox.around(root, world_path))
     read = _read(path, library, None)
     space = read if isinstance(read, list) else variation_space(read[1])
@@ -103,9 +98,8 @@ def read_variation_space(path: Path, root: Path, world_path: Sequence[Path] = ()
 class ChangedScenario:
     """Scenario file from which changed scenarios are loaded without writing them to a file.
 
-    `merged_tree` is the YAML tree of the file, merged with the files that it extends and with `defaults.yaml`.
-    `base_tree` is `merged_tree` without `variations`. `changes` are the values of the selected variation, and `tree` is
-    `base_tree` with these values.
+    `merged_tree` is the YAML tree of the file, merged with `extends` and `defaults.yaml`; `base_tree` has no
+    `variations`. `changes` are the values of the selected variation, and `tree` is `base_tree` with these values.
     """
 
     def __init__(
@@ -116,11 +110,7 @@ class ChangedScenario:
         choice: StackChoice | None = None,
         variation: str | None = "",
     ) -> None:
-        """Read the file and check the selected variation.
-
-        If `variation` is None, nothing is checked. The other parameters and the errors are the same as in
-        `load_scenario`.
-        """
+        """Read the file, and check the selected variation as `load_scenario` does, unless `variation` is None."""
         self._library, self._choice = Library(PathSandbox.around(root, world_path)), choice
         if variation is not None:
             load_scenario(path, root, world_path, choice, variation)
@@ -241,10 +231,7 @@ def _load_multi_robot(
 def _load_single_robot(
     spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path, name: str = "", others: tuple[str, ...] = ()
 ) -> LoadedScenario | list[Problem]:
-    """Load a scenario of one robot, or the view of the robot `name`. Return the scenario, or all its problems.
-
-    In a view, `others` are the names of the other robots.
-    """
+    """Load a scenario of one robot, or the view of the robot `name` beside `others`. Return it, or all its problems."""
     assets = Assets(library)
     world = assets.world_of(spec.world, tree, file)
     robot_map = None if spec.map == "none" else _map_at(("map",), tree, assets)

@@ -39,10 +39,7 @@ class WorldCache:
     _shortest_paths: list[tuple[Solids, object, ShortestPaths]] = field(default_factory=list)
 
     def world(self, loaded: LoadedScenario) -> World:
-        """Return the built world of a scenario. Raises InvalidInput.
-
-        Calls `record_read_file` for each file from which the world was built, also if it was built by an earlier call.
-        """
+        """Return the built world of a scenario, and record all files read for it, also earlier. Raises InvalidInput."""
         known = next((entry for entry in self._worlds if entry[0] == loaded.world), None)
         if known is None:
             with collect_read_files() as read:

@@ -26,10 +26,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 
 class Spec(BaseModel):
-    """Base class of all specifications. Instances are immutable.
-
-    Validation rejects unknown keys, infinite and NaN numbers, and values of another type.
-    """
+    """Base class of all specifications: immutable, strict, without unknown keys, infinity, and NaN."""
 
     model_config = ConfigDict(
         strict=True,
@@ -175,10 +172,7 @@ class Typed(Component):
 
 @dataclass(frozen=True)
 class LazySpec:
-    """Annotation of a field whose value is an instance of the specification class `name` in `module`.
-
-    The module is imported when a value of the field is validated.
-    """
+    """Annotation of a specification `name` in `module`, which is imported when a value of the field is validated."""
 
     module: str
     name: str

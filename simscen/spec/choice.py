@@ -1,7 +1,4 @@
-"""Base class of YAML mappings with exactly one of several keys, such as `{spawn: …}` or `{push: …}`.
-
-Installed packages can add keys.
-"""
+"""Base class of YAML mappings with one of several keys, such as `{spawn: …}`. Packages can add keys."""
 
 from functools import cache
 from typing import Annotated, Any, ClassVar, get_args
@@ -40,10 +37,7 @@ class Choice(Spec):
 
     @classmethod
     def addresses(cls) -> dict[str, str]:
-        """Return the address "module:Class" of the specification of each choice, by key in YAML.
-
-        Choices with a list or another Choice as their value are left out.
-        """
+        """Return the address "module:Class" of each choice by YAML key, except of lists and other Choices."""
         addresses = {key: _address(cls.model_fields[name]) for key, name in cls.choices().items()}
         return {key: address for key, address in addresses.items() if address}
 
@@ -98,10 +92,7 @@ class Choice(Spec):
 
     @property
     def plugin_suffix(self) -> str:
-        """Type and plug-in as a suffix for messages, e.g. " (criterion `dwell` of yardwork 1.2)".
-
-        It is "" if simscen ships the choice.
-        """
+        """Plug-in of the choice for messages, e.g. " (criterion `dwell` of yardwork 1.2)"; "" if simscen ships it."""
         if self.original_class is None:
             return ""
         from simscen.spec.registry import find_type

@@ -1,7 +1,4 @@
-"""Annotations of fields that accept all types of a registry group, such as planners, including types of plug-ins.
-
-A plug-in is an installed package that adds types.
-"""
+"""Annotations of fields that accept all types of a registry group, such as planners, including those of packages."""
 
 import math
 from collections.abc import Hashable

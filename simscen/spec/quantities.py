@@ -80,10 +80,7 @@ class Quantity:
         return f"{self.dimension}, e.g. {self.example}"
 
     def parse(self, value: Any) -> Any:
-        """Convert text such as "90 deg" to SI units; return any other value unchanged.
-
-        Raises PydanticCustomError for text without a number, or with a unit of another dimension.
-        """
+        """Convert text such as "90 deg" to SI units; return other values unchanged. Raises PydanticCustomError."""
         if not isinstance(value, str):
             return value
         units = UNITS[self.dimension]
@@ -176,10 +173,9 @@ class Amount(NamedTuple):
 
 
 def to_common_unit(amounts: tuple[Amount, ...]) -> tuple[tuple[float, ...], str]:
-    """Return the amounts as numbers in one unit, and this unit.
+    """Return the amounts as numbers in their common unit, or else in SI units, and this unit ("" for SI units).
 
-    Amounts with the same unit keep it. Other amounts are converted to the SI unit, which is returned as "". Raises
-    ValueError if their dimensions differ.
+    Raises ValueError if their dimensions differ.
     """
     units = {amount.unit for amount in amounts}
     if len(units) == 1:

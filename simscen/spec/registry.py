@@ -130,10 +130,7 @@ def built_in_specs(group: str) -> dict[str, type[BaseModel]]:
 
 
 def installed_types(group: str) -> tuple[RegisteredType, ...]:
-    """Return the types that installed packages, including simscen, add to a group by entry points, sorted by name.
-
-    The result includes types that cannot be used.
-    """
+    """Return the types, also unusable ones, that packages including simscen add by entry points, sorted by name."""
     return tuple(entry for entry in _all_installed_types() if entry.group == group)
 
 
@@ -143,10 +140,7 @@ def plugin_types(group: str) -> tuple[RegisteredType, ...]:
 
 
 def installed_specs(group: str, with_plugins: bool = True) -> dict[str, type[BaseModel]]:
-    """Return the usable specification classes that entry points add to a group, by name of the type.
-
-    If `with_plugins` is false, only those of simscen itself are returned.
-    """
+    """Return the usable specifications that entry points of simscen, or of all packages, add to a group, by name."""
     specs = {}
     for entry in installed_types(group):
         if not (entry.is_shipped or with_plugins):

@@ -45,10 +45,7 @@ _SUFFIXES_BY_KIND = (
 
 
 def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = ()) -> list[Problem]:
-    """Return the errors and warnings of a file of this kind (see `file_kind`) and of the files that it names.
-
-    All files must lie in `root` or in a folder of `world_path`.
-    """
+    """Return the errors and warnings of a file of this kind (see `file_kind`) and of the files that it names."""
     if kind in ("scenario", "study"):
         loaded = try_variations(file, root, world_path, numbers=CHECKED_DRAWS if kind == "study" else None)
         if isinstance(loaded, list):

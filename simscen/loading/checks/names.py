@@ -175,10 +175,7 @@ def missing_robot_names(spec: ScenarioSpec) -> Iterator[CheckProblem]:
 
 
 def _conditions_without_robot(condition: AnyCondition, keys: Keys, faults: Container[str]) -> Iterator[Keys]:
-    """Yield the keys of each condition that must name a robot, but names none.
-
-    These are conditions on the state of a robot, or on a fault. `faults` are the names of the faults of all robots.
-    """
+    """Yield the keys of each condition on the state of a robot, or on one of `faults`, that names no robot."""
     if condition.robot is not None:
         return
     for key, inner in (("all", condition.all), ("any", condition.any)):

@@ -36,10 +36,7 @@ MotionStop = tuple[Keys, str, tuple[float, float]]
 
 
 def blocked_poses(scene: Scene) -> dict[Keys, CheckProblem]:
-    """Return the problems of a blocked start, and of blocked goals and kidnap poses, by keys of the pose.
-
-    Fixed solids block all poses. Movable bodies at their initial poses also block the start.
-    """
+    """Return the problems of a blocked start, and of blocked goals and kidnap poses, by keys of the pose."""
     found: list[CheckProblem] = []
     if not expects_start_failure(scene.loaded.spec):
         solids = (*scene.world.solids, *scene.bodies)
@@ -138,10 +135,7 @@ def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
 
 
 def _on_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
-    """Return "on the robot" if a spawned object overlaps the robot; None if not, or if it depends on the run.
-
-    It is known for objects that appear relative to the robot, or at t = 0. `when` is the trigger, or None.
-    """
+    """Return "on the robot" if a spawned object overlaps the robot; None if not, or if it depends on the run."""
     if spawn.z >= scene.size.height:
         return None
     if spawn.ahead is not None:
@@ -206,10 +200,7 @@ def too_fast_motions(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _motions(scene: Scene) -> Iterator[tuple[Keys, MappingNode | None, str, MotionPath, Sequence[Solid]]]:
-    """Yield the keys, their YAML tree, the name of the body, the path, and the solids of each scripted motion.
-
-    The tree is None for the tree of the scenario. Motions that depend on the run are left out.
-    """
+    """Yield keys, YAML tree (None: the scenario), body name, path, and solids of each motion known before the run."""
     bodies = {body.name: body for body in scene.world.bodies}
     file = scene.loaded.world
     own = [thing.name for thing in file.spec.objects] if file.spec is not None else []
@@ -239,10 +230,7 @@ def motion_stops(motion: Motion) -> list[MotionStop]:
 
 
 def overlapping_start_problems(scenes: Sequence[Scene]) -> Iterator[Problem]:
-    """Yield a problem for each pair of robots with overlapping footprints at their starts.
-
-    `scenes` are the scenes of all robots of a scenario.
-    """
+    """Yield a problem for each pair of robots of a scenario with overlapping footprints at their starts."""
     for one, other in combinations(scenes, 2):
         outlines = [place_polygon(scene.size.footprint, scene.start) for scene in (one, other)]
         if polygons_overlap(*outlines):

@@ -44,10 +44,7 @@ def why_no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:
 
 
 def possible_run(loaded: LoadedScenario) -> "PossibleRun":
-    """Return which events, faults, and marks (of the action `mark`) can happen in the scenario.
-
-    This is a fixed-point iteration: it starts with nothing, and repeatedly adds what the possible events enable.
-    """
+    """Return which events, faults, and marks can happen: start with none, and repeatedly add what they enable."""
     run = PossibleRun(loaded, frozenset())
     while (possible := run.next_possible) != run.possible:
         run = replace(run, possible=possible)

@@ -23,10 +23,7 @@ def _start_is_blocked(scene: Scene) -> bool:
 
 @WORLD.check("SC050")
 def unreachable_triggers(scene: Scene) -> Iterator[CheckProblem]:
-    """Find events and faults that wait for the robot in an area that it cannot reach within the time limit.
-
-    With `required: false`, the problem is only a warning.
-    """
+    """Find events and faults that wait for the robot in an area that it cannot reach within the time limit."""
     if _start_is_blocked(scene) or scene.loaded.may_do():  # actions of installed packages may take the robot anywhere
         return
     starts, robot, limit = scene.start_poses, scene.loaded.robot.spec, scene.loaded.spec.time_limit

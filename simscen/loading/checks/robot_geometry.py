@@ -19,9 +19,9 @@ DIMENSION_TOLERANCE = 0.01
 
 
 def geometry_warnings(robot: LoadedRobot, spec: RobotSpec, body: RobotBody, roots: tuple[Path, ...]) -> list[Problem]:
-    """Return warnings about a robot with a URDF: wrong dimensions in its file, or wheels and casters off the ground.
+    """Return warnings about a URDF: dimensions unlike those in the robot file, or wheels and casters off the ground.
 
-    `spec` and `body` are the results of `robot_from_file`. All files of the robot must lie in the folders `roots`.
+    `spec` and `body` are the results of `robot_from_file`, and `roots` is its argument.
     """
     if robot.urdf is None:
         return []
@@ -64,10 +64,7 @@ def _urdf_dimensions(wheels: tuple[Wheel, ...]) -> dict[str, float]:
 
 
 def robot_problems(file: RobotFile) -> list[Problem]:
-    """Return the errors and warnings about the geometry of a robot.
-
-    A robot with a URDF is built. Without one, only the ground clearance of its body is checked.
-    """
+    """Return errors and warnings about the geometry of a robot. It is only built if it has a URDF."""
     robot = file.robot
     try:
         if robot.urdf is not None:

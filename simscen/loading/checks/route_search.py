@@ -124,10 +124,7 @@ def trigger_areas(scene: Scene) -> list[TriggerArea]:
 
 
 def _required_areas(scene: Scene, condition: AnyCondition, keys: Keys, name: str) -> Iterator[TriggerArea]:
-    """Yield the areas that the robot must enter before a condition at `keys` can be true.
-
-    `name` is the name of the event or fault.
-    """
+    """Yield the areas that the robot must enter before a condition of the event or fault `name` can be true."""
     if not scene.loaded.includes_robot(condition.robot) or condition.any is not None or condition.not_ is not None:
         return
     if condition.all is not None:

@@ -31,10 +31,7 @@ class Gap(NamedTuple):
 
 
 def unreachable_goals(scene: Scene) -> list[tuple[CheckProblem, Gap]]:
-    """Return a problem for each goal without a route, and the gap that is too narrow.
-
-    The problem is only a warning if a route could exist after all, for example over a ramp.
-    """
+    """Return a problem for each goal without a route, and the gap that is too narrow."""
     blocked = scene.cached(blocked_poses)
     if START in blocked:
         return []

@@ -15,10 +15,9 @@ MODULES = (actions, criteria, events, faults, names, settings, world_file)
 def check_scenario(
     loaded: LoadedScenario, world: World | None = None, unknown_places: Iterable[Problem] = ()
 ) -> list[Problem]:
-    """Return the errors and warnings of a scenario of one robot, or of the view of one of several robots.
+    """Return the errors and warnings of a scenario of one robot, or of a view, including `unknown_places`.
 
-    `world` is the built world; it is only needed to check names in a world from a ROS map or SDF file. The result
-    includes `unknown_places`, the problems that were found while the scenario was loaded.
+    `world` is the built world; it is only needed to check names in a world from a ROS map or SDF file.
     """
     problems = [
         *unknown_places,

@@ -62,10 +62,7 @@ class Scene:
         return self.heights_above(SILL_M)
 
     def heights_above(self, sill: float) -> tuple[float, float]:
-        """Return the lowest and highest z in m between which an obstacle blocks the robot.
-
-        Wheels climb obstacles of up to `sill` m.
-        """
+        """Return the z range in m in which obstacles block the robot, whose wheels climb `sill` m."""
         underside = self.size.underside
         lowest = sill if underside is None else underside + MIN_HULL_OVERLAP_M
         return lowest, max(lowest + sill, self.size.height)
@@ -88,11 +85,7 @@ class Scene:
         return self.world.grid if self.loaded.map is None else load_map(self.loaded.map)
 
     def why_outside(self, pose: Pose2) -> str | None:
-        """Return text such as "outside the map (…)" for a pose at which the robot cannot be; None for other poses.
-
-        The robot can be on its map, or within the bounds of a world without a map. With `map: none`, it can be
-        anywhere.
-        """
+        """Return text such as "outside the map (…)" for a pose off the map, or off a world without map; else None."""
         grid = self._map
         if grid is not None:
             if grid.inside(grid.cell_of(np.array([[pose.x, pose.y]])))[0]:
@@ -129,10 +122,7 @@ class Scene:
 
     @cached_property
     def certain_walls(self) -> tuple[Solid, ...]:
-        """Fixed solids that certainly block the robot: upright prisms, and walls from a map.
-
-        Other solids, such as a mesh or a tilted box, could be ramps.
-        """
+        """Fixed solids that are certainly no ramps: upright prisms, and walls from a map."""
         mapped = self.world.grid is not None
         return tuple(s for s in self.world.solids if upright_prism(s) is not None or (mapped and s.name == "map"))
 

@@ -1,7 +1,4 @@
-"""Runner of the checks that need the built world, but no physics engine.
-
-These are the checks of the stages BUILT_WORLD, WORLD, and TIMING, which `registry.py` describes.
-"""
+"""Runner of the checks that need the built world: stages BUILT_WORLD, WORLD, and TIMING."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -34,9 +31,9 @@ def check_in_world(
 ) -> list[Problem]:
     """Return the errors and warnings of a scenario in its built world.
 
-    `cache` keeps built worlds for further calls. If the stages WORLD or TIMING find problems, a picture of the world is
-    written to the folder `pictures`, unless it is None. Raises InvalidInput for unusable files, and UsageError for a
-    picture that cannot be written.
+    `cache` keeps built worlds for further calls. If there are problems, a picture of the world is written to the
+    folder `pictures`, unless it is None. Raises InvalidInput for unusable files, and UsageError if the picture
+    cannot be written.
     """
     cache = cache or WorldCache()
     world = with_stops_in_bounds(cache.world(loaded), loaded)
@@ -98,10 +95,9 @@ def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
 
 
 def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path) -> Path:
-    """Write a picture to `folder`, and return its path.
+    """Draw the world, the robot at its start and goals, and `gaps` (x, y) in m. Return the path of the picture.
 
-    It shows the world, the robot at its start and its goals, and `gaps`, which are positions (x, y) in m. Raises
-    UsageError if it cannot be written.
+    Raises UsageError if it cannot be written to `folder`.
     """
     from simscen.worlds.built_world import build_world_and_map
     from simscen.worlds.maps.world_picture import draw_world

@@ -72,10 +72,7 @@ class Assets:
         return self.complete_world(spec, tree, path) if spec and tree else None
 
     def complete_world(self, spec: WorldSpec, tree: Node, path: Path) -> LoadedWorld | None:
-        """Return the world `spec` with its map and SDF file, and with poses instead of place names.
-
-        `tree` is the YAML tree of `spec`. `path` is the file that contains it, a world file or a scenario.
-        """
+        """Return the world `spec`, whose YAML tree in the file `path` is `tree`, with its map, SDF file, and places."""
         before = len(self.problems)
         loaded_map = sdf = None
         if spec.map is not None:
@@ -204,10 +201,7 @@ def shipped_robots() -> dict[str, Path]:
 
 
 def find_criterion_masks(spec: BaseModel, tree: MappingNode, assets: Assets) -> Mapping[str, CriterionMask]:
-    """Return the filter masks of the criteria under `pass`, by path as written. Problems are added to `assets`.
-
-    One of them is that a scenario and a file in another folder, which it extends, name two masks by the same path.
-    """
+    """Return the filter masks of the criteria under `pass`, by path as written. Problems are added to `assets`."""
     found: dict[str, CriterionMask] = {}
     for reference in references(spec):
         node = node_at(tree, reference.keys)

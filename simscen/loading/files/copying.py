@@ -63,10 +63,7 @@ def _existing_file(leaf: ScalarNode, folders: set[Path]) -> Path | None:
 
 
 def _with_dependencies(files: Iterable[Path]) -> list[Path]:
-    """Return these files and, recursively, the files that they name, sorted.
-
-    Raises UsageError for a file with one of _UNSEARCHED_SUFFIXES.
-    """
+    """Return these files and all files that they name, sorted. Raises UsageError for _UNSEARCHED_SUFFIXES."""
     found: set[Path] = set()
     waiting = list(files)
     while waiting:

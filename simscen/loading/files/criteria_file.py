@@ -32,10 +32,7 @@ class LoadedCriteria:
     """Filter masks of the criteria, by path as written in the file."""
 
     def for_robot(self, robot: str) -> "LoadedCriteria":
-        """Return the criteria for a robot of a log. `robot` is its name; "" for the only robot of a log.
-
-        A file without `robots` applies to all robots. Raises InvalidInput if `robots` does not contain the robot.
-        """
+        """Return the criteria for a robot of a log; "" is the only robot of a log. Raises InvalidInput."""
         trees = multirobot.split_by_robot(self.tree)
         if robot in trees:
             return _load_tree(self.file, trees[robot], self.library)
@@ -58,10 +55,7 @@ class LoadedCriteria:
 
 
 def load_criteria(path: Path, root: Path, world_path: Sequence[Path] = ()) -> LoadedCriteria:
-    """Load the criteria in the file `path`, merged with the files that it extends and with `defaults.yaml`.
-
-    All files must lie in `root` or in a folder of `world_path`. Raises InvalidInput with all problems.
-    """
+    """Load the criteria in a file, merged with `extends` and `defaults.yaml`. Raises InvalidInput with all problems."""
     library = Library(PathSandbox.around(root, world_path))
     file = library.sandbox.resolve_argument(path)
     if isinstance(file, Problem):

@@ -31,9 +31,8 @@ SCENARIOS_FOLDER = "scenarios"
 def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCENARIO_SUFFIXES) -> list[Path]:
     """Return the absolute paths of the files that `paths` select, sorted.
 
-    A file selects itself. A folder selects all files with one of `suffixes` in it and in its subfolders that are not
-    hidden. Raises InvalidInput for missing paths, and for scenarios with conflicting output folders. Raises
-    NothingSelected if no file is selected.
+    A folder selects all files with one of `suffixes` in it and in its subfolders that are not hidden. Raises
+    InvalidInput for missing paths and conflicting output folders, and NothingSelected.
     """
     problems = [problem for path in paths if (problem := _missing_path_problem(path))]
     found = dict.fromkeys(file.absolute() for path in paths for file in _selected_files(path, suffixes, problems))
@@ -113,10 +112,7 @@ def _selected_files(path: Path, suffixes: tuple[str, ...], problems: list[Proble
 
 
 def _output_folder_conflicts(files: list[Path], root: Path) -> Iterator[Problem]:
-    """Yield a problem for each scenario with an output folder inside the output folder of a run of another scenario.
-
-    For example, the scenario `a/seed-1/b` conflicts with the run of the scenario `a` with seed 1.
-    """
+    """Yield a problem for each scenario such as `a/seed-1/b` whose output folder is that of a run of scenario `a`."""
     ids = {scenario_id(file, root).casefold() for file in files}
     for file in files:
         name = scenario_id(file, root).casefold()

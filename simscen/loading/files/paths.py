@@ -1,7 +1,4 @@
-"""Paths in YAML files, and ids of scenarios, which are paths.
-
-Paths in YAML files must be relative, and lead into the root or a folder of --world-path.
-"""
+"""Paths in YAML files, which must be relative, and ids of scenarios, which are paths."""
 
 import errno
 import os
@@ -67,10 +64,9 @@ class PathSandbox:
         return path
 
     def resolve_argument(self, path: Path) -> Path | Problem:
-        """Return the absolute path of a file on the command line, which need not exist.
+        """Return the absolute path of a file on the command line, which need not exist; or a problem.
 
         If the file is a symbolic link, the path is that of the link.
-        Return a problem if it is outside the sandbox, or if its path has invalid characters.
         """
         file = _resolved(path.parent) / path.name
         if self.contains(file):

@@ -26,10 +26,9 @@ class RobotFile:
 
 
 def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -> RobotFile:
-    """Load the robot in a `*.robot.yaml`, `.urdf` or `.xacro` file, or a robot that ships with simscen.
+    """Load the robot in the file `written` (`*.robot.yaml`, `.urdf`, or `.xacro`), or the shipped robot of this name.
 
-    `written` is the path of the file or the name of the shipped robot. All files must lie in `root` or in a folder of
-    `world_path`. Raises InvalidInput with all problems.
+    All files must lie in `root` or in a folder of `world_path`. Raises InvalidInput with all problems.
     """
     shipped = shipped_robots()
     library = Library(PathSandbox.around(root, world_path))
@@ -50,10 +49,10 @@ def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -
 def load_world_file(
     path: Path, root: Path, world_path: Sequence[Path] = (), unsaved: Mapping[Path, str] | None = None
 ) -> LoadedWorld:
-    """Load the world in a `*.world.yaml`, a ROS map, or an SDF file.
+    """Load the world in a `*.world.yaml`, a ROS map, or an SDF file. Raises InvalidInput with all problems.
 
-    All files must lie in `root` or in a folder of `world_path`. `unsaved` are texts that replace the content of files,
-    such as unsaved texts of an editor. Raises InvalidInput with all problems.
+    All files must lie in `root` or in a folder of `world_path`. `unsaved` are texts that replace the content of
+    files.
     """
     library = Library(PathSandbox.around(root, world_path), unsaved=unsaved or {})
     file = library.sandbox.resolve_argument(path)

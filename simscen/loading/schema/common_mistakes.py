@@ -49,10 +49,7 @@ def hint_for_wrong_type(error_type: str, model: type[BaseModel], loc: Sequence[K
 
 
 def hint_for_misplaced_key(model: type[BaseModel], tree: Node, loc: Sequence[Key], key: str) -> str:
-    """Return a hint on where to move the unknown `key` of the mapping at `loc`; "" if no suitable place is found.
-
-    Inside an item of a list, only places in the same item are suitable.
-    """
+    """Return a hint on where to move an unknown key of the mapping at `loc`, within its list item; "" if unknown."""
     item = next((index + 1 for index, part in enumerate(loc) if isinstance(part, int)), 0)
     for length in range(len(loc) - 1, item - 1, -1):
         if key in keys_of(models_at(model, loc[:length])):

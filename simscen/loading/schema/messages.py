@@ -91,10 +91,7 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
 
 def translate_error(error_type: str, context: Mapping[str, Any], node: Node, text: str) -> Message:
-    """Return the message for a validation error of pydantic in the value `node`.
-
-    `error_type`, `context`, and `text` are the fields `type`, `ctx`, and `msg` of the error.
-    """
+    """Return the message for an error of pydantic in the value `node`, with the fields `type`, `ctx`, and `msg`."""
     if error_type in _EXPECTED_TYPES:
         text = f"expected {_EXPECTED_TYPES[error_type]}, got {describe_node(node)}"
         return Message("SC011", text, _type_hint(error_type, node))

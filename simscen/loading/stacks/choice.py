@@ -55,9 +55,9 @@ class StackChoice:
 def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
     """Return a scenario tree of one robot with the selected stack.
 
-    Zones, masks, and goal tolerances of the scenario are always kept. A stack file replaces all other parameters. A
-    type of stack keeps them if the scenario's stack has this type, and a command keeps them if the scenario's stack is
-    external; otherwise, both keep only COMMON_STACK_KEYS.
+    Zones, masks, and goal tolerances of the scenario are kept. A stack file replaces all other parameters. A type
+    of stack keeps them if the scenario has this type, and a command keeps them if the scenario's stack is external;
+    otherwise, both keep only COMMON_STACK_KEYS.
     """
     own = child(tree, "stack")
     if own is not None and not isinstance(own, MappingNode):

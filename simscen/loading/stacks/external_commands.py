@@ -37,9 +37,8 @@ def parse_command(
 ) -> ExternalCommand:
     """Return the command in `text`, which has shell quoting. The command will be started in `folder`.
 
-    `own_variables` are added to the environment variables `environment`. `timeouts_s` are the timeouts for the start of
-    the program and for each of its answers. Raises ValueError if the command cannot be parsed or its program cannot be
-    run.
+    `own_variables` are added to the variables `environment`. `timeouts_s` are for the start and for each answer.
+    Raises ValueError if the text cannot be parsed or the program cannot be run.
     """
     program, *arguments = split_command(text)
     program = str(expand_home(program)) if program.startswith("~") else program
@@ -94,10 +93,10 @@ def _absolute_search_path(env: Mapping[str, str], folder: Path) -> str:
 
 
 def _digest(argv: Sequence[str], own_variables: Mapping[str, str], env: Mapping[str, str], folder: Path) -> str:
-    """Return the SHA-256 digest of a stack.
+    """Return the SHA-256 digest of the arguments, variables, program, and files of a stack.
 
-    It covers the arguments, `own_variables`, the program, all files in the arguments, and the Python files in the
-    folders of Python scripts and modules in the arguments, including subfolders.
+    The files are those in the arguments, and the Python files in the folders of scripts and modules in the
+    arguments.
     """
     sha = hashlib.sha256(json.dumps([list(argv), sorted(own_variables.items())]).encode())
     found = shutil.which(argv[0], path=_absolute_search_path(env, folder)) if "/" not in argv[0] else None

@@ -33,10 +33,7 @@ NAV2_PARAMS, STACK, ROBOTS = "nav2_params", "stack", "robots"
 
 @dataclass
 class ExpandedTree:
-    """YAML tree of a scenario or stack file that contains the parameters of its Nav2 files.
-
-    `problems` are errors in the Nav2 files. `notes` are warnings about ignored and changed parameters.
-    """
+    """YAML tree with the parameters of its Nav2 files, errors in these files, and warnings (`notes`)."""
 
     tree: MappingNode
     problems: list[Problem] = field(default_factory=list)
@@ -44,10 +41,7 @@ class ExpandedTree:
 
 
 def with_nav2_parameters(tree: MappingNode, library: Library) -> ExpandedTree:
-    """Return the tree of a scenario or stack file with the parameters of its Nav2 files in all sections `stack`.
-
-    The texts of the Nav2 files are added to `library`.
-    """
+    """Return a scenario or stack tree with the parameters of its Nav2 files, and add their texts to `library`."""
     result = ExpandedTree(tree)
     for keys in (*((ROBOTS, name, STACK) for name in entries_of(child(tree, ROBOTS))), (STACK,)):
         stack = node_at(tree, keys)
@@ -57,10 +51,7 @@ def with_nav2_parameters(tree: MappingNode, library: Library) -> ExpandedTree:
 
 
 def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree) -> MappingNode:
-    """Return a section `stack` with the parameters of its Nav2 file, and with Nav2's defaults (`profile: nav2`).
-
-    Values in the section itself have priority. Add problems and notes to `result`.
-    """
+    """Return a section `stack`, completed by its Nav2 file and Nav2's defaults. Add problems and notes to `result`."""
     written, position = stack.entries[NAV2_PARAMS].value, value_position(stack, (NAV2_PARAMS,))
     if not isinstance(written, ScalarNode) or not isinstance(written.value, str):
         return stack  # validation reports the wrong type
@@ -122,11 +113,7 @@ def _parameter_node(value: Any, position: Position) -> Node:
 
 
 def _notes(translations: Mapping[str, list[Translation]], parameters: Nav2Parameters) -> Iterator[Problem]:
-    """Yield warnings about ignored and changed parameters, and about nodes without a counterpart.
-
-    `translations` are the translations by node. Each parameter with a note has its own warning. Other ignored
-    parameters share one warning for each node.
-    """
+    """Yield warnings about changed and ignored parameters (without note: one per node), and about unknown nodes."""
     used = {parameters.positions[node, one.parameter] for node, own in translations.items() for one in own if one.keys}
     for node, own in translations.items():
         ignored = []

@@ -121,8 +121,7 @@ def translate_same_name(
 ) -> Iterator[Translation]:
     """Yield the translation of a parameter to the same value in `section`; nothing if simscen has no such parameter.
 
-    `kind` is an argument of `simscen_parameters`. `simscen_name` is the name in simscen; "" for the same name as in
-    Nav2.
+    `kind` is an argument of `simscen_parameters`. `simscen_name` is another name in simscen.
     """
     target = simscen_name or name
     if target in simscen_parameters(kind):
@@ -131,10 +130,7 @@ def translate_same_name(
 
 @cache
 def simscen_parameters(kind: str) -> frozenset[str]:
-    """Return the names of simscen's parameters, by section of `stack`, e.g. "costmap", or by type, e.g. "dwb".
-
-    The name `a.b` stands for the parameter `b` in the mapping `a`.
-    """
+    """Return simscen's parameters of a section of `stack`, or of a type such as "dwb"; `a.b` is `b` in `a`."""
     from simscen.model import controllers, costmaps, localizers, mppi, planners, recovery
 
     models: dict[str, type[BaseModel]] = {

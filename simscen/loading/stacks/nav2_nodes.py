@@ -48,10 +48,8 @@ def _translate_controller_server(parameters: Parameters) -> Iterator[Translation
 
 
 def _first_plugin(parameters: Parameters, kind: str, default: str) -> str:
-    """Return the name of the first plugin of a kind such as "planner"; `default` if the file lists none.
-
-    Before Iron, the progress checker is a single name instead of a list.
-    """
+    """Return the name of the first plugin of a kind such as "planner"; `default` if the file lists none."""
+    # Before Iron, the progress checker is a single name instead of a list.
     named = parameters.get(f"{kind}_plugins", parameters.get(f"{kind}_plugin", default))
     return next(iter(strings(named)), "") if isinstance(named, list) else str(named)
 
@@ -66,10 +64,10 @@ def _note_unused_plugins(parameters: Parameters, kind: str, chosen: str) -> Iter
 def _translate_plugin(
     parameters: Parameters, section: str, default: str, types: Mapping[str, str]
 ) -> Iterator[Translation]:
-    """Translate the type and the parameters of the first controller or planner.
+    """Translate the type and the parameters of the first controller or planner (`section`).
 
-    `section` is "controller" or "planner". `default` is the name of the plugin if the file lists none. `types` are the
-    types in simscen, by class in Nav2. For a rotation shim controller, only its primary controller is translated.
+    For a rotation shim controller, only its primary controller is translated. `default` is the name of the plugin
+    if the file lists none. `types` are the types in simscen, by class in Nav2.
     """
     name = _first_plugin(parameters, section, default)
     yield from _note_unused_plugins(parameters, section, name)
@@ -105,10 +103,7 @@ def _translate_plugin(
 
 
 def _has_no_effect(kind: str, model: str, name: str, value: Any) -> bool:
-    """Return whether Nav2 ignores this value of a parameter, which simscen would reject as out of range.
-
-    `kind` is the type of controller or planner in simscen, and `model` is the motion model of an "mppi" controller.
-    """
+    """Return whether Nav2 ignores a value, which simscen would reject as out of range. `model` is that of MPPI."""
     if not isinstance(value, float | int):
         return False
     if kind == "dwb":
@@ -123,10 +118,7 @@ def _motion_model(parameters: Parameters, prefix: str) -> str:
 
 
 def _translate_critics(name: str, written: Any, kind: str) -> Iterator[Translation]:
-    """Translate the list of critics `written` of an "mppi" or "dwb" controller. Unknown critics get a note.
-
-    MPPI gets the supported critics of the list. DWB gets the weight 0 for each critic that is not in the list.
-    """
+    """Translate the list `written` of critics: MPPI gets the supported ones, DWB the weight 0 for all others."""
     listed = strings(written)
     supported = MPPI_CRITICS if kind == "mppi" else (*DWB_CRITICS, *DWB_CRITICS_WITHOUT_WEIGHT)
     names = {
@@ -144,11 +136,7 @@ def _translate_critics(name: str, written: Any, kind: str) -> Iterator[Translati
 
 
 def _translate_velocity_smoother(parameters: Parameters) -> Iterator[Translation]:
-    """Translate the limits of velocity and acceleration.
-
-    In simscen, lateral and backward motion have the limits of forward motion, and turning has one limit for
-    acceleration and deceleration. Different limits get a note.
-    """
+    """Translate the limits of forward motion and turning. Other limits get a note if they differ."""
     turning_names = {"max_velocity": "max_angular_velocity", "max_accel": "max_angular_accel", "max_decel": ""}
     for name, turning in turning_names.items():
         limits = _xy_and_rotation(parameters.get(name))
@@ -246,10 +234,7 @@ TRANSLATORS: dict[str, Callable[[Parameters], Iterator[Translation]]] = {
 
 
 def translate(node: str, parameters: Parameters) -> list[Translation]:
-    """Return the translations of the parameters of a node; [] for an unknown node.
-
-    Irrelevant parameters are left out. A parameter that simscen does not have gets a translation without keys.
-    """
+    """Return the translations of the relevant parameters of a node, without keys if simscen has no counterpart."""
     translator = TRANSLATORS.get(OLD_NODE_NAMES.get(node, node))
     if translator is None:
         return []

@@ -85,10 +85,7 @@ def is_nav2_parameter_file(text: str, display_name: str) -> bool:
 
 
 def _ros_nodes(tree: Node, name: str) -> Iterator[tuple[str, MappingNode]]:
-    """Yield the name (without namespace) and the parameters of each ROS node in a YAML tree.
-
-    `name` is the last part of the key of the tree; "" for the tree of a file.
-    """
+    """Yield the name (without namespace) and the parameters of each ROS node in a tree with the key `name`."""
     for key, entry in entries_of(tree).items():
         if key == PARAMETERS_KEY and isinstance(entry.value, MappingNode):
             yield name, entry.value

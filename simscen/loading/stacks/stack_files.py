@@ -21,10 +21,7 @@ _STACK_FILE_KEYS = frozenset({"simscen", "name", "description", "stack"})
 
 
 def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: Sequence[Path] = ()) -> StackChoice:
-    """Return the choice `--stack name=value` of the stack file `path`, which may be outside `root`.
-
-    Raises InvalidInput with all problems of the file.
-    """
+    """Return the choice `--stack name=value` of the stack file `path`. Raises InvalidInput with all its problems."""
     library = Library(PathSandbox.around(root, [*world_path, path.parent]))
     found = read_stack_file(path, library)
     if isinstance(found, list):
@@ -36,10 +33,9 @@ def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: S
 
 
 def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Problem]] | list[Problem]:
-    """Return the section `stack` of a stack file and warnings about the file; or all problems of the file.
+    """Return the section `stack` of a stack file or Nav2 file, with the parameters of its Nav2 files, and warnings.
 
-    `path` can also be a Nav2 parameter file. In the section, the path of each Nav2 file is replaced by the parameters
-    in this file.
+    Return all problems of the file instead if it is invalid.
     """
     file = library.sandbox.resolve_argument(path)
     if isinstance(file, Problem):
@@ -81,10 +77,7 @@ def _read_tree(file: Path, library: Library) -> tuple[Node | None, list[Problem]
 
 
 def recognize_stack_file(tree: Node | None, text: str, display_name: str) -> str:
-    """Recognize a stack file by its content: return STACK_FILE_KIND, NAV2_FILE_KIND, or "" for other files.
-
-    `tree` and `text` are the content of the file, and `display_name` is its path in messages.
-    """
+    """Return STACK_FILE_KIND, NAV2_FILE_KIND, or "" for a file with this tree and text, which is no stack file."""
     if is_nav2_parameter_file(text, display_name):
         return NAV2_FILE_KIND
     keys = entries_of(tree).keys()

@@ -32,8 +32,7 @@ class UserConfig:
     def command(self, name: str, environment: Mapping[str, str], folder: Path) -> ExternalCommand | None:
         """Return the command of the external stack `name`; None if the configuration does not define it.
 
-        `environment` and `folder` are the environment variables and the working folder of this process. Raises
-        InvalidInput if the command cannot be run.
+        `environment` and `folder` are those of this process. Raises InvalidInput if the command cannot be run.
         """
         if name not in self.spec.stacks:
             return None
@@ -72,10 +71,7 @@ def load_config(file: Path) -> UserConfig:
 def undefined_stack(
     loaded: LoadedScenario, defined_names: Iterable[str] = (), config_file: Path | None = None
 ) -> Problem | None:
-    """Return a problem if the scenario has an external stack without a command; else None.
-
-    `defined_names` are the names of the external stacks with a command. `config_file` is the user configuration.
-    """
+    """Return a problem for an external stack without a command; else None. The other parameters are for the hint."""
     stack = loaded.spec.stack
     if not isinstance(stack, ExternalStackSpec) or loaded.external_command is not None:
         return None
@@ -87,10 +83,7 @@ def undefined_stack(
 
 
 def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config_file: Path) -> list[Problem]:
-    """Return a problem if the robots of a scenario need the commands of several `--stack` options; else [].
-
-    `given` are the names of the stacks in these options. `config_file` is the user configuration.
-    """
+    """Return a problem if the robots of a scenario have several of the stacks of `--stack` options (`given`)."""
     own = {name: view for view in loaded.robots.values() if (name := external_stack_name(view.tree)) is not None}
     conflicting = [name for name in given if name in own]
     stacks = " and ".join(map(quoted, conflicting))

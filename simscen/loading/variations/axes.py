@@ -82,10 +82,7 @@ class AxisBuilder:
         return found
 
     def _changes_by_path(self, node: Node | None, distinct: bool) -> list[list[Change]]:
-        """Return the list of changes of each path in `node`, a mapping from paths to lists of values.
-
-        With `distinct`, equal values of a path are reported as problems.
-        """
+        """Return the changes of each path in a mapping from paths to values, which must differ if `distinct`."""
         found = []
         for path, entry in entries_of(node).items():
             values = items_of(entry.value)

@@ -46,11 +46,7 @@ class Condition:
     paths: tuple[str, ...]
 
     def holds(self, values: Mapping[str, Any]) -> bool:
-        """Return whether the condition holds for these values, by path.
-
-        Quantities such as "50 cm" are converted to SI units. Raises ConditionError if the condition cannot be
-        evaluated.
-        """
+        """Return whether the condition holds for values by path, in any units. Raises ConditionError."""
         try:
             result = _evaluate(self.expression, values)
         except (TypeError, ValueError, ArithmeticError, RecursionError) as error:
@@ -101,10 +97,7 @@ def _collect_paths(node: ast.expr, text: str, paths: dict[str, None]) -> None:
 
 
 def _path_text(node: ast.expr, text: str) -> str:
-    """Return the text of a path such as `goals[0].pose.x`. Raises ConditionError if the expression is not a path.
-
-    `text` is the whole condition, for the message.
-    """
+    """Return the text of a path such as `goals[0].pose.x` in the condition `text`. Raises ConditionError."""
     match node:
         case ast.Name(id=name):
             return name

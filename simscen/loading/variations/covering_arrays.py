@@ -62,10 +62,9 @@ def _candidate_row(
     attempt: int,
     is_allowed: Callable[[Row], bool],
 ) -> Row | None:
-    """Return a row that contains `pair` and many pairs of `uncovered`; None if this row is not allowed.
+    """Return a row with `pair` and, chosen greedily, many of `uncovered`; None if it is not allowed.
 
-    The other values are chosen greedily, one parameter after the other. `attempt` changes the order of the parameters
-    and values.
+    `attempt` changes the order of the parameters and values.
     """
     a, x, b, y = pair
     chosen = {a: x, b: y}

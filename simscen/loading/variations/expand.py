@@ -31,10 +31,7 @@ _DESCRIPTIVE_KEYS = frozenset({"description", "tags", "expected", "skip"})
 
 @dataclass(frozen=True)
 class Variation:
-    """Variation of a scenario: its YAML `tree` contains the new values in `changes`.
-
-    `name` is "" for a file without variations.
-    """
+    """Variation of a scenario: its YAML `tree` contains the new values in `changes`. A file without them has `name` ""."""
 
     name: str
     tree: MappingNode = field(repr=False)
@@ -64,10 +61,7 @@ class Variation:
 
 @dataclass(frozen=True)
 class Block:
-    """Block of variations. A variation combines one option of each axis, and meets the conditions.
-
-    With `is_random`, the block has a single axis with options that are drawn at random.
-    """
+    """Block of variations: combinations of axes that meet conditions, or one axis of random draws (`is_random`)."""
 
     axes: Sequence[Axis]
     conditions: Sequence[Condition]
@@ -75,7 +69,7 @@ class Block:
 
     @property
     def count(self) -> int:
-        """Number of combinations, including those that do not meet the conditions."""
+        """Number of variations before conditions are applied; with `is_random`, the `count` in the file."""
         return math.prod(map(len, self.axes))
 
     def options(self, index: int) -> list[Option]:
@@ -110,7 +104,7 @@ class VariationSpace:
         return sum(block.count for block in self.blocks)
 
     def variation(self, number: int) -> Variation | None:
-        """Return the variation with this number, named `variation-<number>`; None if it does not meet the conditions.
+        """Return the variation with this number; None if it does not meet the conditions.
 
         Raises ConditionError if a condition cannot be evaluated, and IndexError for an unknown number.
         """
@@ -118,10 +112,9 @@ class VariationSpace:
         return None if options is None else self._build(numbered_name(number), options)
 
     def numbers(self) -> Iterator[int]:
-        """Yield the numbers of the variations that meet the conditions in `require`; with `is_random`, without end.
+        """Yield the numbers of the variations that meet the conditions; with `is_random`, without end.
 
-        Raises ConditionError if a condition cannot be evaluated, or if MAX_REJECTED_DRAWS consecutive draws do not meet
-        the conditions.
+        Raises ConditionError, also if MAX_REJECTED_DRAWS consecutive draws do not meet the conditions.
         """
         rejected = 0
         for number in itertools.count(1) if self.is_random else range(1, self.count + 1):
@@ -132,10 +125,7 @@ class VariationSpace:
                 raise ConditionError(f"none of {MAX_REJECTED_DRAWS} draws in a row meets the conditions in `require`")
 
     def named_variations(self) -> list[Variation]:
-        """Return the first `count` variations of `numbers()`, with names that state the values that differ.
-
-        Raises ConditionError.
-        """
+        """Return the first `count` variations of `numbers()`, named by values that differ. Raises ConditionError."""
         numbers = list(itertools.islice(self.numbers(), self.count))
         chosen = [options for number in numbers if (options := self._options(number)) is not None]
         values = [
@@ -150,10 +140,7 @@ class VariationSpace:
         return [self._build(name, options) for options, name in zip(chosen, make_unique(names, is_named), strict=True)]
 
     def _options(self, number: int) -> list[Option] | None:
-        """Return the options of a variation; None if it does not meet the conditions.
-
-        Raises ConditionError, and IndexError for an unknown number.
-        """
+        """Return the options of a variation; None if it violates conditions. Raises ConditionError, IndexError."""
         index = number - 1
         for block in self.blocks:
             if index < block.count or self.is_random:
@@ -170,8 +157,8 @@ class VariationSpace:
 def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -> list[Variation] | list[Problem]:
     """Return the variations of a scenario that meet the conditions; or the problems of its `variations`.
 
-    `numbers` selects variations, which get names such as `variation-7`; None selects all. Unknown numbers are ignored.
-    A scenario without `variations` is returned as one variation with the name "".
+    `numbers` selects variations, which get names such as `variation-7`; unknown numbers are ignored. A scenario
+    without `variations` is one variation with the name "".
     """
     space = variation_space(tree)
     if not isinstance(space, VariationSpace):

@@ -42,10 +42,10 @@ def short_names(targets: Sequence[Target]) -> dict[str, str]:
 
 
 def derive_name(keys: dict[str, str], changes: Sequence[Change], number: int) -> str:
-    """Return the name of a variation with these changes, such as `speed=0.5,mass=10`.
+    """Return a name such as `speed=0.5,mass=10`; `variation-<number>` if it would be too long.
 
-    `keys` are the short names of the paths. The number of a value in the list of its path replaces a value that is too
-    long. A name that is too long becomes `variation-<number>`.
+    `keys` are the short names of the paths. The number of a value in the list of its path replaces a value that is
+    too long.
     """
     values = {keys[change.target.path]: _value_text(change.value) or f"no{change.number}" for change in changes}
     name = ",".join(f"{key}={value}" for key, value in values.items())
@@ -65,10 +65,7 @@ def number_of(name: str) -> int | None:
 
 
 def make_unique(names: Sequence[str], is_fixed: Sequence[bool]) -> list[str]:
-    """Add suffixes `+2`, `+3`, … to repeated names, so that all names are unique even if case is ignored.
-
-    Names for which `is_fixed` is true are not changed.
-    """
+    """Add `+2`, `+3`, … to repeated names, ignoring case, except to those for which `is_fixed` is true."""
     taken = {name.casefold() for name, fixed in zip(names, is_fixed, strict=True) if fixed}
     found = []
     for name, fixed in zip(names, is_fixed, strict=True):

@@ -1,7 +1,4 @@
-"""Options of the axes of variations.
-
-An option contains new values for one or several paths. The values are listed in a file or drawn at random.
-"""
+"""Options of the axes of variations: new values for one or several paths, listed in a file or drawn at random."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -57,11 +54,7 @@ Axis = Sequence[Option] | RandomOptions
 
 
 def value_node(distribution: Node, value: object) -> Node:
-    """Return the YAML node of a value that was drawn from a distribution. `distribution` is its YAML tree.
-
-    For a ChoiceIndex, it is the chosen item of the `choice`. For other values, it is a new node at the position of the
-    distribution.
-    """
+    """Return the node of a value drawn from `distribution` (YAML): an item of its `choice`, or a new node."""
     from simscen.loading.variations.sampling import ChoiceIndex
 
     if isinstance(value, ChoiceIndex):

@@ -1,7 +1,4 @@
-"""Sampling of values for variations from distributions.
-
-All random numbers are hashes of the seed, the path, and the number of the draw.
-"""
+"""Sampling of values for variations. Random numbers are hashes of the seed, the path, and the draw's number."""
 
 import hashlib
 import math
@@ -26,18 +23,12 @@ def draw_values(sampled: Sampled, path: str) -> list[Any]:
 
 
 def draw_value(sampled: Sampled, path: str, index: int) -> Any:
-    """Return the value of a path in the variation with this index, from 0, for the method `random`.
-
-    The index may exceed `sampled.count`.     Raises ValueError for an invalid distribution.
-    """
+    """Return the value of a path in the variation `index`, from 0, for `method: random`. Raises ValueError."""
     return quantile(sampled.values[path], _hashed_uniform(sampled.seed, path, "value", index))
 
 
 def _probabilities(sampled: Sampled, path: str) -> list[float]:
-    """Return the cumulative probability of the value of a path for each variation, between 0 and 1 (both excluded).
-
-    `sampled.method` determines the method: random, Latin hypercube, or Sobol.
-    """
+    """Return the cumulative probability, in (0, 1), of the value of a path for each variation."""
     count = sampled.count
     if sampled.method == "sobol":
         return _sobol_probabilities(sampled, path)
@@ -77,10 +68,9 @@ def _hashed_uniform(seed: int, path: str, purpose: str, number: int) -> float:
 
 
 def quantile(distribution: Draw, u: float) -> Any:
-    """Return the quantile of a distribution at the cumulative probability `u`, 0 < u < 1.
+    """Return the quantile of a distribution at the cumulative probability `u`, 0 < u < 1. Raises ValueError.
 
-    A quantity is text with its unit, an item of a `choice` is a ChoiceIndex. Raises ValueError for an invalid
-    distribution.
+    A quantity is text with its unit, an item of a `choice` is a ChoiceIndex.
     """
     match distribution.chosen:
         case Uniform(root=ends):

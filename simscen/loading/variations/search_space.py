@@ -34,10 +34,9 @@ class SearchSpace:
         return [len(one.root) if isinstance(one, OneOf) else 0 for one in chosen]
 
     def variation(self, name: str, point: Sequence[float]) -> Variation | None:
-        """Return the variation at a point; None if it does not meet the conditions.
+        """Return the variation at a point of cumulative probabilities in (0, 1); None if it violates conditions.
 
-        The coordinates of the point are cumulative probabilities between 0 and 1 (both excluded). The values are the
-        corresponding quantiles of the distributions. Raises ConditionError if a condition cannot be evaluated.
+        Raises ConditionError if a condition cannot be evaluated.
         """
         changes = []
         for target, probability in zip(self.targets, point, strict=True):

@@ -18,11 +18,7 @@ class VariationProblems(NamedTuple):
 
 
 def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
-    """Return each problem once. Its message states which variations have the problem.
-
-    If the problem is at a varied value, the message also contains the dotted path of the value. A problem that all
-    variations have and that is not at a varied value is unchanged.
-    """
+    """Return each problem once. Its message states the varied path, and which variations have the problem."""
     if len(variations) == 1 and not variations[0].name:
         return list(dict.fromkeys(variations[0].problems))
     variations_by_problem: dict[Problem, list[VariationProblems]] = {}
@@ -35,10 +31,7 @@ def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
 
 
 def _with_variation_names(problem: Problem, affected: Sequence[VariationProblems], variation_count: int) -> Problem:
-    """Return the problem with a message that states the varied path and the affected variations.
-
-    `affected` are the variations with the problem, `variation_count` is the number of all variations.
-    """
+    """Return a problem with the varied path and the variations with the problem (`affected`) in its message."""
     path = affected[0].varied_paths.get(Position(problem.path, problem.line, problem.col))
     names = [one.name for one in affected if one.name]
     if not names or (path is None and len(names) == variation_count):

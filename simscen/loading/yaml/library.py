@@ -37,10 +37,9 @@ class Library:
     """Texts that replace the content of files, by absolute path, such as unsaved texts of an editor."""
 
     def read(self, path: Path, defaults: bool = False) -> tuple[Node | None, list[Problem]]:
-        """Return the tree of a file, merged with the files that it extends, and all problems.
+        """Return the tree of a file (None if it cannot be parsed), merged with the files it extends, and all problems.
 
-        The tree is None if the file cannot be parsed. With `defaults`, it is also merged with the `defaults.yaml` in
-        its folder.
+        With `defaults`, the tree is also merged with the `defaults.yaml` in its folder.
         """
         tree, problems = self._read_with_base(path, ())
         return self.with_defaults(path, tree, problems) if defaults else (tree, problems)
@@ -48,10 +47,7 @@ class Library:
     def with_defaults(
         self, path: Path, tree: Node | None, problems: list[Problem]
     ) -> tuple[Node | None, list[Problem]]:
-        """Return `tree`, the content of the file `path`, merged with the `defaults.yaml` in its folder.
-
-        Return also `problems`, followed by the problems of the `defaults.yaml`.
-        """
+        """Return `tree`, the content of `path`, merged with the `defaults.yaml` in its folder, and all problems."""
         defaults_file = path.parent / DEFAULTS_FILE
         # A defaults.yaml that cannot be read is a problem; ignoring it would change the scenario silently.
         if isinstance(tree, MappingNode) and os.path.lexists(defaults_file) and path.name != DEFAULTS_FILE:
@@ -79,10 +75,7 @@ class Library:
         return [problem if problem.source else with_source_line(problem, self.texts) for problem in problems]
 
     def _read_with_base(self, path: Path, chain: tuple[Path, ...]) -> tuple[Node | None, list[Problem]]:
-        """Return the tree of a file, merged with the files that it extends, and all problems.
-
-        `chain` are the files from the scenario to the file that extends this one.
-        """
+        """Return the merged tree of a file and all problems. `chain` are the files that led to it by `extends`."""
         tree, problems = self._read_file(path)
         if not isinstance(tree, MappingNode) or EXTENDS not in tree.entries:
             return tree, problems
@@ -143,10 +136,7 @@ def extend_mapping(own: MappingNode, base: MappingNode) -> MappingNode:
 
 
 def merge_mappings(own: MappingNode, base: MappingNode) -> MappingNode:
-    """Return a mapping with the keys of both. For a key in both, the value in `own` replaces the value in `base`.
-
-    If both values are mappings, they are merged, unless they describe things of different types.
-    """
+    """Return a mapping with the keys of both. Values in `own` replace values in `base`; mappings are merged."""
     entries = dict(own.entries)
     for key, base_entry in base.entries.items():
         entry, base_value = entries.get(key), base_entry.value

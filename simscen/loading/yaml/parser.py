@@ -33,8 +33,8 @@ class _ParseError(Exception):
 def parse_yaml(text: str, path: str, *, allow_duplicates: bool = False) -> tuple[Node | None, list[Problem]]:
     """Return the only document of `text` as a tree (None if it cannot be parsed), and all problems.
 
-    `path` is the path of the file in messages. With `allow_duplicates`, a repeated key is only a warning, and its last
-    value is used, as in ROS 2 parameter files.
+    With `allow_duplicates`, a repeated key is only a warning, and its last value is used, as in ROS 2 parameter
+    files.
     """
     composer = _Composer(path, text, allow_duplicates)
     try:
@@ -142,10 +142,7 @@ class _Composer:
         return MappingNode(self._position_of(start), self._apply_merge_keys(start, entries, merged))
 
     def _apply_merge_keys(self, start: ev.Event, entries: dict[str, Entry], merged: list[Node]) -> dict[str, Entry]:
-        """Return `entries` with the keys of the mappings `merged`, which are the values of the merge key `<<`.
-
-        Keys in `entries` have priority, then keys of earlier mappings in `merged`.
-        """
+        """Return `entries` with the keys of `merged`, the values of the merge key `<<`. Earlier keys have priority."""
         for other in merged:
             if not isinstance(other, MappingNode):
                 self.problems.append(self._problem(start, "SC003", "`<<` expects a mapping or a list of mappings"))
@@ -161,10 +158,7 @@ class _Composer:
         return str(event.value)
 
     def _compose_alias(self, event: ev.AliasEvent, depth: int) -> Node:
-        """Return the node to which an alias refers. Its values and levels count again.
-
-        Raises _ParseError if there is no such node, or if the node contains the alias itself.
-        """
+        """Return the node of an alias; its values and levels count again. Raises _ParseError if it is missing."""
         if event.anchor not in self._anchors:
             raise _ParseError(self._problem(event, "SC006", f"alias `*{event.anchor}` has no anchor before it"))
         node = self._anchors[event.anchor]

@@ -15,11 +15,10 @@ LINE_WIDTH_CHARS = 100
 
 
 def changed_text(text: str, path: str, content: Mapping[str, Any], comment: str = "") -> str:
-    """Return `content` as YAML text. Top-level keys and list items with the same value in `text` keep their lines.
+    """Return `content` as YAML text with `comment` at the top.
 
-    The lines of a key or item include the comments directly above it. If the result would not be equal to `content`,
-    for example because of YAML anchors, no lines are kept. `path` is the path of `text` in messages. `comment` is
-    written as a comment at the top.
+    Top-level keys and list items with the same value in `text` keep their lines, with the comments directly above.
+    If the result would not be equal to `content`, for example because of YAML anchors, no lines are kept.
     """
     original, _ = parse_yaml(text, path)
     assert isinstance(original, MappingNode), "the text of a valid scenario is a mapping"
@@ -59,7 +58,7 @@ def _with_comments(start: int, lines: Sequence[str]) -> int:
 
 
 def _list_text(key: str, value: list[Any], original: MappingNode, lines: Sequence[str], segment: Sequence[str]) -> str:
-    """Return the text of a top-level key with the list `value`. Unchanged items keep their lines.
+    """Return the text of a key with the list `value`, in which unchanged items keep their lines.
 
     `lines` are all lines of the original text, `segment` are the lines of this key.
     """

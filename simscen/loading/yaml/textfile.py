@@ -19,10 +19,7 @@ _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\u202a-\u
 
 
 def read_text(path: Path, display_name: str) -> str | Problem:
-    """Return the text of a file with line breaks as \\n, or a problem. `display_name` is its path in messages.
-
-    The file must be a regular file of at most 1 MiB, in UTF-8 and without control characters.
-    """
+    """Return the text of a regular UTF-8 file of at most 1 MiB without control characters, or a problem."""
     try:
         raw = _read_bytes(path)
     except OSError as error:
