@@ -1,4 +1,4 @@
-"""Options for the files of runs: which runs keep their files, and which get a replay page."""
+"""Options for the files of runs: which runs keep their files, and which get a picture and a replay page."""
 
 from enum import Enum
 
@@ -12,13 +12,13 @@ class KeptLogs(str, Enum):
     FAILED = "failed"
 
 
-class ReplayMode(str, Enum):
-    """Option: the runs that get a replay page."""
+class WrittenFor(str, Enum):
+    """Option: the runs for which a file is written, such as a replay page or a picture."""
 
     NONE = "none"
     FAILED = "failed"
     ALL = "all"
 
     def includes(self, outcome: Outcome) -> bool:
-        """Return whether a run with this outcome gets a replay page."""
-        return self is ReplayMode.ALL or (self is ReplayMode.FAILED and not outcome.is_good)
+        """Return whether the file is written for a run with this outcome."""
+        return self is WrittenFor.ALL or (self is WrittenFor.FAILED and not outcome.is_good)

@@ -24,6 +24,7 @@ from simscen.report.display_text import plain_text
 from simscen.report.journal import Journal
 from simscen.report.session_history import UNFINISHED_KINDS
 from simscen.report.session_lines import RunNaming, run_lines
+from simscen.run.kept_files import WrittenFor
 from simscen.run.process.jobs import Job
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session
@@ -118,7 +119,8 @@ def _plan_jobs(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job],
                 key = RunKey(scenario.id, seed)
                 if key in drives:
                     raise ValueError(f"several runs of {key.scenario} with seed {seed}")
-                jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), WALL_LIMIT_S))
+                folder = run_folder(out, key)
+                jobs.append(Job(len(jobs), scenario, key, folder, WALL_LIMIT_S, picture=WrittenFor.FAILED))
                 drives[key] = number, drive
     return jobs, drives
 

@@ -20,17 +20,19 @@ from simscen.cli.shared_options import (
     JunitFamily,
     JunitFamilyOption,
     JunitOption,
+    KeepLogsOption,
     LenientOption,
     OpenOption,
     OutOption,
     OutputOptions,
+    ReplayOption,
     ResumeOption,
     RootOption,
     WallLimitOption,
     WorldPathOption,
 )
 from simscen.core.errors import UsageError
-from simscen.run.kept_files import KeptLogs, ReplayMode
+from simscen.run.kept_files import KeptLogs, WrittenFor
 
 
 def command(
@@ -110,13 +112,8 @@ def command(
     ] = None,
     root: RootOption = None,
     world_path: WorldPathOption = None,
-    replay: Annotated[
-        ReplayMode, typer.Option(help="Runs for which replay.html is written; see `simscen replay`.")
-    ] = ReplayMode.FAILED,
-    keep_logs: Annotated[
-        KeptLogs,
-        typer.Option(help="`failed` deletes logs and pictures of runs that pass, for sessions of thousands of runs."),
-    ] = KeptLogs.ALL,
+    replay: ReplayOption = WrittenFor.FAILED,
+    keep_logs: KeepLogsOption = KeptLogs.ALL,
     lenient: LenientOption = False,
 ) -> None:
     """Run scenarios and report what passed.

@@ -19,17 +19,19 @@ from simscen.cli.shared_options import (
     JunitFamily,
     JunitFamilyOption,
     JunitOption,
+    KeepLogsOption,
     LenientOption,
     OpenOption,
     OutOption,
     OutputOptions,
+    ReplayOption,
     ResumeOption,
     RootOption,
     StackOption,
     WallLimitOption,
     WorldPathOption,
 )
-from simscen.run.kept_files import KeptLogs, ReplayMode
+from simscen.run.kept_files import KeptLogs, WrittenFor
 from simscen.run.sessions.run_session import SessionOptions
 
 
@@ -65,13 +67,8 @@ def command(
     open_: OpenOption = False,
     root: RootOption = None,
     world_path: WorldPathOption = None,
-    replay: Annotated[
-        ReplayMode, typer.Option(help="Runs for which replay.html is written; see `simscen replay`.")
-    ] = ReplayMode.FAILED,
-    keep_logs: Annotated[
-        KeptLogs,
-        typer.Option(help="failed: delete logs and pictures of runs that pass, for sessions of thousands of runs."),
-    ] = KeptLogs.ALL,
+    replay: ReplayOption = WrittenFor.FAILED,
+    keep_logs: KeepLogsOption = KeptLogs.ALL,
     lenient: LenientOption = False,
 ) -> None:
     """Run one scenario many times: how often does it fail, and what makes it fail?

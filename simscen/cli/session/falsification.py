@@ -38,7 +38,7 @@ from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
 from simscen.run.process.jobs import Backend, Job
 from simscen.run.process.supervisor import Interrupted
-from simscen.run.sessions.output_folder import run_folder, write_atomically
+from simscen.run.sessions.output_folder import write_atomically
 from simscen.run.sessions.results import display_path
 from simscen.run.sessions.run_session import SessionOptions, run_session
 from simscen.run.sessions.search import Point, Search, SearchMethod, make_search
@@ -213,7 +213,7 @@ class Falsification:
                 jobs.append(None)
                 continue
             key = scenario.key(options.seed if options.seed is not None else scenario.spec.seed)
-            jobs.append(Job(len(jobs), scenario, key, run_folder(folder, key), options.wall_limit, options.replay))
+            jobs.append(options.job(len(jobs), scenario, key, folder))
         return jobs
 
     def _load(self, name: str, point: Point) -> LoadedScenario | None:

@@ -31,7 +31,6 @@ from simscen.record.log_reader import read_run
 from simscen.report.picture.map_picture import write_picture
 from simscen.report.picture.scene import Scene, scene_with_robots
 from simscen.run.disk_cache import DiskCache, cache_folder
-from simscen.run.kept_files import ReplayMode
 from simscen.run.log_header import log_header, world_scenery
 from simscen.run.preparation import PreparedScenario
 from simscen.run.process.fork_server import ForkServer
@@ -140,15 +139,16 @@ def _execute(job: Job, report_progress: Callable[[float], None]) -> dict[str, An
     """Execute the run of a job in a worker, and return its result as JSON data."""
     prepared = _SCENARIO_CACHE.get_or_prepare(job.scenario)
     progress = ProgressReporter(prepared.spec.physics.tick_rate, report_progress)
-    return execute_run(prepared, job.key.seed, job.folder, (progress,), partial(_write_outputs, replay=job.replay))
+    return execute_run(prepared, job.key.seed, job.folder, (progress,), partial(_write_outputs, job))
 
 
-def _write_outputs(prepared: PreparedScenario, run: Run, folder: Path, replay: ReplayMode) -> None:
-    """Write the picture of a run, and its replay page if `replay` includes the outcome of the run."""
-    scene = Scene(run.trace, run.case, prepared.built.map, run.result, world_scenery(prepared))
-    robots = {name: (one.trace, one.case) for name, one in run.robots.items()}
-    write_picture(scene_with_robots(scene, robots), folder / "map.png")
-    if replay.includes(run.result.outcome) and run.log is not None:
+def _write_outputs(job: Job, prepared: PreparedScenario, run: Run, folder: Path) -> None:
+    """Write the picture and the replay page of a run, if the job requests them for its outcome."""
+    if job.picture.includes(run.result.outcome):
+        scene = Scene(run.trace, run.case, prepared.built.map, run.result, world_scenery(prepared))
+        robots = {name: (one.trace, one.case) for name, one in run.robots.items()}
+        write_picture(scene_with_robots(scene, robots), folder / "map.png")
+    if job.replay.includes(run.result.outcome) and run.log is not None:
         from simscen.report.replay import write_replay
 
         write_replay(folder / "replay.html", [(read_run(run.log, with_sensors=True), run.result)])

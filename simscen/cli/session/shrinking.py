@@ -25,6 +25,7 @@ from simscen.loading.reduction import (
 )
 from simscen.loading.scenario import ChangedScenario
 from simscen.loading.yaml.tree import Keys, MappingNode, Node
+from simscen.run.kept_files import WrittenFor
 from simscen.run.process.jobs import Backend, Job
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
@@ -127,10 +128,11 @@ class CandidateRuns:
     def _run(self, scenarios: Sequence[LoadedScenario]) -> list[RunResult]:
         """Run valid candidates in parallel, and return their results. Raises Stopped."""
         named = [scenario.with_changes(variation=f"candidate-{number}") for number, scenario in enumerate(scenarios)]
+        limit = self.options.wall_limit
         with TemporaryDirectory(prefix="simscen-") as folder:
             jobs = [
-                Job(number, scenario, scenario.key(self.seed), Path(folder, str(number)), self.options.wall_limit)
-                for number, scenario in enumerate(named)
+                Job(number, one, one.key(self.seed), Path(folder, str(number)), limit, picture=WrittenFor.NONE)
+                for number, one in enumerate(named)
             ]
             with interrupt_on_signals():
                 finished_runs, stopped = run_session(jobs, self.options, self.backend, lambda _: None)

@@ -48,7 +48,6 @@ from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
 from simscen.run.process.jobs import Backend, Job
 from simscen.run.process.supervisor import Interrupted
-from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
 SEQUENTIAL_BATCH_SIZE = 32
@@ -257,7 +256,7 @@ class _StudySession:
         for index, run in enumerate(self._batch):
             scenario = self._loaded[run.number]
             key = scenario.key(self._base_seed + run.seed_index)
-            jobs.append(Job(first + index, scenario, key, run_folder(folder, key), options.wall_limit, options.replay))
+            jobs.append(options.job(first + index, scenario, key, folder))
         return jobs
 
     def _plan(

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from simscen.core.records.run_result import RunKey
 from simscen.loading.loaded import LoadedScenario
-from simscen.run.kept_files import ReplayMode
+from simscen.run.kept_files import WrittenFor
 from simscen.spec.registry import RegisteredType
 
 _LENGTH = struct.Struct("<I")
@@ -27,7 +27,8 @@ class Job:
         key: Scenario name, seed, variation, and stack, which identify the run.
         folder: Output folder of the run.
         wall_limit: Limit of the wall time in s.
-        replay: Outcomes for which the run gets a replay page.
+        replay: Outcomes for which a replay page is written.
+        picture: Outcomes for which a picture is written.
     """
 
     number: int
@@ -35,7 +36,8 @@ class Job:
     key: RunKey
     folder: Path
     wall_limit: float
-    replay: ReplayMode = ReplayMode.NONE
+    replay: WrittenFor = WrittenFor.NONE
+    picture: WrittenFor = WrittenFor.ALL
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import Listener, RunFinished, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
-from simscen.run.kept_files import KeptLogs, ReplayMode
+from simscen.run.kept_files import KeptLogs, WrittenFor
 from simscen.run.process.jobs import Backend, Ended, Job, Progressed, Started
 from simscen.run.process.supervisor import Interrupted
 from simscen.run.sessions.log_comparison import compare_twins, compare_with_session
@@ -42,10 +42,15 @@ class SessionOptions:
     fail_fast: bool = False
     wall_limit: float = 300.0
     against: Path | None = None
-    replay: ReplayMode = ReplayMode.NONE
+    replay: WrittenFor = WrittenFor.NONE
     only: frozenset[RunKey] | None = None
     keep_logs: KeptLogs = KeptLogs.ALL
     cluster: str = ""
+
+    def job(self, number: int, scenario: LoadedScenario, key: RunKey, out: Path) -> Job:
+        """Return the job of a run. `out` is the output folder of the session."""
+        picture = WrittenFor.FAILED if self.keep_logs is KeptLogs.FAILED else WrittenFor.ALL
+        return Job(number, scenario, key, run_folder(out, key), self.wall_limit, self.replay, picture)
 
 
 def scenario_seeds(scenario: LoadedScenario, options: SessionOptions) -> range:
@@ -73,13 +78,11 @@ def plan_jobs(scenarios: Sequence[LoadedScenario], options: SessionOptions, out:
                 if options.only is not None and key not in options.only:
                     continue
                 for run_key in (key, key.repetition) if options.twice else (key,):
-                    jobs.append(
-                        Job(len(jobs), scenario, run_key, run_folder(out, run_key), options.wall_limit, options.replay)
-                    )
+                    jobs.append(options.job(len(jobs), scenario, run_key, out))
     # Once each and after all others, because twins are identified by their job numbers.
     for scenario in skipped if options.only is None else ():
         key = scenario.key(scenario_seeds(scenario, options)[0])
-        jobs.append(Job(len(jobs), scenario, key, run_folder(out, key), options.wall_limit))
+        jobs.append(options.job(len(jobs), scenario, key, out))
     return jobs
 
 

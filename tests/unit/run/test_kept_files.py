@@ -1,0 +1,28 @@
+"""Tests of the options for the files of runs."""
+
+from pathlib import Path
+
+import pytest
+
+from simscen.core.records.run_result import Outcome
+from simscen.loading.scenario import load_scenario
+from simscen.run.kept_files import KeptLogs, WrittenFor
+from simscen.run.sessions.run_session import SessionOptions
+
+GOOD = {Outcome.PASSED, Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED}
+
+
+@pytest.mark.parametrize("outcome", Outcome)
+def test_files_for_failures_are_not_written_for_good_outcomes(outcome: Outcome) -> None:
+    assert WrittenFor.ALL.includes(outcome)
+    assert not WrittenFor.NONE.includes(outcome)
+    assert WrittenFor.FAILED.includes(outcome) == (outcome not in GOOD)
+
+
+@pytest.mark.parametrize(("keep_logs", "picture"), [("all", "all"), ("failed", "failed")])
+def test_pictures_are_drawn_for_runs_that_keep_them(tmp_path: Path, keep_logs: str, picture: str) -> None:
+    file = tmp_path / "a.scenario.yaml"
+    file.write_text("simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 1, y: 1}}\ngoals: []\npass: [{collisions: {max: 0}}]\n")
+    scenario = load_scenario(file, tmp_path)
+    options = SessionOptions(keep_logs=KeptLogs(keep_logs))
+    assert options.job(0, scenario, scenario.key(1), tmp_path).picture is WrittenFor(picture)
