@@ -8,7 +8,8 @@ class Exit(IntEnum):
     """Exit codes of the command line.
 
     FAILED: a run failed. USAGE: the command line or an input file is invalid. INCOMPLETE: a run could not be completed.
-    INTERNAL: a defect of simscen. UNDECIDED: a study had too few runs to decide on its required pass rate.
+    INTERNAL: a defect of simscen. UNDECIDED: too few runs to decide on the pass rate that a study requires, or on the
+    failure rate of a search.
     HUNG_UP, INTERRUPTED, TERMINATED: a signal ended the command. The code is 128 plus the number of the signal.
     """
 

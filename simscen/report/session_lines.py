@@ -131,7 +131,7 @@ def session_footer(session: SessionFinished, unfinished: Mapping[str, int]) -> I
 
 
 def interruption_lines(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledLine]:
-    """Yield the last two lines of an interrupted session: outcomes, then report.html and the option --resume.
+    """Yield the last two lines of an interrupted session: outcomes, then report.html and --resume, if possible.
 
     `unfinished` is as in `outcome_counts`.
     """
@@ -140,7 +140,7 @@ def interruption_lines(session: SessionFinished, unfinished: Mapping[str, int]) 
         [StyledText("page: ", "quiet"), StyledText(one_line(session.page), file=session.page)] if session.page else []
     )
     resume = StyledText(f"{'   ' if page else ''}resume with --resume {one_line(session.folder)}", "quiet")
-    yield (*page, *([resume] if session.folder else []))
+    yield (*page, *([resume] if session.folder and session.is_resumable else []))
 
 
 def outcome_counts(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledText]:

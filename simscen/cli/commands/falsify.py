@@ -84,7 +84,8 @@ def command(
     on the number of parallel runs.
 
     Exit code 0: no failure was found; 1: a failure was found; 2: an invalid scenario; 3: a run could not be completed;
-    5: the scenario is skipped; 129, 130, and 143: interrupted.
+    5: the scenario is skipped; 6: no failure was found, but --runs are too few for --probability; 129, 130, and 143:
+    interrupted.
     """
     if probability is not None and method is not SearchMethod.RANDOM:
         raise UsageError("--probability needs --method random: only random values show a rate")

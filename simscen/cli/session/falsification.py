@@ -98,7 +98,7 @@ def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
     Raises InvalidInput, UsageError, and NothingSelected.
     """
     falsification = Falsification(request)
-    reports, journal = start_session(request.output, [request.file])
+    reports, journal = start_session(request.output, [request.file], is_resumable=False)
     with open_screen(request.output.format_) as screen, backend_of(request.options) as backend:
         return screen.exit_code(falsification.execute(backend, journal, reports, screen)), falsification
 
@@ -179,12 +179,20 @@ class Falsification:
             return stopped or Exit.INCOMPLETE
         if study.errors:
             return Exit.INCOMPLETE
-        return Exit.FAILED if self.found else Exit.PASSED
+        if self.found:
+            return Exit.FAILED
+        return Exit.PASSED if self.is_probability_shown else Exit.UNDECIDED
 
     @property
     def is_random(self) -> bool:
         """Whether the runs are independent random draws."""
         return self._request.method is SearchMethod.RANDOM
+
+    @property
+    def is_probability_shown(self) -> bool:
+        """Whether the runs show that the failure rate is at most --probability; True without this option."""
+        probability, largest = self._request.probability, self.max_failure_rate()
+        return probability is None or (largest is not None and largest <= probability)
 
     def max_failure_rate(self) -> float | None:
         """Return the upper confidence bound of the failure rate; None if no random run has been completed."""
@@ -199,8 +207,7 @@ class Falsification:
         request = self._request
         if len(self.found) >= request.failures or len(self.finished_runs) >= request.runs:
             return True
-        largest = self.max_failure_rate()
-        return request.probability is not None and largest is not None and largest <= request.probability
+        return request.probability is not None and self.is_probability_shown
 
     def _make_jobs(self, points: Sequence[Point], folder: Path) -> list[Job | None]:
         """Return a job for each point (proposed values); None for values with which the scenario is invalid."""
@@ -300,6 +307,8 @@ def summary_lines(falsification: Falsification) -> list[str]:
     largest = falsification.max_failure_rate()
     if largest is not None:
         lines.append(f"with {CONFIDENCE:.0%} confidence, at most {100 * largest:.3g} % of random values fail")
+    if not falsification.is_probability_shown:
+        lines.append("undecided: too few runs for --probability; increase --runs")
     return lines
 
 

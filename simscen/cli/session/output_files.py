@@ -35,11 +35,12 @@ RESERVED_NAMES = ("results.json", PAGE, "run.json", JOURNAL_FILE, RUNS_FOLDER)
 class Reports:
     """Writes the reports of a session to its output folder.
 
-    folder:      output folder
-    junit:       further file for the JUnit report; None for no further file
-    family:      dialect of JUnit XML
-    junit_only:  whether to write only the file `junit`
-    used:        further entries of run.json: plug-ins and external stacks that the runs use
+    folder:        output folder
+    junit:         further file for the JUnit report; None for no further file
+    family:        dialect of JUnit XML
+    junit_only:    whether to write only the file `junit`
+    used:          further entries of run.json: plug-ins and external stacks that the runs use
+    is_resumable:  whether the command has the option --resume
     """
 
     def __init__(
@@ -49,11 +50,12 @@ class Reports:
         family: Family,
         junit_only: bool = False,
         used: Mapping[str, object] | None = None,
+        is_resumable: bool = True,
     ) -> None:
         self.folder, self.page = folder, folder / PAGE
         self._junit, self._junit_only = junit or folder / "junit.xml", junit_only
         self._family: Family = family
-        self._used = used or {}
+        self._used, self._is_resumable = used or {}, is_resumable
         self._missing = frozenset({self.page, self._junit})
 
     def begin(self) -> None:
@@ -122,6 +124,7 @@ class Reports:
             skipped=count[Outcome.SKIPPED],
             page="" if self._junit_only or self.page in self._missing else str(self.page),
             study=study,
+            is_resumable=self._is_resumable,
         )
 
 

@@ -125,15 +125,19 @@ def _run(
 
 
 def start_session(
-    output: OutputOptions, inputs: Iterable[Path], used: Mapping[str, object] | None = None
+    output: OutputOptions,
+    inputs: Iterable[Path],
+    used: Mapping[str, object] | None = None,
+    is_resumable: bool = True,
 ) -> tuple[Reports, Journal]:
     """Create the output folder with its journal and run.json, which has the further entries `used`.
 
-    The file of --junit must not be one of the `inputs`. Raises InvalidInput and UsageError.
+    The file of --junit must not be one of the `inputs`. `is_resumable`: whether the command has the option --resume.
+    Raises InvalidInput and UsageError.
     """
     require_writable_junit(output.junit, output.out or output.resume, inputs)
     folder, journal = open_output_folder(output.out, output.resume)
-    reports = Reports(folder, output.junit, output.junit_family.value, used=used)
+    reports = Reports(folder, output.junit, output.junit_family.value, used=used, is_resumable=is_resumable)
     reports.begin()
     return reports, journal
 

@@ -125,6 +125,7 @@ class SessionFinished:
         expected: Number of runs that failed as expected.
         page: Path of the report page; "" if there is none.
         study: Result of `simscen study`; None for other commands.
+        is_resumable: Whether the command has the option --resume.
     """
 
     passed: int
@@ -140,6 +141,7 @@ class SessionFinished:
     skipped: int = 0
     page: str = ""
     study: Study | None = None
+    is_resumable: bool = True
 
 
 SessionEvent = SessionStarted | RunStarted | RunProgress | RunFinished | SessionFinished

@@ -15,9 +15,10 @@ import pytest
 import yaml
 
 from simscen.cli.commands import shrink
-from simscen.cli.session.falsification import summary_lines
+from simscen.cli.session.falsification import Falsification, summary_lines
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.session_events import RunFinished
+from simscen.run.sessions.search import SearchMethod
 
 SCENARIO = """\
 # Many irrelevant parts, and one cause of failure.
@@ -193,8 +194,29 @@ def test_interrupted_runs_do_not_count_as_searched() -> None:
         ],
         found=[],
         max_failure_rate=lambda: None,
+        is_probability_shown=True,
     )
     assert summary_lines(search) == ["found no failure in 1 run"]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("limit", "is_shown"), [(None, True), (0.2, True), (0.19, False)])
+def test_passed_runs_show_a_failure_rate_above_their_confidence_bound(limit: float | None, is_shown: bool) -> None:
+    search = object.__new__(Falsification)
+    search._request = SimpleNamespace(probability=limit, method=SearchMethod.RANDOM)  # type: ignore[assignment]
+    # 1 - 0.05 ** (1 / 14) = 0.1926
+    search.finished_runs = [RunFinished(RunResult(RunKey("a", 1), "a", Outcome.PASSED)) for _ in range(14)]
+    search.found = []
+    assert search.is_probability_shown == is_shown
+    assert ("undecided: too few runs for --probability; increase --runs" in summary_lines(search)) != is_shown
+
+
+@pytest.mark.slow
+def test_random_search_with_too_few_runs_for_its_probability_is_undecided(tmp_path: Path) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO + RANGES.replace("[3, 6]", "[3, 5]"))
+    options = ("--method", "random", "--probability", "0.1", "--runs", "8")
+    done = simscen(tmp_path, "falsify", "a.scenario.yaml", *options)
+    assert done.returncode == 6, done.stderr
+    assert "undecided: too few runs for --probability; increase --runs" in done.stdout
 
 
 @pytest.mark.slow
@@ -272,6 +294,7 @@ def test_an_interrupted_search_without_runs_names_no_report(tmp_path: Path) -> N
     done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=False, capture_output=True, text=True)
     assert done.returncode == 143, done.stderr
     assert "interrupted: 0 passed" in done.stdout
+    assert "--resume" not in done.stdout  # simscen falsify has no such option
     assert "report.html" not in done.stdout and not (tmp_path / "out/report.html").exists()
 
 

@@ -22,7 +22,9 @@ def test_files_for_failures_are_not_written_for_good_outcomes(outcome: Outcome) 
 @pytest.mark.parametrize(("keep_logs", "picture"), [("all", "all"), ("failed", "failed")])
 def test_pictures_are_drawn_for_runs_that_keep_them(tmp_path: Path, keep_logs: str, picture: str) -> None:
     file = tmp_path / "a.scenario.yaml"
-    file.write_text("simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 1, y: 1}}\ngoals: []\npass: [{collisions: {max: 0}}]\n")
+    file.write_text(
+        "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 1, y: 1}}\ngoals: []\npass: [{collisions: {max: 0}}]\n"
+    )
     scenario = load_scenario(file, tmp_path)
     options = SessionOptions(keep_logs=KeptLogs(keep_logs))
     assert options.job(0, scenario, scenario.key(1), tmp_path).picture is WrittenFor(picture)
