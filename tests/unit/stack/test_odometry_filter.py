@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -277,6 +278,16 @@ def test_meaningless_yaw_rates_are_ignored(rate: float) -> None:
 
     end = drive(6, 10, change=broken)[-1]
     assert abs(error(end, end.filtered)[2]) < 0.02
+
+
+def test_only_the_first_gyroscope_counts() -> None:
+    alone, accompanied = OdometryFilter(Spec(), RATE), OdometryFilter(Spec(), RATE)
+    for tick in range(0, 2 * RATE, 4):
+        for subject in (alone, accompanied):
+            subject.on_imu(imu(tick, 0.3))
+        accompanied.on_imu(replace(imu(tick + 2, 5.0), sensor="imu of the arm"))
+        measured = odometry(tick, Pose2(0.0, 0.0, 0.3 * tick / RATE))
+        assert alone.fuse(measured) == accompanied.fuse(measured)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e30])
