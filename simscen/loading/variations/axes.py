@@ -21,7 +21,7 @@ from simscen.loading.variations.conditions import (
 )
 from simscen.loading.variations.covering_arrays import Row, covering_array
 from simscen.loading.variations.naming import NAME_HINT, name_error, number_of
-from simscen.loading.variations.options import Axis, Change, Option, RandomOptions, typical_options, value_node
+from simscen.loading.variations.options import Axis, Change, Option, SampledOptions, typical_options
 from simscen.loading.variations.paths import PathError, Target, resolve_path
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, child, entries_of, items_of, node_at
 
@@ -154,31 +154,22 @@ class AxisBuilder:
             self.add_problem(position, "SC033", f"the variation at line {first.line} is also called {quoted(name)}")
         return name
 
-    def _sampled_options(self, sampled: "Sampled", node: Node | None) -> Axis:
+    def _sampled_options(self, sampled: "Sampled", node: Node | None) -> SampledOptions:
         """Return options with drawn values. Report invalid distributions. `node` is their YAML tree."""
-        from simscen.loading.variations.sampling import draw_value, draw_values
+        from simscen.loading.variations.sampling import quantile
 
         assert isinstance(node, MappingNode)
         targets = []
         for path, entry in node.entries.items():
             target = self._resolve_target(path, entry)
             try:
-                draw_value(sampled, path, 0)
+                quantile(sampled.values[path], 0.5)
             except ValueError as error:
                 self.add_problem(entry.value.position, "SC016", str(error))
                 continue
             if target is not None:
                 targets.append(target)
-        if sampled.method == "random":
-            return RandomOptions(sampled, node, targets)
-        columns = [
-            [
-                Change(target, value_node(node.entries[target.path].value, value), number)
-                for number, value in enumerate(draw_values(sampled, target.path), start=1)
-            ]
-            for target in targets
-        ]
-        return [Option(changes) for changes in zip(*columns, strict=True)]
+        return SampledOptions(sampled, node, targets)
 
     def _resolve_target(self, path: str, entry: Entry) -> Target | None:
         """Return the target of a path, and add it to `targets`. For an invalid path, report it and return None."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from simscen.loading.variations.paths import Target
-from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, node_at
+from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, child, items_of
 
 if TYPE_CHECKING:  # most scenarios have no variations
     from simscen.model.variations import Sampled
@@ -28,43 +28,41 @@ class Option:
     name: str = ""
 
 
-class RandomOptions:
-    """Sequence of options with random values, drawn on demand. Indices beyond the length are valid as well."""
+class SampledOptions:
+    """Sequence of options with values that are drawn from the distributions of `sampled` on demand.
+
+    `distributions` is the YAML tree of the distributions by path. With the method `random`, indices beyond the length
+    are valid as well.
+    """
 
     def __init__(self, sampled: "Sampled", distributions: MappingNode, targets: Sequence[Target]) -> None:
-        """Draw from the distributions in `sampled`. `distributions` is the YAML tree of these distributions by path."""
-        self._sampled, self._distributions, self._targets = sampled, distributions, targets
+        self.sampled, self.targets, self._distributions = sampled, targets, distributions
 
     def __len__(self) -> int:
-        return self._sampled.count
+        return self.sampled.count
 
     def __getitem__(self, index: int) -> Option:
-        from simscen.loading.variations.sampling import draw_value
+        from simscen.loading.variations.sampling import probability
+
+        return self.option([probability(self.sampled, target.path, index) for target in self.targets], index + 1)
+
+    def option(self, probabilities: Sequence[float], number: int = 1) -> Option:
+        """Return the option `number` with the quantiles at these cumulative probabilities, one for each target."""
+        from simscen.loading.variations.sampling import quantile
 
         changes = []
-        for target in self._targets:
-            value = draw_value(self._sampled, target.path, index)
-            node = value_node(self._distributions.entries[target.path].value, value)
-            changes.append(Change(target, node, index + 1))
+        for target, probability in zip(self.targets, probabilities, strict=True):
+            value = quantile(self.sampled.values[target.path], probability)
+            node = self._distributions.entries[target.path].value
+            items = items_of(child(node, "choice"))
+            changes.append(Change(target, items[value] if items else ScalarNode(node.position, value), number))
         return Option(tuple(changes))
 
 
-Axis = Sequence[Option] | RandomOptions
+Axis = Sequence[Option] | SampledOptions
 """Options of which each variation uses one."""
 
 
-def value_node(distribution: Node, value: object) -> Node:
-    """Return the node of a value drawn from `distribution` (YAML): an item of its `choice`, or a new node."""
-    from simscen.loading.variations.sampling import ChoiceIndex
-
-    if isinstance(value, ChoiceIndex):
-        chosen = node_at(distribution, ("choice", value.number))
-        assert chosen is not None
-        return chosen
-    assert isinstance(value, str | int | float)
-    return ScalarNode(distribution.position, value)
-
-
 def typical_options(axis: Axis) -> Sequence[Option]:
-    """Return options of an axis that together change all its targets: the first one if they are random, else all."""
-    return [axis[0]] if isinstance(axis, RandomOptions) else axis
+    """Return options of an axis that together change all its targets: the first one if they are drawn, else all."""
+    return [axis[0]] if isinstance(axis, SampledOptions) else axis

@@ -3,7 +3,7 @@
 import hashlib
 import math
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 from simscen.model.variations import Draw, Integer, LogUniform, Normal, OneOf, Sampled, Uniform
 from simscen.spec.quantities import Amount, to_common_unit
@@ -11,45 +11,35 @@ from simscen.spec.quantities import Amount, to_common_unit
 _SIGNIFICANT_DIGITS = 6
 
 
-class ChoiceIndex(NamedTuple):
-    """Value drawn from a `choice`: the index of the chosen value in the list, from 0."""
+def probability(sampled: Sampled, path: str, index: int) -> float:
+    """Return the cumulative probability, in (0, 1), of the value of a path in the variation `index`, from 0.
 
-    number: int
-
-
-def draw_values(sampled: Sampled, path: str) -> list[Any]:
-    """Return the values of a path for all variations in order. Raises ValueError for an invalid distribution."""
-    return [quantile(sampled.values[path], u) for u in _probabilities(sampled, path)]
-
-
-def draw_value(sampled: Sampled, path: str, index: int) -> Any:
-    """Return the value of a path in the variation `index`, from 0, for `method: random`. Raises ValueError."""
-    return quantile(sampled.values[path], _hashed_uniform(sampled.seed, path, "value", index))
-
-
-def _probabilities(sampled: Sampled, path: str) -> list[float]:
-    """Return the cumulative probability, in (0, 1), of the value of a path for each variation."""
-    count = sampled.count
+    With the method `random`, the index may exceed `sampled.count`.
+    """
     if sampled.method == "sobol":
-        return _sobol_probabilities(sampled, path)
-    probabilities = [_hashed_uniform(sampled.seed, path, "value", number) for number in range(count)]
+        return _sobol_probability(sampled, path, index)
+    own = _hashed_uniform(sampled.seed, path, "value", index)
     if sampled.method == "random":
-        return probabilities
-    # Latin hypercube: each of `count` equal intervals is used once, in a random order.
-    order = sorted(range(count), key=lambda number: _hashed_uniform(sampled.seed, path, "stratum", number))
-    return [(stratum + offset) / count for stratum, offset in zip(order, probabilities, strict=True)]
+        return own
+    return (_strata(sampled.seed, path, sampled.count)[index] + own) / sampled.count
 
 
-def _sobol_probabilities(sampled: Sampled, path: str) -> list[float]:
-    """Return the coordinates of a path in the points of a Sobol sequence with a random shift modulo 1.
+@cache
+def _strata(seed: int, path: str, count: int) -> list[int]:
+    """Return the interval of each variation in a Latin hypercube: each of `count` intervals once, in random order."""
+    return sorted(range(count), key=lambda number: _hashed_uniform(seed, path, "stratum", number))
+
+
+def _sobol_probability(sampled: Sampled, path: str, index: int) -> float:
+    """Return the coordinate of a path in a point of a Sobol sequence with a random shift modulo 1.
 
     (Joe and Kuo: Constructing Sobol Sequences with Better Two-Dimensional Projections, 2008; Cranley and Patterson:
     Randomization of Number Theoretic Methods for Multiple Integration, 1976.)
     """
-    coordinate = sorted(sampled.values).index(path)
+    point = _sobol_points(len(sampled.values), sampled.count)[index]
     shift = _hashed_uniform(sampled.seed, path, "shift", 0)
-    points = _sobol_points(len(sampled.values), sampled.count)[:, coordinate]
-    return [min(max(float(u), 2.0**-53), 1 - 2.0**-53) for u in (points + shift) % 1.0]
+    u = (float(point[sorted(sampled.values).index(path)]) + shift) % 1.0
+    return min(max(u, 2.0**-53), 1 - 2.0**-53)
 
 
 @cache
@@ -70,7 +60,7 @@ def _hashed_uniform(seed: int, path: str, purpose: str, number: int) -> float:
 def quantile(distribution: Draw, u: float) -> Any:
     """Return the quantile of a distribution at the cumulative probability `u`, 0 < u < 1. Raises ValueError.
 
-    A quantity is text with its unit, an item of a `choice` is a ChoiceIndex.
+    A quantity is text with its unit. For a `choice`, the quantile is the index of an item.
     """
     match distribution.chosen:
         case Uniform(root=ends):
@@ -86,7 +76,7 @@ def quantile(distribution: Draw, u: float) -> Any:
                 raise ValueError(f"the range is empty: {first} is greater than {last}")
             return first + math.floor(u * (last - first + 1))
         case OneOf(root=values):
-            return ChoiceIndex(math.floor(u * len(values)))
+            return math.floor(u * len(values))
         case Normal() as normal:
             return _truncated_normal_quantile(normal, u)
     raise AssertionError(distribution.kind)

@@ -4,15 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from simscen.core.errors import Problem
-from simscen.loading.schema.validate import check
-from simscen.loading.variations.axes import AxisBuilder
 from simscen.loading.variations.conditions import Condition, all_hold
-from simscen.loading.variations.expand import VARIATIONS, Variation
-from simscen.loading.variations.options import Change, value_node
-from simscen.loading.variations.paths import Target
-from simscen.loading.variations.sampling import quantile
-from simscen.loading.yaml.tree import MappingNode, items_of, node_at
-from simscen.model.variations import OneOf, Sampled, VariationsSection
+from simscen.loading.variations.expand import VARIATIONS, Variation, variation_space
+from simscen.loading.variations.options import SampledOptions
+from simscen.loading.yaml.tree import MappingNode
+from simscen.model.variations import OneOf
 
 
 @dataclass(frozen=True)
@@ -21,16 +17,13 @@ class SearchSpace:
 
     tree: MappingNode
     """YAML tree of the scenario without its key `variations`."""
-    sampled: Sampled
-    distributions: MappingNode
-    """YAML tree of the distributions by path."""
-    targets: Sequence[Target]
+    options: SampledOptions
     conditions: Sequence[Condition]
 
     @property
     def choice_counts(self) -> list[int]:
         """Number of values of each dimension that is a `choice`; 0 for other distributions."""
-        chosen = [self.sampled.values[target.path].chosen for target in self.targets]
+        chosen = [self.options.sampled.values[target.path].chosen for target in self.options.targets]
         return [len(one.root) if isinstance(one, OneOf) else 0 for one in chosen]
 
     def variation(self, name: str, point: Sequence[float]) -> Variation | None:
@@ -38,36 +31,22 @@ class SearchSpace:
 
         Raises ConditionError if a condition cannot be evaluated.
         """
-        changes = []
-        for target, probability in zip(self.targets, point, strict=True):
-            value = quantile(self.sampled.values[target.path], probability)
-            changes.append(Change(target, value_node(self.distributions.entries[target.path].value, value), 1))
-        if not all_hold(self.conditions, self.tree, changes):
-            return None
-        return Variation.with_changes(name, self.tree, changes)
+        changes = self.options.option(point).changes
+        return (
+            Variation.with_changes(name, self.tree, changes) if all_hold(self.conditions, self.tree, changes) else None
+        )
 
 
 def search_space(tree: MappingNode) -> SearchSpace | list[Problem]:
     """Return the search space of a scenario with `variations: {sampled: …}`; or the problems of its `variations`."""
-    entry = tree.entries.get(VARIATIONS)
-    if entry is None:
+    space = variation_space(tree)
+    if isinstance(space, list):
+        return space
+    if space is None:
         message, hint = "the scenario has no `variations` to search", "add `sampled` with the range of each value"
         return [Problem(*tree.position, "SC010", message, hint)]
-    own = tree.without_keys(VARIATIONS)
-    section = check(VariationsSection, MappingNode(tree.position, {VARIATIONS: entry}))
-    if isinstance(section, list):
-        return section
-    blocks = section.variations.blocks
-    node = next(iter(items_of(entry.value)), entry.value)
-    if len(blocks) != 1 or not blocks[0].is_sampled_alone:
+    axes = [axis for block in space.blocks for axis in block.axes]
+    if len(axes) != 1 or not isinstance(axes[0], SampledOptions):
         message, hint = "only the ranges of `sampled` can be searched", "write one block with `sampled` alone"
-        return [Problem(*entry.value.position, "SC016", message, hint)]
-    builder, block = AxisBuilder(own), blocks[0]
-    _, conditions = builder.build_block(block, node)
-    if builder.problems:
-        return builder.problems
-    distributions = node_at(node, ("sampled", "values"))
-    assert isinstance(distributions, MappingNode)
-    assert block.sampled is not None
-    targets = [builder.targets[path] for path in distributions.entries]
-    return SearchSpace(own, block.sampled, distributions, targets, conditions)
+        return [Problem(*tree.entries[VARIATIONS].value.position, "SC016", message, hint)]
+    return SearchSpace(space.tree, axes[0], space.blocks[0].conditions)
