@@ -1,7 +1,7 @@
 """Specification of an entry of `pass`, with one field for each criterion."""
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, model_validator
 
@@ -62,7 +62,7 @@ class AnyCriterion(Choice):
         return self
 
     @property
-    def chosen(self) -> BaseModel:
+    def chosen(self) -> Any:
         """The specification of the criterion. The keys `whenever` and `then` are combined into one Response."""
         if self.whenever is None:
             return super().chosen

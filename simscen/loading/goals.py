@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from simscen.core.messages.goals import Goal, loop_goal_name, matches_goal_name
 from simscen.core.messages.navigation import ErrorCode
-from simscen.criteria.result import ErrorCodeIs, Result
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import Keys
 from simscen.model.navigation import expected_failure_name
@@ -70,8 +69,8 @@ def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
     entries = zip(spec.goal_names, [spec.goals[-1]] * len(spec.goals) if through else spec.goals, strict=True)
     if any(matches_goal_name(goal, name) and expected_failure_name(entry.expect) for name, entry in entries):
         return True
-    results = [entry.chosen for entry in spec.pass_ if entry.severity == "fail"]
-    if any(isinstance(result, Result) and result.status == "FAILED" for result in results):
+    required = [entry for entry in spec.pass_ if entry.severity == "fail"]
+    if any(entry.kind == "result" and entry.chosen.status == "FAILED" for entry in required):
         return True
     return any(code != ErrorCode.NONE and matches_goal_name(goal, name) for code, name in _required_codes(spec))
 
@@ -83,13 +82,8 @@ def expects_start_failure(spec: ScenarioSpec) -> bool:
 
 def _required_codes(spec: ScenarioSpec) -> Iterator[tuple[ErrorCode, str | None]]:
     """Yield the error codes that criteria require, with the name of the goal, or None for the whole navigation."""
-    for entry in spec.pass_:
-        if entry.severity != "fail":
-            continue
-        match entry.chosen:
-            case ErrorCodeIs(code=code, goal=goal):
-                yield code, goal
-            case Result(error_code=ErrorCode() as code):
-                yield code, None
-            case _:
-                pass
+    for entry in (entry for entry in spec.pass_ if entry.severity == "fail"):
+        if entry.kind == "error_code":
+            yield entry.chosen.code, entry.chosen.goal
+        elif entry.kind == "result" and entry.chosen.error_code is not None:
+            yield entry.chosen.error_code, None

@@ -13,7 +13,7 @@ from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.yaml.textfile import with_source_line
 from simscen.loading.yaml.tree import Key, Keys, MappingNode, Position, key_position, value_position
 from simscen.model.robot import RobotSpec
-from simscen.model.scenario import ScenarioSpec
+from simscen.model.scenario import ScenarioSpec, expected_failure
 from simscen.model.world import RosMapSpec, WorldSpec
 
 if TYPE_CHECKING:
@@ -183,13 +183,8 @@ class LoadedScenario:
     @property
     def expectation(self) -> ExpectedFailure | None:
         """The failure that the scenario expects, or None. Its line is 0 if `expected` is in a file that is extended."""
-        expected = self.spec.expected
-        if expected is None:
-            return None
-        position = self.key_position_of("expected")
-        return ExpectedFailure(
-            expected.fail, tuple(expected.criteria), position.line if position.path == self.path else 0
-        )
+        failure, position = expected_failure(self.spec), self.key_position_of("expected")
+        return failure and replace(failure, line=position.line if position.path == self.path else 0)
 
     def key(self, seed: int) -> RunKey:
         """Return the key of the run with this seed."""

@@ -84,9 +84,11 @@ def contradicting_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     for index, entry in enumerate(loaded.spec.pass_):
         if entry.severity != "fail":
             continue
-        every_goal = entry.kind == "goals_reached" and getattr(entry.chosen, "goals", None) is None and not failing
-        status = "SUCCEEDED" if every_goal else str(getattr(entry.chosen, "status", "")) if entry.result else ""
-        if not status:
+        if entry.kind == "goals_reached" and entry.chosen.goals is None and not failing:
+            status = "SUCCEEDED"
+        elif entry.kind == "result":
+            status = entry.chosen.status
+        else:
             continue
         keys: Keys = ("pass", index, entry.kind)
         before = next((other for key, other in required_results.items() if key != status), None)

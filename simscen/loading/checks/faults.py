@@ -154,7 +154,7 @@ def _start_time_s(when: Trigger | None) -> float | None:
     """Return the time in s at which a fault begins; None if it does not depend on the time alone."""
     if when is None:
         return 0.0
-    return float(when.chosen.root) + when.delay if when.time is not None else None  # type: ignore[attr-defined]
+    return float(when.chosen.root) + when.delay if when.time is not None else None
 
 
 @MEANING.check("SC055", severity="warning")

@@ -9,8 +9,6 @@ from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, OccupancyGri
 from simscen.core.geometry import Polygon, Pose2
 from simscen.core.geometry.polygon_separation import separation_from_boxes
 from simscen.core.geometry.polygons import depth_inside_polygon
-from simscen.criteria.keepout import Keepout
-from simscen.criteria.speed import Speed
 from simscen.loading.builders import load_criterion_masks, load_masks
 from simscen.loading.checks.registry import WORLD, CheckProblem
 from simscen.loading.checks.scene import Scene, expected_failure_hint, required_failure_hint
@@ -103,16 +101,15 @@ def criterion_masks_without_effect(scene: Scene) -> Iterator[CheckProblem]:
     """Find keepout masks of criteria that forbid nothing, and speed masks that limit nothing."""
     masks = scene.cached(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
-        match entry.chosen:
-            case Keepout(mask=str(name)) if not len(masks[name].occupied_boxes):
-                message = "the criterion judges nothing: no cell of the mask is occupied"
-                yield CheckProblem(("pass", index, "keepout", "mask"), message)
-            case Speed(mask=spec) if spec is not None and not spec.speed_limits(masks[spec.file].grid).has_limits:
-                yield CheckProblem(
-                    ("pass", index, "speed", "mask", "file"), f"the criterion judges nothing: {NO_LIMIT_REASON}"
-                )
-            case _:
-                pass
+        spec = entry.chosen.mask if entry.kind in ("keepout", "speed") else None
+        if spec is None:
+            continue
+        if entry.kind == "keepout" and not len(masks[spec].occupied_boxes):
+            message = "the criterion judges nothing: no cell of the mask is occupied"
+            yield CheckProblem(("pass", index, "keepout", "mask"), message)
+        if entry.kind == "speed" and not spec.speed_limits(masks[spec.file].grid).has_limits:
+            message = f"the criterion judges nothing: {NO_LIMIT_REASON}"
+            yield CheckProblem(("pass", index, "speed", "mask", "file"), message)
 
 
 @WORLD.check("SC051")
@@ -120,7 +117,7 @@ def keepout_masks_on_goals(scene: Scene) -> Iterator[CheckProblem]:
     """Find keepout criteria with a mask that forbids the start or a goal."""
     masks = scene.cached(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
-        if not isinstance(entry.chosen, Keepout) or entry.chosen.mask is None:
+        if entry.kind != "keepout" or entry.chosen.mask is None:
             continue
         name, keys = entry.chosen.mask, ("pass", index, "keepout", "mask")
         mask = masks[name]

@@ -13,7 +13,7 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.spec_walk import Reference, references, walk
 from simscen.loading.yaml.tree import Keys
 from simscen.model.scenario import ScenarioSpec
-from simscen.triggers.base import AnyCondition, Condition
+from simscen.triggers.base import AnyCondition
 
 RENAME_HINT = "rename one of them"
 
@@ -183,11 +183,10 @@ def _conditions_without_robot(condition: AnyCondition, keys: Keys, faults: Conta
             yield from _conditions_without_robot(part, (*keys, key, number), faults)
     if condition.not_ is not None:
         yield from _conditions_without_robot(condition.not_, (*keys, "not"), faults)
-    elif not condition.inner:
-        chosen = condition.chosen
-        assert isinstance(chosen, Condition)
-        if chosen.is_robot_specific or (condition.kind == "event" and getattr(chosen, "name", "") in faults):
-            yield *keys, condition.kind
+    if condition.inner:
+        return
+    if condition.chosen.is_robot_specific or (condition.kind == "event" and condition.chosen.name in faults):
+        yield *keys, condition.kind
 
 
 @ROBOT_NAMES.check("SC030")

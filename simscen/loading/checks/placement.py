@@ -3,11 +3,8 @@
 import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations, product
+from typing import TYPE_CHECKING
 
-from simscen.actions.doors import CloseDoor, OpenDoor, panel_path
-from simscen.actions.objects import Move, Spawn, Teleport
-from simscen.actions.pedestrian import Pedestrian
-from simscen.actions.robot import Kidnap
 from simscen.core.errors import Problem
 from simscen.core.geometry import Polygon, Pose2, Pose3
 from simscen.core.geometry.motion_paths import MAX_STEP_M, largest_step, too_fast_message, top_speed
@@ -19,11 +16,13 @@ from simscen.loading.goals import expects_start_failure
 from simscen.loading.yaml.tree import Keys, MappingNode
 from simscen.sim.body.outline import radius_and_height
 from simscen.spec.motions import Motion
-from simscen.triggers.base import Trigger
-from simscen.triggers.timing import Time
 from simscen.worlds.extent import top_height
 from simscen.worlds.geometry.overlaps import bounding_radius, first_solid_in_disc, place_polygon, polygons_overlap
 from simscen.worlds.geometry.prisms import upright_prism
+
+if TYPE_CHECKING:
+    from simscen.actions.objects import Spawn
+    from simscen.triggers.base import Trigger
 
 FREE_SPACE_HINT = "move it to free space"
 MAX_PLATFORM_HEIGHT_M = 0.3
@@ -42,10 +41,10 @@ def blocked_poses(scene: Scene) -> dict[Keys, CheckProblem]:
         solids = (*scene.world.solids, *scene.bodies)
         found += _pose_problem(scene, START, "the robot's start", scene.start, solids, FREE_SPACE_HINT)
     found += _blocked_goals(scene)
-    for keys, action in scene.actions:
-        if isinstance(action, Kidnap):
-            pose, what = action.pose.pose, "the pose to which the robot is kidnapped"
-            found += _pose_problem(scene, (*keys, "pose"), what, pose, scene.world.solids, FREE_SPACE_HINT)
+    for one in scene.loaded.actions:
+        if one.kind == "kidnap":
+            keys, what = (*one.keys, "pose"), "the pose to which the robot is kidnapped"
+            found += _pose_problem(scene, keys, what, one.spec.pose.pose, scene.world.solids, FREE_SPACE_HINT)
     return {problem.keys: problem for problem in found}
 
 
@@ -111,16 +110,15 @@ def _hint_in_gazebo_world(scene: Scene, pose: Pose2, solids: tuple[Solid, ...], 
 @WORLD.check("SC304")
 def blocked_spawns(scene: Scene) -> Iterator[CheckProblem]:
     """Find objects that would be spawned inside an obstacle or on the robot."""
-    for keys, action in scene.actions:
-        if isinstance(action, Spawn):
-            is_event = keys[2] == "do"  # the time of a later step counts from the step before it
-            when = scene.loaded.spec.events[int(keys[1])].when if is_event else None
-            where = _inside_obstacle(scene, action) or _on_robot(scene, action, when)
-            if where:
-                yield CheckProblem((*keys, "name"), f"`{action.name}` would appear {where}", "choose another pose")
+    for one in scene.loaded.actions:
+        if one.kind == "spawn":
+            when = one.step.when if one.step.after is None else None  # later steps count from the step before them
+            if where := _inside_obstacle(scene, one.spec) or _on_robot(scene, one.spec, when):
+                message = f"`{one.spec.name}` would appear {where}"
+                yield CheckProblem((*one.keys, "name"), message, "choose another pose")
 
 
-def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
+def _inside_obstacle(scene: Scene, spawn: "Spawn") -> str | None:
     """Return "inside obstacle …" if an obstacle contains a spawned object completely; else None."""
     if spawn.pose is None:
         return None
@@ -134,20 +132,20 @@ def _inside_obstacle(scene: Scene, spawn: Spawn) -> str | None:
     return None
 
 
-def _on_robot(scene: Scene, spawn: Spawn, when: Trigger | None) -> str | None:
+def _on_robot(scene: Scene, spawn: "Spawn", when: "Trigger | None") -> str | None:
     """Return "on the robot" if a spawned object overlaps the robot; None if not, or if it depends on the run."""
     if spawn.z >= scene.size.height:
         return None
     if spawn.ahead is not None:
         corners = place_polygon(_outline(spawn), Pose2(spawn.ahead[0], spawn.ahead[1], spawn.yaw))
-    elif spawn.pose is not None and when and isinstance(when.time, Time) and when.time.root + when.delay == 0:
+    elif spawn.pose is not None and when and when.time is not None and when.chosen.root + when.delay == 0:
         corners = place_polygon(_outline(spawn), scene.start.inverse().compose(spawn.pose.pose))
     else:
         return None
     return "on the robot" if polygons_overlap(scene.size.footprint, corners) else None
 
 
-def _outline(spawn: Spawn) -> Polygon:
+def _outline(spawn: "Spawn") -> Polygon:
     """Return the outline of a spawned object on the floor, in the frame of the object."""
     solid = spawn.solid(spawn.name)
     prism = upright_prism(Solid(solid.shape, Pose3(z=solid.pose.z), spawn.name))
@@ -158,32 +156,32 @@ def _outline(spawn: Spawn) -> Polygon:
 def blocked_pedestrians(scene: Scene) -> Iterator[CheckProblem]:
     """Find pedestrians with a start or goal that is closer to an obstacle than the radius of the pedestrian."""
     solids = (*scene.world.solids, *scene.immovable_bodies)
-    for keys, action in scene.actions:
-        if not isinstance(action, Pedestrian):
+    for one in scene.loaded.actions:
+        if one.kind != "pedestrian":
             continue
-        stops: list[MotionStop] = [(("pose",), f"the start of `{action.name}`", (action.pose.x, action.pose.y))]
-        stops += [(("goals", k), f"goal {k + 1} of `{action.name}`", (x, y)) for k, (x, y) in enumerate(action.goals)]
+        spec = one.spec
+        stops: list[MotionStop] = [(("pose",), f"the start of `{spec.name}`", (spec.pose.x, spec.pose.y))]
+        stops += [(("goals", k), f"goal {k + 1} of `{spec.name}`", (x, y)) for k, (x, y) in enumerate(spec.goals)]
         for below, what, (x, y) in stops:
-            if solid := first_solid_in_disc(solids, (x, y), action.radius, (SILL_M, action.height)):
-                message = f'{what} ({x:g}, {y:g}) is closer to obstacle "{solid}" than {action.radius:g} m'
-                yield CheckProblem((*keys, *below), message, "choose a position with enough room")
+            if solid := first_solid_in_disc(solids, (x, y), spec.radius, (SILL_M, spec.height)):
+                message = f'{what} ({x:g}, {y:g}) is closer to obstacle "{solid}" than {spec.radius:g} m'
+                yield CheckProblem((*one.keys, *below), message, "choose a position with enough room")
 
 
 @WORLD.check("SC304", severity="warning")
 def motions_into_walls(scene: Scene) -> Iterator[CheckProblem]:
     """Find `move` actions with keyframes or waypoints, and `teleport` actions with poses, inside fixed obstacles."""
-    for keys, action in scene.actions:
+    for one in scene.loaded.actions:
         stops: list[MotionStop] = []
-        if isinstance(action, Move):
-            stops = [(below, f"{what} of `{action.name}`", position) for below, what, position in motion_stops(action)]
-        elif isinstance(action, Teleport):
-            stops = [(("pose",), f"the new pose of `{action.name}`", (action.pose.x, action.pose.y))]
+        if one.kind == "move":
+            stops = motion_stops(one.spec)
+        elif one.kind == "teleport":
+            stops = [(("pose",), "the new pose", (one.spec.pose.x, one.spec.pose.y))]
         for below, what, (x, y) in stops:
             if solid := first_solid_in_disc(scene.world.solids, (x, y), TOUCH_M, scene.z_range):
-                message = f'{what} ({x:g}, {y:g}) is inside obstacle "{solid}"'
-                yield CheckProblem(
-                    (*keys, *below), message, "move it to free space: walls do not stop scripted motions"
-                )
+                message = f'{what} of `{one.spec.name}` ({x:g}, {y:g}) is inside obstacle "{solid}"'
+                hint = "move it to free space: walls do not stop scripted motions"
+                yield CheckProblem((*one.keys, *below), message, hint)
 
 
 @WORLD.check("SC305")
@@ -209,17 +207,18 @@ def _motions(scene: Scene) -> Iterator[tuple[Keys, MappingNode | None, str, Moti
             yield ("objects", own.index(body.name), "move"), file.tree, body.name, body.path, body.solids
         elif body.path is not None:  # an actor of a Gazebo world
             yield ("world",), None, body.name, body.path, body.solids
-    spawned = {action.name: action for _, action in scene.actions if isinstance(action, Spawn)}
-    for keys, action in scene.actions:
-        if isinstance(action, OpenDoor | CloseDoor) and action.name in scene.world.doors:
-            path = panel_path(*scene.world.doors[action.name], action.duration)
-            key = "duration" if "duration" in action.model_fields_set else "name"
-            yield (*keys, key), None, action.name, path, bodies[action.name].solids
-        elif isinstance(action, Move) and action.name in bodies:
-            body = bodies[action.name]
-            yield (*keys, "name"), None, action.name, action.path(body.pose.plane), body.solids
-        elif isinstance(action, Move) and (spawn := spawned.get(action.name)) is not None and spawn.pose is not None:
-            yield (*keys, "name"), None, action.name, action.path(spawn.pose.pose), (spawn.solid(action.name),)
+    spawned = {one.spec.name: one.spec for one in scene.loaded.actions if one.kind == "spawn"}
+    for one in scene.loaded.actions:
+        name, keys = getattr(one.spec, "name", ""), (*one.keys, "name")
+        if one.kind in ("open", "close") and name in scene.world.doors:
+            from simscen.actions.doors import panel_path
+
+            keys = (*one.keys, "duration") if "duration" in one.spec.model_fields_set else keys
+            yield keys, None, name, panel_path(*scene.world.doors[name], one.spec.duration), bodies[name].solids
+        elif one.kind == "move" and name in bodies:
+            yield keys, None, name, one.spec.path(bodies[name].pose.plane), bodies[name].solids
+        elif one.kind == "move" and (spawn := spawned.get(name)) is not None and spawn.pose is not None:
+            yield keys, None, name, one.spec.path(spawn.pose.pose), (spawn.solid(name),)
 
 
 def motion_stops(motion: Motion) -> list[MotionStop]:

@@ -247,5 +247,5 @@ def earliest_true_s(condition: AnyCondition) -> float:
     elif condition.any is not None:
         earliest = min(map(earliest_true_s, condition.any))
     else:
-        earliest = float(condition.chosen.root) if condition.time is not None else 0.0  # type: ignore[attr-defined]
+        earliest = float(condition.chosen.root) if condition.time is not None else 0.0
     return (condition.for_ or 0.0) + earliest

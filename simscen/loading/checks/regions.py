@@ -6,8 +6,6 @@ from itertools import pairwise
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.polygons import depth_inside_polygon
-from simscen.criteria.keepout import Keepout
-from simscen.criteria.localization import LocalizationError
 from simscen.loading.checks.placement import blocked_poses
 from simscen.loading.checks.possible_run import MAX_SPEED_RATIO
 from simscen.loading.checks.registry import WORLD, CheckProblem
@@ -43,7 +41,7 @@ def keepout_regions_on_goals(scene: Scene) -> Iterator[CheckProblem]:
     if _start_is_blocked(scene):
         return
     for index, entry in enumerate(scene.loaded.spec.pass_):
-        if not isinstance(entry.chosen, Keepout) or entry.chosen.region is None:
+        if entry.kind != "keepout" or entry.chosen.region is None:
             continue
         region, keys = entry.chosen.region, ("pass", index, "keepout", "region")
         corners = scene.world.regions[region]
@@ -81,7 +79,7 @@ def loose_localization_bounds(scene: Scene) -> Iterator[CheckProblem]:
     left, bottom, right, top = scene.world.bounds
     diagonal = math.hypot(right - left, top - bottom)
     for index, entry in enumerate(scene.loaded.spec.pass_):
-        for key in ("max", "rmse", "final") if isinstance(entry.chosen, LocalizationError) else ():
+        for key in ("max", "rmse", "final") if entry.kind == "localization_error" else ():
             bound = getattr(entry.chosen, key)
             if bound is not None and 0 < diagonal < bound:
                 message = f"localization_error can hardly fail: the diagonal of the world is {diagonal:.1f} m"

@@ -16,7 +16,6 @@ from simscen.loading.checks.scene import Scene
 from simscen.loading.open_ground import extend_bounds
 from simscen.loading.yaml.tree import Keys
 from simscen.triggers.base import AnyCondition
-from simscen.triggers.robot_state import RobotIn, RobotWithin
 from simscen.worlds.routes.simple_paths import SimplePaths
 
 if TYPE_CHECKING:
@@ -132,24 +131,19 @@ def _required_areas(scene: Scene, condition: AnyCondition, keys: Keys, name: str
             yield from _required_areas(scene, part, (*keys, "all", k), name)
         return
     keys = (*keys, condition.kind)
-    match condition.chosen if condition.kind in ("robot_in", "robot_within") else None:
-        case RobotIn(region=region):
-            corners = scene.world.regions[region]
-            yield TriggerArea(keys, name, f"region `{region}`", corners, _distance_to_region(corners, 0.0))
-        case RobotWithin(region=str(region), distance=max_distance):
-            corners = scene.world.regions[region]
-            what = f"a position within {max_distance:g} m of region `{region}`"
-            yield TriggerArea(keys, name, what, corners, _distance_to_region(corners, max_distance))
-        case RobotWithin(of=[x, y], distance=max_distance):
-            what = f"a position within {max_distance:g} m of ({x:g}, {y:g})"
-            yield TriggerArea(keys, name, what, ((x, y),), lambda pose: pose.distance(Pose2(x, y)) - max_distance)
-        case _:
-            pass
-
-
-def _distance_to_region(corners: Polygon, max_distance: float) -> Callable[[Pose2], float]:
-    """Return the function `TriggerArea.distance` for the area within `max_distance` m of a region."""
-    return lambda pose: distance_to_polygon(pose, corners) - max_distance
+    if condition.kind not in ("robot_in", "robot_within"):
+        return
+    spec = condition.chosen
+    max_distance = 0.0 if condition.kind == "robot_in" else spec.distance
+    near = f"a position within {max_distance:g} m of " if condition.kind == "robot_within" else ""
+    if spec.region is not None:
+        corners = scene.world.regions[spec.region]
+        what = f"{near}region `{spec.region}`"
+        yield TriggerArea(keys, name, what, corners, lambda pose: distance_to_polygon(pose, corners) - max_distance)
+    elif isinstance(spec.of, list):
+        x, y = spec.of
+        what = f"{near}({x:g}, {y:g})"
+        yield TriggerArea(keys, name, what, ((x, y),), lambda pose: pose.distance(Pose2(x, y)) - max_distance)
 
 
 def robot_routes(scene: Scene) -> RobotRoutes:

@@ -46,9 +46,8 @@ def unreachable_goals(scene: Scene) -> list[tuple[CheckProblem, Gap]]:
         if solids is not world and routes.is_reachable(starts, goal.pose, world):
             problem = CheckProblem(keys, message, "no event opens, moves or removes it", warning=True)
         elif scene.loaded.may_do():
-            problem = CheckProblem(
-                keys, message, "unless an action of an installed package opens a route", warning=True
-            )
+            hint = "unless an action of an installed package opens a route"
+            problem = CheckProblem(keys, message, hint, warning=True)
         elif len(scene.certain_walls) < len(world) and routes.is_reachable(starts, goal.pose, scene.certain_walls):
             problem = CheckProblem(keys, message, _ramp_hint(scene), warning=True)
         else:
@@ -131,9 +130,8 @@ class Drive:
     def description(self) -> str:
         """Length and time of the whole drive, as part of a message."""
         total = sum(self.leg_lengths)
-        return (
-            f"the path of {total:.2f} m to all goals takes {total / self.robot.top_speed:.1f} s {self.top_speed_text}"
-        )
+        time = f"{total / self.robot.top_speed:.1f} s"
+        return f"the path of {total:.2f} m to all goals takes {time} {self.top_speed_text}"
 
 
 @TIMING.check("SC303")
@@ -177,22 +175,19 @@ def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tu
     """Yield the key of each bound of a criterion that the drive violates, and the reason for messages."""
     criterion, names = entry.chosen, [goal.name for goal in drive.goals]
     times, lengths = drive.min_leg_times, drive.min_leg_lengths
-    bound = getattr(criterion, "max", None)
-    if entry.kind == "time_to_goal" and isinstance(bound, float):
-        goal = getattr(criterion, "goal", None)
+    if entry.kind == "time_to_goal":
+        goal = criterion.goal
         least = sum(times) if goal is None else min(t for t, n in zip(times, names, strict=True) if is_named(n, goal))
-        if least > bound:
+        if least > criterion.max:
             reason = f"the path to `{goal}` alone takes at least {least:.1f} s"
             yield "max", drive.description if goal is None else reason
     if entry.kind == "path_length":
-        ratio = getattr(criterion, "max_ratio", None)
-        if isinstance(bound, float) and sum(lengths) > bound:
+        if criterion.max is not None and sum(lengths) > criterion.max:
             yield "max", f"the shortest path to all goals is {sum(drive.leg_lengths):.2f} m long"
-        if ratio is not None and sum(lengths) > ratio * sum(drive.leg_lengths):
+        if criterion.max_ratio is not None and sum(lengths) > criterion.max_ratio * sum(drive.leg_lengths):
             yield "max_ratio", "no path is shorter than the shortest one"
-    within = getattr(criterion, "within", None)
-    if entry.kind == "goals_reached" and within is not None:
-        chosen = getattr(criterion, "goals", None) or names
+    if entry.kind == "goals_reached" and criterion.within is not None:
+        within, chosen = criterion.within, criterion.goals or names
         too_late = [k for k, name in enumerate(names) if times[k] > within and any(is_named(name, c) for c in chosen)]
         if too_late:
             k = too_late[0]
@@ -200,9 +195,9 @@ def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tu
 
 
 def _requires_success(entry: AnyCriterion) -> bool:
-    if entry.kind == "result":
-        requires = getattr(entry.chosen, "status", "") == "SUCCEEDED"
-    else:
-        selected_goals = getattr(entry.chosen, "goals", None) or getattr(entry.chosen, "goal", None)
-        requires = entry.kind in ("goals_reached", "time_to_goal") and not selected_goals
+    requires = (
+        (entry.kind == "result" and entry.chosen.status == "SUCCEEDED")
+        or (entry.kind == "goals_reached" and not entry.chosen.goals)
+        or (entry.kind == "time_to_goal" and entry.chosen.goal is None)
+    )
     return requires and entry.severity == "fail"

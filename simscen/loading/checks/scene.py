@@ -6,9 +6,7 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
-from pydantic import BaseModel
 
-from simscen.actions.robot import Kidnap
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose2
@@ -75,7 +73,7 @@ class Scene:
     @property
     def start_poses(self) -> list[Pose2]:
         """Start pose, and poses to which events move (kidnap) the robot."""
-        return [self.start, *(action.pose.pose for _, action in self.actions if isinstance(action, Kidnap))]
+        return [self.start, *(one.spec.pose.pose for one in self.loaded.actions if one.kind == "kidnap")]
 
     @cached_property
     def _map(self) -> OccupancyGrid | None:
@@ -117,7 +115,7 @@ class Scene:
     def _unmoved(self) -> list[Body]:
         if self.loaded.may_do():
             return []
-        moved = {getattr(action, "name", "") for keys, action in self.actions if keys[-1] in MOVING_ACTIONS}
+        moved = {one.spec.name for one in self.loaded.actions if one.kind in MOVING_ACTIONS}
         return [body for body in self.world.bodies if body.path is None and body.name not in moved]
 
     @cached_property
@@ -134,11 +132,6 @@ class Scene:
         own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(first)}
         goals = {**own, **event_goals(self.loaded)}
         return [((*keys, "pose"), goal) for keys, goal in goals.items() if not expects_failure(spec, goal.name)]
-
-    @cached_property
-    def actions(self) -> list[tuple[Keys, BaseModel]]:
-        """Keys and specification of each action of an event that applies to this robot. The last key is the kind."""
-        return [(one.keys, one.spec) for one in self.loaded.actions]
 
     def footprint_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
         """Return text such as "inside obstacle …" if the robot at a pose overlaps a solid; else None."""

@@ -69,9 +69,8 @@ def goals_that_do_not_fit_the_mode(scope: NameScope) -> Iterator[CheckProblem]:
 def empty_ranges_of_the_local_costmap(scope: NameScope) -> Iterator[CheckProblem]:
     """Find a minimum of the local costmap that exceeds its maximum, of which `costmap` supplies one."""
     stack = scope.loaded.spec.stack
-    if isinstance(stack, StackSpec) and (
-        problem := stack.local_costmap.with_defaults_from(stack.costmap).range_problem()
-    ):
+    local = stack.local_costmap.with_defaults_from(stack.costmap) if isinstance(stack, StackSpec) else None
+    if local is not None and (problem := local.range_problem()):
         message = f"{problem}; values that `local_costmap` does not set are those of `costmap`"
         yield CheckProblem(("stack", "local_costmap"), message)
 
@@ -166,9 +165,8 @@ def latency_without_values(loaded: LoadedScenario) -> Iterator[CheckProblem]:
         return
     if robot is None or "latency" not in robot.model_fields_set:
         message = f"the file of robot `{loaded.robot.name}` has no `latency`: computing takes no time"
-        yield CheckProblem(
-            ("stack", "latency"), message, "add `latency` to a *.robot.yaml, or write the durations here"
-        )
+        hint = "add `latency` to a *.robot.yaml, or write the durations here"
+        yield CheckProblem(("stack", "latency"), message, hint)
 
 
 @MEANING.check("SC055", severity="warning")

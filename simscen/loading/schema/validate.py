@@ -112,9 +112,8 @@ def _problem_for_error(model: type[BaseModel], tree: Node, error: dict[str, Any]
         return _type_key_problem(model, tree, loc, error)
     if loc and loc[-1] == "[key]":
         name = ScalarNode(tree.position, str(loc[-2]))
-        return Problem(
-            *key_position(tree, loc), *messages.translate_error(kind, error.get("ctx", {}), name, error["msg"])
-        )
+        message = messages.translate_error(kind, error.get("ctx", {}), name, error["msg"])
+        return Problem(*key_position(tree, loc), *message)
     node = node_at(tree, loc)
     message = messages.translate_error(kind, error.get("ctx", {}), node, error["msg"])
     if not message.hint and kind in ("model_type", "model_attributes_type", "list_type"):
@@ -132,19 +131,18 @@ def _unknown_key_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Probl
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     where = f" in `{holder}`" if holder else ""
     models = models_at(model, loc[:-1])
-    if lookalike := lookalike_hint(key):
-        hint = lookalike
-    elif key in Trigger.modifiers and models == [AnyCondition]:
+    if key in Trigger.modifiers and models == [AnyCondition]:
         hint = f"`{key}` applies to the whole trigger: write it next to `all`, `any` or `not` under `when`"
     elif others := type_values_with_key(model, loc[:-1], key):
         hint = f"`{key}` is a parameter of type {' and '.join(f'`{name}`' for name in others)}"
-    elif reserved_key_hint := common_mistakes.hint_for_reserved_key(loc[:-1], key):
-        hint = reserved_key_hint
-    elif similar := messages.did_you_mean(key, keys_of(models)):
-        hint = similar
-    elif move_hint := common_mistakes.hint_for_misplaced_key(model, tree, loc[:-1], key):
-        hint = move_hint
     else:
+        hint = (
+            lookalike_hint(key)
+            or common_mistakes.hint_for_reserved_key(loc[:-1], key)
+            or messages.did_you_mean(key, keys_of(models))
+            or common_mistakes.hint_for_misplaced_key(model, tree, loc[:-1], key)
+        )
+    if not hint:
         hint = messages.suggestion(key, keys_of(models))
         if any(issubclass(one, Choice) and one.group for one in models):
             hint = f"{hint}; `simscen plugins` lists what installed packages add".removeprefix("; ")
@@ -179,9 +177,8 @@ def _empty_value_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Probl
     """Return the problem of the empty value at `loc`, such as `off:` instead of `off: {}`."""
     *holder, key = loc
     if isinstance(key, int):
-        return Problem(
-            *key_position(tree, loc), "SC018", f"item {key + 1} of `{dotted_path(holder)}` is empty", "remove it"
-        )
+        message = f"item {key + 1} of `{dotted_path(holder)}` is empty"
+        return Problem(*key_position(tree, loc), "SC018", message, "remove it")
     models = models_at(model, loc)
     complete = models and all(has_no_required_keys(option) for option in models)
     hint = f"write `{key}: {{}}`" if complete else "give it a value or remove the key"

@@ -208,19 +208,16 @@ def _too_many_problem(space: VariationSpace, position: Position) -> Problem | No
 
     if space.count > MAX_VARIATIONS:
         message = f"the scenario has {space.count} variations; the limit is {MAX_VARIATIONS}"
-        return Problem(
-            *position, "SC017", message, "run them with `simscen study`, or use `sampled` to draw some of them"
-        )
+        hint = "run them with `simscen study`, or use `sampled` to draw some of them"
+        return Problem(*position, "SC017", message, hint)
     sizes = (
         sum(max((_option_size(option) for option in typical_options(axis)), default=0) for axis in block.axes)
         for block in space.blocks
     )
     values = _node_size(space.tree) + max(sizes, default=0)
     if space.count * values > MAX_TOTAL_VALUES:
-        message = (
-            f"{space.count} variations of up to {values} values exceed the limit of {MAX_TOTAL_VALUES} values in total"
-        )
-        return Problem(*position, "SC006", message)
+        limit = f"the limit of {MAX_TOTAL_VALUES} values in total"
+        return Problem(*position, "SC006", f"{space.count} variations of up to {values} values exceed {limit}")
     return None
 
 

@@ -130,9 +130,8 @@ def _item_keys(path: str, keys: list[Key], items: SequenceNode, part: str, rest:
     found = matches or kinds
     if len(found) > 1:
         hint = f"use the index: {', '.join(f'{holder}[{index}]' for index in found[:5])}"
-        raise PathError(
-            f"{quoted(path)} is ambiguous: {len(found)} items of `{holder}` are called {quoted(part)}", hint
-        )
+        message = f"{quoted(path)} is ambiguous: {len(found)} items of `{holder}` are called {quoted(part)}"
+        raise PathError(message, hint)
     if not found:
         known = [name for item in items.items for name in _item_names(item)]
         if keys[0] in KEYS_BY_KIND:

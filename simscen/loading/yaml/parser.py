@@ -182,9 +182,8 @@ class _Composer:
         tag = getattr(event, "tag", None)
         if tag is not None:
             short = tag.replace("tag:yaml.org,2002:", "!!", 1)
-            self.problems.append(
-                self._problem(event, "SC005", f"tag `{short}` is not allowed", "remove it; a scenario is plain data")
-            )
+            message, hint = f"tag `{short}` is not allowed", "remove it; a scenario is plain data"
+            self.problems.append(self._problem(event, "SC005", message, hint))
 
     def _report_duplicate(self, event: ev.Event, key: str, first: Position) -> None:
         message = f"duplicate key `{key}` (first at {first.line}:{first.col})"
@@ -231,12 +230,6 @@ class _Composer:
             index = find_lookalike(lines[number].partition(" #")[0])
             if index is not None:
                 character = lines[number][index]
-                return Problem(
-                    self.path,
-                    number + 1,
-                    index + 1,
-                    "SC003",
-                    describe_lookalike(character),
-                    f"write {LOOKALIKES[character][1]}",
-                )
+                message, hint = describe_lookalike(character), f"write {LOOKALIKES[character][1]}"
+                return Problem(self.path, number + 1, index + 1, "SC003", message, hint)
         return None
