@@ -276,6 +276,8 @@ class ScenarioSpec(Spec):
     @property
     def steps(self) -> "list[SequenceStep]":
         """The events in order, each followed by the steps of its sequence."""
+        if not self.events:  # the import takes 15 ms
+            return []
         from simscen.model.disturbances import steps_of
 
         return steps_of(self.events)

@@ -1,11 +1,16 @@
 """Checks for actions of events that are impossible or have no effect."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from simscen.loading.checks.registry import MEANING, CheckProblem
 from simscen.loading.known_names import pedestrian_names
 from simscen.loading.loaded import LoadedScenario
-from simscen.model.disturbances import LocatedAction
+
+if TYPE_CHECKING:
+    from simscen.model.disturbances import LocatedAction
 
 DOOR_MOVES = frozenset({"open", "close", "move", "teleport"})
 """Kinds of actions that can move a door."""

@@ -1,19 +1,24 @@
 """Checks for faults that cannot affect their sensor, cannot happen, or have no effect."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from simscen.core.records.disturbances import BELIEF, COMMAND, KIND_BY_TARGET_NAME, MAP, WHEELS
-from simscen.faults.base import FaultTarget
 from simscen.loading.checks.registry import MEANING, NAMES, CheckProblem, NameScope
 from simscen.loading.codes import UNSUPPORTED_BY_STACK
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.schema.messages import quoted, suggestion
-from simscen.model.disturbances import FaultEntry
 from simscen.model.robot import RobotSpec
 from simscen.model.stack import StackSpec
 from simscen.spec.quantities import with_article
-from simscen.triggers.base import Trigger
+
+if TYPE_CHECKING:
+    from simscen.faults.base import FaultTarget
+    from simscen.model.disturbances import FaultEntry
+    from simscen.triggers.base import Trigger
 
 TARGET_DESCRIPTIONS = {COMMAND: "a velocity command", WHEELS: "wheels", BELIEF: "a localizer", MAP: "a map"}
 """Descriptions for messages of fault targets other than sensors, by kind of the target."""
@@ -24,6 +29,8 @@ before faults that delay messages."""
 
 def fault_targets(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, FaultTarget]:
     """Return all targets of faults by name: sensors of the robot, `cmd_vel`, `wheels`, and so on."""
+    from simscen.faults.base import FaultTarget
+
     frequency = loaded.spec.stack.controller_frequency
     others = {
         name: FaultTarget(kind, frequency if kind == COMMAND else 0.0, robot.drive if kind == WHEELS else None)
@@ -38,7 +45,7 @@ def fault_targets(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, Faul
 
 def _listed_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, Mapping[str, FaultTarget]]]:
     """Yield the index and the entry of each fault, and all targets; nothing if the sensors are not known yet."""
-    if loaded.robot.spec is not None:
+    if loaded.robot.spec is not None and loaded.spec.faults:
         targets = fault_targets(loaded, loaded.robot.spec)
         for index, entry in enumerate(loaded.spec.faults):
             yield index, entry, targets

@@ -2,8 +2,8 @@
 
 from collections.abc import Container, Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from simscen.actions.base import AnyAction
 from simscen.core.messages.goals import LOOP_GOAL_NAME
 from simscen.criteria.registry import verdict_names
 from simscen.loading.checks.registry import NAMES, ROBOT_NAMES, CheckProblem, NameScope
@@ -13,7 +13,10 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.spec_walk import Reference, references, walk
 from simscen.loading.yaml.tree import Keys
 from simscen.model.scenario import ScenarioSpec
-from simscen.triggers.base import AnyCondition
+from simscen.spec.choice import Choice
+
+if TYPE_CHECKING:
+    from simscen.triggers.base import AnyCondition
 
 RENAME_HINT = "rename one of them"
 
@@ -65,7 +68,7 @@ def unknown_lidars(scope: NameScope) -> Iterator[CheckProblem]:
         return
     lidars = [name for name, sensor in loaded.robot.spec.sensors.items() if sensor.reading_type == "Scan"]
     for keys, part in walk(loaded.spec, includes_robot=loaded.includes_robot):
-        named = getattr(part.scan_age, "sensor", None) if isinstance(part, AnyCondition) else None
+        named = getattr(getattr(part, "scan_age", None), "sensor", None)
         if named is not None and named not in lidars:
             message = f"robot `{loaded.robot.name}` has no lidar called {quoted(named)}"
             yield CheckProblem((*keys, "scan_age", "sensor"), message, suggestion(named, lidars) or "it has no lidar")
@@ -151,9 +154,10 @@ def unknown_robots(spec: ScenarioSpec) -> Iterator[CheckProblem]:
     """Find triggers and actions that name a robot that does not exist."""
     robots = spec.robots or {}
     for keys, part in walk({"events": spec.events, "faults": spec.faults, ROBOTS: robots}):
-        if not isinstance(part, AnyCondition | AnyAction) or part.robot is None or part.robot in robots:
+        robot = getattr(part, "robot", None) if isinstance(part, Choice) else None
+        if robot is None or robot in robots:
             continue
-        message, hint = f"no robot is called {quoted(part.robot)}", suggestion(part.robot, robots)
+        message, hint = f"no robot is called {quoted(robot)}", suggestion(robot, robots)
         if not robots:
             message, hint = f"{message}: the only robot has no name", "remove `robot`"
         yield CheckProblem((*keys, "robot"), message, hint)
@@ -174,7 +178,7 @@ def missing_robot_names(spec: ScenarioSpec) -> Iterator[CheckProblem]:
             yield CheckProblem(keys, f"`{keys[-1]}` must name one of the robots", hint, at_key=True)
 
 
-def _conditions_without_robot(condition: AnyCondition, keys: Keys, faults: Container[str]) -> Iterator[Keys]:
+def _conditions_without_robot(condition: "AnyCondition", keys: Keys, faults: Container[str]) -> Iterator[Keys]:
     """Yield the keys of each condition on the state of a robot, or on one of `faults`, that names no robot."""
     if condition.robot is not None:
         return

@@ -3,20 +3,24 @@
 Here, a step is an event, or one of the entries of its sequence (`then`).
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from simscen.core.messages.goals import matches_goal_name
 from simscen.core.records.disturbances import BELIEF, KIND_BY_TARGET_NAME
 from simscen.loading.known_names import listed_goal_names
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.yaml.tree import Keys
-from simscen.model.disturbances import LocatedAction, SequenceStep
 from simscen.model.stack import StackSpec
-from simscen.triggers.base import AnyCondition, Trigger
+
+if TYPE_CHECKING:
+    from simscen.model.disturbances import LocatedAction, SequenceStep
+    from simscen.triggers.base import AnyCondition, Trigger
 
 LocatedReason = tuple[Keys, str]
 """Keys of the part of a trigger that prevents it from firing, and the reason as text for messages."""
@@ -43,7 +47,7 @@ def why_no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:
     return None
 
 
-def possible_run(loaded: LoadedScenario) -> "PossibleRun":
+def possible_run(loaded: LoadedScenario) -> PossibleRun:
     """Return which events, faults, and marks can happen: start with none, and repeatedly add what they enable."""
     run = PossibleRun(loaded, frozenset())
     while (possible := run.next_possible) != run.possible:

@@ -3,6 +3,8 @@
 A fast approximate search runs first. If it finds no route, an exact search decides.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -15,10 +17,10 @@ from simscen.core.geometry.shapes import Solid
 from simscen.loading.checks.scene import Scene
 from simscen.loading.open_ground import extend_bounds
 from simscen.loading.yaml.tree import Keys
-from simscen.triggers.base import AnyCondition
 from simscen.worlds.routes.simple_paths import SimplePaths
 
 if TYPE_CHECKING:
+    from simscen.triggers.base import AnyCondition
     from simscen.worlds.routes.shortest_paths import ShortestPaths
 
 
@@ -84,7 +86,7 @@ class RobotRoutes:
         """Return the fast path search between `solids`; None if a solid is too complex for it."""
         return self.scene.cache.simple_paths(solids, self.scene.size.inscribed, self.z_range)
 
-    def _exact_paths(self, solids: tuple[Solid, ...]) -> "ShortestPaths":
+    def _exact_paths(self, solids: tuple[Solid, ...]) -> ShortestPaths:
         return self.scene.cache.shortest_paths(solids, self.bounds, self.scene.size.inscribed, self.z_range)
 
 

@@ -25,7 +25,6 @@ from simscen.loading.yaml.tree import (
     value_position,
 )
 from simscen.spec.choice import Choice
-from simscen.triggers.base import AnyCondition, Trigger
 
 Model = TypeVar("Model", bound=BaseModel)
 LANGUAGE_VERSION = 1
@@ -127,6 +126,8 @@ def _problem_for_error(model: type[BaseModel], tree: Node, error: dict[str, Any]
 
 
 def _unknown_key_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Problem:
+    from simscen.triggers.base import AnyCondition, Trigger
+
     key = str(loc[-1])
     holder = dotted_path(existing_keys(tree, loc[:-1]))
     where = f" in `{holder}`" if holder else ""
