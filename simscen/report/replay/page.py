@@ -21,11 +21,12 @@ from simscen.core.version import PACKAGE
 from simscen.record.log_header import scenery_from_header
 from simscen.record.log_reader import Log
 from simscen.report.display_text import csp_hash, escape_control, one_line
+from simscen.report.picture.object_outlines import spawn_pose
 from simscen.report.picture.palette import css_variables
 from simscen.report.replay.packed_columns import PackedColumns
 from simscen.report.replay.robot_data import moving_objects, occupancy_grid_data, robot_data
 from simscen.report.replay.source_lines import read_source_lines
-from simscen.report.replay.timeline import disturbance_data, timeline_entries, verdict_data
+from simscen.report.replay.timeline import disturbance_data, is_finite_number, timeline_entries, verdict_data
 
 PAGE_FOLDER = PACKAGE / "data" / "replay"
 FORMAT = 1
@@ -171,7 +172,7 @@ def run_data(log: Log, result: RunResult, columns: PackedColumns) -> dict[str, A
         "again": escape_control(result.again) if result.path else "",
         "verdicts": verdict_data(result, lines),
         "disturbances": disturbance_data(result, lines),
-        "metrics": {name: value for name, value in sorted(result.metrics.items()) if value is not None},
+        "metrics": {name: value for name, value in sorted(result.metrics.items()) if is_finite_number(value)},
         "events": sorted(events, key=lambda event: event["tick"]),
         "text": escape_control(log.header.scenario[:MAX_SCENARIO_CHARACTERS]).rstrip("\n").split("\n"),
         "regions": {one_line(name): corners_data(polygon) for name, polygon in log.header.case.regions.items()},
@@ -195,12 +196,7 @@ def _spawned(event: Event) -> dict[str, Any]:
     return {
         "name": one_line(event.name),
         "tick": event.tick,
-        "pose": [_number(event.data.get(key)) for key in ("x", "y", "yaw")],
+        "pose": [round(part, 4) for part in spawn_pose(event)],
         "parts": [corners_data(outline) for outline in outlines],
         "person": bool(event.data.get("person")),
     }
-
-
-def _number(value: object) -> float:
-    """Return a number rounded to four decimal places; 0 for any other value."""
-    return round(float(value), 4) if isinstance(value, int | float) else 0.0

@@ -1,6 +1,7 @@
 """Signal plots on the replay page: signals (quantities over time), and the limits that criteria set on signals."""
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -123,4 +124,4 @@ def _limit(verdict: Verdict, finding: Finding) -> dict[str, Any] | None:
     if name not in SIGNALS or SIGNALS[name].unit != finding.unit:  # such a margin is not a distance to the limit
         return None
     value = finding.value - finding.margin if is_minimum else finding.value + finding.margin
-    return {"signal": name, "value": round(value, 6), "least": is_minimum}
+    return {"signal": name, "value": round(value, 6), "least": is_minimum} if isfinite(value) else None

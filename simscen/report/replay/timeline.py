@@ -5,7 +5,8 @@ A disturbance is an event or a fault of the scenario.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from math import isfinite
+from typing import Any, TypeGuard
 
 from simscen.core.messages.goals import goal_without_loop
 from simscen.core.records.events import GOAL_END_KINDS, Event, EventKind
@@ -106,7 +107,7 @@ def _is_world_event(event: Event) -> bool:
 
 def _entry(event: Event, lines: SourceLines) -> TimelineEntry:
     x, y = event.data.get("x"), event.data.get("y")
-    place = (round(float(x), 3), round(float(y), 3)) if _is_number(x) and _is_number(y) else ()  # type: ignore[arg-type]
+    place = (round(x, 3), round(y, 3)) if is_finite_number(x) and is_finite_number(y) else ()
     details = ", ".join(_details(event))
     return TimelineEntry(
         tick=event.tick,
@@ -136,8 +137,9 @@ def _short(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+def is_finite_number(value: object) -> TypeGuard[float]:
+    """Return whether a value is a number that JSON can represent."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 
 def _line(event: Event, lines: SourceLines) -> int:
@@ -203,12 +205,13 @@ def _disturbance_line(verdict: Verdict, name: str, result: RunResult) -> int:
 
 
 def _finding(verdict: Verdict, finding: Finding) -> dict[str, Any]:
+    place = finding.place
     return {
         "status": finding.status.value,
         "what": one_line(subject(verdict, finding)),
         "said": one_line(comparison(finding)),
         "margin": None if finding.margin is None else f"{finding.margin:+.3g} {finding.unit}".rstrip(),
         "tick": finding.tick,
-        "place": None if finding.place is None else [round(axis, 3) for axis in finding.place],
+        "place": [round(axis, 3) for axis in place] if place is not None and all(map(isfinite, place)) else None,
         "detail": [one_line(text) for text in finding.detail],
     }

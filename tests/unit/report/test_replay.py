@@ -21,6 +21,8 @@ from simscen.core.records.case import Case
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
 from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import Finding, Status, Verdict
+from simscen.criteria.registry import AnyCriterion
+from simscen.judge.run_result import judge_run
 from simscen.record.log_header import LogHeader
 from simscen.record.log_reader import Log
 from simscen.record.messages.encode import occupancy_grid
@@ -225,6 +227,17 @@ def test_local_costmap_is_drawn_at_the_estimated_odom_frame() -> None:
     believed = log.trace.belief.at(np.array([240]))[0]
     rolled = Pose2(*log.trace.odometry.at(np.array([240]))[0])
     assert correction.compose(rolled) == pytest.approx(tuple(believed[:3]))
+
+
+@pytest.mark.filterwarnings("ignore:overflow")
+def test_page_is_valid_if_the_square_of_an_error_overflows() -> None:
+    trace = log_of({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "belief": [[0, 0, 0], [4, 1e200, 0]]}).trace
+    case = Case(Pose2(0, 0), ())
+    criteria = [AnyCriterion.model_validate({"localization_error": {key: 0.1}}) for key in ("rmse", "max", "final")]
+    result = judge_run(RunKey("hall/drive", 7), "", criteria, trace, case)
+    (run,) = Read(replay_page([(Log(LogHeader("hall/drive", 7, case, ""), trace, "", True), result)])).runs
+    assert [verdict["status"] for verdict in run["verdicts"]] == ["fail"] * 3
+    assert "ape_trans_rmse" not in run["metrics"]
 
 
 @pytest.mark.parametrize("garbage", [math.nan, math.inf])
