@@ -15,7 +15,7 @@ from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResu
 from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import Evidence, ExpectedFailure, LogCoverage
-from simscen.criteria.timeline import START_KINDS
+from simscen.criteria.timeline import START_KINDS, has_ended
 from simscen.judge.run_result import judge_run
 from simscen.judge.several_robots import combine_robots
 from simscen.loading.files.criteria_file import LoadedCriteria, load_criteria
@@ -93,7 +93,7 @@ class LogJudge:
         self.notes += [f"{log}: {note}" for note in foreign.notes]
         text = "" if self._scenario is None else self._scenario.read_text(encoding="utf-8")
         header = LogHeader(log.stem, 0, case, text, foreign.map)
-        return Log(header, foreign.trace, "", complete=True, sensors=foreign.sensors), result
+        return Log(header, foreign.trace, "", complete=has_ended(foreign.trace), sensors=foreign.sensors), result
 
     def _judge_simscen_log(self, log: Path) -> RunFinished:
         read = read_run(log)

@@ -12,6 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from foreign_logs import BEGIN, Message, T, drive, header, link, write_bag, write_mcap
 
 from simscen.cli.main import main
+from simscen.cli.session.judging import LogJudge
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.read import read_foreign_log
 
@@ -90,3 +91,12 @@ def test_replay_page_is_written_with_and_without_criteria(simscen, tmp_path: Pat
     (tmp_path / "limits.yaml").write_text("simscen: 1\npass: [{localization_error: {max: 0.01 m}}]\n")
     ended = simscen("replay", str(log), "--truth", "/mocap", "--scenario", str(tmp_path / "limits.yaml"))
     assert ended.code == 0 and "<title>monday, seed 0, failed</title>" in page.read_text()
+
+
+@pytest.mark.parametrize(("kept", "is_complete"), [(1.0, True), (0.6, False)])
+def test_replay_of_a_truncated_log_is_marked_as_truncated(tmp_path: Path, kept: float, is_complete: bool) -> None:
+    log = tmp_path / "monday.mcap"
+    write_mcap(log, [a_map(), mounted(), *drive(20.0)], chunk_size=10_000)
+    log.write_bytes(log.read_bytes()[: int(kept * log.stat().st_size)])
+    shown, _ = LogJudge(ForeignLogOptions("/mocap"), None, None, ()).judge_for_replay(log)
+    assert shown.complete == is_complete
