@@ -103,7 +103,7 @@ def suite_command(
     baseline: the time of PyBullet alone on one core for the same steps and scans, measured before and after the
     session.
 
-    Exit code 0: all runs were completed; 3: a run was aborted.
+    Exit code 0: all runs were completed; 3: a run was aborted. If all were aborted, nothing is measured.
     """
     from simscen.cli.session.fork_server_start import FORK_SERVER
     from simscen.cli.session.selection import Selection, load_selection
@@ -115,7 +115,10 @@ def suite_command(
 
         scenarios, _ = load_selection(paths or [Path("scenarios")], None, (), False, Selection())
         suite = measure_suite(evenly_spaced(scenarios, most), workers, Path(folder), FORK_SERVER, print_progress)
-    print_result(Result.on_this_machine(suite.figures), _suite_text(suite), {"suite": asdict(suite)}, format_, before)
+    if suite.simulated:
+        print_result(
+            Result.on_this_machine(suite.figures), _suite_text(suite), {"suite": asdict(suite)}, format_, before
+        )
     if suite.unfinished:
         print(f"{len(suite.unfinished)} runs were aborted: {', '.join(suite.unfinished)}", file=sys.stderr)
         sys.exit(Exit.INCOMPLETE)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from simscen.bench.speed.measurement import Measurement
+from simscen.bench.speed.session_speed import SuiteResult
 from simscen.cli.benchmarks.results import FORMAT_VERSION, Result, as_json, comparison_text, judgment, read_result
 from simscen.core.errors import UsageError
 
@@ -115,3 +116,10 @@ def test_unreadable_result_is_a_usage_error(tmp_path: Path, exists: bool) -> Non
 def test_results_of_different_commands_cannot_be_compared() -> None:
     with pytest.raises(UsageError, match="no common figure; compare results of the same command"):
         comparison_text(BEFORE, replace(AFTER, figures={"2 robots": Measurement(80.0, "ms per simulated second")}))
+
+
+def test_suite_whose_runs_were_all_aborted_has_no_figures(simscen, monkeypatch: pytest.MonkeyPatch) -> None:
+    nothing = SuiteResult(1, ("good",), 1, simulated=0.0, wall=1.0, cpu=0.0, memory=(), baseline=0.1)
+    monkeypatch.setattr("simscen.bench.speed.session_speed.measure_suite", lambda *_: nothing)
+    ended = simscen("bench", "suite", "good.scenario.yaml", "-j", "1")
+    assert (ended.code, ended.out, ended.err) == (3, "", "1 runs were aborted: good\n")
