@@ -22,6 +22,8 @@ NOISE_SIGMAS = 4.0
 """Additional tolerance in standard deviations of the range noise."""
 MAD_TO_STD = 1.4826
 """Factor from the median absolute deviation to the standard deviation of a normal distribution."""
+MAX_INVALID_HIT_FRACTION, MIN_EXPECTED_HIT_FRACTION = 0.1, 0.3
+"""Maximum fraction of beams with a hit in an invalid scan, and minimum fraction of beams that should hit the world."""
 SMOOTH_STEP_M = 0.1
 """Maximum difference between the expected ranges of neighbor beams that end at the same smooth surface."""
 
@@ -53,6 +55,13 @@ class ComparedScans:
     def residuals(self) -> Array:
         """Measured minus expected ranges (n, beams) in m; nan without a measured or an expected range."""
         return _residuals(self.scans, self.expected)
+
+    @cached_property
+    def is_invalid(self) -> Mask:
+        """Mask (n,) of scans with a wrong number of beams, or with hardly any hit."""
+        hits, expected = self.is_hit.mean(axis=1), np.isfinite(self.expected).mean(axis=1)
+        lacks_hits: Mask = (hits < MAX_INVALID_HIT_FRACTION) & (expected > MIN_EXPECTED_HIT_FRACTION)
+        return self.scans.is_malformed | lacks_hits
 
     @cached_property
     def is_explained(self) -> Mask:

@@ -9,17 +9,17 @@ class RobotFrames:
     """Names of the frames of one robot in the log.
 
     With several robots, frames have the robot's name as a prefix, except `map` and the frames of moving objects.
-    `odom`, `base`, and `truth` are the names of the frames ODOM, BASE, and TRUTH.
+    `prefix` is this prefix, and `odom`, `base`, and `truth` are the names of the frames ODOM, BASE, and TRUTH.
     """
 
     def __init__(self, robot: str = "") -> None:
         # A robot named "object" must not get the prefix of the moving objects.
-        self._prefix = f"{robot}{'_' if f'{robot}/' == _OBJECT_PREFIX else ''}/" if robot else ""
+        self.prefix = f"{robot}{'_' if f'{robot}/' == _OBJECT_PREFIX else ''}/" if robot else ""
         self.odom, self.base, self.truth = self.log_frame(ODOM), self.log_frame(BASE), self.log_frame(TRUTH)
 
     def log_frame(self, frame: str) -> str:
         """Return the name in the log of a frame of the robot's stack."""
-        return frame if frame == MAP else f"{self._prefix}{frame}"
+        return frame if frame == MAP else f"{self.prefix}{frame}"
 
     def sensor_frame(self, sensor: str) -> str:
         """Return the name in the log of the frame of a sensor."""
@@ -27,7 +27,7 @@ class RobotFrames:
 
     def stack_frame(self, frame: str) -> str:
         """Return the name in the robot's stack of a frame in the log, which is the name without the prefix."""
-        return frame.removeprefix(self._prefix)
+        return frame.removeprefix(self.prefix)
 
 
 def sensor_frame(sensor: str) -> str:

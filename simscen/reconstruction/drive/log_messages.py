@@ -11,9 +11,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from simscen.record import topics
-from simscen.record.foreign.decoded_messages import DECODERS, Decoders
+from simscen.record.foreign.decoded_messages import DECODERS
 from simscen.record.foreign.options import TOPICS
-from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
+from simscen.record.foreign.raw_messages import (
+    Decoders,
+    RawMessage,
+    UnusableLog,
+    open_messages,
+    type_mismatch,
+)
 from simscen.record.frame_names import RobotFrames
 from simscen.record.messages import decode
 from simscen.record.messages.decode import MessageReader
@@ -113,7 +119,7 @@ def collect_messages(path: Path, named: Mapping[str, str], has_truth: bool = Fal
         robots
     """
     prefix = f"/{robot}" if robot else ""
-    namespace = f"{prefix}/" if robot else ""
+    namespace, frame_prefix = f"{prefix}/" if robot else "", RobotFrames(robot).prefix
     names = {**TOPICS, **EXTRA_TOPICS, **({"truth": topics.TRUTH.name} if has_truth else {}), **named}
     absolute = {role: topic if topic.startswith(namespace) else prefix + topic for role, topic in names.items()}
     roles: dict[str, list[str]] = {}
@@ -125,13 +131,15 @@ def collect_messages(path: Path, named: Mapping[str, str], has_truth: bool = Fal
     for raw in stream:
         for role in roles.get(raw.topic, ()):
             if raw.type in _DECODERS[role]:
-                messages.by_role.setdefault(role, []).append(_without_robot(_decode(raw, role), robot))
+                messages.by_role.setdefault(role, []).append(_decode(raw, role, frame_prefix))
         if raw.topic not in roles and raw.type == topics.SCAN_TYPE and raw.topic.startswith(namespace):
-            other_scans.setdefault(raw.topic, []).append(_without_robot(_decode(raw, "scan"), robot))
+            other_scans.setdefault(raw.topic, []).append(_decode(raw, "scan", frame_prefix))
     for role in named:
         if not messages.of(role):
-            reason = _reason_missing(absolute[role], role, stream.topics)
-            raise UnusableLog(reason, f"its topics: {', '.join(sorted(stream.topics)[:12]) or 'none'}")
+            topic, hint = absolute[role], f"its topics: {', '.join(sorted(stream.topics)[:12]) or 'none'}"
+            if topic not in stream.topics:
+                raise UnusableLog(f"it has no topic {topic}", hint)
+            raise UnusableLog(type_mismatch(topic, stream.topics[topic], _DECODERS[role]) or f"{topic} is empty", hint)
     if not messages.of("scan") and other_scans:
         topic = min(other_scans)
         messages.by_role["scan"] = other_scans[topic]
@@ -144,15 +152,6 @@ def collect_messages(path: Path, named: Mapping[str, str], has_truth: bool = Fal
     return messages
 
 
-def _reason_missing(topic: str, role: str, types: Mapping[str, str]) -> str:
-    """Return why a topic has no usable messages for a role. `types` are the message types of all topics."""
-    if topic not in types:
-        return f"it has no topic {topic}"
-    if types[topic] not in _DECODERS[role]:
-        return f"{topic} is a {types[topic] or 'type without a name'}, expected {' or '.join(_DECODERS[role])}"
-    return f"{topic} has no messages"
-
-
 class _TopicsToRead:
     """Container of the topics to read: topics with a role, and topics with "scan" in their name."""
 
@@ -163,30 +162,6 @@ class _TopicsToRead:
         return topic in self._roles or "scan" in str(topic)
 
 
-def _decode(raw: RawMessage, role: str) -> LoggedMessage:
-    """Decode a message of a topic with a role. Raises UnusableLog if this is impossible."""
-    message = raw.decode(_DECODERS[role][raw.type])
-    return LoggedMessage(raw.time, _stamp(message), message)
-
-
-def _without_robot(message: LoggedMessage, robot: str) -> LoggedMessage:
-    """Return a message without the name of the robot in frame names."""
-    if not robot:
-        return message
-    frames = RobotFrames(robot)
-
-    def stripped(part: Any) -> Any:
-        names = [name for name in ("frame", "child") if name in getattr(part, "_fields", ())]
-        return part._replace(**{name: frames.stack_frame(getattr(part, name)) for name in names})
-
-    content = message.content
-    if isinstance(content, list) and content and hasattr(content[0], "_fields"):
-        return message._replace(content=[stripped(part) for part in content])
-    return message._replace(content=stripped(content)) if hasattr(content, "_fields") else message
-
-
-def _stamp(message: Any) -> int:
-    """Return the stamp of a decoded message in ns; 0 for a message without a header."""
-    if isinstance(message, list):
-        return int(message[0].stamp) if message and hasattr(message[0], "stamp") else 0
-    return int(getattr(message, "stamp", 0) or 0)
+def _decode(raw: RawMessage, role: str, frame_prefix: str) -> LoggedMessage:
+    message = raw.decode(_DECODERS[role], frame_prefix=frame_prefix)
+    return LoggedMessage(raw.time, getattr(message, "stamp", 0) or 0, message)

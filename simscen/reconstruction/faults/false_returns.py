@@ -16,7 +16,6 @@ from simscen.reconstruction.drive.recorded_drive import Mask
 from simscen.reconstruction.faults.lidar_readings import (
     MIN_SECTOR_BEAMS,
     MIN_WINDOW_S,
-    invalid_scans,
     lidar_fault_in_window,
     mask_runs,
     usable_windows,
@@ -42,9 +41,9 @@ MIN_DRIVEN_M, MIN_GHOST_S = 0.6, 2.0
 
 def false_return_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:
     """Yield the faults dust (single beams that end in free space) and ghost. `end` is the end of the drive in s."""
-    usable = ~invalid_scans(compared)
+    usable = ~compared.is_invalid
     isolated = isolated_returns(compared)
-    for window in usable_windows(isolated.mean(axis=1) > MIN_FALSE_FRACTION, usable, compared):
+    for window in usable_windows(isolated.mean(axis=1) > MIN_FALSE_FRACTION, compared):
         rows = usable[window.samples]
         ranges = np.where(
             compared.is_hit, compared.scans.ranges, np.minimum(compared.expected, compared.scans.range_max)
@@ -87,7 +86,7 @@ def ghost_beams(compared: ComparedScans) -> list[tuple[int, int, float]]:
     """Return the first beam, the last beam, and the range in m of each ghost."""
     if float(np.hypot(*np.ptp(compared.poses[:, :2], axis=0))) < MIN_DRIVEN_M:
         return []
-    short = compared.is_short & ~invalid_scans(compared)[:, None]
+    short = compared.is_short & ~compared.is_invalid[:, None]
     seen = short.sum(axis=0)
     ranges = np.where(short, compared.scans.ranges, np.nan)
     center, spread = np.full(len(seen), np.nan), np.full(len(seen), np.inf)

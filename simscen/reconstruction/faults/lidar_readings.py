@@ -26,8 +26,6 @@ MIN_NOISE_S = 2.0
 """Minimum duration of reported noise."""
 MIN_INVALID_SCANS = 2
 """Minimum number of invalid scans that are reported."""
-MAX_INVALID_HIT_FRACTION, MIN_EXPECTED_HIT_FRACTION = 0.1, 0.3
-"""Maximum fraction of beams with a hit in an invalid scan, and minimum fraction of beams that should hit the world."""
 MIN_NAN_FRACTION = 0.03
 """Minimum fraction of nan ranges in a scan with missing beams."""
 BLIND_FRACTION = 0.95
@@ -48,19 +46,9 @@ HEAVY_RAIN_MM_H = 25.0
 """Maximum reported rain rate."""
 
 
-def invalid_scans(compared: ComparedScans) -> Mask:
-    """Return a mask (n,) of invalid scans: scans with a wrong number of beams, or with hardly any hit."""
-    hits = compared.is_hit.mean(axis=1)
-    expected = np.isfinite(compared.expected).mean(axis=1)
-    result: Mask = compared.scans.is_malformed | (
-        (hits < MAX_INVALID_HIT_FRACTION) & (expected > MIN_EXPECTED_HIT_FRACTION)
-    )
-    return result
-
-
 def invalid_scan_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:
     """Yield at most one fault, which covers all invalid scans."""
-    invalid, times = invalid_scans(compared), compared.scans.times
+    invalid, times = compared.is_invalid, compared.scans.times
     if int(invalid.sum()) < MIN_INVALID_SCANS:
         return
     indices = np.flatnonzero(invalid)
@@ -95,10 +83,10 @@ def _garbage_value(compared: ComparedScans, index: int) -> str:
 
 def missing_beam_faults(compared: ComparedScans, end: float) -> Iterator[FoundFault]:
     """Yield faults of beams that return nan: blind sectors, and beams that are lost at random."""
-    usable = ~invalid_scans(compared)
+    usable = ~compared.is_invalid
     missing = np.isnan(compared.scans.ranges)
     blind = np.zeros(missing.shape[1], dtype=bool)
-    for window in usable_windows(missing.mean(axis=1) > MIN_NAN_FRACTION, usable, compared):
+    for window in usable_windows(missing.mean(axis=1) > MIN_NAN_FRACTION, compared):
         chosen = missing[window.samples][usable[window.samples]]
         always = chosen.mean(axis=0) > BLIND_FRACTION
         if always.mean() < BLIND_FRACTION and (
@@ -138,10 +126,10 @@ def range_faults(compared: ComparedScans, end: float, nominal_noise: float) -> I
 
     It is rain if the noise exceeds `nominal_noise`, a standard deviation in m, by MIN_EXTRA_NOISE_M.
     """
-    usable = ~invalid_scans(compared)
+    usable = ~compared.is_invalid
     near = np.isfinite(compared.expected) & (compared.expected < 0.97 * compared.scans.range_max)
     lost = compared.is_missing & near
-    for window in usable_windows(lost.mean(axis=1) > MIN_MISSING_FRACTION, usable, compared):
+    for window in usable_windows(lost.mean(axis=1) > MIN_MISSING_FRACTION, compared):
         rows = np.zeros(len(usable), dtype=bool)
         rows[window.samples] = usable[window.samples]
         hits = compared.scans.ranges[rows][compared.is_hit[rows]]
@@ -182,12 +170,11 @@ def noise_faults(compared: ComparedScans, end: float, nominal_noise: float, is_k
 
     `is_known` states that `nominal_noise` is the noise of this lidar instead of a typical value.
     """
-    usable = ~invalid_scans(compared)
     noise = median_filter(compared.noise, size=5, mode="nearest")
     limit = nominal_noise + max(MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR * nominal_noise)
     if is_known:
         limit = max(KNOWN_NOISE_FACTOR * nominal_noise, nominal_noise + MIN_KNOWN_EXTRA_NOISE_M)
-    for window in usable_windows(noise > limit, usable, compared):
+    for window in usable_windows(noise > limit, compared):
         if window.length < MIN_NOISE_S:
             continue
         measured = float(np.sqrt(np.mean(noise[window.samples] ** 2)))
@@ -196,12 +183,11 @@ def noise_faults(compared: ComparedScans, end: float, nominal_noise: float, is_k
         yield lidar_fault_in_window("noise", {"std": f"{100 * extra:.1f} cm"}, window, compared, end, text)
 
 
-def usable_windows(mask: Mask, usable: Mask, compared: ComparedScans) -> list[Window]:
-    """Return the time windows in which `mask` (n,) is true. An unusable scan has the value of the last usable scan."""
-    held = mask.copy()
+def usable_windows(mask: Mask, compared: ComparedScans) -> list[Window]:
+    """Return the time windows in which `mask` (n,) is true. An invalid scan has the value of the last valid scan."""
+    usable = ~compared.is_invalid
     newest = np.maximum.accumulate(np.where(usable, np.arange(len(mask)), 0))
-    held = held[newest] & usable[newest]
-    return windows(held, compared.scans.times, MIN_WINDOW_S, MAX_WINDOW_GAP_S)
+    return windows(mask[newest] & usable[newest], compared.scans.times, MIN_WINDOW_S, MAX_WINDOW_GAP_S)
 
 
 def lidar_fault_in_window(

@@ -11,7 +11,6 @@ from simscen.core.geometry import Array
 from simscen.reconstruction.compared_scans import ComparedScans
 from simscen.reconstruction.drive.recorded_drive import Indices, Mask
 from simscen.reconstruction.faults.false_returns import ghost_beams, isolated_returns
-from simscen.reconstruction.faults.lidar_readings import invalid_scans
 from simscen.reconstruction.faults.message_stream import repeated_scans
 from simscen.reconstruction.static_world import StaticWorld
 
@@ -54,7 +53,7 @@ class ScanCluster:
 
 def usable_scans(compared: ComparedScans) -> Mask:
     """Return a mask (n,) of scans that are neither invalid nor a repetition of the previous scan."""
-    return ~invalid_scans(compared) & ~repeated_scans(compared.scans)
+    return ~compared.is_invalid & ~repeated_scans(compared.scans)
 
 
 def scan_clusters(compared: ComparedScans, world: StaticWorld, has_true_poses: bool) -> list[list[ScanCluster]]:

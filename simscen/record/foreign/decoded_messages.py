@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from simscen.record import topics
 from simscen.record.foreign.options import TOPICS, ForeignLogOptions
-from simscen.record.foreign.raw_messages import RawMessage, UnusableLog
+from simscen.record.foreign.raw_messages import Decoders, RawMessage
 from simscen.record.messages import decode
-from simscen.record.messages.decode import MessageReader, decode_checked
-
-Decoders = Mapping[str, Callable[[MessageReader], Any]]
-"""Functions that decode a message, by ROS message type."""
+from simscen.record.messages.decode import MessageReader
 
 
 def _stamp(reader: MessageReader) -> int:
@@ -71,23 +68,9 @@ def decode_messages(raw: Iterable[RawMessage], roles: Mapping[str, Sequence[str]
     decoded = DecodedMessages()
     for message in raw:
         for role in roles.get(message.topic, ()):
-            _decode(decoded, role, message)
+            messages = decoded.by_role[role]
+            if mismatch := message.mismatch(DECODERS[role]):
+                decoded.problems[role] = mismatch
+            else:
+                messages.append((message.time, message.decode(DECODERS[role], f"message {len(messages) + 1}")))
     return decoded
-
-
-def _decode(decoded: DecodedMessages, role: str, message: RawMessage) -> None:
-    """Add a message to `decoded`, or the reason why it is unsuitable for the role."""
-    decoders, messages = DECODERS[role], decoded.by_role[role]
-    if message.encoding != "cdr":
-        encoding = message.encoding or "something unknown"
-        decoded.problems[role] = f"{message.topic} is encoded as {encoding}, not as CDR"
-        return
-    if message.type not in decoders:
-        expected = " or ".join(decoders)
-        decoded.problems[role] = f"{message.topic} is a {message.type or 'type without a name'}, expected {expected}"
-        return
-    try:
-        messages.append((message.time, decode_checked(decoders[message.type], message.data)))
-    except (ValueError, OverflowError) as error:
-        where = f"message {len(messages) + 1} of {message.topic}"
-        raise UnusableLog(f"{where} cannot be read as {message.type}: {error}") from error

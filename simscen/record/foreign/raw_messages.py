@@ -2,10 +2,10 @@
 
 import json
 import re
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from mcap import records
 
@@ -15,7 +15,8 @@ from simscen.record.log_reader import invalid_log, unreadable_log_as_invalid_inp
 from simscen.record.mcap_reader import RecordReader, is_mcap, open_log
 from simscen.record.messages.decode import MessageReader, decode_checked
 
-T = TypeVar("T")
+Decoders = Mapping[str, Callable[[MessageReader], Any]]
+"""Functions that decode a message, by ROS message type."""
 
 
 class UnusableLog(ValueError):
@@ -45,14 +46,30 @@ class RawMessage(NamedTuple):
     time: int
     data: bytes
 
-    def decode(self, decoder: Callable[[MessageReader], T]) -> T:
-        """Return the message, decoded by a function of `messages.decode`. Raises UnusableLog if this is impossible."""
+    def mismatch(self, decoders: Decoders) -> str:
+        """Return why no decoder suits the encoding and type of the message; "" if one does."""
         if self.encoding != "cdr":
-            raise UnusableLog(f"{self.topic} is encoded as {self.encoding or 'something unknown'}, not as CDR")
+            return f"{self.topic} is encoded as {self.encoding or 'something unknown'}, not as CDR"
+        return type_mismatch(self.topic, self.type, decoders)
+
+    def decode(self, decoders: Decoders, label: str = "a message", frame_prefix: str = "") -> Any:
+        """Return the decoded message. Raises UnusableLog, with the `label` of the message, if this is impossible.
+
+        `frame_prefix` is removed from the names of frames.
+        """
+        if mismatch := self.mismatch(decoders):
+            raise UnusableLog(mismatch)
         try:
-            return decode_checked(decoder, self.data)
+            return decode_checked(decoders[self.type], self.data, frame_prefix)
         except (ValueError, OverflowError) as error:
-            raise UnusableLog(f"a message of {self.topic} cannot be read as {self.type}: {error}") from error
+            raise UnusableLog(f"{label} of {self.topic} cannot be read as {self.type}: {error}") from error
+
+
+def type_mismatch(topic: str, message_type: str, decoders: Decoders) -> str:
+    """Return why no decoder suits the message type of a topic; "" if one does."""
+    if message_type in decoders:
+        return ""
+    return f"{topic} is a {message_type or 'type without a name'}, expected {' or '.join(decoders)}"
 
 
 class McapMessages:

@@ -11,9 +11,8 @@ from typing import Any
 from simscen.core.clock import NS_PER_SECOND
 from simscen.core.geometry import Pose3
 from simscen.record import topics
-from simscen.record.foreign.decoded_messages import Decoders
 from simscen.record.foreign.options import parse_frame_pair
-from simscen.record.foreign.raw_messages import RawMessage, UnusableLog, open_messages
+from simscen.record.foreign.raw_messages import UnusableLog, open_messages
 from simscen.record.foreign.transforms import TransformTree, is_upside_down, lidar_mount
 from simscen.record.localization_logs.rows import (
     MAX_COORDINATE_M,
@@ -117,27 +116,21 @@ def _collect_messages(path: Path, odometry: str, scan: str, truth: str) -> _Mess
     messages = _Messages()
     for index, raw in enumerate(stream):
         if raw.topic in (topics.TF_STATIC.name, topics.TF.name):
-            links, is_static = _decode(raw, {topics.TF.type: transforms}), raw.topic == topics.TF_STATIC.name
+            links, is_static = raw.decode({topics.TF.type: transforms}), raw.topic == topics.TF_STATIC.name
             messages.transforms.add(raw.time, links, is_static)
             messages.tf_indices[raw.time] = index
             messages.static_transforms.update({link.child: link for link in links if is_static})
         elif raw.topic == INITIAL_POSE_TOPIC:
-            messages.initial.append((raw.time, index, _decode(raw, POSE_DECODERS)))
+            messages.initial.append((raw.time, index, raw.decode(POSE_DECODERS)))
         elif raw.topic == scan:
-            messages.scans.append((raw.time, index, _decode(raw, {topics.SCAN_TYPE: laser_scan})))
+            messages.scans.append((raw.time, index, raw.decode({topics.SCAN_TYPE: laser_scan})))
         elif raw.topic in (odometry, truth):
-            pose = raw.time, index, _decode(raw, POSE_DECODERS)
+            pose = raw.time, index, raw.decode(POSE_DECODERS)
             messages.odometry += [pose] if raw.topic == odometry else []
             messages.truth += [pose] if raw.topic == truth else []
     messages.topics, messages.is_complete = stream.topics, stream.complete
     messages.sort_by_time()
     return messages
-
-
-def _decode(raw: RawMessage, decoders: Decoders) -> Any:
-    if raw.type not in decoders:
-        raise UnusableLog(f"{raw.topic} is a {raw.type or 'type without a name'}, expected {' or '.join(decoders)}")
-    return raw.decode(decoders[raw.type])
 
 
 def _time(logged: int, message: Any, use_log_time: bool) -> float:

@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -30,60 +30,41 @@ def read_csv_rows(path: Path) -> LocalizationRows:
     """
     rows, mount = LocalizationRows(hint="see `simscen localize --help` for its columns"), Pose2(0.0, 0.0)
     with path.open(encoding="utf-8", newline="") as lines:
-        for number, row in _numbered_rows(lines, rows.hint):
-            cells = [cell.strip() for cell in row]
-            if not cells or not cells[0] or cells[0].startswith("#"):
-                continue
-            try:
-                values = [float(cell) for cell in cells[1:] if cell]
-                if cells[0] == "mount":
-                    mount = _checked_pose(values)
-                else:
-                    _add_row(rows, cells[0], number, values, mount)
-            except ValueError as error:
-                raise UnusableLog(f"line {number}: {error}", rows.hint) from error
+        reader = csv.reader(lines)
+        try:
+            for number, row in enumerate(reader, 1):
+                cells = [cell.strip() for cell in row]
+                while cells and not cells[-1]:  # a spreadsheet pads short rows
+                    cells.pop()
+                if not cells or not cells[0] or cells[0].startswith("#"):
+                    continue
+                try:
+                    if cells[0] == "mount":
+                        mount = _pose(cells[1:])
+                    else:
+                        _add_row(rows, cells[0], number, cells[1:], mount)
+                except ValueError as error:
+                    raise UnusableLog(f"line {number}: {error}", rows.hint) from error
+        except csv.Error as error:
+            raise UnusableLog(f"line {reader.line_num} is not CSV: {error}", rows.hint) from error
     return rows
 
 
-def _numbered_rows(lines: Iterable[str], hint: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield number (from 1) and cells of each row of a CSV file. Raises UnusableLog with `hint` if it is not CSV."""
-    reader = csv.reader(lines)
-    try:
-        yield from enumerate(reader, 1)
-    except csv.Error as error:
-        raise UnusableLog(f"line {reader.line_num} is not CSV: {error}", hint) from error
-
-
-def _add_row(rows: LocalizationRows, kind: str, order: int, values: list[float], mount: Pose2) -> None:
+def _add_row(rows: LocalizationRows, kind: str, order: int, cells: list[str], mount: Pose2) -> None:
     """Add a row of the CSV file to `rows`. `order` is the number of the row, `mount` the last pose of the lidar."""
     match kind:
         case "odom" | "truth":
-            time, pose = (values or [math.nan])[0], values[1:]
             target = rows.odometry if kind == "odom" else rows.truth
-            _check_time(time)
-            target.append(PoseRow(time, order, _checked_pose(pose)))
+            target.append(PoseRow(_time(cells[0] if cells else ""), order, _pose(cells[1:])))
         case "scan":
+            values = [float(cell) for cell in cells]
             if len(values) < 6 or not all(math.isfinite(value) for value in values[:5]):
                 raise ValueError("a scan needs TIME, ANGLE_MIN, ANGLE_INCREMENT, RANGE_MIN, RANGE_MAX and ranges")
-            time, first, step, range_min, range_max = values[:5]
-            _check_time(time)
-            rows.scans.append(ScanRow(time, order, np.array(values[5:]), (first, step, range_min, range_max), mount))
+            first, step, range_min, range_max = values[1:5]
+            layout = first, step, range_min, range_max
+            rows.scans.append(ScanRow(_time(cells[0]), order, np.array(values[5:]), layout, mount))
         case _:
             raise ValueError(f"unknown kind of row {kind!r}; use odom, scan, truth or mount")
-
-
-def _check_time(time: float) -> None:
-    if not all_within((time,), MAX_TIME_S):
-        raise ValueError(f"{time} is not a valid time")
-
-
-def _checked_pose(values: list[float]) -> Pose2:
-    """Return the pose x, y, yaw. Raises ValueError if `values` are not three valid numbers."""
-    if len(values) != 3 or not all(math.isfinite(value) for value in values):
-        raise ValueError(f"expected 3 numbers, got {values}")
-    if not all_within(values, MAX_COORDINATE_M):
-        raise ValueError(f"invalid coordinates {values}")
-    return Pose2(*values)
 
 
 DEFAULT_MAX_RANGE_M = 81.9
@@ -133,7 +114,9 @@ def _parse_robotlaser(rows: LocalizationRows, order: int, words: list[str]) -> N
 
     `laser` and `robot` are poses x, y, theta.
     """
-    first, _, step, range_max = (_parse_finite(word) for word in words[2:6])
+    first, _, step, range_max = (float(word) for word in words[2:6])
+    if not all(map(math.isfinite, (first, step, range_max))):
+        raise ValueError("an angle or the maximum range is not finite")
     count = int(words[8])
     ranges = _ranges(words[9 : 9 + count], count)
     rest = words[10 + count + int(words[9 + count]) :]
@@ -149,9 +132,11 @@ def _ranges(words: list[str], count: int) -> Array:
 
 
 def _pose(words: list[str]) -> Pose2:
-    x, y, yaw = (_parse_finite(word) for word in words)
+    if len(words) != 3:
+        raise ValueError(f"expected 3 numbers, got {words}")
+    x, y, yaw = (float(word) for word in words)
     if not all_within((x, y, yaw), MAX_COORDINATE_M):
-        raise ValueError(f"invalid coordinates {x:g}, {y:g}")
+        raise ValueError(f"invalid coordinates {x:g}, {y:g}, {yaw:g}")
     return Pose2(x, y, yaw)
 
 
@@ -162,14 +147,8 @@ def _relative_pose(base: Pose2, other: Pose2) -> Pose2:
 
 
 def _time(word: str) -> float:
-    if not all_within((value := _parse_finite(word),), MAX_TIME_S):
+    if not all_within((value := float(word),), MAX_TIME_S):
         raise ValueError(f"{word} is not a valid time")
-    return value
-
-
-def _parse_finite(word: str) -> float:
-    if not math.isfinite(value := float(word)):
-        raise ValueError(f"{word} is not a number")
     return value
 
 

@@ -71,11 +71,16 @@ class MessageReader(Reader):
 
 
 class CheckedReader(MessageReader):
-    """Reads a message of another program: normalizes quaternions, and removes leading slashes of frames."""
+    """Reads a message of another program: normalizes quaternions, and removes leading slashes of frames.
+
+    `frame_prefix` is removed from the names of frames, too.
+    """
+
+    frame_prefix = ""
 
     def frame(self) -> str:
         """Return the name of the next frame without leading slashes."""
-        return self.string().lstrip("/")
+        return self.string().lstrip("/").removeprefix(self.frame_prefix)
 
     def pose(self) -> Numbers:
         """Return the next pose with a normalized quaternion. Raises ValueError if its length is not 1 or is nan."""
@@ -86,9 +91,10 @@ class CheckedReader(MessageReader):
         return (*pose[:3], *(value / norm for value in pose[3:]))
 
 
-def decode_checked(decoder: Callable[[MessageReader], T], data: bytes) -> T:
+def decode_checked(decoder: Callable[[MessageReader], T], data: bytes, frame_prefix: str = "") -> T:
     """Decode a message of another program with a CheckedReader. Raises ValueError if the message is invalid."""
     reader = CheckedReader(data)
+    reader.frame_prefix = frame_prefix
     message = decoder(reader)
     if reader.remaining > 3:  # up to three bytes of padding
         raise ValueError("a message is longer than its type")

@@ -61,9 +61,10 @@ def test_log_without_reference_needs_a_start(simscen, tmp_path: Path) -> None:
     [
         ("bad.csv", "odom,0,1,2\n", "line 1: expected 3 numbers"),
         ("bad.csv", "odometry,0,1,2,3\n", "unknown kind of row"),
-        ("bad.csv", "odom,0,1,2,3\n", "it has no scans"),
+        ("bad.csv", "odom,0,1,2,3,,\n", "it has no scans"),
+        ("bad.csv", "scan,0,-1,0.1,0.1,9,1.0,,2.0\n", "line 1: could not convert string to float: ''"),
         ("bad.log", "FLASER 3 1.0 2.0\n", "line 1 is not a FLASER line"),
-        ("bad.log", "ODOM 1 2 nan 0 0 0 1 host 1\n", "nan is not a number"),
+        ("bad.log", "ODOM 1 2 nan 0 0 0 1 host 1\n", "invalid coordinates 1, 2, nan"),
         ("bad.mcap", "what", "not an MCAP file"),
     ],
 )
