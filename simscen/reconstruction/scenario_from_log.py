@@ -17,8 +17,13 @@ from simscen.reconstruction.drive.run_description import choose_robot, read_desc
 from simscen.reconstruction.estimators import run_estimators
 from simscen.reconstruction.objects.find_objects import object_of_robot
 from simscen.reconstruction.scenario.contents import EstimatedParts, GivenParts, ScenarioContents, scenario_contents
-from simscen.reconstruction.scenario.given_parts import GivenFiles, choose_world, prepare_given_parts, scenario_stem
-from simscen.reconstruction.scenario.new_files import NewFiles
+from simscen.reconstruction.scenario.given_parts import (
+    GivenFiles,
+    NewFiles,
+    choose_world,
+    prepare_given_parts,
+    scenario_stem,
+)
 from simscen.reconstruction.scenario.robot_file import robot_properties
 from simscen.reconstruction.scenario.scenario_text import scenario_text
 from simscen.reconstruction.static_world import StaticWorld

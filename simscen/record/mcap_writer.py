@@ -237,7 +237,6 @@ class McapWriter:
         return [schemas, channels, _encode(statistics), *indices]
 
     def _finish_chunk(self) -> None:
-        """Write the current chunk and its message indexes, and clear it."""
         chunk, chunk_start = self._chunk, self._written
         content, channels, (start, end) = chunk.content(), chunk.active_channels(), chunk.time_span()
         packed, size = self._compress(content), len(content)
@@ -264,7 +263,6 @@ class McapWriter:
         self._put(b"".join(parts))
 
     def _put(self, data: bytes) -> None:
-        """Write bytes to the sink, and update their number and checksum."""
         self._sink.write(data)
         self._written += len(data)
         self._checksum = zlib.crc32(data, self._checksum)

@@ -151,7 +151,6 @@ class TraceRows:
 
 
 def _poses(buffer: SignalBuffer) -> Samples:
-    """Return the planar poses in a buffer."""
     ticks, poses = buffer.columns()
     return Samples(ticks, to_planar(poses))
 

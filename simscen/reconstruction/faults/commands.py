@@ -86,7 +86,6 @@ def _speeds(drive: RecordedDrive) -> tuple[Array, Array, Array]:
 
 
 def _moving_average(speeds: Array) -> Array:
-    """Return the moving average of speeds (n,) over SMOOTHING_S."""
     return uniform_filter1d(speeds, round(SMOOTHING_S / SAMPLE_PERIOD_S), mode="nearest")
 
 

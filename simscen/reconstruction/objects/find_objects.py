@@ -112,12 +112,10 @@ def median_of_three(values: Array) -> Array:
 
 
 def _median_fraction(fractions: Array) -> float:
-    """Return the median of the fractions that are not nan; 0 if all are."""
     return float(np.nanmedian(fractions)) if np.isfinite(fractions).any() else 0.0
 
 
 def _merge_tracks(tracks: list[ObjectTrack], compared: ComparedScans, usable: Indices) -> list[ObjectTrack]:
-    """Merge tracks of the same standing object."""
     merged: list[ObjectTrack] = []
     for track in tracks:
         same = next((earlier for earlier in merged if _is_same(earlier, track, compared, usable)), None)
@@ -190,7 +188,6 @@ def _disappearance(compared: ComparedScans, track: ObjectTrack, usable: Indices)
 
 
 def _keyframe(shape: ObjectShape, index: int) -> Keyframe:
-    """Return the keyframe with the pose of this index."""
     x, y, yaw = shape.poses[index].tolist()
     return float(shape.times[index]), x, y, yaw
 

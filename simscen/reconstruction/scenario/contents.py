@@ -221,7 +221,6 @@ def _goal_reason(goal: RecordedGoal) -> Reason:
 
 
 def _timeout(goal: RecordedGoal, duration: float) -> float:
-    """Return the timeout of a goal in s. `duration` is the duration of the drive in s."""
     if goal.ended is not None and goal.error == TIMEOUT_CODE:
         return goal.ended - goal.sent
     if goal.ended is None:
@@ -230,7 +229,6 @@ def _timeout(goal: RecordedGoal, duration: float) -> float:
 
 
 def _wait(goal: RecordedGoal, following: RecordedGoal | None) -> float:
-    """Return the time in s that the robot waits at a goal before the following goal."""
     if following is None or goal.ended is None or goal.status not in ("reached", "unknown"):
         return 0.0
     gap = following.sent - goal.ended
@@ -238,7 +236,6 @@ def _wait(goal: RecordedGoal, following: RecordedGoal | None) -> float:
 
 
 def _summary(drive: RecordedDrive, estimated: EstimatedParts) -> Iterator[str]:
-    """Yield sentences about the drive and its incidents."""
     yield f"Reconstructed from a recorded drive of {drive.duration:.1f} s."
     for incident in estimated.incidents:
         x, y = incident.position

@@ -62,7 +62,6 @@ def propose_criteria(
 
 
 def _speed(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
-    """Yield a limit for the speed of the robot."""
     if not len(drive.odometry):
         return
     fastest = float(np.percentile(np.hypot(*drive.odometry.values[:, 3:5].T), SPEED_PERCENTILE))
@@ -80,7 +79,6 @@ def _limit_reason(broken: Mapping[str, Incident], criterion: str, held: str) -> 
 
 
 def _localization(drive: RecordedDrive, broken: Mapping[str, Incident]) -> ProposedCriterion:
-    """Return a limit for the localization error. `broken` are the incidents by violated criterion."""
     errors = np.hypot(*(drive.belief.values[:, :2] - drive.poses.poses_at(drive.belief.times)[:, :2]).T)
     largest = float(errors.max())
     limit = LOST_ERROR_M if "localization_error" in broken else max(MIN_ERROR_LIMIT_M, ERROR_MARGIN * largest)
@@ -91,7 +89,6 @@ def _localization(drive: RecordedDrive, broken: Mapping[str, Incident]) -> Propo
 
 
 def _efficiency(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
-    """Yield limits for the time to the goal and for the path length."""
     if not drive.goals or drive.goals[-1].ended is None:
         return
     took = drive.goals[-1].ended - drive.goals[0].sent

@@ -13,7 +13,7 @@ import numpy as np
 
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import World
-from simscen.core.errors import InvalidInput, Problem
+from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.loading.builders import load_map, world_from_file
 from simscen.loading.files.discovery import default_root
 from simscen.loading.files.single_files import load_world_file
@@ -23,7 +23,6 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.drive.run_description import RunDescription
 from simscen.reconstruction.reasons import Reason
 from simscen.reconstruction.scenario.contents import GivenParts
-from simscen.reconstruction.scenario.new_files import NewFiles
 from simscen.reconstruction.scenario.robot_file import TYPICAL_ROBOT, observed_limits, write_robot_file
 from simscen.reconstruction.static_world import StaticWorld, map_from_scans, world_from_map
 from simscen.worlds.maps.ros_map import save_map
@@ -47,6 +46,25 @@ class GivenFiles:
     world: Path | None = None
     map: Path | None = None
     robot: str = ""
+
+
+class NewFiles:
+    """Files written next to the scenario, in order, which are removed again if the reconstruction fails."""
+
+    def __init__(self) -> None:
+        self.paths: list[Path] = []
+
+    def add(self, *files: Path) -> None:
+        """Add files before they are written. Raises UsageError if one exists."""
+        for file in files:
+            if file.exists():
+                raise UsageError(f"{file} already exists; choose another name for the scenario, or remove the file")
+        self.paths += files
+
+    def remove(self) -> None:
+        """Remove all files."""
+        for file in self.paths:
+            file.unlink(missing_ok=True)
 
 
 @dataclass
@@ -95,7 +113,6 @@ def choose_world(
 
 
 def _write_map(grid: OccupancyGrid, file: Path, new: NewFiles) -> Path:
-    """Write a map to the YAML file `file` and its image, and return `file`."""
     new.add(file, file.with_suffix(".pgm"))
     save_map(grid, file)
     return file
@@ -146,7 +163,6 @@ def _world_of_file(file: Path, out: Path, reason: Reason, new: NewFiles) -> Worl
 
 
 def _differs(given: OccupancyGrid, drawn: OccupancyGrid) -> bool:
-    """Return whether the map `given` to the robot and the map `drawn` from the world have different walls."""
     if given.shape != drawn.shape or given.origin.distance(drawn.origin) > 1e-6:
         return True
     return float(np.mean((given.cells > 50) != (drawn.cells > 50))) > MAX_EQUAL_MAP_DIFFERENCE

@@ -48,13 +48,11 @@ def find_incidents(drive: RecordedDrive) -> list[Incident]:
 
 
 def _position(drive: RecordedDrive, time: float) -> tuple[float, float]:
-    """Return the position (x, y) of the robot in m at a time in s."""
     x, y, _ = drive.poses.poses_at(np.array([time]))[0].tolist()
     return x, y
 
 
 def _contacts(drive: RecordedDrive) -> Iterator[Incident]:
-    """Yield an incident for each time window in which the bumper was pressed."""
     for pressed in windows(drive.bumper.values[:, 0] > 0.5, drive.bumper.times, max_gap=0.3):
         detail = f"the bumper was pressed for {max(pressed.length, 0.05):.2f} s"
         yield Incident("contact", pressed.begin, _position(drive, pressed.begin), detail, "collisions")
@@ -121,7 +119,6 @@ def _lost(drive: RecordedDrive) -> Iterator[Incident]:
 
 
 def _goals(drive: RecordedDrive) -> Iterator[Incident]:
-    """Yield an incident for each failed goal, and for the last goal if it has no result."""
     for number, goal in enumerate(drive.goals):
         if goal.status == "failed" and goal.ended is not None:
             code = f" with {goal.error}" if goal.error else ""

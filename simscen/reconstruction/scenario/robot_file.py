@@ -157,7 +157,6 @@ def observed_limits(drive: RecordedDrive) -> tuple[float, float]:
 
 
 def _largest(signal: TimedValues, column: int) -> float:
-    """Return the SPEED_PERCENTILE of the absolute values in a column; 0 without values."""
     return float(np.percentile(np.abs(signal.values[:, column]), SPEED_PERCENTILE)) if len(signal) else 0.0
 
 
@@ -170,7 +169,6 @@ def _velocities(poses: TimedValues) -> TimedValues:
 
 
 def _sensors(drive: RecordedDrive, lidar_noise: float) -> dict[str, Any]:
-    """Return the value of the key `sensors`."""
     sensors: dict[str, Any] = {}
     if drive.scans is not None:
         sensors["lidar"] = {"lidar": _lidar(drive.scans, lidar_noise)}

@@ -91,7 +91,6 @@ def _comment(text: str, indent: str = "", hanging: str = "") -> list[str]:
 
 
 def _reason(contents: ScenarioContents, key: str) -> list[str]:
-    """Return the reason for a key as a comment; [] if there is none."""
     reason = contents.reasons.get(key)
     return [] if reason is None else _comment(reason.comment)
 
@@ -213,7 +212,6 @@ def _text(text: str) -> str:
 
 
 def _entry(key: str, value: Any) -> list[str]:
-    """Return a key and its value as lines of YAML."""
     if isinstance(value, str):
         return [f"{key}: {_text(value)}"]
     return to_yaml({key: value}, CompactDumper).rstrip("\n").split("\n")

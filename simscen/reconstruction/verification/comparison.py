@@ -163,13 +163,11 @@ def compare_drives(recorded: RecordedDrive, repeated: RecordedDrive) -> Iterator
 
 
 def _numbers(name: str, log: float, run: float, unit: str) -> ComparedQuantity:
-    """Return the row of a quantity with one number for the log and one for the run."""
     difference = round(run - log, 2) + 0.0  # no minus sign before a zero
     return ComparedQuantity(name, f"{log:.2f} {unit}", f"{run:.2f} {unit}", f"{difference:+.2f} {unit}")
 
 
 def _outcome(goal: RecordedGoal) -> str:
-    """Return status, time, and error of a goal as text."""
     end = "" if goal.ended is None else f" at {goal.ended:.2f} s"
     return f"{goal.status}{end}{f' ({goal.error})' if goal.error else ''}"
 

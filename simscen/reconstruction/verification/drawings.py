@@ -133,7 +133,6 @@ def _time_marks(drive: RecordedDrive, name: str, box: Box) -> Iterator[str]:
 
 
 def _object(thing: FoundObject, box: Box) -> Iterator[str]:
-    """Yield the outline or the path of an object, and its name."""
     _, x, y, yaw = thing.keyframes[0]
     if thing.is_moving:
         yield f'<polyline class="object" points="{_points(np.array(thing.keyframes)[:, 1:3])}"/>'
@@ -149,7 +148,6 @@ def _object(thing: FoundObject, box: Box) -> Iterator[str]:
 
 
 def _points(poses: Array) -> str:
-    """Return the positions of poses (n, 2 or more) as the attribute `points` of a polyline."""
     step = max(1, len(poses) // TARGET_POINTS)
     return " ".join(f"{x:.2f},{-y:.2f}" for x, y in poses[::step, :2].tolist())
 

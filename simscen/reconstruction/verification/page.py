@@ -94,7 +94,6 @@ def _result(verified: Verification) -> Iterator[str]:
 
 
 def _maps(world: StaticWorld, objects: Sequence[FoundObject], verified: Verification) -> Iterator[str]:
-    """Yield the legend and a map of each drive."""
     recorded = [incident.recorded for incident in verified.incidents]
     repeated = [incident.repeated for incident in verified.incidents if incident.repeated is not None]
     drives = verified.drive, verified.repeated
@@ -152,7 +151,6 @@ def _charts(verified: Verification) -> Iterator[str]:
 
 
 def _figure(label: str, series: Sequence[Series]) -> str:
-    """Return a chart of values in m, with a caption."""
     return f"<figure><figcaption>{escape(label)}</figcaption>{chart(label, series, 'm')}</figure>"
 
 

@@ -50,5 +50,4 @@ def goal_events(messages: Sequence[tuple[int, list[GoalState]]], names: Sequence
 
 
 def _count(number: int) -> str:
-    """Return text such as "2 goals"."""
     return f"{number} goal" if number == 1 else f"{number} goals"

@@ -50,7 +50,6 @@ def marker_array(markers: Iterable[Marker]) -> bytes:
 
 
 def _put(message: Writer, marker: Marker, number: int, action: int) -> None:
-    """Append a visualization_msgs/msg/Marker with the ID `number` to a message."""
     message.put("iI", 0, 0).string(marker.frame).string(marker.group).put("3i", number, marker.kind, action)
     message.put("7d", *marker.pose).put("3d", *marker.scale).put("4f", *marker.color)
     message.put("iI", 0, 0)  # lifetime: forever
