@@ -19,6 +19,7 @@ from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedG
 from simscen.reconstruction.reasons import windows
 from simscen.record.foreign.goal_events import goal_events
 from simscen.record.messages import event_text
+from simscen.record.messages.decode import StampedPose
 
 SAME_GOAL_M = 0.05
 """Maximum distance between the ends of two successive plans to the same goal."""
@@ -40,13 +41,18 @@ _STATUS_OF_EVENTS = {
 }
 ToSeconds = Callable[[int], float]
 """Function that converts a log time in ns to s since the start of the drive."""
+ToMap = Callable[[StampedPose, float], Pose2]
+"""Function that converts a pose in any frame, at a time in s, to the map frame."""
 
 
-def find_goals(messages: LogMessages, to_seconds: ToSeconds, poses: TimedValues) -> Iterator[RecordedGoal]:
+def find_goals(
+    messages: LogMessages, to_seconds: ToSeconds, to_map: ToMap, poses: TimedValues
+) -> Iterator[RecordedGoal]:
     """Return the goals of a drive. `poses` (n, 3) are the best known poses x, y, yaw in the map frame."""
     sent = [
-        RecordedGoal("", Pose3(*message.content.pose).plane, to_seconds(message.log_time), source="/goal_pose")
+        RecordedGoal("", to_map(message.content, time), time, source="/goal_pose")
         for message in messages.of("goal")
+        for time in [to_seconds(message.log_time)]
     ]
     events = [
         (to_seconds(message.log_time), event_text.from_json(message.content)) for message in messages.of("events")

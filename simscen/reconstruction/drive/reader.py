@@ -92,6 +92,17 @@ class _DriveReader:
         odometry = self._signal("odom", 6, lambda odom: (*Pose3(*odom.pose).plane, *(odom.twist or (0.0, 0.0, 0.0))))
         belief = self._signal("amcl_pose", 9, lambda pose: (*Pose3(*pose.pose).plane, *pose.covariance))
         poses, source, is_truth = self._poses(odometry, belief)
+
+        def to_map(stamped: StampedPose, time: float) -> Pose2:
+            pose = Pose3(*stamped.pose).plane
+            if stamped.frame in ("map", ""):
+                return pose
+            of_robot = self._pose_in(stamped.frame, time, poses, odometry)
+            return Pose2(*poses.poses_at(np.array([time]))[0].tolist()).compose(of_robot.between(pose))
+
+        goals = [*find_goals(self._messages, self._seconds, to_map, poses)]
+        if not goals:
+            self._notes.append("a goal, because the robot got none and did not drive anywhere")
         return RecordedDrive(
             name=self._path.stem,
             duration=self._seconds(self._end),
@@ -107,8 +118,7 @@ class _DriveReader:
             scans=self._scans(),
             map=self._map(),
             goals=tuple(
-                goal if goal.name else replace(goal, name=f"goal-{number}")
-                for number, goal in enumerate(find_goals(self._messages, self._seconds, poses), 1)
+                goal if goal.name else replace(goal, name=f"goal-{number}") for number, goal in enumerate(goals, 1)
             ),
             footprint=self._footprint(poses, odometry),
             notes=tuple(self._notes),
@@ -304,14 +314,8 @@ class _DriveReader:
             return ()
         polygon: PolygonMessage = messages[0].content
         corners = np.array(polygon.corners, dtype=np.float64).reshape(-1, 2)
-        if polygon.frame not in self._base_frames:
-            in_frame = self._poses_in(polygon.frame, odometry)
-            x, y, yaw = (
-                (poses if in_frame is None else in_frame)
-                .poses_at(self._times("footprint", messages[:1])[0])[0]
-                .tolist()
-            )
-            corners = Pose2(x, y, yaw).inverse().apply(corners)
+        time = float(self._times("footprint", messages[:1])[0][0])
+        corners = self._pose_in(polygon.frame, time, poses, odometry).inverse().apply(corners)
         if len(corners) < 3 or not np.abs(corners).max() <= MAX_FOOTPRINT_M:  # also false for nan
             return ()
         return tuple((round(a, 3), round(b, 3)) for a, b in corners.tolist())
@@ -327,12 +331,16 @@ class _DriveReader:
         of_odometry = (message.content.child for message in self._messages.of("odom") if message.content.child)
         return tuple(dict.fromkeys((*of_odometry, "base_link", "base_footprint")))
 
-    def _poses_in(self, frame: str, odometry: TimedValues) -> TimedValues | None:
-        """Return the poses of the robot in the frame of the odometry or of /tf; None if they are unknown."""
-        if len(odometry) and frame == self._odom_frame:
-            return odometry
+    def _pose_in(self, frame: str, time: float, poses: TimedValues, odometry: TimedValues) -> Pose2:
+        """Return the pose of the robot in a frame at a time in s; in the map frame if the frame is unknown.
+
+        `poses` are the poses in the map frame.
+        """
+        if frame in self._base_frames:
+            return Pose2(0.0, 0.0)
         found = (self._poses_of_tf(frame, base) for base in self._base_frames)
-        return next((poses for poses in found if poses is not None), None)
+        known = odometry if len(odometry) and frame == self._odom_frame else next(filter(None, found), poses)
+        return Pose2(*known.poses_at(np.array([time]))[0].tolist())
 
 
 _STAMPED = ("scan", "odom", "amcl_pose", "truth")

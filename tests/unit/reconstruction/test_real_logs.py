@@ -169,6 +169,26 @@ def test_the_user_can_give_the_map(tmp_path):
     assert load_scenario(tmp_path / "site.scenario.yaml", tmp_path).world.path.name == "office.yaml"
 
 
+@pytest.mark.parametrize("frame", ["odom", "base_link"])
+def test_a_goal_can_be_in_another_frame_than_the_map(frame, tmp_path):
+    """At the time of the goal, the robot is at the origin of the odometry, at (1, 3) on the map."""
+    said = messages()
+    for one in said:
+        if one.topic == "/goal_pose":
+            one.message.header.frame_id, one.message.pose = frame, logs.pose(GOAL[0] - 1.0, GOAL[1] - 3.0)
+    (only,) = read_drive(logs.write_bag(tmp_path / "bag", said)).goals
+    assert math.dist(only.pose[:2], GOAL) < 0.1
+
+
+def test_a_robot_that_stands_still_has_no_goal(tmp_path):
+    said = [
+        replace(one, message=logs.odometry(one.time, "odom", 0.0, 0.0)) for one in messages() if "odom" in one.topic
+    ]
+    drive = read_drive(logs.write_bag(tmp_path / "bag", said))
+    assert not drive.goals
+    assert "a goal, because the robot got none and did not drive anywhere" in drive.notes
+
+
 def test_without_goals_the_end_of_the_motion_is_the_goal(tmp_path):
     bag = logs.write_bag(tmp_path / "bag", messages(with_goal=False))
     drive = read_drive(bag)
