@@ -152,7 +152,9 @@ def finish_session(
     comparison: Comparison | None = None,
     study: Study | None = None,
 ) -> bool:
-    """Write the reports of a session, send its last event to `listen`, and return whether all files were written.
+    """Write the reports of a session, send its last event to `listen`, and close the journal.
+
+    Return whether all files were written.
 
     `start` is the value of time.monotonic() at the start of the session. Without runs, only run.json is written.
     """
@@ -160,6 +162,7 @@ def finish_session(
     wall = time.monotonic() - start
     listen(reports.finished_event(finished_runs, wall, is_interrupted, comparison, study))
     written = reports.write_duration(wall) and written
+    journal.close()
     if journal.error is not None:
         reason = journal.error.strerror
         print_text(f"simscen: the journal in {journal.folder} is incomplete: {reason}", sys.stderr)

@@ -40,8 +40,8 @@ def simscen(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
     monkeypatch.chdir(tmp_path)
     (tmp_path / "good.scenario.yaml").write_text(GOOD)
 
-    def call(*arguments: str) -> CommandResult:
-        monkeypatch.setattr(sys, "argv", ["simscen", *arguments])
+    def call(*arguments: object) -> CommandResult:
+        monkeypatch.setattr(sys, "argv", ["simscen", *map(str, arguments)])
         code = 0
         try:
             main()

@@ -2,14 +2,13 @@
 
 import json
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from simscen.cli.main import app
+from simscen.cli.main import app, main
 from simscen.cli.session.selection import PARALLEL_JOBS, scenarios_of_shard, shard_of
 from simscen.core.errors import InvalidInput, NothingSelected, UsageError
 
@@ -24,9 +23,14 @@ pass: [{collisions: {max: 0}}, {clearance: {min: LIMIT}}]
 
 
 def simscen(*arguments: object) -> int:
-    """Run simscen in a separate process, because a session locks its folder until the process ends."""
-    command = [sys.executable, "-m", "simscen", *map(str, arguments)]
-    return subprocess.run(command, check=False, capture_output=True).returncode
+    """Return the exit code of a command."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["simscen", *map(str, arguments)])
+        try:
+            main()
+        except SystemExit as end:
+            return int(end.code or 0)
+    return 0
 
 
 @pytest.fixture(scope="module")

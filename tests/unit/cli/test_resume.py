@@ -19,10 +19,7 @@ pass: [{{collisions: {{max: 0}}}}]
 """
 
 
-def run(folder, *options):
-    """Run simscen in a separate process, because a session locks its folder until the process ends."""
-    command = [sys.executable, "-m", "simscen", "run", "a.scenario.yaml", "b.scenario.yaml", "-j", "1", *options]
-    return subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout
+RUN = ("run", "a.scenario.yaml", "b.scenario.yaml", "-j", "1")
 
 
 @pytest.fixture(scope="module")
@@ -31,15 +28,22 @@ def finished(tmp_path_factory):
     folder = tmp_path_factory.mktemp("finished")
     for name, seconds in (("a", "0.2"), ("b", "0.3")):
         (folder / f"{name}.scenario.yaml").write_text(SCENARIO.replace("TIME", seconds))
-    run(folder, "--out", "out")
+    command = [sys.executable, "-m", "simscen", *RUN, "--out", "out"]
+    subprocess.run(command, cwd=folder, check=True, capture_output=True)
     return folder
 
 
 @pytest.fixture
-def session(finished, tmp_path):
-    """Return the folder of a copy of the finished session, and a function that resumes it."""
+def session(finished, simscen, tmp_path):
+    """Return the folder of a copy of the finished session, and a function that resumes it and returns its output."""
     shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
-    return tmp_path / "out", lambda: run(tmp_path, "--resume", "out")
+
+    def resume():
+        ended = simscen(*RUN, "--resume", "out")
+        assert ended.code == 0
+        return ended.out
+
+    return tmp_path / "out", resume
 
 
 def kept(folder):
@@ -76,13 +80,13 @@ def test_run_with_missing_or_changed_log_is_repeated(session, damage):
     assert log.read_bytes() == whole
 
 
-def test_runs_that_are_not_selected_again_are_named(session):
+def test_runs_that_are_not_selected_again_are_named(session, simscen):
     """Otherwise, a session with a failure would pass if it is resumed with a smaller selection."""
     folder, _ = session
-    command = [sys.executable, "-m", "simscen", "run", "b.scenario.yaml", "--resume", "out"]
-    ended = subprocess.run(command, cwd=folder.parent, check=True, capture_output=True, text=True)
+    ended = simscen("run", "b.scenario.yaml", "--resume", "out")
+    assert ended.code == 0
     warning = "1 run of 2 of the session to resume, such as a (seed 1), will not be in its reports"
-    assert ended.stderr == f"simscen: warning: out: {warning}, because the selection has changed\n"
+    assert ended.err == f"simscen: warning: out: {warning}, because the selection has changed\n"
     assert json.loads((folder / "results.json").read_text())["total"] == 1
 
 

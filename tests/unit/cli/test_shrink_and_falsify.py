@@ -46,12 +46,6 @@ pass:
 """
 
 
-def simscen(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
-    """Run simscen in a separate process, because a session locks its folder until the process ends."""
-    command = [sys.executable, "-m", "simscen", *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True)
-
-
 def load_yaml(file: Path) -> Any:
     return yaml.safe_load(file.read_text())
 
@@ -65,10 +59,10 @@ def verdicts_of(run: Any) -> list[Any]:
     return [[verdict["id"], verdict["status"], verdict["findings"]] for verdict in run["verdicts"]]
 
 
-def test_shrink_keeps_only_the_cause_of_the_failure(tmp_path: Path) -> None:
+def test_shrink_keeps_only_the_cause_of_the_failure(simscen: Callable[..., Any], tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
-    done = simscen(tmp_path, "shrink", "a.scenario.yaml", "-j", 2)
-    assert done.returncode == 0, done.stderr
+    done = simscen("shrink", "a.scenario.yaml", "-j", 2)
+    assert done.code == 0, done.err
     file = tmp_path / "a.minimal.scenario.yaml"
     shrunk = load_yaml(file)
     assert [item["name"] for item in shrunk["world"]["obstacles"]] == ["crate-3"]
@@ -77,20 +71,20 @@ def test_shrink_keeps_only_the_cause_of_the_failure(tmp_path: Path) -> None:
     assert set(shrunk["robot"]) == {"pose"}
     assert "# There must be space to turn." in file.read_text()
     for text in ("world.obstacles[0] (crate-1)", "events", "faults", "stack", "robot.motor_torque"):
-        assert f"  {text}\n" in done.stdout, done.stdout
-    assert "-> " in done.stdout
-    assert simscen(tmp_path, "run", file.name).returncode == 1
+        assert f"  {text}\n" in done.out, done.out
+    assert "-> " in done.out
+    assert simscen("run", file.name).code == 1
 
 
 @pytest.mark.slow
-def test_a_run_in_an_output_folder_is_shrunk_with_its_variation(tmp_path: Path) -> None:
+def test_a_run_in_an_output_folder_is_shrunk_with_its_variation(simscen: Callable[..., Any], tmp_path: Path) -> None:
     varied = SCENARIO + "variations: {grid: {robot.pose.x: [4, 6], robot.motor_torque: [90 %, 100 %]}}\n"
     (tmp_path / "a.scenario.yaml").write_text(varied)
-    assert simscen(tmp_path, "run", ".", "--out", "out").returncode == 1
+    assert simscen("run", ".", "--out", "out").code == 1
     run = next(one for one in runs_of(tmp_path / "out") if one["outcome"] == "failed")
     folder = Path("out", run["artifacts"]["mcap"]).parent
-    done = simscen(tmp_path, "shrink", folder, "--keep-world", "--runs", 8)
-    assert done.returncode == 1, done.stderr
+    done = simscen("shrink", folder, "--keep-world", "--runs", 8)
+    assert done.code == 1, done.err
     shrunk = load_yaml(tmp_path / "a.minimal.scenario.yaml")
     assert shrunk["robot"]["pose"]["x"] == 6
     assert "variations" not in shrunk
@@ -105,13 +99,15 @@ def test_a_run_in_an_output_folder_is_shrunk_with_its_variation(tmp_path: Path) 
         (["a.scenario.yaml", "--runs", "1"], "1 run is not enough to reproduce the failure; increase --runs"),
     ],
 )
-def test_unshrinkable_run_is_an_error(tmp_path: Path, options: list[str], message: str) -> None:
+def test_unshrinkable_run_is_an_error(
+    simscen: Callable[..., Any], tmp_path: Path, options: list[str], message: str
+) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     (tmp_path / "good.scenario.yaml").write_text(SCENARIO.replace("min: 1 m", "min: 10 cm"))
-    done = simscen(tmp_path, "shrink", *options)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert "Traceback" not in done.stderr
+    done = simscen("shrink", *options)
+    assert done.code == 2
+    assert message in done.err
+    assert "Traceback" not in done.err
 
 
 @pytest.mark.parametrize(
@@ -145,14 +141,14 @@ def test_other_folder_of_a_session_is_not_the_folder_of_a_run(
 
 
 @pytest.mark.slow
-def test_a_spent_budget_still_writes_a_smaller_scenario(tmp_path: Path) -> None:
+def test_a_spent_budget_still_writes_a_smaller_scenario(simscen: Callable[..., Any], tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
-    done = simscen(tmp_path, "shrink", "a.scenario.yaml", "--runs", 6)
-    assert done.returncode == 1, done.stderr
-    assert "not enough to try everything; increase --runs" in done.stdout
-    assert simscen(tmp_path, "run", "a.minimal.scenario.yaml").returncode == 1
-    second = simscen(tmp_path, "shrink", "a.scenario.yaml", "--runs", 6, "-j", 1, "--out", "one.scenario.yaml")
-    assert second.returncode == 1
+    done = simscen("shrink", "a.scenario.yaml", "--runs", 6)
+    assert done.code == 1, done.err
+    assert "not enough to try everything; increase --runs" in done.out
+    assert simscen("run", "a.minimal.scenario.yaml").code == 1
+    second = simscen("shrink", "a.scenario.yaml", "--runs", 6, "-j", 1, "--out", "one.scenario.yaml")
+    assert second.code == 1
     assert (tmp_path / "one.scenario.yaml").read_bytes() == (tmp_path / "a.minimal.scenario.yaml").read_bytes()
 
 
@@ -168,19 +164,21 @@ variations:
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("method", ["sobol", "tpe", "random"])
-def test_a_found_failure_is_written_as_a_scenario_that_fails(tmp_path: Path, method: str) -> None:
+def test_a_found_failure_is_written_as_a_scenario_that_fails(
+    simscen: Callable[..., Any], tmp_path: Path, method: str
+) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO + RANGES)
-    done = simscen(tmp_path, "falsify", "a.scenario.yaml", "--method", method, "--out", "out", "-j", 2)
-    assert done.returncode == 1, done.stderr
+    done = simscen("falsify", "a.scenario.yaml", "--method", method, "--out", "out", "-j", 2)
+    assert done.code == 1, done.err
     file = tmp_path / "a.failure-1.scenario.yaml"
     assert 5.6 < load_yaml(file)["robot"]["pose"]["x"] < 6.0  # crate-3 starts at 6.93 m; radius 0.22 m
     assert "variations" not in load_yaml(file)
-    assert simscen(tmp_path, "run", file.name, "--out", "rerun").returncode == 1
+    assert simscen("run", file.name, "--out", "rerun").code == 1
     (rerun,) = runs_of(tmp_path / "rerun")
     assert verdicts_of(rerun) in [verdicts_of(run) for run in runs_of(tmp_path / "out")]
-    assert "smaller: simscen shrink a.failure-1.scenario.yaml" in done.stdout
+    assert "smaller: simscen shrink a.failure-1.scenario.yaml" in done.out
     if method == "tpe":  # the method that depends on the order of the results
-        simscen(tmp_path, "falsify", "a.scenario.yaml", "--method", method, "--out", "out1", "-j", 1)
+        simscen("falsify", "a.scenario.yaml", "--method", method, "--out", "out1", "-j", 1)
         assert (tmp_path / "out/results.json").read_bytes() == (tmp_path / "out1/results.json").read_bytes()
 
 
@@ -211,21 +209,23 @@ def test_passed_runs_show_a_failure_rate_above_their_confidence_bound(limit: flo
 
 
 @pytest.mark.slow
-def test_random_search_with_too_few_runs_for_its_probability_is_undecided(tmp_path: Path) -> None:
+def test_random_search_with_too_few_runs_for_its_probability_is_undecided(
+    simscen: Callable[..., Any], tmp_path: Path
+) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO + RANGES.replace("[3, 6]", "[3, 5]"))
     options = ("--method", "random", "--probability", "0.1", "--runs", "8")
-    done = simscen(tmp_path, "falsify", "a.scenario.yaml", *options)
-    assert done.returncode == 6, done.stderr
-    assert "undecided: too few runs for --probability; increase --runs" in done.stdout
+    done = simscen("falsify", "a.scenario.yaml", *options)
+    assert done.code == 6, done.err
+    assert "undecided: too few runs for --probability; increase --runs" in done.out
 
 
 @pytest.mark.slow
-def test_random_search_without_a_failure_bounds_the_failure_rate(tmp_path: Path) -> None:
+def test_random_search_without_a_failure_bounds_the_failure_rate(simscen: Callable[..., Any], tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO + RANGES.replace("[3, 6]", "[3, 5]"))
-    done = simscen(tmp_path, "falsify", "a.scenario.yaml", "--method", "random", "--probability", "0.1")
-    assert done.returncode == 0, done.stderr
-    assert "found no failure in 32 runs" in done.stdout  # 29 are needed, in batches of 8
-    assert "with 95% confidence, at most 8.94 % of random values fail" in done.stdout  # 1 - 0.05 ** (1 / 32)
+    done = simscen("falsify", "a.scenario.yaml", "--method", "random", "--probability", "0.1")
+    assert done.code == 0, done.err
+    assert "found no failure in 32 runs" in done.out  # 29 are needed, in batches of 8
+    assert "with 95% confidence, at most 8.94 % of random values fail" in done.out  # 1 - 0.05 ** (1 / 32)
     assert not list(tmp_path.glob("*.failure-*"))
 
 
@@ -298,12 +298,12 @@ def test_an_interrupted_search_without_runs_names_no_report(tmp_path: Path) -> N
     assert "report.html" not in done.stdout and not (tmp_path / "out/report.html").exists()
 
 
-def test_the_junit_report_of_a_search_does_not_replace_its_world(tmp_path: Path) -> None:
+def test_the_junit_report_of_a_search_does_not_replace_its_world(simscen: Callable[..., Any], tmp_path: Path) -> None:
     world = "simscen: 1\nwalls: [{points: [[0, 0], [12, 0], [12, 12], [0, 12], [0, 0]]}]\n"
     (tmp_path / "hall.world.yaml").write_text(world)
     start, end = SCENARIO.partition("world:\n")[0], SCENARIO.partition("robot:\n")[2]
     (tmp_path / "a.scenario.yaml").write_text(f"{start}world: hall.world.yaml\nrobot:\n{end}{RANGES}")
-    done = simscen(tmp_path, "falsify", "a.scenario.yaml", "--runs", "1", "--junit", "hall.world.yaml")
-    assert done.returncode == 2, done.stdout
-    assert "cannot write hall.world.yaml: it is one of the input files" in done.stderr
+    done = simscen("falsify", "a.scenario.yaml", "--runs", "1", "--junit", "hall.world.yaml")
+    assert done.code == 2, done.out
+    assert "cannot write hall.world.yaml: it is one of the input files" in done.err
     assert (tmp_path / "hall.world.yaml").read_text() == world

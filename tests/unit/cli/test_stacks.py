@@ -2,8 +2,6 @@
 
 import json
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -13,7 +11,6 @@ from simscen import simulate
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.record.log_reader import read_log
 
-COMMAND = [sys.executable, "-c", "import sys; from simscen.cli.start import start; sys.exit(start())"]
 SHORT = """\
 simscen: 1
 world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
@@ -160,8 +157,7 @@ def test_determinism_is_checked_for_each_stack(simscen, project: Path) -> None:
 @pytest.mark.slow
 def test_resume_repeats_runs_of_a_changed_stack_file_only(simscen, project: Path) -> None:
     def call(*options: str) -> None:
-        """Run simscen in a separate process, because a session locks its folder until the process ends."""
-        subprocess.run([*COMMAND, "run", "a.scenario.yaml", *BOTH, *options], check=True, capture_output=True)
+        assert simscen("run", "a.scenario.yaml", *BOTH, *options).code == 0
 
     call("--out", "out")
     logs = {stack: (project / f"out/runs/a/seed-1-{stack}/run.mcap") for stack in ("ref", "dwb")}

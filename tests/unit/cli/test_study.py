@@ -32,11 +32,15 @@ variations:
 """
 
 
-def study(folder: Path, text: str, *options: object) -> subprocess.CompletedProcess[str]:
-    """Run a study of this scenario in a separate process, because a session locks its folder."""
-    (folder / "s.study.yaml").write_text(text)
-    command = [sys.executable, "-m", "simscen", "study", "s.study.yaml", *map(str, options)]
-    return subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True)
+@pytest.fixture
+def study(simscen: Callable[..., Any], tmp_path: Path) -> Callable[..., Any]:
+    """Return a function that runs a study of a scenario, given as text, with options."""
+
+    def run(text: str, *options: object) -> Any:
+        (tmp_path / "s.study.yaml").write_text(text)
+        return simscen("study", "s.study.yaml", *map(str, options))
+
+    return run
 
 
 def results(folder: Path, name: str = "out") -> Any:
@@ -49,10 +53,10 @@ def case(folder: Path) -> ET.Element:
     return found
 
 
-def test_study_finds_the_parameter_that_lowers_the_margin(tmp_path: Path) -> None:
-    done = study(tmp_path, SCENARIO + RANDOM, "--out", "out")
-    assert done.returncode == 1, done.stderr
-    runs = [line for line in done.stdout.splitlines() if line.startswith("  ") and " s simulated" in line]
+def test_study_finds_the_parameter_that_lowers_the_margin(study: Callable[..., Any], tmp_path: Path) -> None:
+    done = study(SCENARIO + RANDOM, "--out", "out")
+    assert done.code == 1, done.err
+    runs = [line for line in done.out.splitlines() if line.startswith("  ") and " s simulated" in line]
     columns = {line.index(" s simulated") for line in runs}
     assert len(columns) == 1
     found = results(tmp_path)["study"]
@@ -73,22 +77,21 @@ def test_study_finds_the_parameter_that_lowers_the_margin(tmp_path: Path) -> Non
     assert rates[-1] == 1.0
     worst = found["worst"]["clearance"]
     assert worst["margin"] == pytest.approx(min(xs) - radius - 1.0, abs=2e-3)
-    assert "robot.pose.x on clearance   +1.00" in done.stdout
+    assert "robot.pose.x on clearance   +1.00" in done.out
     page = (tmp_path / "out/report.html").read_text()
     assert "margin of clearance against robot.pose.x" in page
     assert page.count('<circle class="bad"') == 2 * found["failed"]
     assert 'href="./runs/s.study/' in page
 
 
-def test_results_do_not_depend_on_the_number_of_workers_or_on_batches(tmp_path: Path) -> None:
+def test_results_do_not_depend_on_the_number_of_workers_or_on_batches(
+    study: Callable[..., Any], simscen: Callable[..., Any], tmp_path: Path
+) -> None:
     text = SCENARIO + RANDOM + "acceptance: {pass_rate: {min: 50 %, method: anytime, runs: 5}}\n"
     for workers in (1, 2):
-        study(tmp_path, text, "--out", f"out{workers}", "-j", workers)
+        study(text, "--out", f"out{workers}", "-j", workers)
     assert (tmp_path / "out1/results.json").read_bytes() == (tmp_path / "out2/results.json").read_bytes()
-    reported = subprocess.run(
-        [sys.executable, "-m", "simscen", "report", "out1"], cwd=tmp_path, check=False, capture_output=True
-    )
-    assert reported.returncode in (0, 6)
+    assert simscen("report", "out1").code in (0, 6)
     assert (tmp_path / "out1/results.json").read_bytes() == (tmp_path / "out2/results.json").read_bytes()
 
 
@@ -102,74 +105,75 @@ def test_results_do_not_depend_on_the_number_of_workers_or_on_batches(tmp_path: 
     ],
 )
 def test_a_claim_has_its_own_exit_code_and_testcase(
-    tmp_path: Path, x: str, claim: str, code: int, status: str, element: str
+    study: Callable[..., Any], tmp_path: Path, x: str, claim: str, code: int, status: str, element: str
 ) -> None:
     text = SCENARIO.replace("{x: 1,", f"{{x: {x},") + f"acceptance: {{pass_rate: {claim}}}\n"
-    done = study(tmp_path, text, "--out", "out")
-    assert done.returncode == code, done.stderr
+    done = study(text, "--out", "out")
+    assert done.code == code, done.err
     assert results(tmp_path)["study"]["claim"]["status"] == status
     message = case(tmp_path)
     assert message.get("name", "").startswith("s.study [pass rate >= 0.8 (confidence 0.95)]")
     assert [child.tag for child in message] == [element]
     if element == "error":
         assert message[0].get("type") == "simscen.undecided"
-    assert f"claim: pass rate of at least 80 % with 95 % confidence: {status}" in done.stdout
+    assert f"claim: pass rate of at least 80 % with 95 % confidence: {status}" in done.out
 
 
 @pytest.mark.slow
-def test_a_sequential_claim_stops_early_and_can_be_resumed(tmp_path: Path) -> None:
+def test_a_sequential_claim_stops_early_and_can_be_resumed(study: Callable[..., Any], tmp_path: Path) -> None:
     text = SCENARIO.replace("{x: 1,", "{x: 2,") + "acceptance: {pass_rate: {min: 80 %, method: anytime, runs: 500}}\n"
-    assert study(tmp_path, text, "--out", "out").returncode == 0
+    assert study(text, "--out", "out").code == 0
     found = results(tmp_path)
     assert found["total"] == 32
     assert found["study"]["claim"]["runs"] < 32
-    again = study(tmp_path, text, "--resume", "out")
-    assert again.returncode == 0
+    again = study(text, "--resume", "out")
+    assert again.code == 0
     assert all(run["resumed"] for run in results(tmp_path)["runs"])
     assert results(tmp_path)["study"] == found["study"]
 
 
 @pytest.mark.slow
-def test_pairwise_values_have_no_confidence_interval_and_no_claim(tmp_path: Path) -> None:
+def test_pairwise_values_have_no_confidence_interval_and_no_claim(study: Callable[..., Any], tmp_path: Path) -> None:
     pairwise = (
         "variations: {pairwise: {robot.pose.x: [1 m, 2 m, 3 m], robot.pose.y: [9, 10, 11], "
         "robot.motor_torque: [0.8, 0.9, 1]}}\n"
     )
-    done = study(tmp_path, SCENARIO + pairwise, "--out", "out", "--repeat", 2)
-    assert done.returncode == 1, done.stderr
+    done = study(SCENARIO + pairwise, "--out", "out", "--repeat", 2)
+    assert done.code == 1, done.err
     found = results(tmp_path)["study"]
     assert found["sampling"] == "designed"
     assert found["interval"] is None
     assert found["pair_coverage"] == 1.0
     assert found["passed"] + found["failed"] == 20
-    assert "the values were chosen" in done.stdout
-    claimed = study(tmp_path, SCENARIO + pairwise + "acceptance: {pass_rate: {min: 80 %}}\n")
-    assert claimed.returncode == 2
-    assert "not independent random draws" in claimed.stderr
+    assert "the values were chosen" in done.out
+    claimed = study(SCENARIO + pairwise + "acceptance: {pass_rate: {min: 80 %}}\n")
+    assert claimed.code == 2
+    assert "not independent random draws" in claimed.err
 
 
 @pytest.mark.slow
-def test_values_meet_the_conditions_and_their_share_is_reported(tmp_path: Path) -> None:
+def test_values_meet_the_conditions_and_their_share_is_reported(study: Callable[..., Any], tmp_path: Path) -> None:
     text = SCENARIO + RANDOM + "  require: ['robot.pose.x > 1.4']\n"
-    done = study(tmp_path, text, "--out", "out")
-    assert done.returncode == 0, done.stderr
+    done = study(text, "--out", "out")
+    assert done.code == 0, done.err
     found = results(tmp_path)["study"]
     assert found["passed"] == 24
     assert 0.3 < found["accepted"] < 0.7
     last = max(int(each["variation"].removeprefix("variation-")) for each in found["values"])
     assert found["accepted"] == pytest.approx(24 / last)
-    impossible = study(tmp_path, SCENARIO + RANDOM + "  require: ['robot.pose.x > 9']\n")
-    assert impossible.returncode == 2
-    assert "none of 10000 draws in a row meets the conditions" in impossible.stderr
+    impossible = study(SCENARIO + RANDOM + "  require: ['robot.pose.x > 9']\n")
+    assert impossible.code == 2
+    assert "none of 10000 draws in a row meets the conditions" in impossible.err
 
 
 @pytest.mark.slow
-def test_printed_command_repeats_a_failed_run(tmp_path: Path) -> None:
-    study(tmp_path, SCENARIO + RANDOM.replace("count: 24", "count: 2000"), "--out", "out", "--runs", 8)
+def test_printed_command_repeats_a_failed_run(
+    study: Callable[..., Any], simscen: Callable[..., Any], tmp_path: Path
+) -> None:
+    study(SCENARIO + RANDOM.replace("count: 24", "count: 2000"), "--out", "out", "--runs", 8)
     runs = results(tmp_path)["runs"]
     failed = next(run for run in runs if run["outcome"] == "failed")
-    command = [sys.executable, "-m", *failed["again"].split(), "--out", "again"]
-    assert subprocess.run(command, cwd=tmp_path, check=False, capture_output=True).returncode == 1
+    assert simscen(*failed["again"].split()[1:], "--out", "again").code == 1
     (run,) = results(tmp_path, "again")["runs"]
     assert run["verdicts"] == failed["verdicts"]
 
@@ -195,8 +199,10 @@ def test_invalid_studies_are_refused(
     assert message in done.err
 
 
-def test_logs_of_passed_runs_are_deleted_on_request(tmp_path: Path) -> None:
-    study(tmp_path, SCENARIO + RANDOM, "--out", "out", "--runs", 6, "--keep-logs", "failed")
+def test_logs_of_passed_runs_are_deleted_on_request(
+    study: Callable[..., Any], simscen: Callable[..., Any], tmp_path: Path
+) -> None:
+    study(SCENARIO + RANDOM, "--out", "out", "--runs", 6, "--keep-logs", "failed")
     runs = results(tmp_path)["runs"]
     assert {run["outcome"] for run in runs} == {"passed", "failed"}
     for run in runs:
@@ -205,8 +211,7 @@ def test_logs_of_passed_runs_are_deleted_on_request(tmp_path: Path) -> None:
         assert (folder / "run.mcap").exists() == (run["outcome"] == "failed")
         assert [file.name for file in folder.iterdir()] == ["result.json"] or run["outcome"] == "failed"
     before = (tmp_path / "out/results.json").read_bytes()
-    command = [sys.executable, "-m", "simscen", "report", "out"]
-    assert subprocess.run(command, cwd=tmp_path, check=False, capture_output=True).returncode == 1
+    assert simscen("report", "out").code == 1
     assert (tmp_path / "out/results.json").read_bytes() == before
 
 

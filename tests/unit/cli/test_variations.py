@@ -2,8 +2,6 @@
 
 import json
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -12,7 +10,6 @@ import pytest
 import simscen as package
 from simscen.core.errors import UsageError
 
-COMMAND = [sys.executable, "-c", "import sys; from simscen.cli.start import start; sys.exit(start())"]
 SHORT = """\
 simscen: 1
 world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
@@ -85,7 +82,7 @@ def test_stacks_are_compared_for_each_variation(simscen, project: Path) -> None:
 
 @pytest.mark.slow
 def test_resume_runs_missing_variations(simscen, project: Path) -> None:
-    subprocess.run([*COMMAND, "run", ".", "--variation", "x=1", "--out", "out"], check=True, capture_output=True)
+    assert simscen("run", ".", "--variation", "x=1", "--out", "out").code == 0
     before = (project / "out/runs/a/seed-1-x=1/run.mcap").stat().st_mtime_ns
     assert simscen("run", ".", "--resume", "out").code == 0
     assert (project / "out/runs/a/seed-1-x=1/run.mcap").stat().st_mtime_ns == before
