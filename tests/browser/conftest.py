@@ -29,6 +29,8 @@ ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / ".browser"
 AXE = "axe-core@4.14.1"
 NAMES = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
+POLL_INTERVAL_S = 0.02
+"""Time until a server of the editor notices that it is shut down."""
 NPM = ["npm", "install", "--no-audit", "--no-fund", "--no-save", "--ignore-scripts", "--fetch-retries=0"]
 
 
@@ -114,7 +116,7 @@ def edit(open_page: Opener, tmp_path: Path) -> Iterator[Edit]:
         session = EditorSession(EditedFile(file, kind, root or file.parent), lambda: backend_of(SessionOptions()))
         server = EditorServer(session)
         servers.append(server)
-        threading.Thread(target=server.serve_forever, daemon=True).start()
+        threading.Thread(target=server.serve_forever, args=(POLL_INTERVAL_S,), daemon=True).start()
         opened = open_page(server.url, **given)
         opened.until("document.documentElement.dataset.ready !== undefined")
         settle(opened)

@@ -182,8 +182,7 @@ def test_javascript_modules_of_the_editor_pass_their_tests() -> None:
     assert done.returncode == 0, done.stdout
 
 
-@pytest.mark.parametrize("dark", [False, True])
-@pytest.mark.parametrize("size", [(1280, 800), (390, 800)])
+@pytest.mark.parametrize(("size", "dark"), [((1280, 800), False), ((390, 800), True)])
 def test_the_page_is_usable_at_any_width_and_by_screen_readers(
     edit: Edit, hall: Path, axe: str, dark: bool, size: tuple[int, int]
 ) -> None:

@@ -1,5 +1,6 @@
 """Scenarios from logs of robots that simscen never met, written with rosbags from its own message definitions."""
 
+import functools
 import math
 import re
 import sys
@@ -43,9 +44,14 @@ def walk(time):
     return 5.0, 0.8 + 0.4 * time
 
 
-def messages(with_map=True, with_goal=True, idle=0.0):
+@functools.cache
+def scans(with_person):
+    return drives.scans((lambda time: [drives.body(*walk(time), 0.0, (0.25,))]) if with_person else None)
+
+
+def messages(with_map=True, with_goal=True, idle=0.0, with_person=False):
     """Return what a robot with a lidar, odometry, and AMCL logs; it stands for `idle` s before its goal."""
-    measured = drives.scans(lambda time: [drives.body(*walk(time), 0.0, (0.25,))])
+    measured = scans(with_person)
     times = np.arange(0.0, drives.DURATION_S, 0.05)
     at = drives.poses(times)
     rng = np.random.default_rng(7)
@@ -116,7 +122,7 @@ def bag(tmp_path_factory):
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("plugin", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
 def test_a_bag_becomes_a_scenario_with_its_goal_person_and_outage(plugin, tmp_path):
-    bag = logs.write_bag(tmp_path / "bag", messages(), plugin)
+    bag = logs.write_bag(tmp_path / "bag", messages(with_person=True), plugin)
     made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
     loaded = load_scenario(made.file, tmp_path)
     assert loaded.robot.path.name == "site.robot.yaml"

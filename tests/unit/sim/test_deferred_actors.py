@@ -141,6 +141,7 @@ def squeeze(seed, every=6, **observation):
     return poses
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("seed", [1, 6, 10])
 def test_observations_do_not_change_the_contacts_of_a_jammed_robot(seed):
     poses = squeeze(seed, has_images=False)
