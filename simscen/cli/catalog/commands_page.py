@@ -22,7 +22,7 @@ EXIT_CODES = {
     Exit.INCOMPLETE: "A run could not be completed (crash, timeout, out of memory), or a result could not be written.",
     Exit.INTERNAL: "A bug in simscen.",
     Exit.NOTHING_SELECTED: "Nothing was selected, or all selected scenarios are skipped.",
-    Exit.UNDECIDED: "The claim of a study is undecided: more runs may decide it.",
+    Exit.UNDECIDED: "The claim of a study, or `--probability` of a search, is undecided: more runs may decide it.",
     Exit.HUNG_UP: "Interrupted by SIGHUP: the terminal was closed.",
     Exit.INTERRUPTED: "Interrupted by Ctrl-C (SIGINT).",
     Exit.TERMINATED: "Interrupted by SIGTERM.",

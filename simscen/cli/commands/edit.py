@@ -53,7 +53,7 @@ def command(
     simulates the text without saving it. The page is served on this machine only, at an address with a secret token,
     until you press Ctrl-C.
 
-    Exit code 0: ended with Ctrl-C; 2: the file or an option is unusable.
+    Exit code 0: ended with Ctrl-C; 2: the file or an option is unusable; 129 and 143: ended by another signal.
     """
     edited, text = _edited_file(file, new, map_, root, tuple(world_path or ()), lenient)
     if stack is not None and edited.kind != "scenario":
@@ -73,7 +73,9 @@ def command(
         session.runs.close()
         raise UsageError(f"port {port} cannot be used: {error.strerror}; choose another with --port") from error
     with server:
-        signal.signal(signal.SIGTERM, lambda *_: sys.exit(Exit.TERMINATED))
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(number) is not signal.SIG_IGN:  # with nohup, SIGHUP is ignored
+                signal.signal(number, lambda number, _: sys.exit(Exit(128 + number)))
         try:
             print_text(f"editing {escaped(edited.display_name)} at {server.url}\npress Ctrl-C to end")
             sys.stdout.flush()
@@ -107,7 +109,16 @@ def _edited_file(
     if not file.is_file():
         what = "it is not a regular file" if file.exists() else "no such file"
         raise InvalidInput([Problem(str(file), 0, 0, "SC001", what, "start a new one with --new --map office.yaml")])
-    return _existing_file(file, root or default_root([file]), world_path), ""
+    from simscen.loading.checks.files import file_kind
+    from simscen.loading.files.assets import SDF_SUFFIXES
+
+    root_folder = root or default_root([file])
+    kind = "scenario" if file.name.endswith((*SCENARIO_SUFFIXES, *STUDY_SUFFIXES)) else file_kind(file, root_folder)
+    if kind not in ("scenario", "world") or file.name.endswith(SDF_SUFFIXES):
+        hint = "edit takes a scenario or a *.world.yaml; for other maps use: simscen edit --new --map FILE"
+        message = f"is a {'Gazebo world' if kind == 'world' else f'{kind} file'}"
+        raise InvalidInput([Problem(str(file), 0, 0, "SC001", message, hint)])
+    return _edited(file, kind, root_folder, world_path), ""
 
 
 def _new_file(
@@ -127,19 +138,6 @@ def _new_file(
     with paths_from_working_folder(root_folder):
         text = new_scenario_text(target, map_, root_folder, world_path, lenient)
     return _edited(target, "scenario", root_folder, world_path), text
-
-
-def _existing_file(file: Path, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
-    """Return an existing scenario, study, or world file. Raises InvalidInput for other files."""
-    from simscen.loading.checks.files import file_kind
-    from simscen.loading.files.assets import SDF_SUFFIXES
-
-    kind = "scenario" if file.name.endswith((*SCENARIO_SUFFIXES, *STUDY_SUFFIXES)) else file_kind(file, root)
-    if kind not in ("scenario", "world") or file.name.endswith(SDF_SUFFIXES):
-        hint = "edit takes a scenario or a *.world.yaml; for other maps use: simscen edit --new --map FILE"
-        message = f"is a {'Gazebo world' if kind == 'world' else f'{kind} file'}"
-        raise InvalidInput([Problem(str(file), 0, 0, "SC001", message, hint)])
-    return _edited(file, kind, root, world_path)
 
 
 def _edited(file: Path, kind: str, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":

@@ -63,12 +63,20 @@ def test_editor_serves_the_page_until_ctrl_c_and_leaves_no_files(tmp_path: Path)
         urllib.request.urlopen(url, timeout=5)
 
 
-def test_sigterm_ends_the_editor_with_exit_code_143(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
+def test_signal_ends_the_editor_and_deletes_the_files_of_its_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals, code: int
+) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
-    with editor(tmp_path, "a.scenario.yaml") as (process, _):
-        process.terminate()
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
+    with editor(tmp_path, "a.scenario.yaml") as (process, url):
+        walls = "{simscen: 1, walls: [{points: [[0, 0], [9, 0], [9, 5], [0, 5], [0, 0]]}]}"
+        ask(url, "run", text=SCENARIO.replace("{simscen: 1}", walls) + "pass: [{collisions: {max: 0}}]\n")
+        process.send_signal(number)
         assert process.communicate(timeout=30)[1] == ""
-        assert process.returncode == 143
+        assert process.returncode == code
+    assert not list((tmp_path / "temporary").glob("simscen-edit-*"))
 
 
 @pytest.mark.sample(1)
