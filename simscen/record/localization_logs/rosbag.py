@@ -13,7 +13,7 @@ from simscen.core.geometry import Pose3
 from simscen.record import topics
 from simscen.record.foreign.options import parse_frame_pair
 from simscen.record.foreign.raw_messages import UnusableLog, open_messages
-from simscen.record.foreign.transforms import TransformTree, is_upside_down, lidar_mount
+from simscen.record.foreign.transforms import TransformTree, UnknownTransform, is_upside_down, lidar_mount
 from simscen.record.localization_logs.rows import (
     MAX_COORDINATE_M,
     LocalizationRows,
@@ -63,7 +63,13 @@ class _Messages:
 
     def between(self, outer: str, inner: str) -> list[LoggedMessage]:
         """Return the poses of the frame `inner` in `outer` as messages. Raises UnusableLog if the poses are unknown."""
-        _, times, stamped, poses = self.transforms.between(outer, inner)
+        try:
+            _, times, stamped, poses = self.transforms.between(outer, inner)
+        except UnknownTransform:
+            raise
+        except UnusableLog as error:  # its hint is about the options of `simscen judge`
+            hint = "name a topic instead of two frames, or cut the log where its clock was set"
+            raise UnusableLog(str(error), hint) from error
         stamps = [0] * len(times) if stamped is None else stamped.stamps.tolist()
         return [
             (logged, self.tf_indices[logged], StampedPose(stamp, outer, tuple(pose), child=inner))

@@ -146,6 +146,16 @@ def test_odometry_and_reference_can_be_tf_frames(simscen, tmp_path: Path) -> Non
     assert "tf does not connect odom with base; frames: base_link, laser, map, odom" in ended.err
 
 
+def test_frames_with_an_unusable_clock_have_a_hint_that_fits_the_command(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    links = [Message("/tf", BEGIN + k * SECOND, link("base_link", "odom", BEGIN, Pose2(0.1 * k, 0))) for k in range(9)]
+    write_bag(tmp_path / "tf", [*links, *(message for message in drive_log() if message.topic == "/scan")])
+    ended = simscen("localize", "tf", *OPTIONS, "--odom", "odom:base_link")
+    assert ended.code == 2
+    assert "do not advance" in ended.err and "name a topic instead of two frames" in ended.err
+    assert "--time log" not in ended.err  # simscen localize has no such option
+
+
 def test_start_is_initialpose_without_a_reference(simscen, tmp_path: Path) -> None:
     """The pose can also be published later."""
     write_map(tmp_path)
