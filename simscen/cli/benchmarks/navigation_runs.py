@@ -1,9 +1,8 @@
 """Execution of the experiments of `simscen bench nav`, and summary of their results."""
 
-import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from simscen.bench.localization.consistency import anees_bounds, nees_at
@@ -72,7 +71,7 @@ def execute_experiments(
     """
     jobs, drives = _plan_jobs(experiments, journal.folder)
     pending = plan_session(journal, jobs, workers)
-    progress = _Progress(len(jobs), len(pending.reused), {job.key: job for job in jobs})
+    progress = _Progress(len(jobs), len(pending.reused))
 
     def listen(event: SessionEvent) -> None:
         journal(event)
@@ -131,18 +130,11 @@ def _top_speed(scenario: LoadedScenario) -> float | None:
     return max(robot.top_speed for robot in robots if robot) if all(robots) else None
 
 
-def _repeat_command(job: Job) -> str:
-    scenario = job.scenario
-    folders = [part for folder in scenario.world_path for part in ("--world-path", str(folder))]
-    root = ["--root", str(scenario.root)]
-    return shlex.join(["simscen", "run", str(scenario.file), "--seed", str(job.key.seed), *root, *folders])
-
-
 class _Progress:
     """Listener that prints the number of finished runs, and all runs that did not pass, to stderr."""
 
-    def __init__(self, total: int, done: int, jobs: dict[RunKey, Job]) -> None:
-        self._total, self._jobs, self._done = total, jobs, done
+    def __init__(self, total: int, done: int) -> None:
+        self._total, self._done = total, done
 
     def __call__(self, event: SessionEvent) -> None:
         """Handle an event of the session."""
@@ -151,9 +143,7 @@ class _Progress:
         self._done += 1
         if event.outcome is not Outcome.PASSED:
             print_progress("")
-            repeatable = replace(event, again=_repeat_command(self._jobs[event.key]))
-            lines = run_lines(repeatable, RunNaming(has_seeds=True))
-            print_text("\n".join(map(plain_text, lines)), sys.stderr)
+            print_text("\n".join(map(plain_text, run_lines(event, RunNaming(has_seeds=True)))), sys.stderr)
         print_progress(f"{self._done} of {self._total} runs" if self._done < self._total else "")
 
 
