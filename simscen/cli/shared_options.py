@@ -135,25 +135,15 @@ SameFrameOption = Annotated[
 def foreign_log_options(
     truth: str | None, topics: list[str] | None, time: TimeStamps, tick_rate: int, same_frame: bool
 ) -> ForeignLogOptions:
-    """Return the options for reading a log of a real robot. The parameters are the options of the same names.
-
-    Raises UsageError if --truth or --topic is invalid.
-    """
+    """Return the options for reading a log of a real robot. Raises UsageError if --truth or --topic is invalid."""
     clock: Clock = "log" if time is TimeStamps.LOG else "header"
     options = ForeignLogOptions(truth, parse_topics(topics or [], TOPICS), tick_rate, clock, same_frame)
-    _check_truth(options)
-    return options
-
-
-def _check_truth(options: ForeignLogOptions) -> None:
-    """Raise UsageError if --truth is malformed, or is the topic of the robot's own pose estimate."""
-    if options.truth is None:
-        return
-    if not options.truth.startswith("/") and not (options.frames and all(options.frames)):
+    if truth is not None and not truth.startswith("/") and not (options.frames and all(options.frames)):
         expected = "expected a /topic, or two frames such as map:base_link"
-        raise UsageError(f"cannot read --truth: {expected}, got {escaped(options.truth) or 'nothing'}")
-    if options.truth == options.topic("amcl_pose"):
-        raise UsageError(f"--truth {escaped(options.truth)} is the belief of the robot; name an independent source")
+        raise UsageError(f"cannot read --truth: {expected}, got {escaped(truth) or 'nothing'}")
+    if truth is not None and truth == options.topic("amcl_pose"):
+        raise UsageError(f"--truth {escaped(truth)} is the belief of the robot; name an independent source")
+    return options
 
 
 def parse_topics(arguments: list[str], names: Collection[str]) -> dict[str, str]:

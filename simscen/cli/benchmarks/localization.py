@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simscen.cli.benchmarks.results import print_progress
+from simscen.cli.benchmarks.results import FormatOption, print_progress
 from simscen.cli.benchmarks.tables import table_lines, wrap_lines
 from simscen.cli.diagnostics import print_text
 from simscen.cli.shared_options import TextOrJson
@@ -37,7 +37,7 @@ def command(
     sparse: Annotated[
         bool, typer.Option("--sparse", help="Use logs with scans 1 m or 0.5 rad apart, with five seeds each.")
     ] = False,
-    format_: Annotated[TextOrJson, typer.Option("--format", help="Output format.")] = TextOrJson.TEXT,
+    format_: FormatOption = TextOrJson.TEXT,
 ) -> None:
     """Measure the accuracy of AMCL on generated logs.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from simscen.cli.benchmarks.results import FormatOption
 from simscen.cli.diagnostics import as_text as problems_as_text
 from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
 from simscen.cli.shared_options import ResumeOption, TextOrJson
@@ -75,7 +76,7 @@ def command(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="New or empty output folder.")] = None,
     resume: ResumeOption = None,
-    format_: Annotated[TextOrJson, typer.Option("--format", help="Output format.")] = TextOrJson.TEXT,
+    format_: FormatOption = TextOrJson.TEXT,
 ) -> None:
     """Measure the navigation of the reference stack, and print one line per experiment.
 

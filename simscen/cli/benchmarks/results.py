@@ -31,11 +31,6 @@ class Result:
     machine: str
     simscen: str
 
-    @classmethod
-    def on_this_machine(cls, figures: Measurements) -> "Result":
-        """Return the result of this machine and of the installed version of simscen."""
-        return cls(figures, describe_processor(), version("simscen"))
-
 
 def as_json(result: Result, sections: dict[str, Any] | None = None) -> str:
     """Return the result as JSON, with the further keys `sections`."""
@@ -135,8 +130,13 @@ def _spread(figure: Measurement) -> str:
     return f"{min(figure.rounds):.4g} … {max(figure.rounds):.4g}" if len(figure.rounds) > 1 else "-"
 
 
-COMPARE_HELP = "Compare with this result of --format json, and tell changes from noise."
-"""Help text of the option --compare."""
+CompareOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--compare", metavar="FILE", help="Compare with this result of --format json, and tell changes from noise."
+    ),
+]
+FormatOption = Annotated[TextOrJson, typer.Option("--format", help="Output format.")]
 
 
 def print_progress(text: str) -> None:
@@ -146,12 +146,13 @@ def print_progress(text: str) -> None:
 
 
 def print_result(
-    result: Result, text: str, sections: dict[str, Any], format_: TextOrJson, before: Result | None
+    figures: Measurements, text: str, sections: dict[str, Any], format_: TextOrJson, before: Result | None
 ) -> None:
-    """Print a result: in the format JSON with the further keys `sections`, in the format TEXT as `text`.
+    """Print figures of this machine: in the format JSON with the further keys `sections`, in the format TEXT as `text`.
 
     The text is followed by the comparison with the earlier result `before`, if there is one.
     """
+    result = Result(figures, describe_processor(), version("simscen"))
     print_progress("")
     if format_ is TextOrJson.JSON:
         print(as_json(result, sections))
@@ -159,8 +160,3 @@ def print_result(
     print_text(text)
     if before is not None:
         print_text("\n" + comparison_text(before, result))
-
-
-def load_baseline(file: Path | None) -> Result | None:
-    """Return the result in the file of the option --compare; None without a file. Raises UsageError."""
-    return None if file is None else read_result(file)

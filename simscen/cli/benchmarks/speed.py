@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from simscen.bench.speed.measurement import Measurements
-from simscen.cli.benchmarks.results import COMPARE_HELP, Result, load_baseline, print_progress, print_result
+from simscen.cli.benchmarks.results import CompareOption, FormatOption, print_progress, print_result, read_result
 from simscen.cli.diagnostics import print_text
 from simscen.cli.process import engine_output_on_stderr
 from simscen.cli.shared_options import TextOrJson
@@ -24,21 +24,21 @@ if TYPE_CHECKING:
 
 
 def growth_command(
-    format_: Annotated[TextOrJson, typer.Option("--format", help="Output format.")] = TextOrJson.TEXT,
+    format_: FormatOption = TextOrJson.TEXT,
     rounds: Annotated[int, typer.Option(min=1, max=100, help="Number of runs of each; the median is used.")] = 3,
-    compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
+    compare: CompareOption = None,
 ) -> None:
     """Measure how the cost of a simulated second grows with the size of the scenario.
 
     Repeats a patrol of 15 s and increases one quantity at a time: static obstacles, pushable objects, scripted objects,
     lidar beams, AMCL particles, or robots. Prints CPU times of one core. Takes a minute and a half.
     """
-    before = load_baseline(compare)
+    before = None if compare is None else read_result(compare)
     with engine_output_on_stderr():
         from simscen.bench.speed.growth import measure_growth
 
         figures = measure_growth(rounds, print_progress)
-    print_result(Result.on_this_machine(figures), _growth_text(figures), {}, format_, before)
+    print_result(figures, _growth_text(figures), {}, format_, before)
 
 
 def _growth_text(figures: Measurements) -> str:
@@ -93,8 +93,8 @@ def suite_command(
     jobs: Annotated[
         int | None, typer.Option("--jobs", "-j", min=1, max=256, help="Number of parallel runs; default: one per core.")
     ] = None,
-    format_: Annotated[TextOrJson, typer.Option("--format", help="Output format.")] = TextOrJson.TEXT,
-    compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
+    format_: FormatOption = TextOrJson.TEXT,
+    compare: CompareOption = None,
 ) -> None:
     """Measure the speed of a suite of scenarios on all cores.
 
@@ -108,7 +108,7 @@ def suite_command(
     from simscen.cli.session.fork_server_start import FORK_SERVER
     from simscen.cli.session.selection import Selection, load_selection
 
-    before = load_baseline(compare)
+    before = None if compare is None else read_result(compare)
     workers = jobs or len(os.sched_getaffinity(0))
     with engine_output_on_stderr(), TemporaryDirectory() as folder:
         from simscen.bench.speed.session_speed import evenly_spaced, measure_suite
@@ -116,9 +116,7 @@ def suite_command(
         scenarios, _ = load_selection(paths or [Path("scenarios")], None, (), False, Selection())
         suite = measure_suite(evenly_spaced(scenarios, most), workers, Path(folder), FORK_SERVER, print_progress)
     if suite.simulated:
-        print_result(
-            Result.on_this_machine(suite.figures), _suite_text(suite), {"suite": asdict(suite)}, format_, before
-        )
+        print_result(suite.figures, _suite_text(suite), {"suite": asdict(suite)}, format_, before)
     if suite.unfinished:
         print(f"{len(suite.unfinished)} runs were aborted: {', '.join(suite.unfinished)}", file=sys.stderr)
         sys.exit(Exit.INCOMPLETE)

@@ -1,14 +1,13 @@
 """Command `simscen bench`, which measures speed; its subcommands also measure navigation and localization."""
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from simscen.bench.speed.measurement import Measurement, Measurements
 from simscen.cli.benchmarks import localization, navigation, results, speed
-from simscen.cli.benchmarks.results import COMPARE_HELP, Result, load_baseline, print_progress, print_result
+from simscen.cli.benchmarks.results import CompareOption, FormatOption, print_progress, print_result, read_result
 from simscen.cli.process import engine_output_on_stderr
 from simscen.cli.shared_options import TextOrJson
 
@@ -28,9 +27,9 @@ app.command("localization")(localization.command)
 @app.callback(invoke_without_command=True)
 def command(
     ctx: typer.Context,
-    format_: Annotated[TextOrJson, typer.Option("--format", help="Output format.")] = TextOrJson.TEXT,
+    format_: FormatOption = TextOrJson.TEXT,
     rounds: Annotated[int, typer.Option(min=1, max=100, help="Number of runs of the patrol; the median is used.")] = 5,
-    compare: Annotated[Path | None, typer.Option("--compare", metavar="FILE", help=COMPARE_HELP)] = None,
+    compare: CompareOption = None,
 ) -> None:
     """Measure speed, navigation, and localization.
 
@@ -55,7 +54,7 @@ def command(
         return
     from simscen.cli.session.fork_server_start import FORK_SERVER
 
-    before = load_baseline(compare)
+    before = None if compare is None else read_result(compare)
     with engine_output_on_stderr():
         from simscen.bench.speed import run_speed
         from simscen.bench.speed.run_overhead import measure_external, measure_overhead
@@ -66,37 +65,28 @@ def command(
         fields = [run_speed.measure_obstacle_field(count) for count in (209, 2090)]
         print_progress("the stack as an external process")
         external = measure_external(max(1, rounds // 2))
-    figures = {**_patrol_figures(patrol), **overhead.figures, **_field_and_stack_figures(fields, external)}
-    lines = [*_patrol_lines(patrol, rounds), *_overhead_lines(overhead), *_field_lines(fields)]
-    text = "\n".join([*lines, *_external_lines(external)])
+    figures = {**_patrol_figures(patrol), **overhead.figures}
+    for field in fields:
+        figures[f"scan among {field.obstacles} obstacles"] = Measurement(field.scan_ms, "ms")
+        figures[f"step among {field.obstacles} obstacles"] = Measurement(field.step_us, "µs")
+    figures["cycle with the stack as a process"] = Measurement(external.external_us, "µs")
     sections = {
         "patrol": {**asdict(patrol), "real_time_factor": patrol.factor, "ratio_to_bare": patrol.ratio},
         "overhead": asdict(overhead),
         "fields": [asdict(field) for field in fields],
         "external": {**asdict(external), "ratio": external.ratio},
     }
-    print_result(Result.on_this_machine(figures), text, sections, format_, before)
+    text = "\n".join([*_patrol_lines(patrol, rounds), *_other_lines(overhead, fields, external)])
+    print_result(figures, text, sections, format_, before)
 
 
 def _patrol_figures(patrol: "PatrolTimes") -> Measurements:
+    rounds = {"patrol": patrol.cpu_rounds, "PyBullet alone": patrol.baseline_rounds, **patrol.part_rounds}
     scale, unit = 1e3 / patrol.simulated, "ms per simulated second"
     return {
         "patrol, times PyBullet alone": Measurement.of(patrol.ratios, ""),
-        "patrol": Measurement.of([scale * cpu for cpu in patrol.cpu_rounds], unit),
-        "PyBullet alone": Measurement.of([scale * baseline for baseline in patrol.baseline_rounds], unit),
-        **{
-            name: Measurement.of([scale * seconds for seconds in rounds], unit)
-            for name, rounds in patrol.part_rounds.items()
-        },
+        **{name: Measurement.of([scale * seconds for seconds in times], unit) for name, times in rounds.items()},
     }
-
-
-def _field_and_stack_figures(fields: "list[ObstacleFieldTimes]", external: "ExternalStackCost") -> Measurements:
-    figures = dict[str, Measurement]()
-    for field in fields:
-        figures[f"scan among {field.obstacles} obstacles"] = Measurement(field.scan_ms, "ms")
-        figures[f"step among {field.obstacles} obstacles"] = Measurement(field.step_us, "µs")
-    return {**figures, "cycle with the stack as a process": Measurement(external.external_us, "µs")}
 
 
 def _patrol_lines(patrol: "PatrolTimes", rounds: int) -> list[str]:
@@ -116,14 +106,12 @@ def _patrol_lines(patrol: "PatrolTimes", rounds: int) -> list[str]:
     ]
 
 
-def _overhead_lines(overhead: "Overhead") -> list[str]:
+def _other_lines(overhead: "Overhead", fields: "list[ObstacleFieldTimes]", external: "ExternalStackCost") -> list[str]:
+    """Return the lines about the overhead of a run, the fields of obstacles, and the external stack."""
     width = max(map(len, overhead.figures))
-    lines = [f"    {name:{width}} {figure.value:7.1f} {figure.unit}" for name, figure in overhead.figures.items()]
-    return ["overhead of a run (CPU time unless noted otherwise)", *lines]
-
-
-def _field_lines(fields: "list[ObstacleFieldTimes]") -> list[str]:
     return [
+        "overhead of a run (CPU time unless noted otherwise)",
+        *(f"    {name:{width}} {figure.value:7.1f} {figure.unit}" for name, figure in overhead.figures.items()),
         "a scan of 720 beams and a physics step among cylinders",
         "    obstacles      scan   PyBullet alone      step   PyBullet alone",
         *(
@@ -131,11 +119,6 @@ def _field_lines(fields: "list[ObstacleFieldTimes]") -> list[str]:
             f" {f.step_us:6.0f} µs {f.baseline_step_us:13.0f} µs"
             for f in fields
         ),
-    ]
-
-
-def _external_lines(external: "ExternalStackCost") -> list[str]:
-    return [
         f"the stack of the patrol as an external process with all topics, {external.cycles} cycles",
         f"    {external.external_us:.0f} µs of wall time per cycle; "
         f"in process {external.in_process_us:.0f} µs ({external.ratio:.1f} times)",

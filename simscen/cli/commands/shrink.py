@@ -2,6 +2,7 @@
 
 import sys
 from dataclasses import dataclass
+from functools import reduce
 from pathlib import Path
 from typing import Annotated
 
@@ -30,7 +31,7 @@ from simscen.loading.files.discovery import default_root, sibling
 from simscen.loading.reduction import changed_values, removed_parts, with_inline_world, with_only_criterion
 from simscen.loading.scenario import ChangedScenario
 from simscen.loading.yaml.rewriting import changed_text
-from simscen.loading.yaml.tree import Keys, MappingNode, Node, SequenceNode, child
+from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, child, nodes_with_keys
 from simscen.report.journal_reader import JOURNAL_FILE, PlannedRun, read_journal
 from simscen.run.sessions.output_folder import RUNS_FOLDER, write_atomically
 from simscen.run.sessions.results import display_path
@@ -174,26 +175,17 @@ def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: 
         )
     if candidates.first_accepted([tree], failure.occurs_in) is None:
         raise UsageError("the run no longer fails if only this criterion is kept; this is a bug in simscen")
-    nominal = {change.target.keys: _value_at(scenario.base_tree, change.target.keys) for change in scenario.changes}
+    base: Node | None = scenario.base_tree
+    nominal = {change.target.keys: reduce(child, change.target.keys, base) for change in scenario.changes}
     shrinker.shrink({keys: value for keys, value in nominal.items() if keys[0] in tree.entries})
     if sys.stderr.isatty():
         print_text("", sys.stderr)
     return shrinker, tree
 
 
-def _value_at(tree: MappingNode, keys: Keys) -> Node | None:
-    """Return the value at `keys`; None if the tree has no such value."""
-    node: Node | None = tree
-    for key in keys:
-        node = child(node, key)
-    return node
-
-
-def _size(node: Node) -> int:
+def _size(tree: MappingNode) -> int:
     """Return the number of scalar values in a YAML tree."""
-    if isinstance(node, MappingNode):
-        return sum(_size(entry.value) for entry in node.entries.values())
-    return sum(map(_size, node.items)) if isinstance(node, SequenceNode) else 1
+    return sum(isinstance(node, ScalarNode) for _, node in nodes_with_keys(tree))
 
 
 def _failure_text(result: RunResult, failure: Failure) -> str:

@@ -61,8 +61,8 @@ def inspect(
     from simscen.worlds.maps.map_size import MAP_RESOLUTION_M
 
     root_folder = root or default_root([path])
-    source = _load(path, root_folder, world_path or [])
-    world = _build(source, root_folder, world_path or [], lenient)
+    source = _load(path, root_folder, world_path)
+    world = _build(source, root_folder, world_path, lenient)
     built = _with_map(world, path, height, MAP_RESOLUTION_M, "in scenarios, use `map: none`")
     summary = inspect_world(built)
     if as_json:
@@ -97,8 +97,7 @@ def export(
     from simscen.worlds.maps.ros_map import save_map
 
     root_folder = root or default_root([path])
-    source = _load(path, root_folder, world_path or [])
-    world = _build(source, root_folder, world_path or [], lenient)
+    world = _build(_load(path, root_folder, world_path), root_folder, world_path, lenient)
     grid = _with_map(world, path, height, resolution, "choose larger cells with --resolution").map
     save(map_, lambda file: save_map(grid, file), [path])
     rows, columns = grid.shape
@@ -122,8 +121,8 @@ def convert(
     Exit code 0: written; 2: the world is unusable or cannot be written.
     """
     root_folder = root or default_root([path])
-    source = _load(path, root_folder, world_path or [])
-    spec, changes = _convert(source, root_folder, world_path or [], lenient, height)
+    source = _load(path, root_folder, world_path)
+    spec, changes = _convert(source, root_folder, world_path, lenient, height)
     if source.map is not None:
         path_of_map = os.path.relpath(source.map.path.resolve(), out.resolve().parent)
         spec = spec.model_copy(update={"map": Path(path_of_map).as_posix()})
@@ -136,7 +135,7 @@ def convert(
 
 
 def _convert(
-    source: LoadedWorld, root_folder: Path, world_path: list[Path], lenient: bool, height: float
+    source: LoadedWorld, root_folder: Path, world_path: list[Path] | None, lenient: bool, height: float
 ) -> tuple[WorldSpec, list[str]]:
     """Return the content of the world file, and a description of each change. Raises InvalidInput.
 
@@ -157,14 +156,14 @@ def _convert(
         raise InvalidInput([Problem(str(source.path), 0, 0, "SC312", message)]) from None
 
 
-def _load(path: Path, root_folder: Path, world_path: list[Path]) -> LoadedWorld:
+def _load(path: Path, root_folder: Path, world_path: list[Path] | None) -> LoadedWorld:
     with paths_from_working_folder(root_folder):
-        return load_world_file(path, root_folder, world_path)
+        return load_world_file(path, root_folder, world_path or ())
 
 
-def _build(source: LoadedWorld, root_folder: Path, world_path: list[Path], lenient: bool) -> World:
+def _build(source: LoadedWorld, root_folder: Path, world_path: list[Path] | None, lenient: bool) -> World:
     with paths_from_working_folder(root_folder):
-        return world_from_file(source, root_folder, world_path, lenient)
+        return world_from_file(source, root_folder, world_path or (), lenient)
 
 
 def _with_map(world: World, path: Path, height: float, resolution: float, alternative: str) -> BuiltWorld:
