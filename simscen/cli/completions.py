@@ -3,7 +3,6 @@
 Each completion function takes the text typed so far, and returns the values that start with it.
 """
 
-from collections.abc import Iterator
 from pathlib import Path
 
 from simscen.cli.process import config_file
@@ -15,25 +14,24 @@ def scenarios(incomplete: str) -> list[str]:
     """Return paths of scenario files and folders."""
     from simscen.loading.files.discovery import SCENARIO_SUFFIXES
 
-    return list(_files(incomplete, SCENARIO_SUFFIXES))
+    return _files(incomplete, SCENARIO_SUFFIXES)
 
 
 def logs(incomplete: str) -> list[str]:
     """Return paths of MCAP logs and folders."""
-    return list(_files(incomplete, (".mcap",)))
+    return _files(incomplete, (".mcap",))
 
 
 def yaml_files(incomplete: str) -> list[str]:
     """Return paths of YAML files and folders."""
-    return list(_files(incomplete, (".yaml", ".yml")))
+    return _files(incomplete, (".yaml", ".yml"))
 
 
 def topics(incomplete: str) -> list[str]:
     """Return names that `simscen explain` knows; if the text has a dot, paths of keys such as `goals.pose`."""
     from simscen.cli.catalog.topic_lookup import known_names
 
-    names = known_names(keys="." in incomplete)
-    return [name for name in names if name.startswith(incomplete)]
+    return [name for name in known_names(keys="." in incomplete) if name.startswith(incomplete)]
 
 
 def scenarios_to_copy(incomplete: str) -> list[str]:
@@ -55,20 +53,16 @@ def stacks(incomplete: str) -> list[str]:
     return [name for name in names if name.startswith(incomplete)]
 
 
-def _files(incomplete: str, suffixes: tuple[str, ...]) -> Iterator[str]:
-    """Yield the matching folders, with a slash appended, and the matching files with one of the suffixes."""
+def _files(incomplete: str, suffixes: tuple[str, ...]) -> list[str]:
+    """Return the matching folders, with a slash appended, and the matching files with one of the suffixes."""
     parent, slash, start = incomplete.rpartition("/")
     folder = expand_home(parent + slash or ".")
     try:
-        found = sorted(folder.iterdir())
+        names = [f"{path.name}/" if path.is_dir() else path.name for path in sorted(folder.iterdir())]
     except OSError:
-        return
-    for path in found:
-        if path.name.startswith(start) and (start.startswith(".") or not path.name.startswith(".")):
-            if path.is_dir():
-                yield f"{parent}{slash}{path.name}/"
-            elif path.name.endswith(suffixes):
-                yield f"{parent}{slash}{path.name}"
+        return []
+    shown = [name for name in names if name.startswith(start) and (start.startswith(".") or not name.startswith("."))]
+    return [f"{parent}{slash}{name}" for name in shown if name.endswith(("/", *suffixes))]
 
 
 def shipped_scenarios() -> dict[str, Path]:

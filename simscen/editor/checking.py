@@ -34,12 +34,12 @@ class TextChecks:
     stack: StackChoice | None = None
     cache: WorldCache = field(default_factory=lambda: WorldCache(MAX_WORLDS))
 
-    def load(self, text: str) -> tuple[LoadedScenario, ...] | list[Problem]:
-        """Return the variations CHECKED_VARIATIONS of the scenario in a text, or the problems that prevent loading."""
+    def load(self, text: str) -> tuple[LoadedScenario, ...]:
+        """Return the variations CHECKED_VARIATIONS of the scenario in a text. Raises InvalidInput."""
         file, unsaved = self.file, {self.file.path: text}
         loaded = try_variations(file.path, file.root, file.world_path, self.stack, CHECKED_VARIATIONS, unsaved)
         if isinstance(loaded, list):
-            return loaded
+            raise InvalidInput(loaded)
         return tuple(scenario.with_changes(lenient=self.lenient) for scenario in loaded)
 
     def problems(self, text: str) -> list[Problem]:
@@ -51,12 +51,9 @@ class TextChecks:
         return sorted(dict.fromkeys(found))
 
     def _scenario_problems(self, text: str) -> list[Problem]:
-        loaded = self.load(text)
-        if isinstance(loaded, list):
-            return loaded
         checked = [
             VariationProblems(one.variation, one.varied_paths, [*one.notes, *world_problems(one, self.cache)])
-            for one in loaded
+            for one in self.load(text)
         ]
         return merge_problems(checked)
 

@@ -1,13 +1,13 @@
 """Preview for the editor page: shortest paths and clearances of the robots, shown while the user drags an object."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from simscen.core.errors import InvalidInput, Problem
+from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.polylines import polyline_length
 from simscen.editor.checking import TextChecks
@@ -31,24 +31,17 @@ def preview_data(checks: TextChecks, text: str) -> dict[str, Any]:
 
     If the text has problems, there are no robots, and `reason` is the first problem.
     """
-    loaded = checks.load(text)
-    if isinstance(loaded, list):
-        return {"reason": _reason(loaded), "robots": {}}
     try:
+        loaded = checks.load(text)[0]
         robots = {
-            f"robots/{name}" if loaded[0].robots else "robot": _robot_data(view, checks)
-            for name, view in loaded[0].robot_views.items()
+            f"robots/{name}" if loaded.robots else "robot": _robot_data(view, checks)
+            for name, view in loaded.robot_views.items()
         }
     except InvalidInput as error:
-        return {"reason": _reason(error.problems), "robots": {}}
+        first = min(error.problems)
+        place = f"line {first.line}: " if first.line else ""
+        return {"reason": f"No path is shown until this is corrected: {place}{first.message}", "robots": {}}
     return {"reason": "", "robots": robots}
-
-
-def _reason(problems: Sequence[Problem]) -> str:
-    """Return the text of the first problem, as the reason why no path is shown."""
-    first = min(problems)
-    place = f"line {first.line}: " if first.line else ""
-    return f"No path is shown until this is corrected: {place}{first.message}"
 
 
 def _robot_data(loaded: LoadedScenario, checks: TextChecks) -> dict[str, Any]:

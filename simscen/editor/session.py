@@ -181,11 +181,10 @@ class EditorSession:
             raise RequestRefused("only a scenario can run")
         text = _text(request)
         with self._check_lock:
+            errors = [problem for problem in self._checks.problems(text) if problem.severity == "error"]
+            if errors:
+                raise RequestRefused(f"the scenario has problems: {_first_message(errors)}", 422)
             loaded = self._checks.load(text)
-            problems = loaded if isinstance(loaded, list) else self._checks.problems(text)
-        errors = [problem for problem in problems if problem.severity == "error"]
-        if isinstance(loaded, list) or errors:
-            raise RequestRefused(f"the scenario has problems: {_first_message(errors or problems)}", 422)
         scenario, undefined = self._resolve_commands(loaded[0])
         if undefined:
             raise RequestRefused(f"{_first_message(undefined)}; {undefined[0].hint}", 422)
@@ -193,15 +192,13 @@ class EditorSession:
 
     def run_status(self, request: Data) -> Data:
         """Return the state of the run with the number `run`."""
-        trial = self._trial(request)
-        if trial is None:
+        if (trial := self._trial(request)) is None:
             raise RequestRefused("there is no such run", 404)
         return trial.data()
 
     def run_stop(self, request: Data) -> Data:
         """Stop the run with the number `run`."""
-        trial = self._trial(request)
-        if trial is not None:
+        if (trial := self._trial(request)) is not None:
             trial.is_canceled = True
         return {}
 

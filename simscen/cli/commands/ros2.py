@@ -6,10 +6,9 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated
 
 import typer
 
@@ -161,7 +160,12 @@ def command(
         "parameters": parameters.nodes if parameters is not None else None,
         "parameter_file": str(params) if params is not None else "",
     }
-    _execute_adapter(python or _find_python(), options)
+    interpreter = python or _find_python()
+    try:
+        # The adapter replaces this process, and inherits the socket to the simulation.
+        os.execvp(interpreter, [interpreter, str(_ADAPTER_START), json.dumps(options)])
+    except OSError as error:
+        raise UsageError(f"cannot run {interpreter}: {error.strerror}") from error
 
 
 def _check_parameters(kind: GraphKind, parameters: Nav2Parameters | None, names: PublishedNames) -> None:
@@ -198,11 +202,3 @@ def _has_rclpy(python: str) -> bool:
     except (OSError, subprocess.TimeoutExpired):
         return False
     return result.returncode == 0
-
-
-def _execute_adapter(python: str, options: Mapping[str, object]) -> NoReturn:
-    """Replace this process by the adapter, which inherits the socket to the simulation. Raises UsageError."""
-    try:
-        os.execvp(python, [python, str(_ADAPTER_START), json.dumps(options)])
-    except OSError as error:
-        raise UsageError(f"cannot run {python}: {error.strerror}") from error

@@ -1,13 +1,10 @@
 """Stacks chosen with `--stack NAME=VALUE`, and the commands of external stacks (programs outside of simscen)."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from simscen.cli.diagnostics import escaped, paths_from_working_folder
 from simscen.cli.process import caller_environment, config_file
@@ -19,14 +16,11 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.stacks.choice import REFERENCE, StackChoice
-from simscen.loading.stacks.userconfig import conflicting_stacks, undefined_stack
+from simscen.loading.stacks.userconfig import UserConfig, conflicting_stacks, load_config, undefined_stack
 from simscen.model.stack_files import ExternalStackSpec
 from simscen.spec.registry import all_types, find_type
 
 YAML_SUFFIXES = (".yaml", ".yml")
-if TYPE_CHECKING:
-    from simscen.loading.stacks.userconfig import UserConfig
-
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}")
 """Valid name of a stack."""
 
@@ -44,8 +38,6 @@ class Stacks:
     @cached_property
     def config(self) -> UserConfig:
         """Configuration of the user, which is read on first use. Raises InvalidInput."""
-        from simscen.loading.stacks.userconfig import load_config
-
         return load_config(config_file())
 
     def with_command(self, loaded: LoadedScenario) -> tuple[LoadedScenario, list[Problem]]:

@@ -80,7 +80,13 @@ def open_screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
     `slow` is the number of slowest runs to list at the end: 0 lists all, None lists none. Only the format GITHUB has a
     job summary. Raises UsageError if the file of the summary is not writable.
     """
-    summary = _step_summary() if format_ is Format.GITHUB else None
+    summary = None
+    if format_ is Format.GITHUB and (path := os.environ.get(STEP_SUMMARY)):
+        try:
+            probe_writable(Path(path))
+        except OSError as error:
+            raise UsageError(f"cannot write {STEP_SUMMARY} {path}: {error.strerror}") from error
+        summary = StringIO()
     printer: Reporter
     match format_:
         case Format.TEXT:
@@ -98,18 +104,3 @@ def open_screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
             printer.__exit__(*sys.exc_info())
         if summary is not None:
             output.append_summary(summary.getvalue())
-
-
-def _step_summary() -> StringIO | None:
-    """Return a buffer for the job summary; None outside of GitHub Actions.
-
-    Raises UsageError if the file of the summary is not writable.
-    """
-    path = os.environ.get(STEP_SUMMARY)
-    if not path:
-        return None
-    try:
-        probe_writable(Path(path))
-    except OSError as error:
-        raise UsageError(f"cannot write {STEP_SUMMARY} {path}: {error.strerror}") from error
-    return StringIO()

@@ -25,11 +25,10 @@ def create_file(file: Path, name: str) -> Iterator[None]:
         raise UsageError(f"cannot write {name!r}: {reason}") from None
     try:
         yield
-    except OSError as error:
+    except BaseException as error:
         file.unlink(missing_ok=True)
-        raise UsageError(f"cannot write {name!r}: {os_error_reason(error)}") from None
-    except BaseException:
-        file.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise UsageError(f"cannot write {name!r}: {os_error_reason(error)}") from None
         raise
 
 

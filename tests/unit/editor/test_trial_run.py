@@ -45,9 +45,7 @@ class EndlessBackend:
 
 @pytest.fixture
 def loaded(tmp_path: Path) -> LoadedScenario:
-    found = TextChecks(EditedFile(tmp_path / "a.scenario.yaml", "scenario", tmp_path)).load(TEXT)
-    assert not isinstance(found, list)
-    return found[0]
+    return TextChecks(EditedFile(tmp_path / "a.scenario.yaml", "scenario", tmp_path)).load(TEXT)[0]
 
 
 def until(holds: Callable[[], bool]) -> None:
