@@ -96,11 +96,14 @@ class Task:
         return (*dropped, *self._end_goal(tick, TaskResult.FAILED))
 
     def cancel(self, tick: int) -> Events:
-        """Cancel the current goal or wait, and all later goals. Without any of them, do nothing."""
+        """Cancel the current goal or wait, and all later goals. Without any of them, do nothing.
+
+        The task ends as canceled even if an earlier goal has failed.
+        """
         if self.goal is None and self._wait_until is None and not self._waiting:
             return ()
         dropped = () if self.goal is None else self._end_action(tick, EventKind.GOAL_CANCELED)
-        self._waiting, self._wait_until = [], None
+        self._waiting, self._wait_until, self._failure = [], None, None
         return (*dropped, *self._end_goal(tick, TaskResult.CANCELED))
 
     def preempt(self, tick: int, goal: Goal) -> Events:

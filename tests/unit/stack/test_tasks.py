@@ -141,6 +141,16 @@ def test_cancel_ends_a_task_whose_next_goal_is_not_accepted_yet():
     assert preempted.accept_next(2) is None
 
 
+def test_canceled_task_ends_as_canceled_after_an_earlier_failure():
+    tour, journal = task(C, D, stop=False)
+    tour.accept_next(1)
+    tour.record_failed(2, ErrorCode.NO_VALID_PATH, "no way")
+    tour.accept_next(3)
+    tour.cancel(4)
+    assert told(journal)[-1] == (4, "navigation.ended", "CANCELED")
+    assert journal[-1].data["error_name"] == "NONE"
+
+
 @pytest.mark.parametrize(
     ("mode", "stop", "code"),
     [
