@@ -5,6 +5,8 @@ clusters near the predicted position update the track. A track with a significan
 moving.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from simscen.advanced.prediction.association import ScanClusters, associate, start_tracks
@@ -54,6 +56,11 @@ class Tracker:
 
     def on_scan(self, scan: Scan, odometry: Pose2) -> None:
         """Process a scan that was taken with the base at `odometry` in the odom frame."""
+        if scan.angle_increment < 0.0:
+            self.on_scan(_counterclockwise(scan), odometry)
+            if self.moving_hits is not None:
+                self.moving_hits = self.moving_hits[::-1]
+            return
         lidar = odometry.compose(scan.mount)
         if len(self._directions) != len(scan.ranges):
             self._set_directions(scan)
@@ -138,6 +145,12 @@ class Tracker:
         for obstacle in obstacles:
             hits |= np.abs(ends - lidar.to_lidar(obstacle.position)) <= self._spec.margin + obstacle.radius
         self.moving_hits = hits & (scan.ranges >= scan.range_min) & (scan.ranges <= scan.range_max)
+
+
+def _counterclockwise(scan: Scan) -> Scan:
+    """Return the scan of a lidar that rotates clockwise with its beams in reverse order."""
+    angle_min = scan.angle_min + (len(scan.ranges) - 1) * scan.angle_increment
+    return replace(scan, ranges=scan.ranges[::-1], angle_min=angle_min, angle_increment=-scan.angle_increment)
 
 
 def _ends(ranges: Array, directions: Points) -> Points:

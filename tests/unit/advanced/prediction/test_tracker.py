@@ -3,6 +3,7 @@
 import cmath
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -53,6 +54,7 @@ class Watch:
             if self.covered is not None:
                 ranges[:40] = self.covered
             scan = Scan("lidar", round(self.time * TICK_RATE_HZ), ranges, -self.view / 2, step, 0.1, 30.0)
+            self.scan = scan
             self.tracker.on_scan(scan, self.odometry(self.time))
             each(self)
         return self
@@ -75,7 +77,7 @@ def static_room() -> Flatland:
 
 
 @pytest.mark.parametrize("discs", [crossing, oncoming])
-@pytest.mark.parametrize("view, beams", [(FRONT, 720), (FULL, 360)])
+@pytest.mark.parametrize("view, beams", [(FRONT, 720), (FULL, 360), (-FRONT, 720)])
 def test_moving_cylinder_is_detected_within_a_second_and_tracked_to_centimeters(
     discs: Callable[[float], list[Disc]], view: float, beams: int
 ) -> None:
@@ -91,6 +93,9 @@ def test_moving_cylinder_is_detected_within_a_second_and_tracked_to_centimeters(
         position_errors.append(math.dist(moving.centers[0], (x, y)))
         velocity_errors.append(math.dist(moving.velocities[0], (later[0] - x, later[1] - y)))
         assert moving.radii[0] == pytest.approx(radius, abs=0.08)
+        hits = replace(watch.scan, ranges=np.where(watch.tracker.moving_hits, watch.scan.ranges, np.inf)).points()
+        assert len(hits) > 0
+        assert np.hypot(*(hits - (x, y)).T).max() < radius + 0.3
 
     watch.run(2.0, compare)
     assert np.median(position_errors) < 0.04 and max(position_errors) < 0.12
