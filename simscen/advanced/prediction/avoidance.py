@@ -52,7 +52,7 @@ class Avoidance:
     def __init__(self, spec: Prediction, robot: RobotModel, full_speed: float) -> None:
         """Take the parameters, the robot, and the full speed of the controller in m/s."""
         self._spec, self._robot = spec, robot
-        self._speed = max(full_speed, 0.3)
+        self._speed = min(max(full_speed, 0.3), robot.max_linear)
         is_round = robot.circumscribed_radius - robot.inscribed_radius < MAX_ROUND_DIFFERENCE_M
         self._discs = CoveringDiscs(replace(robot, radius=robot.circumscribed_radius) if is_round else robot)
         self._last: Twist | None = None

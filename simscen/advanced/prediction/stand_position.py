@@ -26,11 +26,10 @@ class StandPosition:
 
     def __init__(self, robot: RobotModel, full_speed: float) -> None:
         """Take the robot and its full speed in m/s."""
-        self._speed, self._max_turn_rate = (
-            RETURN_SPEED_RATIO * full_speed,
-            min(RETURN_TURN_RATE_RAD_S, robot.max_angular),
-        )
-        self._can_reverse, self._can_turn_in_place = robot.max_reverse > 0.0, robot.turning_radius == 0.0
+        self._speed = RETURN_SPEED_RATIO * full_speed
+        self._reverse_speed = min(self._speed, robot.max_reverse)
+        self._max_turn_rate = min(RETURN_TURN_RATE_RAD_S, robot.max_angular)
+        self._can_turn_in_place = robot.turning_radius == 0.0
         self._home: Pose2 | None = None
         self._is_away = False
 
@@ -55,10 +54,12 @@ class StandPosition:
             turn = wrap(home.yaw - pose.yaw)
             return Twist(0.0, 0.0, self._turn_rate(turn)) if abs(turn) > ARRIVED_RAD else STOP
         bearing = wrap(math.atan2(home.y - pose.y, home.x - pose.x) - pose.yaw)
-        sign = -1.0 if abs(bearing) > math.pi / 2 and self._can_reverse else 1.0
-        deviation = wrap(bearing + math.pi) if sign < 0 else bearing
-        speed = min(self._speed, RETURN_GAIN_PER_S * distance) if abs(deviation) < MAX_BEARING_RAD else 0.0
-        return Twist(sign * speed, 0.0, self._turn_rate(deviation))
+        backward = abs(bearing) > math.pi / 2 and self._reverse_speed > 0.0
+        deviation = wrap(bearing + math.pi) if backward else bearing
+        if abs(deviation) >= MAX_BEARING_RAD:
+            return Twist(0.0, 0.0, self._turn_rate(deviation))
+        speed = min(self._reverse_speed if backward else self._speed, RETURN_GAIN_PER_S * distance)
+        return Twist(-speed if backward else speed, 0.0, self._turn_rate(deviation))
 
     def _turn_rate(self, angle: float) -> float:
         """Return the turn rate in rad/s for turning by an angle in rad."""

@@ -81,8 +81,9 @@ BACKUP_TURN_RATES_RAD_S = (0.0, 0.3, -0.3, 0.6, -0.6)
 class RotationClearance:
     """Checks whether a robot has room to rotate in place, and finds a command to back up if it has not."""
 
-    def __init__(self, footprint: Footprint) -> None:
-        self._footprint = footprint
+    def __init__(self, footprint: Footprint, max_reverse: float) -> None:
+        """Take the footprint, and the maximum speed in m/s of driving backward."""
+        self._footprint, self._backup_speed = footprint, min(BACKUP_SPEED_M_S, max_reverse)
 
     def has_room(self, angle: float, pose: Pose2, costmap: CostmapView) -> bool:
         """Return whether a rotation by `angle` rad keeps the required clearance, or the current one if smaller."""
@@ -97,8 +98,8 @@ class RotationClearance:
 
     def backup_command(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
         """Return the command to back up, with the first turn rate that is free of collisions; None if there is none."""
-        for turn_rate in BACKUP_TURN_RATES_RAD_S:
-            command = Twist(-BACKUP_SPEED_M_S, 0.0, turn_rate)
+        for turn_rate in BACKUP_TURN_RATES_RAD_S if self._backup_speed > 0.0 else ():
+            command = Twist(-self._backup_speed, 0.0, turn_rate)
             if time_to_collision(self._footprint, costmap, pose, command, BACKUP_FREE_TIME_S) >= BACKUP_FREE_TIME_S:
                 return command
         return None

@@ -67,7 +67,7 @@ class RegulatedPurePursuit(PathFollower):
             robot, spec.rotate_to_heading_angular_vel, spec.max_angular_accel, period, spec.goal_tolerance_ratio
         )
         self._collision_checker = CollisionChecker(footprint, spec.min_slowed_speed)
-        self._rotation_clearance = RotationClearance(footprint)
+        self._rotation_clearance = RotationClearance(footprint, robot.max_reverse)
         self._speed_regulation = SpeedRegulation(spec, setting)
         self.arc: tuple[Pose2, Twist] | None = None
         """Pose and velocity of the last command."""

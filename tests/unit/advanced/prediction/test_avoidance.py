@@ -11,6 +11,7 @@ import pytest
 from simscen.advanced.prediction import avoidance
 from simscen.advanced.prediction.avoidance import Avoidance
 from simscen.advanced.prediction.followed_path import FollowedPath
+from simscen.advanced.prediction.stand_position import StandPosition
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.goals import Goal
@@ -188,3 +189,18 @@ def test_a_command_is_as_risky_sideways_as_forward(heading: float) -> None:
         for name, command in commands.items()
     }
     assert kept == {"forward": False, "sideways": False, "rest": True}
+
+
+@pytest.mark.parametrize(("max_reverse", "speed"), [(0.1, -0.1), (1.0, -0.3), (0.0, 0.0)])
+def test_robot_returns_to_its_position_within_its_reverse_speed(max_reverse: float, speed: float) -> None:
+    position = StandPosition(replace(box_robot(), max_reverse=max_reverse), 1.0)
+    position.remember(Pose2(0.0, 0.0), has_moving_obstacles=True)
+    assert position.return_command(Pose2(1.0, 0.0)).vx == pytest.approx(speed)
+
+
+def test_slow_robot_avoids_obstacles_within_its_speed() -> None:
+    moving = MovingObstacles([MovingObstacle(-0.9 + 0.0j, 0.5 + 0.0j, 0.3, 1e-4, 0.0, 1e-3)], 1.0)
+    costmap = CostmapView(np.zeros((200, 200), np.uint8), np.full((200, 200), 2.0, np.float32), 0.05, (-5.0, -5.0))
+    avoidance_of_slow_robot = Avoidance(Prediction(), replace(box_robot(), max_linear=0.2), 0.2)
+    command = avoidance_of_slow_robot.steer(STOP, Pose2(0.0, 0.0), STOP, moving, costmap, None)
+    assert 0.0 < command.vx <= 0.2

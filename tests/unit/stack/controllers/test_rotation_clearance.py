@@ -1,6 +1,7 @@
 """Tests of the free space for turns in place."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -24,7 +25,7 @@ def seen(world: Flatland, robot: RobotModel) -> CostmapView:
 
 
 def room_of(robot: RobotModel) -> RotationClearance:
-    return RotationClearance(Footprint(robot, 0.05))
+    return RotationClearance(Footprint(robot, 0.05), robot.max_reverse)
 
 
 @pytest.mark.parametrize(("gap", "room"), [(0.02, False), (0.20, True)])
@@ -67,6 +68,12 @@ def test_robot_backs_out_along_an_arc_around_an_obstacle_behind_it(side: int) ->
 def test_robot_with_a_wall_behind_it_does_not_back_out() -> None:
     closed = Flatland([*SLOT.boxes, (-0.6, -0.5, -0.5, 0.5)])
     assert room_of(LONG).backup_command(HERE, seen(closed, LONG)) is None
+
+
+@pytest.mark.parametrize(("max_reverse", "speed"), [(0.1, 0.1), (1.0, 0.15), (0.0, None)])
+def test_robot_backs_out_at_most_at_its_reverse_speed(max_reverse: float, speed: float | None) -> None:
+    back = room_of(replace(LONG, max_reverse=max_reverse)).backup_command(HERE, seen(SLOT, LONG))
+    assert (None if back is None else -back.vx) == speed
 
 
 def test_a_round_robot_can_always_turn() -> None:
