@@ -21,9 +21,8 @@ def split_by_robot(tree: MappingNode) -> dict[str, MappingNode]:
 def has_valid_robots(tree: MappingNode) -> bool:
     """Return whether a scenario has the key `robots`, and its value is a mapping from names to mappings."""
     robots = child(tree, ROBOTS)
-    return isinstance(robots, MappingNode) and all(
-        isinstance(entry.value, MappingNode) for entry in robots.entries.values()
-    )
+    values = [entry.value for entry in entries_of(robots).values()]
+    return isinstance(robots, MappingNode) and all(isinstance(value, MappingNode) for value in values)
 
 
 def _single_robot_tree(tree: MappingNode, entry: Entry) -> MappingNode:

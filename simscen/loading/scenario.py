@@ -76,12 +76,8 @@ def try_variations(
         return library.with_source(sorted(problems))
     tried = [(variation, _load_variation(variation, library, file, choice)) for variation in variations]
     if any(isinstance(found, list) for _, found in tried):
-        return merge_problems(
-            [
-                VariationProblems(one.name, one.varied_paths, found if isinstance(found, list) else ())
-                for one, found in tried
-            ]
-        )
+        problems_of = ((one, found if isinstance(found, list) else ()) for one, found in tried)
+        return merge_problems([VariationProblems(one.name, one.varied_paths, found) for one, found in problems_of])
     return tuple(found for _, found in tried if isinstance(found, LoadedScenario))
 
 
@@ -147,9 +143,8 @@ def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Pat
         message, hint = f"its id would end in {name!r}: not a folder name", "give the file a name before the suffix"
         return [Problem(sandbox.display_name(file), 0, 0, "SC041", message, hint)]
     tree, problems = library.read(file, defaults=True)
-    if kind := recognize_stack_file(
-        tree, library.texts.get(display_name := sandbox.display_name(file), ""), display_name
-    ):
+    display_name = sandbox.display_name(file)
+    if kind := recognize_stack_file(tree, library.texts.get(display_name, ""), display_name):
         return [not_a_scenario(kind, display_name)]
     if choice is not None:
         library.add(choice.texts, choice.files)
@@ -179,9 +174,8 @@ def _load_variation(
         return library.with_source(sorted([*spec, *assets.problems]))
     if problems := ROBOT_NAMES.problems(tree, spec):
         return library.with_source(problems)
-    loaded = (
-        _load_multi_robot(spec, tree, library, file) if spec.robots else _load_single_robot(spec, tree, library, file)
-    )
+    load = _load_multi_robot if spec.robots else _load_single_robot
+    loaded = load(spec, tree, library, file)
     if isinstance(loaded, list):
         return loaded
     notes = (*loaded.notes, *library.with_source(expanded_tree.notes), *(choice.notes if choice is not None else ()))

@@ -1,7 +1,6 @@
 """Checks of the places, regions, and motions in a world file against the geometry of the built world."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from simscen.core.environment.world_model import World
 from simscen.core.errors import Problem
@@ -27,9 +26,12 @@ def check_built_world(world: World, source: LoadedWorld) -> list[Problem]:
 @BUILT_WORLD.check("SC314", severity="warning")
 def places_in_obstacles(world: World, spec: WorldSpec) -> Iterator[CheckProblem]:
     """Find places inside obstacles."""
-    world = _without_platforms(world) if spec.ramps else world
+    from simscen.worlds.geometry.drive_obstacles import drive_obstacles
+
+    limits = RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_MAX_SLOPE_RAD, RAMP_ROBOT_MAX_STEP_M
+    solids = drive_obstacles(world.solids, *limits) if spec.ramps else world.solids
     for name, place in spec.places.items():
-        solid = first_solid_in_disc(world.solids, (place.x, place.y), TOUCH_M, BLOCKING_HEIGHTS_M)
+        solid = first_solid_in_disc(solids, (place.x, place.y), TOUCH_M, BLOCKING_HEIGHTS_M)
         if solid is not None:
             message = f'place {quoted(name)} is inside obstacle "{solid}"'
             yield CheckProblem(("places", name), message, at_key=True)
@@ -54,11 +56,3 @@ def regions_outside_the_world(world: World, spec: WorldSpec) -> Iterator[CheckPr
         if max(xs) < left or min(xs) > right or max(ys) < bottom or min(ys) > top:
             message = f"region {quoted(name)} is outside the world ({left:g} … {right:g}, {bottom:g} … {top:g})"
             yield CheckProblem(("regions", name), message, at_key=True)
-
-
-def _without_platforms(world: World) -> World:
-    """Return the world without the solids that the assumed robot can climb."""
-    from simscen.worlds.geometry.drive_obstacles import drive_obstacles
-
-    solids = drive_obstacles(world.solids, RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_MAX_SLOPE_RAD, RAMP_ROBOT_MAX_STEP_M)
-    return replace(world, solids=solids)

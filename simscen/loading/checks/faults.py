@@ -127,9 +127,7 @@ def resampling_after_delay(scope: NameScope) -> Iterator[CheckProblem]:
     faults = loaded.spec.faults
     for index, entry, targets in _listed_faults(loaded):
         target = targets.get(entry.sensor)
-        before = [
-            fault.label for fault in faults[:index] if fault.sensor == entry.sensor and fault.kind in ("delay", "stuck")
-        ]
+        before = [one.label for one in faults[:index] if one.sensor == entry.sensor and one.kind in ("delay", "stuck")]
         resamples = entry.kind in RESAMPLING_FAULTS and target is not None and target.kind in ("Scan", "Image")
         if resamples and before:
             message = f"`{entry.label}` has no effect: `{before[0]}` before it holds the measurements back"

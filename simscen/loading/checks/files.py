@@ -50,9 +50,7 @@ def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = (
         loaded = try_variations(file, root, world_path, numbers=CHECKED_DRAWS if kind == "study" else None)
         if isinstance(loaded, list):
             return loaded
-        return merge_problems(
-            [VariationProblems(scenario.variation, scenario.varied_paths, scenario.notes) for scenario in loaded]
-        )
+        return merge_problems([VariationProblems(one.variation, one.varied_paths, one.notes) for one in loaded])
     library = Library(PathSandbox.around(root, world_path))
     if isinstance(path := library.sandbox.resolve_argument(file), Problem):
         return [path]
@@ -86,9 +84,8 @@ def file_kind(file: Path, root: Path) -> str:
     tree, _ = library.read(file.absolute())
     if is_ros_map(tree):
         return "map"
-    if kind := recognize_stack_file(
-        tree, "".join(library.texts.values()), library.sandbox.display_name(file.absolute())
-    ):
+    display_name = library.sandbox.display_name(file.absolute())
+    if kind := recognize_stack_file(tree, "".join(library.texts.values()), display_name):
         return "stack" if kind == STACK_FILE_KIND else kind
     keys = entries_of(tree).keys()
     if keys & _SCENARIO_KEYS:

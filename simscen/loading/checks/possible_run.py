@@ -177,9 +177,8 @@ class PossibleRun:
 
     def _why_never_localization_error(self, error: Any) -> str | None:
         stack = self.loaded.spec.stack
-        is_displaced = self.may_do("kidnap") or any(
-            KIND_BY_TARGET_NAME.get(fault.sensor) == BELIEF for fault in self.loaded.spec.faults
-        )
+        targets = [KIND_BY_TARGET_NAME.get(fault.sensor) for fault in self.loaded.spec.faults]
+        is_displaced = self.may_do("kidnap") or BELIEF in targets
         gets_truth = isinstance(stack, StackSpec) and stack.gets_ground_truth and not is_displaced
         too_large = getattr(error, "root", error) >= MAX_TRUTH_ERROR_M
         return "the localizer gets the true pose" if gets_truth and too_large else None

@@ -150,8 +150,13 @@ class Assets:
         if spec is None or tree is None:
             return None
         image = self._find(spec.image, value_position(tree, ("image",)))
-        notes = tuple(self.library.with_source(_ignored_key_warnings(tree)))
-        return LoadedMap(path, spec, image, notes) if image else None
+        notes = []
+        for key, entry in entries_of(tree).items():
+            if key not in RosMapSpec.model_fields:
+                hint = did_you_mean(key, RosMapSpec.model_fields) or "it is ignored, as by map_server"
+                message = f"{quoted(key)} has no meaning in a ROS map"
+                notes.append(Problem(*entry.key, "SC311", message, hint, "warning"))
+        return LoadedMap(path, spec, image, tuple(self.library.with_source(notes))) if image else None
 
     def _read_tree(self, path: Path) -> Node | None:
         tree, problems = self.library.read(path)
@@ -181,16 +186,6 @@ class Assets:
 def is_ros_map(tree: Node | None) -> bool:
     """Return whether a YAML tree is the content of a ROS map file, as map_server reads it."""
     return {"image", "resolution"} <= entries_of(tree).keys()
-
-
-def _ignored_key_warnings(tree: Node) -> list[Problem]:
-    warnings = []
-    for key, entry in entries_of(tree).items():
-        if key not in RosMapSpec.model_fields:
-            hint = did_you_mean(key, RosMapSpec.model_fields) or "it is ignored, as by map_server"
-            message = f"{quoted(key)} has no meaning in a ROS map"
-            warnings.append(Problem(*entry.key, "SC311", message, hint, "warning"))
-    return warnings
 
 
 def shipped_robots() -> dict[str, Path]:

@@ -45,9 +45,8 @@ class PathSandbox:
             return problem
         if written.startswith(MODEL_SCHEME):
             message = f"{quoted(written)} was not found in any folder of --world-path"
-            missing = Problem(
-                *position, "SC023", message, "" if self.world_path else "allow its folder with --world-path"
-            )
+            hint = "" if self.world_path else "allow its folder with --world-path"
+            missing = Problem(*position, "SC023", message, hint)
             return self._in_world_path(written.removeprefix(MODEL_SCHEME)) or missing
         path = _resolved(folder / written)
         if not self.contains(path):

@@ -63,7 +63,9 @@ def replace_stack(tree: MappingNode, choice: StackChoice) -> MappingNode:
     if own is not None and not isinstance(own, MappingNode):
         return tree  # validation reports the wrong type
     own = own or MappingNode(tree.position, {})
-    if choice.section is None and _has_type(own, choice.type):
+    written = child(own, "type")
+    own_type = "" if EXTERNAL in own.entries else REFERENCE if written is None else written.plain
+    if choice.section is None and choice.type and own_type == choice.type:
         return tree
     return tree.with_value(("stack",), _replaced_section(own, choice), tree.position)
 
@@ -72,9 +74,8 @@ def _replaced_section(own: MappingNode, choice: StackChoice) -> MappingNode:
     """Return the section `stack` of the choice, with the values of the scenario's section `own` that are kept."""
     scenario_entries = {name: own.entries[name] for name in SCENARIO_KEYS if name in own.entries}
     if choice.section is not None:
-        return _with_goal_tolerances(
-            MappingNode(choice.section.position, {**choice.section.entries, **scenario_entries}), own
-        )
+        entries = {**choice.section.entries, **scenario_entries}
+        return _with_goal_tolerances(MappingNode(choice.section.position, entries), own)
     position = Position(f"--stack {choice.written}", 0, 0)
     if choice.external_command is not None:
         named = {EXTERNAL: Entry(position, ScalarNode(position, choice.name))}
@@ -97,10 +98,3 @@ def _with_goal_tolerances(section: MappingNode, own: MappingNode) -> MappingNode
     merged = MappingNode(checker.position, {**(replaced.entries if replaced else {}), **tolerances})
     entry = Entry(own.entries[GOAL_CHECKER].key, merged)
     return MappingNode(section.position, {**section.entries, GOAL_CHECKER: entry})
-
-
-def _has_type(section: MappingNode, stack_type: str) -> bool:
-    """Return whether a section `stack` selects this type of stack; False for an external stack."""
-    written = child(section, "type")
-    selected = REFERENCE if written is None else written.plain
-    return EXTERNAL not in section.entries and selected == stack_type

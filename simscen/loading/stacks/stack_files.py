@@ -27,9 +27,8 @@ def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: S
     if isinstance(found, list):
         raise InvalidInput(found)
     section, notes = found
-    return StackChoice(
-        name, value, "", path.absolute(), section, dict(library.texts), dict(library.files), notes=tuple(notes)
-    )
+    texts, files = dict(library.texts), dict(library.files)
+    return StackChoice(name, value, "", path.absolute(), section, texts, files, notes=tuple(notes))
 
 
 def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Problem]] | list[Problem]:

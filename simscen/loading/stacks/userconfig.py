@@ -41,9 +41,8 @@ class UserConfig:
         if not is_folder(working_folder):
             raise self._invalid((name, "cwd"), "no such folder", "")
         try:
-            return parse_command(
-                stack.command, environment, working_folder, stack.env, (stack.start_limit, stack.answer_limit)
-            )
+            timeouts = stack.start_limit, stack.answer_limit
+            return parse_command(stack.command, environment, working_folder, stack.env, timeouts)
         except ValueError as error:
             hint = "" if stack.cwd is None else f"it starts in {working_folder}"
             raise self._invalid((name, "command"), str(error), hint) from error

@@ -14,7 +14,7 @@ from typing import Any
 from simscen.core.geometry import wrap
 from simscen.loading.variations.options import Change
 from simscen.loading.variations.paths import PathError, resolve_path
-from simscen.loading.yaml.tree import MappingNode, Node, child
+from simscen.loading.yaml.tree import MappingNode, existing_keys, node_at
 from simscen.spec.quantities import si_number
 
 # What conditions can contain, besides `and`, `or`, and `not`.
@@ -168,7 +168,4 @@ def written_value(tree: MappingNode, path: str) -> Any:
         keys = resolve_path(path, tree.position, tree).keys
     except PathError:
         return None
-    node: Node | None = tree
-    for key in keys:
-        node = child(node, key)
-    return None if node is None else node.plain
+    return node_at(tree, keys).plain if existing_keys(tree, keys) == keys else None

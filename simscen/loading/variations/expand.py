@@ -128,9 +128,8 @@ class VariationSpace:
         """Return the first `count` variations of `numbers()`, named by values that differ. Raises ConditionError."""
         numbers = list(itertools.islice(self.numbers(), self.count))
         chosen = [options for number in numbers if (options := self._options(number)) is not None]
-        values = [
-            {change.target.path: change.value.plain for o in options for change in o.changes} for options in chosen
-        ]
+        changes = [[change for option in options for change in option.changes] for options in chosen]
+        values = [{change.target.path: change.value.plain for change in each} for each in changes]
         differ = {path for path in self.targets if any(value.get(path) != values[0].get(path) for value in values)}
         all_targets = list(self.targets.values())
         named_targets = [target for target in all_targets if target.keys[0] not in _DESCRIPTIVE_KEYS] or all_targets

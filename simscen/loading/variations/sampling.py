@@ -106,9 +106,8 @@ def _truncated_normal_quantile(normal: Normal, u: float) -> Any:
     min_probability, max_probability = distribution.cdf(low) if ends else 0.0, distribution.cdf(high) if ends else 1.0
     if max_probability - min_probability < 1e-12:
         raise ValueError("the range from `min` to `max` is too many `std` away from `mean`")
-    return _with_unit(
-        min(max(distribution.inv_cdf(min_probability + u * (max_probability - min_probability)), low), high), unit
-    )
+    number = distribution.inv_cdf(min_probability + u * (max_probability - min_probability))
+    return _with_unit(min(max(number, low), high), unit)
 
 
 def _with_unit(number: float, unit: str) -> Any:

@@ -20,7 +20,10 @@ class Dumper(yaml.SafeDumper):
     def resolve(self, kind: type[yaml.Node], value: Any, implicit: Any) -> Any:
         """Return the tag of a node. For a scalar without quotes, `parse_scalar` determines the tag."""
         if kind is yaml.ScalarNode and implicit[0]:
-            return f"tag:yaml.org,2002:{_plain_type(value)}"
+            try:
+                return f"tag:yaml.org,2002:{_TAGS[type(parse_scalar(value))]}"
+            except ValueError:  # an integer that parse_scalar rejects
+                return "tag:yaml.org,2002:int"
         return super().resolve(kind, value, implicit)  # type: ignore[no-untyped-call]
 
     def ignore_aliases(self, data: Any) -> bool:
@@ -34,13 +37,6 @@ def to_yaml(data: Any, dumper: type[Dumper] = Dumper) -> str:
     if _NEEDS_ESCAPES.search(text):
         text = yaml.dump(data, Dumper=dumper, sort_keys=False, allow_unicode=False, width=1000)
     return text
-
-
-def _plain_type(text: str) -> str:
-    try:
-        return _TAGS[type(parse_scalar(text))]
-    except ValueError:  # an integer that parse_scalar rejects
-        return "int"
 
 
 class CompactDumper(Dumper):
