@@ -19,6 +19,8 @@ from simscen.core.messages.navigation import Belief, Path
 from simscen.core.records.events import Event
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy as np
 
 
@@ -74,7 +76,7 @@ class Situation(Protocol):
         """Newest pose estimate that the stack published; None before the first one."""
 
     @property
-    def events(self) -> tuple[Event, ...]:
+    def events(self) -> Sequence[Event]:
         """All events so far, oldest first."""
 
     @property

@@ -1,5 +1,6 @@
 """Start the events and faults of a scenario when their triggers fire, and end the faults when their time is over."""
 
+from collections.abc import Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -127,7 +128,6 @@ class TriggerState:
         return not self._remaining and not self._scheduled
 
     def _has_edge(self, now: Situation) -> bool:
-        """Return whether the condition has changed in the direction that fires the trigger."""
         before, self._was_true = self._was_true, self._condition.holds(now)
         return self._was_true != before and self._was_true == (self._trigger.edge == "rising")
 
@@ -186,7 +186,7 @@ class RelativeSituation:
         return self._now.travelled - self._initial_distance
 
     @property
-    def events(self) -> tuple[Event, ...]:
+    def events(self) -> Sequence[Event]:
         """Events since the previous step."""
         return self._now.events[self._initial_event_count :]
 
@@ -199,5 +199,4 @@ class RelativeSituation:
         return (0 if last is None else last) - self._start_tick
 
     def __getattr__(self, name: str) -> Any:
-        """Return any other attribute of the situation, such as the robot's pose."""
         return getattr(self._now, name)

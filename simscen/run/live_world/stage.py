@@ -28,7 +28,7 @@ from simscen.stack.validation.stack import CheckedStack
 
 
 class LiveStage:
-    """Interface of triggers and actions for one robot. Implements core.stage.Stage, and keeps the robot's events.
+    """Interface of triggers and actions for one robot, as core.stage.Stage describes it. Keeps the robot's events.
 
     An order is what an action tells the robot's stack: a new goal, a cancellation, or a change of zones. Orders are
     delivered at the beats of the robot (ticks at which a sensor, its stack, or a truth sample is due).
@@ -60,17 +60,13 @@ class LiveStage:
         self._goals = {goal.name: goal for goal in goals}
         self._update_pose()
         self.belief: Belief | None = None
-        """Last belief (pose estimate) of the stack, or None."""
         self.clearance: float | None = None
-        """Clearance in m at the last truth sample, up to the measuring range (`Case.clearance_range`), or None."""
         self.travelled = 0.0
-        """Driven distance in m, without teleportations."""
         self._scan_ticks: dict[str, int] = {}
         self._is_due = True
         self.pending_orders: list[Callable[[int], None]] = []
         """Orders for the robot's next beat: functions that take the current tick."""
-        self.events: tuple[Event, ...] = ()
-        """All events so far."""
+        self.events: list[Event] = []
         self.new_events: list[Event] = []
         """Events since the last call of `take_events`."""
         self.is_observed = True
@@ -125,118 +121,91 @@ class LiveStage:
     # Observed by triggers
 
     def last_scan_tick(self, sensor: str | None) -> int | None:
-        """Return the tick at which the stack last received a scan of a lidar (None: any lidar), or None."""
         return max(self._scan_ticks.values(), default=None) if sensor is None else self._scan_ticks.get(sensor)
 
     @property
     def tick(self) -> int:
-        """Simulated time in ticks."""
         return self._simulation.tick
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """Names of all robots; empty if there is only one robot."""
         return tuple(self._stages) if len(self._stages) > 1 else ()
 
     def of(self, robot: str) -> "LiveStage":
-        """Return the stage of the robot with this name."""
         return self._stages[robot]
 
     @property
     def robot(self) -> Pose2:
-        """True pose of the robot."""
         return self._pose.plane
 
     @property
     def plan(self) -> Path | None:
-        """Plan that the robot follows, or None."""
         return self._stack.plan
 
     @property
     def goal(self) -> Goal | None:
-        """Goal that the robot drives to, or None."""
         return self._stack.goal
 
     def region(self, name: str) -> Polygon:
-        """Return the polygon of a region of the world."""
         return self._world.regions[name]
 
     def object(self, name: str) -> Pose2 | None:
-        """Return the pose of an object, or None if it does not exist."""
         pose = self._simulation.object_pose(name)
         return pose.plane if pose else None
 
     # Changed by actions
 
     def spawn(self, body: Body) -> None:
-        """Add a body to the world; replaces a body of the same name."""
         if self._simulation.object_pose(body.name):
             self.remove(body.name)
         self._simulation.spawn(body)
         self.record_world_event(Event(0, EventKind.OBJECT_SPAWNED, body.name, body_data(body)))
 
     def remove(self, name: str) -> None:
-        """Remove a body from the world."""
         self._pedestrians.remove(name)
         self._simulation.remove(name)
         self.record_world_event(Event(0, EventKind.OBJECT_REMOVED, name))
 
     def add_pedestrian(self, walker: WalkingPedestrian) -> None:
-        """Add a pedestrian; replaces a body of the same name."""
         if self._simulation.object_pose(walker.name):
             self.remove(walker.name)
         data = {**body_data(self._pedestrians.add(walker)), "person": True, "behavior": walker.behavior}
         self.record_world_event(Event(0, EventKind.OBJECT_SPAWNED, walker.name, data))
 
     def has_room(self, place: tuple[float, float], radius: float, walls_only: bool = False) -> bool:
-        """Return whether a pedestrian with this radius in m fits at a position (x, y) in m.
-
-        `walls_only` ignores objects, robots, and other pedestrians.
-        """
         return self._pedestrians.has_room(place, radius, walls_only)
 
     def rng(self, name: str) -> np.random.Generator:
-        """Return a new generator for the random stream with this name."""
         return self._streams.generator(name)
 
     def door(self, name: str) -> tuple[Pose2, Pose2]:
-        """Return the closed pose and the open pose of a door panel."""
         return self._world.doors[name]
 
     def move(self, name: str, path: MotionPath) -> None:
-        """Let a body follow a path from now on."""
         self._pedestrians.remove(name)
         self._simulation.move(name, path)
         self.record_world_event(Event(0, EventKind.OBJECT_MOVED, name, path_data(path)))
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """Return the path that an object follows and the seconds since its start; None if it follows no path.
-
-        A pedestrian's path is unknown: it is returned as a path that stays at the current pose.
-        """
         pose = self.object(name)
         if pose is not None and self._pedestrians.simulates(name):
             return MotionPath((0.0, 1.0), (pose, pose), "loop"), 0.0
         return self._simulation.motion(name)
 
     def mass(self, name: str) -> float:
-        """Return the mass of an object in kg, or 0 if it cannot be pushed."""
         return self._simulation.mass(name)
 
     def place(self, name: str, pose: Pose2) -> None:
-        """Teleport an object to a pose."""
         self._pedestrians.remove(name)
         self._simulation.place(name, pose)
         self.record_world_event(Event(0, EventKind.OBJECT_PLACED, name, pose_data(pose)))
 
     def place_robot(self, pose: Pose2) -> None:
-        """Teleport the robot to a pose."""
         self._simulation.place_robot(self._robot.name, pose)
         self._update_pose()
         self.record_event(Event(0, EventKind.ROBOT_PLACED, "", pose_data(pose)))
 
     def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
-        """Push an object (None: the robot) with an impulse in N s (x, y in the world frame), spread over `seconds`."""
         if name is not None:
             self._simulation.push_object(name, impulse, seconds)
         else:
@@ -246,7 +215,6 @@ class LiveStage:
         (self.record_event if name is None else self.record_world_event)(Event(0, kind, name or "", data))
 
     def add_friction_patch(self, name: str, patch: Patch) -> None:
-        """Change the friction of an area of the floor; replaces a patch of the same name."""
         self._simulation.add_friction_patch(name, patch)
         outline: list[Value] = [[round(x, 3), round(y, 3)] for x, y in patch.outline]
         data: dict[str, Value] = {"outline": outline, "friction": patch.friction}
@@ -254,21 +222,17 @@ class LiveStage:
         self.record_world_event(Event(0, EventKind.FLOOR_CHANGED, name, data))
 
     def send_goal(self, name: str) -> None:
-        """Preempt the current goal by the goal with this name."""
         goal = self._goals[name]
         self._send_order(lambda tick: self._stack.preempt(tick, goal))
 
     def cancel_goal(self) -> None:
-        """Cancel the current goal and all following goals."""
         self._send_order(self._stack.cancel)
 
     def record_world_event(self, event: Event) -> None:
-        """Add an event of the world to the events of all robots."""
         for stage in self._stages.values():
             stage.record_event(event)
 
     def switch_zone(self, order: ZoneSwitch) -> str:
-        """Switch a zone of a costmap filter. Return the reason if this has no effect, else ""."""
         if not isinstance(self._stack, CheckedStack | ExternalStack) or not self._stack.can_switch_zones:
             return "the stack does not support switching zones"
         if reason := self._filters.rejection_reason(order):
@@ -283,7 +247,6 @@ class LiveStage:
         return ""
 
     def record_event(self, event: Event) -> None:
-        """Add an event to the events of this robot. An event with tick 0 gets the current tick."""
         stamped = event if event.tick else replace(event, tick=self.tick)
         self.new_events.append(stamped)
-        self.events += (stamped,)
+        self.events.append(stamped)
