@@ -3,7 +3,7 @@
 The rules apply to parameter files and to running nodes. https://docs.nav2.org/configuration/ describes the parameters.
 """
 
-from typing import Any, Collection, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Collection, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 MAP, ODOM = "map", "odom"
 
@@ -34,8 +34,13 @@ class PublishedNames(NamedTuple):
 
 Parameters = Mapping[str, Any]
 """Parameters of one node by dotted name, e.g. `obstacle_layer.scan.topic`."""
-COSTMAPS = {"local_costmap": ODOM, "global_costmap": MAP}
-"""Nodes of Nav2's costmaps, and their usual global frames."""
+COSTMAPS = ("global_costmap", "local_costmap")
+"""Nodes of Nav2's costmaps."""
+CHECKED_NODES = (
+    *("amcl", "bt_navigator", "controller_server", "velocity_smoother", "behavior_server", "collision_monitor"),
+    *COSTMAPS,
+)
+"""Nodes whose frames and topics are checked."""
 Subscriptions = Mapping[str, Collection[str]]
 """Topics to which each node subscribes, by name of the node."""
 
@@ -54,8 +59,21 @@ def check(
         node = _Node(name, nodes[name], published, subscribed, problems)
         if node.get("use_sim_time") is False:
             node.add_problem("use_sim_time", "is false: the node would use wall time", is_severe=False)
-        if name in RULES:
-            RULES[name](node)
+        if name not in CHECKED_NODES:
+            continue
+        for key in ("base_frame_id", "robot_base_frame"):
+            node.check_base(key)
+        for key in ("odom_frame_id", "local_frame"):
+            node.check_frame(key, ODOM)
+        node.check_frame("global_frame_id", MAP)
+        node.check_frame("global_frame", *([MAP] if name == "bt_navigator" else [MAP, ODOM]))
+        node.check_topic("scan_topic", published.scans, "scans")
+        node.check_topic("odom_topic", [published.odometry], "odometry")
+        if name in COSTMAPS:
+            _check_costmap_layers(node)
+        if name == "collision_monitor":
+            for source in node.items("observation_sources"):
+                _check_source(node, str(source))
     return problems
 
 
@@ -100,7 +118,6 @@ class _Node(NamedTuple):
         return []
 
     def add_problem(self, key: str, message: str, is_severe: bool = True) -> None:
-        """Add a problem of the parameter `key`."""
         self.problems.append(ParameterProblem(self.name, key, f"{key} {message}", is_severe))
 
     def check_base(self, key: str) -> None:
@@ -127,16 +144,7 @@ class _Node(NamedTuple):
             self.add_problem(key, f"is {value!r}, which no node publishes; simscen's {kind}: {available}")
 
 
-def _check_amcl(node: _Node) -> None:
-    node.check_base("base_frame_id")
-    node.check_frame("odom_frame_id", ODOM)
-    node.check_frame("global_frame_id", MAP)
-    node.check_topic("scan_topic", node.published.scans, "scans")
-
-
-def _check_costmap(node: _Node) -> None:
-    node.check_base("robot_base_frame")
-    node.check_frame("global_frame", MAP, ODOM)
+def _check_costmap_layers(node: _Node) -> None:
     for layer in node.items("plugins"):
         sources = node.get(f"{layer}.observation_sources")
         for source in sources.split() if isinstance(sources, str) else ():
@@ -153,39 +161,5 @@ def _check_source(node: _Node, source: str) -> None:
         node.add_problem(key, f"is {kind!r}: simscen publishes scans only", is_severe=False)
 
 
-def _check_navigator(node: _Node) -> None:
-    node.check_base("robot_base_frame")
-    node.check_frame("global_frame", MAP)
-    node.check_topic("odom_topic", [node.published.odometry], "odometry")
-
-
-def _check_odometry_topic(node: _Node) -> None:
-    node.check_topic("odom_topic", [node.published.odometry], "odometry")
-
-
-def _check_behavior_server(node: _Node) -> None:
-    node.check_base("robot_base_frame")
-    node.check_frame("local_frame", ODOM)
-    node.check_frame("global_frame", MAP, ODOM)
-
-
-def _check_collision_monitor(node: _Node) -> None:
-    node.check_base("base_frame_id")
-    node.check_frame("odom_frame_id", ODOM)
-    for source in node.items("observation_sources"):
-        _check_source(node, str(source))
-
-
-RULES: Dict[str, Any] = {
-    "amcl": _check_amcl,
-    "local_costmap": _check_costmap,
-    "global_costmap": _check_costmap,
-    "bt_navigator": _check_navigator,
-    "controller_server": _check_odometry_topic,
-    "velocity_smoother": _check_odometry_topic,
-    "behavior_server": _check_behavior_server,
-    "collision_monitor": _check_collision_monitor,
-}
-"""Functions that check the parameters of a node, by name of the node."""
-NODES = ("amcl", "bt_navigator", "controller_server", "planner_server", "behavior_server", *sorted(COSTMAPS))
+NODES = ("amcl", "bt_navigator", "controller_server", "planner_server", "behavior_server", *COSTMAPS)
 """Nodes that a run needs. Another localizer that publishes map -> odom may replace `amcl`."""

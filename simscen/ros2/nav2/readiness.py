@@ -42,7 +42,7 @@ class Nav2Readiness:
 
     def wrong_parameters(self) -> List[str]:
         """Return one text for each severe problem of the parameters of the running nodes."""
-        nodes = [node for node in self._graph.nodes() if node[0] in parameter_rules.RULES]
+        nodes = [node for node in self._graph.nodes() if node[0] in parameter_rules.CHECKED_NODES]
         values = {}
         for node in nodes:
             path = full_name(node)
