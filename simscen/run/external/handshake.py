@@ -4,7 +4,7 @@ docs/reference/stack-protocol.md defines these frames.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from simscen.core.environment.costmap_filters import Zones
@@ -16,7 +16,7 @@ from simscen.core.version import __version__
 from simscen.peer import wire
 from simscen.record.topics import Topic
 from simscen.run.external.protocol import EXACT_SUFFIX, STACK_TOPICS
-from simscen.stack.protocols import RobotModel, Surroundings
+from simscen.stack.protocols import Surroundings
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def hello_content(
         "answer_limit": answer_limit,
         "mode": parameters.mode,
         "robot_name": parameters.robot_name,
-        "robot": _robot_data(surroundings.robot),
+        "robot": {**asdict(surroundings.robot), "footprint": _polygon_data(surroundings.robot.footprint)},
         "map": _grid_data(surroundings.map),
         "keepout": [_polygon_data(area) for area in surroundings.keepout],
         "speed_zones": [{"polygon": _polygon_data(area), "speed_limit": v} for area, v in surroundings.speed_zones],
@@ -112,22 +112,6 @@ def goal_data(goal: Goal) -> dict[str, Any]:
     tolerances = {"xy_tolerance": goal.xy_tolerance, "yaw_tolerance": goal.yaw_tolerance}
     drive = {"timeout": goal.timeout, "via": goal.via, "wait": goal.wait}
     return {"name": goal.name, "x": x, "y": y, "yaw": yaw, **tolerances, **drive}
-
-
-def _robot_data(robot: RobotModel) -> dict[str, Any]:
-    return {
-        "footprint": _polygon_data(robot.footprint),
-        "radius": robot.radius,
-        "max_linear": robot.max_linear,
-        "max_reverse": robot.max_reverse,
-        "max_lateral": robot.max_lateral,
-        "max_angular": robot.max_angular,
-        "linear_acceleration": robot.linear_acceleration,
-        "linear_deceleration": robot.linear_deceleration,
-        "angular_acceleration": robot.angular_acceleration,
-        "turning_radius": robot.turning_radius,
-        "holonomic": robot.holonomic,
-    }
 
 
 def _sensor_data(name: str, parameters: RunParameters) -> dict[str, Any]:
