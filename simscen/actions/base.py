@@ -40,7 +40,6 @@ class WorldAction(Action):
 
     @property
     def is_robot_specific(self) -> bool:
-        """Always False."""
         return False
 
 

@@ -26,6 +26,5 @@ class Mark(Spec, WorldAction):
     """A remark for people who read the log."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Log the mark."""
         stage.record_world_event(Event(0, EventKind.MARK, self.name, {"note": self.note} if self.note else {}))
         return Effect(True, f"marked {self.name}")

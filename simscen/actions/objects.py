@@ -53,7 +53,6 @@ class Spawn(ShapedObject, Action):
 
     @property
     def is_robot_specific(self) -> bool:
-        """Whether the pose depends on the robot."""
         return self.pose is None
 
     def perform(self, stage: Stage) -> Effect:

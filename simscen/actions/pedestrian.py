@@ -153,7 +153,6 @@ class Crowd(_WalkSettings, WorldAction):
 
     @property
     def names(self) -> list[str]:
-        """Names of all people."""
         return [f"{self.name}-{number}" for number in range(1, self.count + 1)]
 
     def perform(self, stage: Stage) -> Effect:
@@ -218,6 +217,5 @@ def _draw_point(
 
 
 def _draw_speed(rng: np.random.Generator) -> float:
-    """Return a random preferred walking speed in m/s."""
     draw = float(rng.standard_normal())
     return MEAN_SPEED_M_S + SPEED_STD_M_S * max(-MAX_SPEED_STDS, min(MAX_SPEED_STDS, draw))

@@ -50,7 +50,6 @@ class FrictionPatch(Spec, WorldAction):
         return self
 
     def perform(self, stage: Stage) -> Effect:
-        """Add the patch."""
         if self.region is not None:
             name, outline, where = self.region, stage.region(self.region), f"in {self.region}"
         else:

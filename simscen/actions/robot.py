@@ -63,7 +63,6 @@ class Push(Spec, Action):
 
     @property
     def is_robot_specific(self) -> bool:
-        """True if the robot is pushed, False for an object."""
         return self.name is None
 
     def perform(self, stage: Stage) -> Effect:
@@ -103,7 +102,6 @@ class NewGoal(Spec, Action):
     """Maximum heading error; default: the tolerance of the stack's goal checker."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Send the goal."""
         stage.send_goal(self.name)
         return Effect(True, f"sent goal {self.name}")
 

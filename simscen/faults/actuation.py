@@ -60,7 +60,6 @@ class Slip(Spec, Fault):
     """Slip ratio of the right wheels."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to reduce the motion of the robot and to enlarge the increments of the odometry."""
         return _SlippingWheels(self, setting.separation)
 
 
@@ -108,12 +107,9 @@ class Gain(Spec, Fault):
     """Ratio of driven to commanded speed of the right wheels; only on `wheels`."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return (key, reason) if `left` or `right` is set although the target has no such wheels."""
         return inapplicable_side(self, target)
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to scale velocity commands."""
-
         def scaled(command: Twist) -> Twist:
             both = Twist(self.linear * command.vx, self.linear * command.vy, self.angular * command.wz)
             if not setting.separation or self.left == self.right == 1:
@@ -151,11 +147,9 @@ class Saturation(Spec, Fault):
     """Maximum speed of the right wheels in both directions; only on `wheels`."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return (key, reason) if `left` or `right` is set although the target has no such wheels."""
         return inapplicable_side(self, target)
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to limit velocity commands."""
         return _LimitedCommands(self, setting)
 
 
@@ -225,7 +219,6 @@ class LowBattery(Spec, Fault):
         return self
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to reduce the maximum speed."""
         start_tick = setting.now()
 
         def limited(command: Twist) -> Twist:

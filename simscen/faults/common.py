@@ -73,7 +73,6 @@ class ChangedReadings(FaultEffect):
         self._change = change
 
     def reading(self, reading: Reading) -> Reading:
-        """Return the changed reading."""
         return self._change(reading)
 
 
@@ -84,7 +83,6 @@ class ChangedRanges(FaultEffect):
         self._ranges = ranges
 
     def reading(self, reading: Reading) -> Reading:
-        """Return the scan with changed ranges. Other readings are returned unchanged."""
         return replace(reading, ranges=self._ranges(reading)) if isinstance(reading, Scan) else reading
 
 
@@ -95,7 +93,6 @@ class ChangedCommands(FaultEffect):
         self._change = change
 
     def command(self, command: Twist) -> Twist:
-        """Return the changed command."""
         return self._change(command)
 
 

@@ -47,13 +47,11 @@ class Garbage(Spec, Fault):
     """Probability that a message is garbage."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return the key "value" and a reason if its value is `empty` or `short`, but messages have a fixed size."""
         if self.value not in WRONG_SIZES or target.kind in ("Scan", "Image"):
             return None
         return "value", f"its messages cannot be {self.value}: they have a fixed number of values"
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to replace messages at random."""
         return ChangedReadings(lambda reading: self._garbage(rng, reading))
 
     def _garbage(self, rng: np.random.Generator, reading: Reading) -> Reading:
@@ -105,7 +103,6 @@ class Stuck(Spec, Fault):
     )
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to repeat the next message."""
         return _RepeatedMessage(STOP if setting.kind == "Wheels" else None)
 
 

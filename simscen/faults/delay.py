@@ -38,7 +38,6 @@ class Delay(Spec, Fault):
     """Largest additional delay; drawn uniformly for each message."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to delay messages."""
         return _DelayedMessages(rng, self, setting)
 
 
@@ -80,7 +79,6 @@ class _DelayedMessages(FaultEffect):
         return apply_correction(belief, self._correction)
 
     def end(self) -> FaultEffect | None:
-        """Return this effect if messages are still in transit, otherwise None."""
         self._ended = True
         return self if self._readings or self._commands or self._corrections else None
 

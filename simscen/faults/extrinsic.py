@@ -48,7 +48,6 @@ class Extrinsic(Spec, Fault):
     """Counterclockwise."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to measure from the wrong pose."""
         error = Pose3.from_rpy(self.x, self.y, self.z, self.roll, self.pitch, self.yaw)
         simulator = setting.simulator
 

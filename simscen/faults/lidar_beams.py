@@ -30,8 +30,6 @@ class BeamDropout(Spec, Fault):
     """Probability that a beam returns nothing."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to remove beams at random."""
-
         def ranges(scan: Scan) -> Array:
             is_lost = rng.random(len(scan.ranges)) < self.probability
             return np.where(is_lost, np.nan, scan.ranges)
@@ -58,12 +56,9 @@ class Sector(Spec, Fault):
         return turn if self.to - self.from_ >= turn - 1e-9 else (self.to - self.from_) % turn
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return (`to`, reason) if the sector has no width."""
         return ("to", "the sector ends where it begins") if not self.width else None
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to remove the beams of the sector from each scan."""
-
         def ranges(scan: Scan) -> Array:
             offsets = np.remainder(scan.angles() - self.from_ + 1e-9, 2 * math.pi)
             return np.where(offsets <= self.width + 2e-9, np.nan, scan.ranges)
@@ -82,14 +77,12 @@ class RangeLimit(Spec, Fault):
     """Largest range or depth that is still measured."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return (`max`, reason) if it is not below the maximum range of the sensor."""
         own = getattr(target.spec, "max_range", None)
         if own is None or self.max < own:
             return None
         return "max", f"{self.max:g} m is no limit: the range of the sensor is {own:g} m"
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to limit the range of readings."""
         return ChangedReadings(self._limited)
 
     def _limited(self, reading: Reading) -> Reading:
@@ -123,15 +116,12 @@ class Ghost(Spec, Fault):
     """Probability that a beam of the window hits the ghost, drawn again for each scan."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return (`range`, reason) if the ghost is outside the range limits of the lidar."""
         nearest, farthest = (getattr(target.spec, key, None) for key in ("min_range", "max_range"))
         if nearest is None or farthest is None or nearest <= self.range <= farthest:
             return None
         return "range", f"the sensor measures from {nearest:g} m to {farthest:g} m"
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to add the ghost to scans at random."""
-
         def ranges(scan: Scan) -> Array:
             offsets = np.remainder(scan.angles() - self.direction + math.pi, 2 * math.pi) - math.pi
             is_hit = (np.abs(offsets) <= self.width / 2) & (rng.random(len(offsets)) < self.probability)

@@ -39,7 +39,6 @@ class Glass(Spec, Fault):
     """Probability that a beam passes through the objects."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to make the named objects transparent."""
         simulator = setting.simulator
         assert simulator is not None  # a lidar has one
 
@@ -71,7 +70,6 @@ class Rain(Spec, Fault):
     """Reflectivity of all surfaces: 90 % is white, 10 % black."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to attenuate beams and to add range errors."""
         relative_std = 0.02 * float((1 - np.exp(-self.rate / MM_PER_HOUR)) ** 2)
         extinction = float(0.01 * (self.rate / MM_PER_HOUR) ** 0.6)
 
@@ -102,8 +100,6 @@ class Dust(Spec, Fault):
     """Mean distance that a beam travels in free space before it hits a particle."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to shorten beams at random."""
-
         def ranges(scan: Scan) -> Array:
             particles = np.round(rng.exponential(self.mean_free_path, len(scan.ranges)), 3)
             with np.errstate(invalid="ignore"):

@@ -41,7 +41,6 @@ class Jump(Spec, Fault):
     """Counterclockwise."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to shift each belief."""
         return _ShiftedBelief(Pose2(self.x, self.y, self.yaw))
 
 
@@ -76,7 +75,6 @@ class Shift(Spec, Fault):
     """Counterclockwise."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to shift the map that the stack receives."""
         shift = Pose2(self.x, self.y, self.yaw)
         return _ChangedMap(lambda grid: replace(grid, origin=shift.compose(grid.origin)))
 
@@ -95,7 +93,6 @@ class Outdated(Spec, Fault):
     """Polygons in which the map shows an obstacle."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to change the map that the stack receives."""
         return _ChangedMap(self._edited)
 
     def _edited(self, grid: OccupancyGrid) -> OccupancyGrid:

@@ -54,7 +54,6 @@ class Off(Spec, Fault):
     affects: ClassVar[frozenset[str]] = MESSAGE_KINDS | {"Belief"}
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to drop all messages."""
         return _MessageLoss(lambda: True)
 
 
@@ -72,7 +71,6 @@ class Dropout(Spec, Fault):
     """Probability that a message is lost."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to drop messages at random."""
         return _MessageLoss(lambda: bool(rng.random() < self.probability))
 
 
@@ -92,7 +90,6 @@ class Intermittent(Spec, Fault):
     """Mean length of the gaps, in which all messages are lost."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start with a gap of random length."""
         return _MessageLoss(_GilbertChannel(rng, self, setting).is_down)
 
 
@@ -105,7 +102,6 @@ class _GilbertChannel:
         self._until = setting.clock.seconds(setting.now()) + rng.exponential(spec.down)
 
     def is_down(self) -> bool:
-        """Return whether the channel is in a gap now."""
         now = self._setting.clock.seconds(self._setting.now())
         while self._until <= now:
             self._is_down = not self._is_down
@@ -127,13 +123,11 @@ class Slow(Spec, Fault):
     """Messages per second that arrive."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return (`rate`, reason) if it is not below the normal rate of the target."""
         if not target.rate or self.rate < target.rate:
             return None
         return "rate", f"{self.rate:g} Hz is not slower than its normal rate of {target.rate:g} messages per second"
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to drop messages, except the first message in each period."""
         return _MessageLoss(_RateLimit(self.rate, setting).exceeds)
 
 

@@ -60,7 +60,6 @@ class Noise(Spec, Fault):
     """Standard deviation of the acceleration along each axis."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to draw noise for each message."""
         if setting.kind != "Odometry":
             return _NoisyValues(rng, self)
 

@@ -63,7 +63,6 @@ class Bias(Spec, Fault):
     """Added to red, green, and blue of each pixel, relative to full scale."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to add the error to each reading."""
         if setting.kind == "Odometry":
             return OdometryDistortion(lambda step, velocity, _: (self._distorted(step), self._distorted(velocity)))
         return ChangedReadings(self._biased_reading)
@@ -100,7 +99,6 @@ class Scale(Spec, Fault):
     """Ratio of reported to true value."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start to scale each value or each odometry increment."""
         if setting.kind == "Odometry":
             return OdometryDistortion(lambda step, velocity, _: (self._distorted(step), self._distorted(velocity)))
         return ChangedReadings(self._scaled_reading)
@@ -144,7 +142,6 @@ class Drift(Spec, Fault):
     """Growth rate of the error of the angular velocity about the vertical axis."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        """Start with an error of zero."""
         if setting.kind != "Odometry":
             return _DriftingValues(self, setting)
 

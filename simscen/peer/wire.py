@@ -84,7 +84,6 @@ def from_json(body: bytes) -> dict[str, Any]:
 
 
 def _reject_constant(word: str) -> None:
-    """Raise ValueError for NaN or Infinity in JSON."""
     raise ValueError(f"{word} is not a JSON number")
 
 
@@ -196,7 +195,6 @@ class Connection:
         self._stream.close()
 
     def _receive_exactly(self, size: int) -> bytes:
-        """Wait for `size` bytes, and return them."""
         parts, remaining = [], size
         while remaining:
             try:

@@ -116,7 +116,6 @@ class Adapter:
         return {TF_STATIC} & set(self._options.without)
 
     def _check_launched(self) -> None:
-        """Raise AdapterError if the launch command has ended."""
         if self._launched is not None and self._launched.end_reason is not None:
             raise AdapterError(f"the launched command {self._launched.end_reason}: {self._launched.command}")
 

@@ -203,7 +203,6 @@ class AdapterRun:
             self._steps_until_ready.append(step)
 
     def _process_frame(self, kind: int, content: Dict[str, Any], now: int) -> None:
-        """Update the goals by a GOAL, PREEMPT, or CANCEL frame."""
         if kind == wire.GOAL:
             self.goals.start([Goal.from_content(goal) for goal in content["goals"]])
             self._adapter.continue_after_failure = content["on_goal_failure"] == "continue"
@@ -256,5 +255,4 @@ def _is_robot_topic(topic: Dict[str, Any]) -> bool:
 
 
 def _terminate(*_: Any) -> None:
-    """Handle SIGTERM: raise Disconnected."""
     raise Disconnected("terminated by simscen")

@@ -74,7 +74,6 @@ class PoseEstimate:
 
 
 def _require_map_frame(message: ReceivedMessage) -> None:
-    """Raise AdapterError if the frame of a message is not the map frame."""
     frame = messages.read_header(message.data)[1]
     if frame.lstrip("/") != MAP_FRAME:
         raise AdapterError(f"{message.topic} is in the frame {frame!r}; simscen's map frame is {MAP_FRAME!r}")

@@ -96,7 +96,6 @@ class Readiness:
         return next(end.type for end in self._graph.publishers_of(self._graph.names(COMMAND)))
 
     def _command_problems(self) -> List[str]:
-        """Return problems of the publishers of /cmd_vel."""
         name = self._graph.names(COMMAND)
         ends = self._graph.publishers_of(name)
         if not ends:
@@ -130,7 +129,6 @@ class Readiness:
         return found
 
     def _other_publishers(self, topic: Topic) -> List[str]:
-        """Return a problem for each other node that publishes a topic of simscen."""
         if topic.name in SHARED_TOPICS:
             return []
         name = self._graph.names(topic.name)
@@ -171,7 +169,6 @@ class Readiness:
         return found
 
     def _nodes_on_wall_time(self) -> List[str]:
-        """Return a problem for each node that does not use simulated time."""
         if self._options.wall_time:
             return []
         return [

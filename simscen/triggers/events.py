@@ -38,7 +38,6 @@ class EventStatus(Spec, Condition):
     """The required status of the event or fault; a mark has none."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the log contains the mark, or the start or end of the event or fault."""
         kinds = [EventKind(f"{source}.{self.status}") for source in ("event", "fault")]
         return any(_count_events(now, kind, self.name) > 0 for kind in (*kinds, EventKind.MARK))
 
@@ -53,7 +52,6 @@ class Replan(Spec, Condition):
     """Number of replans."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the log contains `count` plans that were not made for a new goal."""
         plans = (event for event in now.events if event.kind == EventKind.PLAN_MADE)
         return sum(plan.data.get("reason", "goal") != "goal" for plan in plans) >= self.count
 
@@ -72,7 +70,6 @@ class RecoveryStatus(Spec, Condition):
     """Required number of starts or ends."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the log contains `count` matching starts or ends of recovery behaviors."""
         return _count_events(now, EventKind(f"recovery.{self.status}"), self.name) >= self.count
 
 
@@ -86,7 +83,6 @@ class Collided(Spec, Condition):
     """Name of the object; default: any."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the log contains a collision with the object."""
         return _count_events(now, EventKind.COLLISION_STARTED, self.object) > 0
 
 
@@ -104,7 +100,6 @@ class GoalStatus(Spec, Condition):
     """Required number of reports."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the log contains `count` matching reports."""
         kind = EventKind(f"goal.{self.status}")
         return sum(e.kind == kind and matches_goal_name(e.name, self.name) for e in now.events) >= self.count
 
@@ -124,7 +119,6 @@ class Waypoint(Spec, Condition):
     """Number of waypoints."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the log contains `count` completed waypoints."""
         return (
             sum(e.kind in COMPLETION_KINDS and matches_goal_name(e.name, self.name) for e in now.events) >= self.count
         )
@@ -148,5 +142,4 @@ class PedestrianStatus(Spec, Condition):
     """Required number of reactions, ends of reactions, or reached goals."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the log contains `count` matching events of pedestrians."""
         return _count_events(now, EventKind(f"pedestrian.{self.status}"), self.name) >= self.count

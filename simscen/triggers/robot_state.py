@@ -27,7 +27,6 @@ class SpeedBelow(Value[PositiveSpeed], Condition):
     """
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the true speed over ground is below the limit."""
         return math.hypot(now.twist.vx, now.twist.vy) < self.root
 
 
@@ -38,7 +37,6 @@ class SpeedAbove(Value[PositiveSpeed], Condition):
     """
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the true speed over ground is above the limit."""
         return math.hypot(now.twist.vx, now.twist.vy) > self.root
 
 
@@ -51,7 +49,6 @@ class TurningAbove(Value[PositiveAngularSpeed], Condition):
     """
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the true turn rate is above the limit."""
         return abs(now.twist.wz) > self.root
 
 
@@ -64,7 +61,6 @@ class TurningBelow(Value[PositiveAngularSpeed], Condition):
     """
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the true turn rate is below the limit."""
         return abs(now.twist.wz) < self.root
 
 
@@ -75,7 +71,6 @@ class Travelled(Value[NonNegativeLength], Condition):
     """
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the driven distance has reached the length."""
         return now.travelled >= self.root
 
 
@@ -88,7 +83,6 @@ class DistanceRemaining(Value[NonNegativeLength], Condition):
     """
 
     def holds(self, now: Situation) -> bool:
-        """Return whether there is a goal within the distance."""
         return now.goal is not None and now.robot.distance(now.goal.pose) <= self.root
 
 
@@ -101,7 +95,6 @@ class BelievedDistanceRemaining(Value[NonNegativeLength], Condition):
     """
 
     def holds(self, now: Situation) -> bool:
-        """Return whether there are a goal and an estimated pose within the distance."""
         return now.goal is not None and now.belief is not None and now.belief.pose.distance(now.goal.pose) <= self.root
 
 
@@ -112,7 +105,6 @@ class LocalizationError(Value[NonNegativeLength], Condition):
     """
 
     def holds(self, now: Situation) -> bool:
-        """Return whether there is an estimated pose with a larger error."""
         return now.belief is not None and now.robot.distance(now.belief.pose) > self.root
 
 
@@ -133,7 +125,6 @@ class LocalizationLost(Spec, Condition):
     """Maximum standard deviation of the position (m) that the localizer reports; default: no maximum."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether there is an estimated pose that is wrong or uncertain."""
         belief = now.belief
         if belief is None:
             return False
@@ -158,7 +149,6 @@ class RobotIn(Spec, Condition):
     """Name of a region of the world."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the true position is inside or on the border."""
         return distance_to_polygon(now.robot, now.region(self.region)) <= 0
 
 
@@ -186,7 +176,6 @@ class RobotWithin(Spec, Condition):
         return self
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the true position is near the target."""
         if self.region is not None:
             return distance_to_polygon(now.robot, now.region(self.region)) <= self.distance
         target = Pose2(self.of[0], self.of[1]) if self.of else now.object(self.object or "")
@@ -203,5 +192,4 @@ class ClearanceBelow(Value[PositiveLength], Condition):
     """
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the newest measured distance is smaller than the given one."""
         return now.clearance is not None and now.clearance < self.root

@@ -18,7 +18,6 @@ class Time(Value[Duration], Condition):
     is_robot_specific: ClassVar[bool] = False
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the tick nearest to the time has been reached."""
         return now.tick >= now.clock.ticks(self.root)
 
 
@@ -37,6 +36,5 @@ class ScanAge(Spec, Condition):
     """Name of the lidar in the robot's `sensors`; default: the lidar whose scan arrived last."""
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the newest scan is older than `above`."""
         last = now.last_scan_tick(self.sensor)
         return now.tick - (0 if last is None else last) > now.clock.ticks(self.above)

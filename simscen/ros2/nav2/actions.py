@@ -79,7 +79,6 @@ class MotionActions:
                 self._servers[action] = _Server(node, NS_PER_S / rate)
 
     def _process_status(self, action: str, message: Any) -> None:
-        """Record whether a server executes its action."""
         self._executing[action] = any(goal.status == EXECUTING for goal in message.status_list)
 
     def record_command(self, now: int) -> None:

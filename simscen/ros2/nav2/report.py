@@ -85,7 +85,6 @@ class Nav2Report:
         return True
 
     def _add_tree_changes(self, message: Any) -> None:
-        """Add a line for each change in a BehaviorTreeLog message."""
         for change in message.event_log:
             text = tree_change(change.node_name, change.previous_status, change.current_status)
             self._lines.append(LogLine(INFO, BEHAVIOR_TREE_LOGGER, text))

@@ -145,7 +145,6 @@ def _to_error_code(value: Any) -> ErrorCode | int:
 
 
 def _checked_data(data: dict[str, Any]) -> dict[str, Value]:
-    """Return the data of an event. Raises ProtocolViolation if it is longer than MAX_TEXT_LENGTH."""
     if len(str(data)) > MAX_TEXT_LENGTH:
         raise ProtocolViolation("an event with too much data")
     return data

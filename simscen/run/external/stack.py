@@ -220,7 +220,6 @@ class ExternalStack:
         return answer
 
     def _to_decision(self, tick: int, answer: Answer, is_command_due: bool) -> Decision:
-        """Return the decision in an answer, with the goal events of the GoalTracker."""
         self._goals.advance(tick)
         if is_command_due and self._goals.fail_if_timed_out(tick):
             self._send(wire.CANCEL, {"tick": tick, "all": self._parameters.stop_on_failure, "reason": "timeout"})

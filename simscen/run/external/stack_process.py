@@ -167,7 +167,6 @@ class StackProcess:
                 return
 
     def _flush(self) -> None:
-        """Send as many queued bytes as the socket accepts."""
         try:
             while self._send_buffer and not self._disconnected:
                 del self._send_buffer[: self._stream.send(self._send_buffer[:READ_BYTES])]
@@ -206,7 +205,6 @@ class StackProcess:
         return received >= wire.SIZE.size and received >= wire.SIZE.size + self._frame_size()
 
     def _frame_size(self) -> int:
-        """Return the size of the next frame in bytes. Raises RunError if it is invalid."""
         (size,) = wire.SIZE.unpack_from(self._receive_buffer)
         if not 1 <= size <= wire.MAX_FRAME_BYTES:
             raise self.error(

@@ -114,7 +114,6 @@ class _SpeedMask:
         return {"percent": self._percent, "base": self._base, "multiplier": self._multiplier}
 
     def draw(self, grid: OccupancyGrid, zones: Zones) -> OccupancyGrid:
-        """Return the mask of the enabled zones in the cells of `grid`."""
         if not zones.speed and zones.masks.speed is not None and grid is zones.masks.speed.grid:
             return grid
         limits: Array = np.full(grid.shape, np.inf)
@@ -134,7 +133,6 @@ class _SpeedMask:
 
 
 def _grid_around(polygons: list[Polygon]) -> OccupancyGrid:
-    """Return a free grid that covers all polygons."""
     corners = np.array([corner for polygon in polygons for corner in polygon] or [(0.0, 0.0)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     columns, rows = np.maximum(1, np.ceil((high - low) / CELL_M)).astype(int)

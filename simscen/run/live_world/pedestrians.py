@@ -135,7 +135,6 @@ class PedestrianSimulation:
         return all(position.distance(pose) >= radius + other for pose, other in others)
 
     def _step(self) -> None:
-        """Advance all pedestrians by one time step of the pedestrian model."""
         crowd, step_s = self._crowd, self._step_s
         before = crowd.poses()
         actions = crowd.step(self._surroundings(), step_s)

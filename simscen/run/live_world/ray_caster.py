@@ -39,7 +39,6 @@ class LiveRayCaster(RayCaster):
         return self._scene.sweep(fan, pose, reach)
 
     def _update_scene(self, origin: Vector, reach: float) -> None:
-        """Update the poses of the moving objects that rays from `origin` can reach."""
         robot, state = self._robot, self._state
         if robot.bodies is not self._bodies:  # the same object until a body is added or removed
             self._meshes, self._bodies = self._build_meshes(robot.bodies), robot.bodies
