@@ -158,15 +158,13 @@ class _LimitedCommands(FaultEffect):
 
     def __init__(self, spec: Saturation, setting: FaultSetting) -> None:
         self._spec, self._setting = spec, setting
-        self._previous: tuple[int, Twist] | None = None
+        self._tick, self._previous = setting.now(), setting.command
 
     def command(self, command: Twist) -> Twist | None:
-        limited = self._limit_speeds(command)
-        if self._previous is not None:
-            tick, previous = self._previous
-            limited = self._limit_accelerations(previous, limited, self._setting.seconds_since(tick))
-        self._previous = self._setting.now(), limited
-        return limited
+        seconds = self._setting.seconds_since(self._tick)
+        self._previous = self._limit_accelerations(self._previous, self._limit_speeds(command), seconds)
+        self._tick = self._setting.now()
+        return self._previous
 
     def _limit_speeds(self, command: Twist) -> Twist:
         spec, separation = self._spec, self._setting.separation

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Protocol
 from pydantic import BaseModel
 
 from simscen.core.clock import Clock
+from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.records.disturbances import FAULT_TARGET_KINDS
 from simscen.spec.base import LazySpec
 from simscen.spec.choice import Choice
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from simscen.core.environment.occupancy_grid import OccupancyGrid
     from simscen.core.geometry import Array, Pose3
-    from simscen.core.geometry.kinematics import Twist
     from simscen.core.messages.navigation import Belief
     from simscen.core.messages.sensor_data import Image, Reading, Scan
 
@@ -52,6 +52,7 @@ class FaultSetting:
     now:         returns the current tick
     kind:        kind of the target, one of the fault's `affects`
     simulator:   simulator of the target; None if the target is not a lidar or camera
+    command:     command that the base executed when the fault began
     """
 
     separation: float = 0.0
@@ -59,6 +60,7 @@ class FaultSetting:
     now: Callable[[], int] = lambda: 0
     kind: str = ""
     simulator: SensorSimulator | None = None
+    command: Twist = STOP
 
     def seconds_since(self, tick: int) -> float:
         """Return the simulated seconds between `tick` and now."""

@@ -7,7 +7,7 @@ the previous fault.
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import NoReturn
 
 import numpy as np
@@ -91,6 +91,7 @@ class FaultInjector:
         self._activations[index] += 1
         rng = self._streams.generator(f"fault{self._names[index]}#{self._activations[index]}")
         setting = self._setting(entry)
+        setting = replace(setting, command=self._link.active_command(setting.now()))
         effect: object = entry.fault.begin(rng, setting)
         if not isinstance(effect, FaultEffect):
             self._raise_invalid(index, f"returned {effect!r} from `begin`, which is not a FaultEffect")

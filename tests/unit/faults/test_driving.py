@@ -7,6 +7,7 @@ from fault_effects import ManualClock, odometry, start, unsuitable_key
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Odometry
+from simscen.faults.base import AnyFault, FaultSetting
 from simscen.model.robot import Differential, Omnidirectional
 
 WHEELED = Differential(type="differential", wheel_radius=0.1, wheel_separation=0.4)
@@ -49,6 +50,14 @@ def test_acceleration_is_limited_between_beats():
         speeds.append(effect.command(Twist(0.6, 0.0, 2.0)))
     assert [speed.vx for speed in speeds] == pytest.approx(np.minimum(0.6, 0.025 * np.arange(1, 31)))
     assert [speed.wz for speed in speeds] == pytest.approx(np.minimum(2.0, 0.05 * np.arange(1, 31)))
+
+
+def test_acceleration_is_limited_from_the_command_before_the_fault():
+    now, fault = ManualClock(), AnyFault.model_validate({"saturation": {"linear_acceleration": 0.5}}).fault
+    effect = fault.begin(np.random.default_rng(1), FaultSetting(now=now, kind="Wheels", command=Twist(0.2)))
+    assert effect.command(Twist(0.6)) == Twist(0.2)
+    now.tick = 24
+    assert effect.command(Twist(0.6)).vx == pytest.approx(0.25)
 
 
 def test_wheel_slip_affects_each_odometry_sensor_separately():
