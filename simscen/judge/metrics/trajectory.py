@@ -1,5 +1,7 @@
 """Metrics of the driven path (turns and curvature), and of the errors of the estimated pose."""
 
+from collections.abc import Set
+
 import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
@@ -129,10 +131,11 @@ def _error_statistics(name: str, errors: Array) -> Values:
 def _relative_errors(trace: Trace) -> Values:
     """Return the RPE metrics: statistics of (Q_i^-1 Q_j)^-1 (P_i^-1 P_j) with true poses Q and estimated poses P.
 
-    Between the samples i and j, the robot drove at least RPE_DELTA_M.
+    Between the samples i and j, the robot drove at least RPE_DELTA_M, and was not teleported.
     """
     believed, true = trace.belief.values, interpolate_poses(truth(trace), trace.belief.ticks)
-    i, j = _pairs(np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1))
+    teleported = frozenset(teleport_samples(trace, trace.belief.ticks))
+    i, j = _pairs(np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1), teleported)
     if not len(i):
         return {
             f"rpe_{kind}_{one}": f"the robot drove less than {RPE_DELTA_M:g} m"
@@ -147,18 +150,21 @@ def _relative_errors(trace: Trace) -> Values:
     }
 
 
-def _pairs(steps: Array) -> tuple[list[int], list[int]]:
+def _pairs(steps: Array, teleported: Set[int]) -> tuple[list[int], list[int]]:
     """Return the first and the second index of pairs of samples between which the robot drove at least RPE_DELTA_M.
 
-    `steps` are the distances in m between consecutive samples.
+    `steps` are the distances in m between consecutive samples. A new pair begins at each of the samples `teleported`.
     """
-    ids, length = [0], 0.0
+    pairs: list[tuple[int, int]] = []
+    first, length = 0, 0.0
     for k, step in enumerate(steps.tolist(), start=1):
         length += step
-        if length >= RPE_DELTA_M:
-            ids.append(k)
-            length = 0.0
-    return ids[:-1], ids[1:]
+        if k in teleported:
+            first, length = k, 0.0
+        elif length >= RPE_DELTA_M:
+            pairs.append((first, k))
+            first, length = k, 0.0
+    return [one for one, _ in pairs], [other for _, other in pairs]
 
 
 def _between(origin: Array, poses: Array) -> Array:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Samples
 from simscen.judge.metrics.trajectory import pose_metrics
 from simscen.testing.synthetic_trace import synthetic_trace
@@ -30,6 +31,16 @@ def test_relative_errors_are_over_consecutive_meters():
     assert metrics["rpe_trans_rmse"] == pytest.approx(((0.04 + 0.01 + 0.16) / 3) ** 0.5)
     assert metrics["rpe_rot_max"] == 0.0
     assert metrics["ape_trans_final"] == pytest.approx(0.5)
+
+
+def test_relative_errors_do_not_cover_a_teleportation():
+    ticks = [6 * k for k in range(6)]
+    true = [(x, 0, 0) for x in (0, 1, 1.5, 9.5, 10, 10.5)]  # placed between the samples at 1.5 m and 9.5 m
+    believed = [(x, 0, 0) for x in (0, 1.1, 1.6, 1.7, 2.2, 2.7)]
+    trace = located(ticks, true, ticks, believed)
+    kidnapped = replace(trace, events=(Event(12, EventKind.ROBOT_PLACED), *trace.events))
+    assert pose_metrics(kidnapped)["rpe_trans_mean"] == pytest.approx((0.1 + 0.0) / 2)
+    assert pose_metrics(trace)["rpe_trans_max"] == pytest.approx(7.9)
 
 
 def test_turning_in_place_adds_no_distance():
