@@ -21,7 +21,9 @@ from simscen.judge.movable_objects import MovableObject, movable_objects
 
 GOAL_CRITERIA = frozenset({"goals_reached", "result", "error_code", "time_to_goal", "stuck"})
 """Criteria that can fail because something blocks the robot."""
-LOCALIZATION_CRITERIA = frozenset({"localization_error", "relocalized_within", "no_false_success", *GOAL_CRITERIA})
+LOCALIZATION_CRITERIA = GOAL_CRITERIA | {
+    *("localization_error", "relocalized_within", "localization_consistency", "no_false_success"),
+}
 """Criteria that can fail because the estimated pose is wrong."""
 MAX_LINES = 6
 """Maximum number of lines for a finding."""
@@ -54,7 +56,7 @@ def causes(criterion: str, tick: int, trace: Trace, case: Case) -> list[str]:
     if criterion == "collisions":
         diagnoses.append(diagnose_collision(trace, tick))
     if criterion in LOCALIZATION_CRITERIA:
-        error_is_reported = criterion not in GOAL_CRITERIA
+        error_is_reported = criterion not in {*GOAL_CRITERIA, "localization_consistency"}
         diagnoses.append(diagnose_localization(trace, tick, error_is_reported))
     for sentences, names in diagnoses:
         lines += [f"why: {text}" for text in sentences]

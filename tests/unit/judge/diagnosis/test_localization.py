@@ -14,6 +14,7 @@ def test_kidnapping_explains_a_localization_error():
     assert why("localization_error", events, case=case, **far) == [
         "why: event `carried off` had moved the robot elsewhere 4.00 s before"
     ]
+    assert why("localization_consistency", events, case=case, **far) == why("goals_reached", events, case=case, **far)
     assert why("localization_error", events, case=case) == [
         "meanwhile: event `carried off` happened 4.00 s before: something"
     ]
