@@ -82,11 +82,11 @@ def outcome_text(outcomes: OutcomeCounts) -> str:
 
 
 def exclusion_notes(against: BaselineComparison) -> list[str]:
-    """Return notes on pairs in which one run arrived, on pairs with an error, and on runs without a partner."""
+    """Return notes on pairs with different arrivals, on pairs with an error, and on runs without a partner."""
     notes = []
     if against.pairs_with_one_arrival:
         pairs = number_with_noun(against.pairs_with_one_arrival, "pair")
-        notes.append(f"in {pairs} only one run arrived, so only their collisions are compared")
+        notes.append(f"the arrivals differ in {pairs}, so only their collisions are compared")
     excluded = []
     if against.error_pairs:
         excluded.append(f"{number_with_noun(against.error_pairs, 'pair')} with an error")

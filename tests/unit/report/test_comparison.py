@@ -31,7 +31,7 @@ EXPECTED = """\
     mean over pairs    ref   mine  difference  95 % interval  -/=/+
     time_to_goal, s  25.34  28.23       +2.89  +0.78 … +4.95  1/0/7
     replans           3.00   3.00       +0.00                 0/2/0
-    in 2 pairs only one run arrived, so only their collisions are compared
+    the arrivals differ in 2 pairs, so only their collisions are compared
     left out: 1 pair with an error, 1 run without a partner
 
 """  # noqa: E501 - as it is printed
