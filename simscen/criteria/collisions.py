@@ -14,6 +14,7 @@ from simscen.core.records.verdict import Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import InvalidTrace, MissingEvidence, at_most, counted, undecided
 from simscen.criteria.trace_signals.distances import pedestrian_radii
+from simscen.criteria.trace_signals.event_readers import require_object
 from simscen.criteria.trace_signals.ground_truth import speed, turn_rate
 from simscen.spec.base import Spec
 from simscen.spec.places import ObjectName
@@ -71,8 +72,11 @@ class Collisions(Spec, Criterion):
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return findings for the number of collisions and, with `max_impulse`, for the largest impulse.
 
-        Raises MissingEvidence if the cause of a contact matters (`caused_by_robot`) and the trace has no velocity.
+        Raises MissingEvidence if there is no object named `with`, or if the cause of a contact matters
+        (`caused_by_robot`) and the trace has no velocity.
         """
+        if self.object is not None:
+            require_object(case, self.object)
         if not len(trace.truth) and not trace.of_kind(EventKind.COLLISION_STARTED):
             return [undecided("collisions", "neither the robot's path nor its contacts were recorded")]
         contacts = [contact for contact in _contacts(trace) if self.object in (None, contact.start.name)]

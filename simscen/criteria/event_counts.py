@@ -11,9 +11,9 @@ from simscen.core.messages.navigation import ReplanReason
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.verdict import Evidence, Finding, Status
 from simscen.criteria.base import Criterion
-from simscen.criteria.findings import counted, undecided
+from simscen.criteria.findings import MissingEvidence, counted, undecided
 from simscen.criteria.timeline import has_ended
-from simscen.criteria.trace_signals.event_readers import replans
+from simscen.criteria.trace_signals.event_readers import recoveries, replans
 from simscen.spec.base import Spec
 from simscen.spec.extensible_union import BehaviorName
 
@@ -70,7 +70,7 @@ class Replans(CountBounds, Criterion):
         replans all the time does not follow any plan.
     Source: Nav2's navigate_to_pose_w_replanning trees.
 
-    Inconclusive if an external stack reports plans, but not why it made them.
+    Inconclusive if an external stack reports plans, but not why it made them, or a reached goal, but no plan.
 
     Example: `replans: {min: 1}`
     """
@@ -100,6 +100,8 @@ class Recoveries(CountBounds, Criterion):
         recoveries are the first sign of trouble.
     Source: Nav2's recovery node and behavior server (spin, wait, backup, clear costmap).
 
+    Inconclusive if an external stack reports neither that it accepts a goal nor recoveries.
+
     Example: `recoveries: {min: 1, name: spin}`
     """
 
@@ -110,7 +112,10 @@ class Recoveries(CountBounds, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each bound."""
-        starts = trace.of_kind(EventKind.RECOVERY_STARTED)
+        try:
+            starts = recoveries(trace, case)
+        except MissingEvidence as reason:
+            return [undecided("recoveries", str(reason))]
         counted_starts = [start for start in starts if self.name in (None, start.name)]
         details = [f"t = {trace.seconds(start.tick):.2f} s: {start.name}" for start in starts[:MAX_DETAILS]]
         noun = "recovery" if self.name is None else f"{self.name} recovery"

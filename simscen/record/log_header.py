@@ -86,7 +86,7 @@ class LogHeader:
 
 def case_to_json(case: Case) -> str:
     """Return a Case as JSON, in which infinity is the string "Infinity"."""
-    return str(to_json(case, inf_nan_mode="strings", indent=1, exclude={"labels"}), "utf-8")
+    return str(to_json(case, inf_nan_mode="strings", indent=1, exclude={"labels", "objects"}), "utf-8")
 
 
 def case_from_json(text: str | bytes) -> Case:

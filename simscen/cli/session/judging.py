@@ -1,6 +1,6 @@
 """Evaluation of recorded logs for `simscen judge`, with the criteria in the log or in a separate criteria file."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +11,7 @@ from simscen.core.environment.costmap_filters import MaskBlocks
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose2
 from simscen.core.records.case import Case
+from simscen.core.records.events import EventKind
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult, error_result, skipped_result
 from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.core.records.trace import Trace
@@ -20,6 +21,7 @@ from simscen.judge.run_result import judge_run
 from simscen.judge.several_robots import combine_robots
 from simscen.loading.files.criteria_file import LoadedCriteria, load_criteria
 from simscen.loading.files.discovery import default_root
+from simscen.loading.spec_walk import references
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.tree import MappingNode
 from simscen.model.scenario import expected_failure
@@ -50,6 +52,7 @@ class LogJudge:
         self._options, self._scenario = options, scenario
         self._case: Case | None = None
         self._file_masks: Mapping[str, MaskBlocks] | None = None
+        self._file_objects: frozenset[str] | None = None
         self._criteria: LoadedCriteria | None = None
         if scenario is not None:
             root_folder = root or default_root([scenario])
@@ -118,7 +121,10 @@ class LogJudge:
             criteria = written.for_robot(robot)
         # The disturbances are in the scenario of the log, at lines that the criteria file does not have.
         case = replace(case, disturbances=tuple(replace(disturbance, line=0) for disturbance in case.disturbances))
-        case = replace(case, masks={**case.masks, **self._masks(criteria)}, labels=_labels(read))
+        labels, objects = _names_in_log(read)
+        if any(reference.target == "object" for reference in references(criteria.spec)):
+            objects |= self._world_objects(criteria)
+        case = replace(case, masks={**case.masks, **self._masks(criteria)}, labels=labels, objects=objects)
         # `expected` of a file without `robots` applies to the run, not to each robot.
         expected = None if robot else expected_failure(criteria.spec)
         return self._judge_by_file(log, header.key, read.trace, case, read.coverage, criteria, expected)
@@ -158,6 +164,18 @@ class LogJudge:
         self._file_masks = masks if criteria is self._criteria else self._file_masks
         return masks
 
+    def _world_objects(self, criteria: LoadedCriteria) -> frozenset[str]:
+        """Return the names of the objects in the world that the criteria file names."""
+        if self._file_objects is None:
+            from simscen.run.criteria_case import world_of_criteria
+
+            with _scenario_errors(criteria):
+                world = world_of_criteria(criteria)
+            self._file_objects = frozenset(
+                [*(body.name for body in world.bodies), *(solid.name for solid in world.solids)]
+            )
+        return self._file_objects
+
     def _foreign_case(self) -> Case:
         """Return what criteria need from the criteria file, such as goals, regions, and footprint."""
         assert self._criteria is not None
@@ -184,23 +202,30 @@ class LogJudge:
         return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=file)
 
 
-def _labels(log: Log) -> frozenset[str]:
-    """Return the names of all events, faults, and marks in a log and its scenario."""
+def _names_in_log(log: Log) -> tuple[frozenset[str], frozenset[str]]:
+    """Return the names of all events, faults, and marks in a log and its scenario, and of its objects.
+
+    Objects of world files are missing.
+    """
     tree, _ = parse_yaml(log.header.scenario, "scenario.yaml")
-    marks = _marks(tree.plain) if isinstance(tree, MappingNode) else ()
-    planned = (disturbance.name for disturbance in log.header.case.disturbances)
-    return frozenset((*planned, *marks, *(event.name for event in log.trace.of_kind(*START_KINDS))))
+    scenario = tree.plain if isinstance(tree, MappingNode) else {}
+    world = scenario.get("world")
+    walls = len(world.get("walls") or ()) if isinstance(world, Mapping) else 0
+    events = log.trace.of_kind(*START_KINDS), log.trace.of_kind(EventKind.OBJECT_SPAWNED, EventKind.COLLISION_STARTED)
+    started, objects = ({event.name for event in kind} for kind in events)
+    planned = {disturbance.name for disturbance in log.header.case.disturbances}
+    added = _names(scenario, {"spawn", "pedestrian"}) | _names(world) | {f"wall_{k + 1}" for k in range(walls)}
+    return frozenset(planned | started | _names(scenario, {"mark"})), frozenset(objects | added)
 
 
-def _marks(plain: object) -> Iterator[str]:
-    """Yield the names in all actions `mark` of a scenario."""
-    if isinstance(plain, Mapping):
-        mark = plain.get("mark")
-        if isinstance(mark, Mapping):
-            yield str(mark.get("name"))
-    parts = plain.values() if isinstance(plain, Mapping) else plain if isinstance(plain, list) else ()
-    for part in parts:
-        yield from _marks(part)
+def _names(plain: object, keys: Set[str] | None = None, key: str = "") -> set[str]:
+    """Return the values of `name` in YAML data. With `keys`, return only those in values of these keys."""
+    if isinstance(plain, list):
+        return {name for part in plain for name in _names(part, keys, key)}
+    if not isinstance(plain, Mapping):
+        return set()
+    own = {str(plain["name"])} if "name" in plain and (keys is None or key in keys) else set()
+    return own.union(*(_names(part, keys, below) for below, part in plain.items()))
 
 
 def _not_judged(log: Path, failure: RunFailure) -> RunFinished:

@@ -76,6 +76,7 @@ class Case:
         expected: Expected failure of goals, by goal name: "failed" for any failure, or the name of an error code.
         labels: Names of all events, faults, and marks; None if the criteria were checked together with the scenario, so
             that they name no others. Not written to logs.
+        objects: Names of all objects, other robots, and pedestrians; None as for `labels`. Not written to logs.
     """
 
     start: Pose2
@@ -92,6 +93,7 @@ class Case:
     masks: Mapping[str, MaskBlocks] = field(default_factory=dict)
     expected: Mapping[str, str] = field(default_factory=dict)
     labels: frozenset[str] | None = None
+    objects: frozenset[str] | None = None
 
     @property
     def every_goal(self) -> tuple[Goal, ...]:

@@ -18,13 +18,26 @@ from simscen.criteria.timeline import spans
 from simscen.criteria.trace_signals.sampling import SignalQuery, sample_ticks
 
 if TYPE_CHECKING:
+    from simscen.core.records.case import Case
     from simscen.core.records.trace import Trace
 
 
 def in_collision(query: SignalQuery) -> Array:
-    """Return whether the robot touches something, or the object of the query."""
+    """Return whether the robot touches something, or the object of the query.
+
+    Raises MissingEvidence if there is no such object.
+    """
     start, end = EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED
-    return _active_between_events(query.trace, start, (end,), query.arguments.get("with"))
+    name = query.arguments.get("with")
+    if name is not None:
+        require_object(query.case, str(name))
+    return _active_between_events(query.trace, start, (end,), name)
+
+
+def require_object(case: Case, name: str) -> None:
+    """Raise MissingEvidence if neither the log nor the criteria file has an object with this name."""
+    if case.objects is not None and name not in case.objects:
+        raise MissingEvidence(f"neither the log nor the world of the criteria file has an object `{name}`")
 
 
 def goal_active(query: SignalQuery) -> Array:
@@ -75,17 +88,31 @@ def replan_count(query: SignalQuery) -> Array:
 def replans(trace: Trace) -> list[Event]:
     """Return the events of plans that were made for another reason than a new goal.
 
-    Raises MissingEvidence if the trace has plans, but the stack did not report why it made them.
+    Raises MissingEvidence if the trace has plans, but the stack did not report why it made them, or if it reported a
+    reached goal without any plan.
     """
     plans = trace.of_kind(EventKind.PLAN_MADE)
     if trace.plans and not plans:
         raise MissingEvidence("the stack did not report why it made its plans")
+    if not plans and trace.of_kind(EventKind.GOAL_REACHED, EventKind.GOAL_PASSED):
+        raise MissingEvidence("the stack reported no plan, although it reached a goal")
     return [plan for plan in plans if plan.data.get("reason", "goal") != "goal"]
 
 
 def recovery_count(query: SignalQuery) -> Array:
     """Return the number of recoveries that have started so far."""
-    return _count_until_samples(query.trace, query.trace.of_kind(EventKind.RECOVERY_STARTED))
+    return _count_until_samples(query.trace, recoveries(query.trace, query.case))
+
+
+def recoveries(trace: Trace, case: Case) -> list[Event]:
+    """Return the events of recoveries that started.
+
+    Raises MissingEvidence if the stack reported neither a recovery nor the acceptance of a goal.
+    """
+    reported = trace.of_kind(EventKind.RECOVERY_STARTED, EventKind.GOAL_ACCEPTED)
+    if case.goals and not reported:
+        raise MissingEvidence("the stack reported neither goals nor recoveries")
+    return [event for event in reported if event.kind == EventKind.RECOVERY_STARTED]
 
 
 def _label(query: SignalQuery) -> str:

@@ -14,10 +14,17 @@ from simscen.judge.run_result import judge_run
 
 SCENARIO = """\
 simscen: 1
-world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
+world:
+  simscen: 1
+  walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]
+  obstacles: [{name: post, box: [0.1, 0.1, 1], pose: {x: 5, y: 3}}]
 robot: {pose: {x: 1, y: 1}}
 goals: [{name: "1e3", pose: {x: 1.5, y: 1}}]
-events: [{name: late, when: {time: 90 s}, do: [{mark: {name: spot}}], required: false}]
+events:
+  - name: late
+    when: {time: 90 s}
+    do: [{mark: {name: spot}}, {spawn: {name: crate, box: [0.1, 0.1, 0.1], pose: {x: 4, y: 3}}}]
+    required: false
 time_limit: 20 s
 """
 GOOD = SCENARIO + "pass:\n  - goals_reached: {}\n"
@@ -138,6 +145,28 @@ def test_nothing_is_shown_by_names_that_the_scenario_of_the_log_does_not_have(
     kind, _, name = condition.partition(", ")[2].partition(": ")
     assert (ended.code == 0) is is_known
     assert (f"inconclusive: the scenario has no {kind} `{name}`" in ended.out) is not is_known
+
+
+@pytest.mark.parametrize(
+    ("name", "world", "is_known"),
+    [
+        ("wall_1", "", True),
+        ("post", "", True),
+        ("crate", "", True),
+        ("crat", "", False),
+        ("shelf", "", False),
+        ("shelf", "world: {simscen: 1, objects: [{name: shelf, box: [1, 1, 1], pose: {x: 3, y: 3}}]}", True),
+    ],
+)
+def test_contacts_with_an_object_are_undecided_unless_a_file_has_this_object(
+    simscen, out: Path, name: str, world: str, is_known: bool
+) -> None:
+    criteria = f"[{{collisions: {{with: {name}}}}}, {{always: {{not: {{signal: in_collision, with: {name}}}}}}}]"
+    (out.parent / "limits.yaml").write_text(f"{world}\npass: {criteria}\n")
+    ended = simscen("judge", str(_log(out, "good")), "--scenario", "limits.yaml")
+    assert (ended.code == 0) is is_known
+    reason = f"inconclusive: neither the log nor the world of the criteria file has an object `{name}`"
+    assert ended.out.count(reason) == (0 if is_known else 2)
 
 
 def test_violated_criterion_names_the_line_of_the_criteria_file(simscen, out: Path) -> None:
