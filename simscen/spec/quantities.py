@@ -59,25 +59,16 @@ class Quantity:
         return core_schema.no_info_before_validator_function(self.parse, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        number, units = dict(handler(schema)), ", ".join(UNITS[self.dimension])
+        number, units = dict(handler(schema)), list(UNITS[self.dimension])
+        message = f"expected {with_article(self.dimension)}, e.g. 1.5 {units[0]}; units: {', '.join(units)}"
         # Bounds apply only to numbers and the pattern only to text, so both fit into one schema.
         return {
             **number,
             "type": [number["type"], "string"],
-            "pattern": _json_schema_pattern(UNITS[self.dimension]),
-            "description": self.description,
-            "patternErrorMessage": f"expected {with_article(self.dimension)}, e.g. {self.example}; units: {units}",
+            "pattern": _json_schema_pattern(units),
+            "description": f"{self.dimension}, e.g. 1.5 {units[0]}",
+            "patternErrorMessage": message,
         }
-
-    @property
-    def example(self) -> str:
-        """Example of a value in YAML, e.g. "1.5 m"."""
-        return f"1.5 {next(iter(UNITS[self.dimension]))}"
-
-    @property
-    def description(self) -> str:
-        """Description of the field for the JSON schema."""
-        return f"{self.dimension}, e.g. {self.example}"
 
     def parse(self, value: Any) -> Any:
         """Convert text such as "90 deg" to SI units; return other values unchanged. Raises PydanticCustomError."""
@@ -87,16 +78,15 @@ class Quantity:
         match = NUMBER_AND_UNIT_PATTERN.fullmatch(value)
         if match and match[2] in units:
             return float(match[1]) * units[match[2]]
-        if match and any(match[2] in others for others in UNITS.values()):
-            other = next(name for name, others in UNITS.items() if match[2] in others)
+        other = next((name for name, others in UNITS.items() if match and match[2] in others), "")
+        if match and other:
             problem = f"`{match[2]}` is a unit of {other}, but this is {with_article(self.dimension)}"
         elif match:
             problem = f"unknown unit `{match[2]}` for {with_article(self.dimension)}"
         else:
             problem = f"expected {with_article(self.dimension)}, got {_text(value)}"
-        raise PydanticCustomError(
-            "quantity", "{problem}; units: {units}", {"problem": problem, "units": ", ".join(units)}
-        )
+        context = {"problem": problem, "units": ", ".join(units)}
+        raise PydanticCustomError("quantity", "{problem}; units: {units}", context)
 
 
 def _text(value: str) -> str:

@@ -34,7 +34,13 @@ def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCEN
     A folder selects all files with one of `suffixes` in it and in its subfolders that are not hidden. Raises
     InvalidInput for missing paths and conflicting output folders, and NothingSelected.
     """
-    problems = [problem for path in paths if (problem := _missing_path_problem(path))]
+    problems: list[Problem] = []
+    for path in paths:
+        try:
+            path.lstat()
+        except (OSError, ValueError) as error:
+            message = os_error_reason(error) if isinstance(error, OSError) else "no such file or directory"
+            problems.append(Problem(str(path), 0, 0, "SC001", message))
     found = dict.fromkeys(file.absolute() for path in paths for file in _selected_files(path, suffixes, problems))
     if problems:
         raise InvalidInput(problems)
@@ -81,15 +87,6 @@ def _is_too_wide(folder: Path) -> bool:
     """Return whether a folder is `/`, the home folder, or a parent of the home folder."""
     home = expand_home("~")
     return folder == folder.parent or (home.is_absolute() and Path(os.path.realpath(home)).is_relative_to(folder))
-
-
-def _missing_path_problem(path: Path) -> Problem | None:
-    try:
-        path.lstat()
-    except (OSError, ValueError) as error:
-        message = os_error_reason(error) if isinstance(error, OSError) else "no such file or directory"
-        return Problem(str(path), 0, 0, "SC001", message)
-    return None
 
 
 def _selected_files(path: Path, suffixes: tuple[str, ...], problems: list[Problem]) -> Iterator[Path]:

@@ -109,7 +109,7 @@ class VariationSpace:
         Raises ConditionError if a condition cannot be evaluated, and IndexError for an unknown number.
         """
         options = self._options(number)
-        return None if options is None else self._build(numbered_name(number), options)
+        return None if options is None else Variation.with_changes(numbered_name(number), self.tree, _changes(options))
 
     def numbers(self) -> Iterator[int]:
         """Yield the numbers of the variations that meet the conditions; with `is_random`, without end.
@@ -128,15 +128,15 @@ class VariationSpace:
         """Return the first `count` variations of `numbers()`, named by values that differ. Raises ConditionError."""
         numbers = list(itertools.islice(self.numbers(), self.count))
         chosen = [options for number in numbers if (options := self._options(number)) is not None]
-        changes = [[change for option in options for change in option.changes] for options in chosen]
-        values = [{change.target.path: change.value.plain for change in each} for each in changes]
+        values = [{change.target.path: change.value.plain for change in _changes(options)} for options in chosen]
         differ = {path for path in self.targets if any(value.get(path) != values[0].get(path) for value in values)}
         all_targets = list(self.targets.values())
         named_targets = [target for target in all_targets if target.keys[0] not in _DESCRIPTIVE_KEYS] or all_targets
         keys = short_names([target for target in named_targets if target.path in differ] or named_targets)
         names = [_variation_name(options, keys, number) for number, options in zip(numbers, chosen, strict=True)]
         is_named = [len(options) == 1 and bool(options[0].name) for options in chosen]
-        return [self._build(name, options) for options, name in zip(chosen, make_unique(names, is_named), strict=True)]
+        names = make_unique(names, is_named)
+        return [Variation.with_changes(name, self.tree, _changes(o)) for name, o in zip(names, chosen, strict=True)]
 
     def _options(self, number: int) -> list[Option] | None:
         """Return the options of a variation; None if it violates conditions. Raises ConditionError, IndexError."""
@@ -144,13 +144,13 @@ class VariationSpace:
         for block in self.blocks:
             if index < block.count or self.is_random:
                 options = block.options(index)
-                changes = [change for option in options for change in option.changes]
-                return options if all_hold(block.conditions, self.tree, changes) else None
+                return options if all_hold(block.conditions, self.tree, _changes(options)) else None
             index -= block.count
         raise IndexError(number)
 
-    def _build(self, name: str, options: Sequence[Option]) -> Variation:
-        return Variation.with_changes(name, self.tree, [change for option in options for change in option.changes])
+
+def _changes(options: Sequence[Option]) -> list[Change]:
+    return [change for option in options for change in option.changes]
 
 
 def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -> list[Variation] | list[Problem]:
