@@ -27,6 +27,8 @@ from simscen.report.replay.stack_report import behavior_tree_data, log_lines_dat
 
 MAX_BEAMS, MAX_RANGES = 360, 300_000
 """Maximum number of beams per scan, and of ranges in all scans of a lidar."""
+MAX_RANGE_M = 1e6
+"""Upper limit of the maximum range of a lidar, because JSON has no infinity."""
 MAX_PARTICLES, MAX_CLOUDS = 250, 300
 """Maximum number of particles per cloud, and of clouds per robot."""
 MAX_PLAN_POINTS, MAX_PATH_POINTS = 120, 60_000
@@ -60,7 +62,7 @@ def _lidar(topic: str, messages: LoggedMessages, sensors: SensorMessages, column
         "first": round(first.angle_min, 6),
         "step": round(first.angle_increment * stride, 8),
         "least": round(first.range_min, 4),
-        "most": round(first.range_max, 4),
+        "most": round(min(first.range_max, MAX_RANGE_M), 4),
         "beams": beams,
         "ticks": columns.add([tick for tick, _ in scans]),
         "measured": columns.add([scan.tick if sensors.stamps_are_run_times else tick for tick, scan in scans]),

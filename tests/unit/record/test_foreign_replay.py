@@ -81,6 +81,17 @@ def test_scan_of_a_lidar_that_is_upside_down_is_mirrored(tmp_path: Path) -> None
     assert hit == pytest.approx([0.2 + np.cos(1.0), np.sin(1.0)], abs=1e-6)
 
 
+def test_a_lidar_can_have_an_infinite_maximum_range(simscen, tmp_path: Path) -> None:
+    """This is the default of pointcloud_to_laserscan."""
+    log = drive(2.0)
+    for message in log:
+        if message.topic == "/scan":
+            message.message.range_max = np.inf
+    write_mcap(tmp_path / "log.mcap", log)
+    ended = simscen("replay", str(tmp_path / "log.mcap"), "--truth", "/mocap")
+    assert (ended.code, ended.err) == (0, "")
+
+
 def test_replay_page_is_written_with_and_without_criteria(simscen, tmp_path: Path) -> None:
     log = tmp_path / "monday.mcap"
     write_mcap(log, [a_map(), mounted(), *drive(2.0)])
