@@ -15,6 +15,7 @@ import numpy as np
 from simscen.core.clock import NS_PER_SECOND
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
+from simscen.reconstruction.drive.clocks import MAX_CLOCK_DIFFERENCE_NS, adjust_clock_rate, clock_offset
 from simscen.reconstruction.drive.goals import find_goals, trim_to_first_goal
 from simscen.reconstruction.drive.log_messages import LoggedMessage, LogMessages, PolygonMessage, collect_messages
 from simscen.reconstruction.drive.recorded_drive import (
@@ -28,16 +29,11 @@ from simscen.reconstruction.drive.recorded_drive import (
 )
 from simscen.record import topics
 from simscen.record.foreign.raw_messages import UnusableLog, is_simscen_log, unusable_log_as_invalid_input
-from simscen.record.foreign.timebase import MIN_CLOCK_RATE, to_clock_of_stamps
 from simscen.record.foreign.transforms import TransformTree, UnknownTransform, is_upside_down, lidar_mount
 from simscen.record.messages.decode import ScanMessage, StampedPose
 
 NO_TRUTH = "none"
 """Value of `truth` to ignore the ground truth of a log."""
-MAX_CLOCK_DIFFERENCE_NS = 10 * NS_PER_SECOND
-"""Maximum difference between the stamp and the log time of a message if both are from the same clock."""
-MAX_CLOCK_RATE_ERROR = 0.002
-"""Maximum deviation from 1 of the ratio between the rates of two clocks that measure the same time."""
 MIN_POSES = 2
 """Minimum number of poses of a topic or transform that is used as the source of poses."""
 MAX_COORDINATE_M = 1e6
@@ -74,15 +70,15 @@ class _DriveReader:
 
     def __init__(self, path: Path, messages: LogMessages) -> None:
         self._path, self._messages = path, messages
-        self._notes: list[str] = [*messages.notes]
-        self._adjust_clock_rate()
+        self._notes = messages.notes
+        adjust_clock_rate(messages)
         moving = [message for role, logged in messages.by_role.items() if role not in _LATCHED for message in logged]
         if not moving:
             names = ", ".join(sorted(messages.topics)[:12]) or "none"
             raise UnusableLog("it has no messages of a drive", f"its topics: {names}; name others with --topic")
         has_events = topics.EVENTS.name in messages.topics
         self._start = 0 if has_events else min(message.log_time for message in moving)
-        self._stamp_start = self._start + self._clock_offset()
+        self._stamp_start = self._start + clock_offset(messages)
         self._end = max(message.log_time for message in moving)
         if not messages.is_complete:
             self._notes.append("what happened after its end, because it is truncated")
@@ -123,41 +119,6 @@ class _DriveReader:
             footprint=self._footprint(poses, odometry),
             notes=tuple(self._notes),
         )
-
-    def _adjust_clock_rate(self) -> None:
-        """Convert all log times to the clock of the stamps if its rate differs, as for a simulator in slow motion."""
-        by_role = ([message for message in self._messages.of(role) if message.stamp] for role in _STAMPED)
-        stamped = max(by_role, key=len)
-        if not stamped:
-            return
-        logged, stamps = (np.array([message[column] for message in stamped], dtype=np.int64) for column in (0, 1))
-        rate = float(np.ptp(stamps)) / max(1.0, float(np.ptp(logged)))
-        is_same_clock = np.median(np.abs(stamps - logged)) <= MAX_CLOCK_DIFFERENCE_NS
-        if is_same_clock or rate < MIN_CLOCK_RATE or abs(rate - 1.0) <= MAX_CLOCK_RATE_ERROR:
-            return
-        self._notes.append(f"delays of messages, because stamps advance {rate:.3f} s per second of log time")
-        for role, messages in self._messages.by_role.items():
-            times = np.array([message.log_time for message in messages], dtype=np.int64)
-            converted = to_clock_of_stamps(times, logged, stamps).tolist()
-            self._messages.by_role[role] = [
-                message._replace(log_time=time) for message, time in zip(messages, converted, strict=True)
-            ]
-
-    def _clock_offset(self) -> int:
-        """Return the difference in ns between the clock of the stamps and the clock of the log; 0 for one clock."""
-        differences = [
-            message.stamp - message.log_time
-            for role in _STAMPED
-            for message in self._messages.of(role)
-            if message.stamp
-        ]
-        if not differences:
-            return 0
-        offset = max(differences)
-        if abs(offset) <= MAX_CLOCK_DIFFERENCE_NS:
-            return 0
-        self._notes.append("the smallest delay of messages, because stamps and log times are of different clocks")
-        return int(offset)
 
     def _seconds(self, logged: int) -> float:
         """Convert a log time in ns to s since the start."""
@@ -261,17 +222,14 @@ class _DriveReader:
         if beams < 2 or not first.angle_increment or not np.isfinite(layout[:3]).all() or not first.range_max > 0.0:
             self._notes.append(f"usable scans of `{frame}`, because their angles or range limits are invalid")
             return None
-        ranges = np.full((len(messages), beams), np.nan)
-        is_malformed = np.zeros(len(messages), dtype=bool)
-        for row, index in enumerate(order.tolist()):
-            values = messages[index].content.ranges
-            is_malformed[row] = len(values) != beams
-            if not is_malformed[row]:
-                ranges[row] = values
+        measured = [messages[index].content.ranges for index in order.tolist()]
+        is_malformed = np.array([len(values) != beams for values in measured])
+        nothing = np.full(beams, np.nan)
+        ranges = np.array([values if len(values) == beams else nothing for values in measured])
         mount, height, is_flipped = self._mount(frame)
         angles = first.angle_min + first.angle_increment * np.arange(beams, dtype=np.float64)
         angles = -angles if is_flipped else angles
-        if beams > 1 and angles[1] < angles[0]:  # the estimators expect ascending angles
+        if angles[1] < angles[0]:  # the estimators expect ascending angles
             angles, ranges = angles[::-1], ranges[:, ::-1]
         limits = first.range_min, first.range_max
         return Scans(times[order], arrivals[order], ranges, angles, *limits, mount, height, is_malformed)
@@ -343,8 +301,6 @@ class _DriveReader:
         return Pose2(*known.poses_at(np.array([time]))[0].tolist())
 
 
-_STAMPED = ("scan", "odom", "amcl_pose", "truth")
-"""Roles whose stamps are compared with the log times."""
 _LATCHED = frozenset({"map", "tf_static", "footprint", "events"})
 """Roles whose messages can be logged at any time, so that they do not define the start and end of the drive."""
 
