@@ -127,6 +127,9 @@ class Fault(ABC):
     cmd_vel, "Wheels" for the wheels, "Belief" for the localizer, and "Map" for the map."""
     keys_by_kind: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     """Keys that apply to each kind of target; all keys for kinds that are not listed."""
+    measures_again: ClassVar[bool] = False
+    """Whether the fault simulates measurements again. It then acts at the tick of the measurement, before the latency
+    of the sensor and before all other faults."""
     neutral_values: ClassVar[Mapping[str, object]] = {}
     """Values of the keys with which the fault has no effect; {} if the fault always has an effect."""
 

@@ -28,6 +28,7 @@ class Extrinsic(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan", "Image", "Imu"})
+    measures_again: ClassVar[bool] = True
     neutral_values: ClassVar[Mapping[str, object]] = dict.fromkeys(("x", "y", "z", *ROTATION_KEYS), 0.0)
     keys_by_kind: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "Scan": ("x", "y", "z", *ROTATION_KEYS),

@@ -32,6 +32,7 @@ class Glass(Spec, Fault):
     """
 
     affects: ClassVar[frozenset[str]] = frozenset({"Scan"})
+    measures_again: ClassVar[bool] = True
     neutral_values: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     of: Annotated[list[ObjectName], Field(min_length=1, max_length=100)]
     """Walls, obstacles, objects, and doors of the world, or objects that an event spawns."""

@@ -6,7 +6,7 @@ from pathlib import Path
 from simscen.core.clock import Clock
 from simscen.core.environment.world_model import Patch
 from simscen.core.messages.navigation import Belief
-from simscen.core.messages.sensor_data import Odometry
+from simscen.core.messages.sensor_data import Odometry, Reading
 from simscen.core.random_streams import Streams
 from simscen.core.records.events import Event, EventKind
 from simscen.model.stack_files import ExternalStackSpec
@@ -114,6 +114,12 @@ def _build_robot(
     clock, streams = Clock(spec.physics.tick_rate), Streams(seed, name)
     rays = LiveRayCaster(RayScene(scene), robot)
     sensors: tuple[Sensor, ...] = build_sensors(prepared.robot, clock, streams, robot, rays)
+
+    def measure(reading: Reading) -> Reading:
+        return faults.measure(reading)
+
+    if any(entry.fault.measures_again for entry in spec.faults):
+        sensors = tuple(SensorWithFaults(sensor, measure) for sensor in sensors)
     truth_period = clock.period(spec.physics.truth_rate)
     control_period = clock.period(prepared.stack.controller_frequency)
     if prepared.stack.gets_ground_truth:
@@ -196,6 +202,18 @@ class TruthSensor:
         """Return the true pose and velocity."""
         truth = self._robot.truth()
         return Odometry(self.name, tick, truth.pose.plane, truth.twist)
+
+
+class SensorWithFaults:
+    """The sensor `inner`, but `disturb` changes its measurements."""
+
+    def __init__(self, inner: Sensor, disturb: Callable[[Reading], Reading]) -> None:
+        self._inner, self._disturb = inner, disturb
+        self.name, self.period = inner.name, inner.period
+
+    def read(self, tick: int) -> Reading:
+        """Return the changed measurement."""
+        return self._disturb(self._inner.read(tick))
 
 
 class LocalizerWithFaults:

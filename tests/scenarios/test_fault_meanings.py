@@ -105,6 +105,41 @@ def test_rotated_lidar_measures_a_rotated_scene(tmp_path):
         assert np.mean(np.abs(off) < 0.06) > 0.9, "too many beams do not hit a wall"
 
 
+LATE_LIDAR = """\
+simscen: 1
+world:
+  simscen: 1
+  walls: [{name: outer wall, thickness: 0.002, points: [[0, 0], [8, 0], [8, 4], [0, 4], [0, 0]]}]
+robot: {model: late.robot.yaml, pose: {x: 1, y: 1}}
+stack: {localizer: {type: ground_truth}}
+goals: [{pose: {x: 5, y: 3}}]
+time_limit: 6 s
+"""
+
+LATE_ROBOT = """\
+simscen: 1
+name: late
+mass: 2 kg
+radius: 0.2 m
+body: [{cylinder: [0.2, 0.2], z: 0.03}]
+drive: {type: differential, wheel_radius: 0.033, wheel_separation: 0.287}
+limits: {linear: 0.5, angular: 2, linear_acceleration: 1, angular_acceleration: 3.2}
+sensors: {lidar: {lidar: {noise: 0, latency: 200 ms}}, odom: {odometry: {}}}
+"""
+
+
+@pytest.mark.parametrize("before", ["", "{sensor: lidar, delay: {latency: 100 ms}}, "])
+def test_a_displaced_lidar_measures_before_its_scans_are_delayed(before: str, tmp_path):
+    (tmp_path / "late.robot.yaml").write_text(LATE_ROBOT)
+    _, moments = play(f"faults: [{before}{{sensor: lidar, extrinsic: {{yaw: 90 deg}}}}]\n", tmp_path, LATE_LIDAR)
+    truth = {moment.tick: moment.truth.pose.plane for moment in moments if moment.truth}
+    late = [(truth[scan.tick], scan) for tick, scan in scans(moments) if tick >= scan.tick + 48 and scan.tick in truth]
+    assert len(late) > 20
+    for pose, scan in late:
+        off = scan.ranges - ranges_to_walls(pose.x, pose.y, scan.angles() + pose.yaw + math.radians(90))
+        assert np.mean(np.abs(off) < 0.06) > 0.95, "measured from the pose at its arrival"
+
+
 def test_a_lidar_that_is_pitched_down_sees_the_floor_as_a_wall(tmp_path):
     _, moments = play("faults: [{sensor: lidar, extrinsic: {pitch: 5 deg}}]\n", tmp_path, STATIONARY)
     height = 0.18

@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
 TARGET_DESCRIPTIONS = {COMMAND: "a velocity command", WHEELS: "wheels", BELIEF: "a localizer", MAP: "a map"}
 """Descriptions for messages of fault targets other than sensors, by kind of the target."""
-RESAMPLING_FAULTS = frozenset({"glass", "extrinsic"})
-"""Kinds of faults that simulate a measurement again, in a changed world or from another pose. They must be listed
-before faults that delay messages."""
 
 
 def fault_targets(loaded: LoadedScenario, robot: RobotSpec) -> Mapping[str, FaultTarget]:
@@ -118,21 +115,6 @@ def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, 
         target = targets.get(entry.sensor)
         if target is not None and target.kind in entry.fault.affects and not entry.fault.unsuitable_key(target):
             yield index, entry, target
-
-
-@NAMES.check("SC032")
-def resampling_after_delay(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find faults that simulate the measurement again, but are listed after a fault that delays the messages."""
-    loaded = scope.loaded
-    faults = loaded.spec.faults
-    for index, entry, targets in _listed_faults(loaded):
-        target = targets.get(entry.sensor)
-        before = [one.label for one in faults[:index] if one.sensor == entry.sensor and one.kind in ("delay", "stuck")]
-        resamples = entry.kind in RESAMPLING_FAULTS and target is not None and target.kind in ("Scan", "Image")
-        if resamples and before:
-            message = f"`{entry.label}` has no effect: `{before[0]}` before it holds the measurements back"
-            hint = f"list it before `{before[0]}`; faults apply in the order of the list"
-            yield CheckProblem(("faults", index, entry.kind), message, hint, at_key=True)
 
 
 @MEANING.check("SC050")

@@ -1,7 +1,7 @@
 """Inject the faults of a robot into its readings, beliefs (pose estimates), and commands during a run.
 
 Several faults of one sensor or actuator form a chain in the order of the scenario: each fault receives the output of
-the previous fault.
+the previous fault. Faults that simulate measurements again (`Fault.measures_again`) come first.
 """
 
 import math
@@ -38,6 +38,7 @@ class _ActiveFault:
     sensor:         name of the target (the affected sensor or actuator)
     kind:           kind of the target: class of its readings, such as "Scan", or COMMAND, WHEELS, BELIEF, or MAP
     effect:         implementation of the fault
+    measures_again: whether the effect is applied to measurements, before the latency of the sensor
     changed_count:  number of messages that the fault has changed or withheld
     has_ended:      whether the fault has ended
     """
@@ -46,6 +47,7 @@ class _ActiveFault:
     sensor: str
     kind: str
     effect: FaultEffect
+    measures_again: bool
     changed_count: int = 0
     has_ended: bool = False
 
@@ -95,7 +97,9 @@ class FaultInjector:
         effect: object = entry.fault.begin(rng, setting)
         if not isinstance(effect, FaultEffect):
             self._raise_invalid(index, f"returned {effect!r} from `begin`, which is not a FaultEffect")
-        self.active[index, self._activations[index]] = _ActiveFault(index, entry.sensor, setting.kind, effect)
+        self.active[index, self._activations[index]] = _ActiveFault(
+            index, entry.sensor, setting.kind, effect, entry.fault.measures_again
+        )
         self._affects_commands = self._affects_commands or setting.kind == COMMAND
         return setting.kind
 
@@ -104,12 +108,21 @@ class FaultInjector:
         key = index, self._activations[index]
         active = self.active.pop(key)
         if remaining := active.effect.end():
-            self.active[key] = _ActiveFault(index, active.sensor, active.kind, remaining, has_ended=True)
+            self.active[key] = replace(active, effect=remaining, has_ended=True)
         return active.changed_count
+
+    def measure(self, reading: Reading) -> Reading:
+        """Return the measurement that a sensor with faults makes instead of `reading`. Call it at each measurement."""
+        for active in self._in_order() if self.active else ():
+            if active.measures_again and active.affects(reading):
+                reading = self._disturb_reading(active, reading) or reading
+        return reading
 
     def disturb(self, readings: Readings) -> Readings:
         """Return the readings that the stack receives: disturbed readings, and delayed readings that arrive now."""
         for active in self._in_order():
+            if active.measures_again:
+                continue
             if active.index in self._map_faults:
                 self._map_faults.remove(active.index)
                 self._count(active)
