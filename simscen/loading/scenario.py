@@ -158,7 +158,6 @@ def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Pat
 def _load_variation(
     variation: Variation, library: Library, file: Path, choice: StackChoice | None
 ) -> LoadedScenario | list[Problem]:
-    """Load one variation, with the stack `choice` unless it is None. Return the scenario or all its problems."""
     tree = variation.tree if choice is None else multirobot.apply_stack_choice(variation.tree, choice)
     if choice is not None and (ineffective := list(_ineffective_variation_problems(variation, tree, choice))):
         return library.with_source(ineffective)
@@ -197,7 +196,6 @@ def _ineffective_variation_problems(variation: Variation, tree: MappingNode, cho
 def _load_multi_robot(
     spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path
 ) -> LoadedScenario | list[Problem]:
-    """Load a scenario of several robots. Return the scenario, or all its problems without duplicates."""
     views: dict[str, LoadedScenario] = {}
     problems: list[Problem] = []
     for name, own in multirobot.split_by_robot(tree).items():
@@ -266,6 +264,5 @@ def _load_single_robot(
 
 
 def _map_at(keys: Keys, tree: MappingNode, assets: Assets) -> LoadedMap | None:
-    """Load the ROS map whose path is at `keys` of a valid scenario; None if there is no path."""
     node = node_at(tree, keys)
     return assets.map(node) if isinstance(node, ScalarNode) else None

@@ -9,7 +9,7 @@ from simscen.core.geometry.kinematics import MecanumWheels
 from simscen.model.sensors import Sensor
 from simscen.model.stack_base import RobotLatency
 from simscen.spec.base import LanguageVersion, Spec, by_default
-from simscen.spec.places import Name, PoseSpec, Ring
+from simscen.spec.places import FilePath, Name, PoseSpec, Ring
 from simscen.spec.quantities import (
     Angle,
     Friction,
@@ -25,7 +25,6 @@ from simscen.spec.quantities import (
 )
 from simscen.spec.shapes import ShapedObject
 
-FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
 Argument = Annotated[str, Field(max_length=4096)] | int | float | bool
 JointNames = Annotated[list[Name], Field(min_length=1, max_length=20)]
 

@@ -12,9 +12,10 @@ from simscen.core.records.verdict import ExpectedFailure as DeclaredFailure
 from simscen.criteria.registry import AnyCriterion
 from simscen.model.navigation import Expectation, Navigation, OnReached
 from simscen.model.stack_files import AnyStack
-from simscen.model.world import FilePath, WorldSpec
+from simscen.model.world import WorldSpec
 from simscen.spec.base import LanguageVersion, LazySpec, Spec, by_default, text_or_mapping
 from simscen.spec.places import (
+    FilePath,
     Name,
     PlaceAllowed,
     PlaceName,

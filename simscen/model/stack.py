@@ -14,9 +14,9 @@ from simscen.model.profiles import Profile, apply_profile
 from simscen.model.recovery import Recovery
 from simscen.model.stack_base import Latency, StackBase
 from simscen.spec.base import Typed, by_default, text_or_mapping
+from simscen.spec.places import FilePath
 from simscen.spec.quantities import Quantity
 
-ParameterFile = Annotated[str, Field(min_length=1, max_length=4096)]
 _LatencyOrRobot = Annotated[
     Annotated[Literal["robot"], Tag("a text")] | Annotated[Latency, Tag("a mapping")],
     Discriminator(text_or_mapping),
@@ -38,7 +38,7 @@ class StackSpec(InProcessStack):
     profile: Profile = "reference"
     """Set of default values for the other parameters. `nav2`: the values of nav2_bringup. `advanced`: components that
     Nav2 does not have, such as motion prediction and scan matching. `simscen`: deprecated name of `advanced`."""
-    nav2_params: ParameterFile | None = None
+    nav2_params: FilePath | None = None
     """Parameter file of Nav2, such as nav2_params.yaml. Parameters that do not exist here are ignored."""
     localizer: Localizer = by_default()
     """Localizer, which estimates the pose of the robot."""

@@ -6,11 +6,9 @@ from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_v
 
 from simscen.spec.base import LanguageVersion, Spec
 from simscen.spec.motions import Motion
-from simscen.spec.places import Name, PlaceName, PlaceOrPoint, PlaceOrPose, PoseSpec, Ring
+from simscen.spec.places import FilePath, Name, PlaceName, PlaceOrPoint, PlaceOrPose, PoseSpec, Ring
 from simscen.spec.quantities import Duration, Friction, Length, Mass, PositiveLength, Probability
 from simscen.spec.shapes import ShapedObject
-
-FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
 
 
 class Wall(Spec):

@@ -110,7 +110,8 @@ DoorName = Annotated[Name, ReferenceTo("door")]
 GoalName = Annotated[Name, ReferenceTo("goal")]
 EventName = Annotated[Name, ReferenceTo("event")]
 DisturbanceName = Annotated[Name, ReferenceTo("disturbance")]
-MaskFile = Annotated[str, Field(min_length=1, max_length=4096), ReferenceTo("mask")]
+FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
+MaskFile = Annotated[FilePath, ReferenceTo("mask")]
 
 
 PLACE_NAME_DESCRIPTION = "Name of a place in the world."

@@ -15,7 +15,6 @@ from simscen.worlds.geometry.overlaps import place_polygon, polygons_overlap
 
 
 def _start_is_blocked(scene: Scene) -> bool:
-    """Return whether the start of the robot is inside an obstacle or outside the map."""
     return START in scene.cached(blocked_poses)
 
 

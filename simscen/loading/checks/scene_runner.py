@@ -60,7 +60,6 @@ def world_problems(
 
 
 def _check_robot(loaded: LoadedScenario, world: World, cache: WorldCache, pictures: Path | None) -> list[Problem]:
-    """Return the problems of a scenario of one robot, or of the view of one of several robots."""
     loaded = _with_robot_spec(loaded)
     blocking = blocking_world(loaded, world)
     problems: list[Problem] = []

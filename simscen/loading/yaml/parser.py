@@ -111,7 +111,6 @@ class _Composer:
         return node
 
     def _scalar_value(self, event: ev.ScalarEvent) -> str | int | float | bool | None:
-        """Return the value of a scalar; for an integer that is too large, report a problem and return 0."""
         if not event.implicit[0]:
             return str(event.value)
         try:
@@ -172,7 +171,6 @@ class _Composer:
         return node
 
     def _count_values(self, event: ev.Event, count: int) -> None:
-        """Add `count` to the number of values. Raises _ParseError if there are too many."""
         self._value_count += count
         if self._value_count > MAX_VALUES:
             subject = "aliases expand to" if isinstance(event, ev.AliasEvent) else "the file has"
