@@ -92,12 +92,12 @@ def _texts(value: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
 def angles_of(spec: BaseModel) -> Iterator[tuple[Keys, float]]:
     """Yield the keys and values in rad of all angles, including those in lists, such as the yaw of keyframes."""
     for keys, part in walk(spec):
-        for name, below, kind in _fields_with_angles(type(part)):
+        for name, below, kind in fields_with_angles(type(part)):
             yield from _angles_in(getattr(part, name), kind, (*keys, *below))
 
 
 @cache
-def _fields_with_angles(model: type[BaseModel]) -> list[tuple[str, Keys, Any]]:
+def fields_with_angles(model: type[BaseModel]) -> list[tuple[str, Keys, Any]]:
     """Return the name, the keys in YAML, and the type of each field that is an angle or contains one."""
     return [found for found in _fields(model) if any(map(_is_angle, _annotations(found[2])))]
 

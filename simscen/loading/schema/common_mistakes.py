@@ -4,6 +4,7 @@ A Choice is a mapping with one key that selects its kind, such as the criterion 
 location of a validation error in pydantic: keys and list indices, with tags of union members between them.
 """
 
+import math
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
@@ -11,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from simscen.loading.schema.lookup import has_no_required_keys, keys_of, models_at
 from simscen.loading.schema.messages import did_you_mean
+from simscen.loading.spec_walk import fields_with_angles
 from simscen.loading.yaml.tree import Key, Keys, MappingNode, Node, ScalarNode, SequenceNode, dotted_path, existing_keys
 from simscen.spec.choice import Choice
 from simscen.spec.places import PoseSpec
@@ -46,6 +48,15 @@ def hint_for_wrong_type(error_type: str, model: type[BaseModel], loc: Sequence[K
         if loc and any(issubclass(one, Choice) and loc[-1] in one.choices() for one in models_at(model, loc[:-1])):
             return f"`simscen explain {loc[-1]}` shows its keys"
     return ""
+
+
+def hint_for_bounds(model: type[BaseModel], loc: Sequence[Key], node: Node) -> str:
+    """Return the reason for the bounds of `node`, or a hint that an angle could be in degrees; "" if unknown."""
+    value = node.value if isinstance(node, ScalarNode) else None
+    is_angle = any(keys == (loc[-1],) for one in models_at(model, loc[:-1]) for _, keys, _ in fields_with_angles(one))
+    if is_angle and isinstance(value, int | float) and abs(value) > 2 * math.pi:
+        return f"angles without a unit are in radians; did you mean `{value:g} deg`?"
+    return HINTS_FOR_BOUNDS.get(tuple(loc), "")
 
 
 def hint_for_misplaced_key(model: type[BaseModel], tree: Node, loc: Sequence[Key], key: str) -> str:

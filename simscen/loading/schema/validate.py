@@ -118,7 +118,7 @@ def _problem_for_error(model: type[BaseModel], tree: Node, error: dict[str, Any]
     if not message.hint and kind in ("model_type", "model_attributes_type", "list_type"):
         message = message._replace(hint=common_mistakes.hint_for_wrong_type(kind, model, loc, node))
     elif not message.hint and message.code == "SC013":
-        message = message._replace(hint=common_mistakes.HINTS_FOR_BOUNDS.get(loc, ""))
+        message = message._replace(hint=common_mistakes.hint_for_bounds(model, loc, node))
     if kind == "value_error" and isinstance(node, MappingNode):
         named = (name for name in re.findall(r"`(\w+)`", message.text) if name in node.entries)
         loc = (*loc, *islice(named, 1))  # the first key that the message names
