@@ -61,6 +61,18 @@ class Endpoint(NamedTuple):
 STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
 
 
+class CountingExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy is not installed here
+    """Executor that counts the events that it handles."""
+
+    handled_count = 0
+
+    def wait_for_ready_callbacks(self, *args: Any, **kwargs: Any) -> Any:
+        """Return the callback of the next event, as the base class does. Raises an exception if there is no event."""
+        ready = super().wait_for_ready_callbacks(*args, **kwargs)
+        self.handled_count += 1
+        return ready
+
+
 class Graph:
     """simscen's node in one ROS domain.
 
@@ -71,7 +83,7 @@ class Graph:
         """`check_alive` is called repeatedly while waiting, and may raise an exception to end the wait."""
         self.names, self._check_alive = names, check_alive
         self.node = rclpy.create_node(NODE_NAME, namespace=names.namespace or None, use_global_arguments=False)
-        self.executor = SingleThreadedExecutor()
+        self.executor = CountingExecutor()
         self.executor.add_node(self.node)
         self.publishers: Dict[str, Any] = {}
         self.types: Dict[str, str] = {}
@@ -141,9 +153,9 @@ class Graph:
     def receive_all(self) -> None:
         """Move all messages that have arrived to `inbox`, without waiting."""
         while True:
-            before = len(self.inbox)
+            before = self.executor.handled_count
             self.spin_once()
-            if len(self.inbox) == before:
+            if self.executor.handled_count == before:
                 return
 
     def spin_until(self, done: Callable[[], bool], seconds: float) -> bool:
