@@ -28,11 +28,7 @@ from simscen.model.scenario import ScenarioSpec
 
 
 def load_scenario(
-    path: Path,
-    root: Path,
-    world_path: Sequence[Path] = (),
-    choice: StackChoice | None = None,
-    variation: str = "",
+    path: Path, root: Path, world_path: Sequence[Path] = (), choice: StackChoice | None = None, variation: str = ""
 ) -> LoadedScenario:
     """Load the scenario in the file `path`, or its variation with the name `variation`.
 

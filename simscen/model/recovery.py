@@ -92,12 +92,7 @@ class ClearCostmap(BehaviorSpec):
     """Whether to clear the entire global costmap, as in Nav2; otherwise only the area of the local costmap."""
 
 
-_SHIPPED: dict[str, type[BehaviorSpec]] = {
-    "clear_costmap": ClearCostmap,
-    "spin": Spin,
-    "wait": Wait,
-    "backup": BackUp,
-}
+_SHIPPED: dict[str, type[BehaviorSpec]] = {"clear_costmap": ClearCostmap, "spin": Spin, "wait": Wait, "backup": BackUp}
 """Specifications of the behaviors of the reference stack, by type."""
 BEHAVIORS = {name: f"{model.__module__}:{model.__name__}" for name, model in _SHIPPED.items()}
 """Specifications of the behaviors of the reference stack as `module:Class`, by type."""

@@ -18,8 +18,7 @@ from simscen.spec.places import FilePath
 from simscen.spec.quantities import Quantity
 
 _LatencyOrRobot = Annotated[
-    Annotated[Literal["robot"], Tag("a text")] | Annotated[Latency, Tag("a mapping")],
-    Discriminator(text_or_mapping),
+    Annotated[Literal["robot"], Tag("a text")] | Annotated[Latency, Tag("a mapping")], Discriminator(text_or_mapping)
 ]
 REFERENCE_BUILDER = "simscen.stack.build:StackBuilder"
 ADVANCED_BUILDER = "simscen.advanced.stack:AdvancedStackBuilder"

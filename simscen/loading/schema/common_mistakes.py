@@ -19,7 +19,7 @@ from simscen.spec.places import PoseSpec
 from simscen.spec.quantities import MAX_TEXT_CHARS
 
 HINTS_FOR_BOUNDS: dict[Keys, str] = {
-    ("physics", "truth_rate"): "criteria are judged at these samples; lower rates miss short violations",
+    ("physics", "truth_rate"): "criteria are judged at these samples; lower rates miss short violations"
 }
 """Hints for values outside their bounds, by the keys of the value."""
 MAX_SEARCH_DEPTH = 3

@@ -15,11 +15,7 @@ from simscen.loading.stacks.nav2_mapping import (
     translate_same_name,
 )
 
-DEFAULT_LAYERS = {
-    "static_layer": "StaticLayer",
-    "obstacle_layer": "ObstacleLayer",
-    "inflation_layer": "InflationLayer",
-}
+DEFAULT_LAYERS = {"static_layer": "StaticLayer", "obstacle_layer": "ObstacleLayer", "inflation_layer": "InflationLayer"}
 """Classes of the layers of a costmap without `plugins`, by name of the layer."""
 OBSERVATION_LAYERS = ("ObstacleLayer", "VoxelLayer")
 """Classes of layers that mark and clear obstacles by sensor data."""

@@ -56,11 +56,7 @@ def pairs_of(row: Row) -> set[Pair]:
 
 
 def _candidate_row(
-    pair: Pair,
-    counts: Sequence[int],
-    uncovered: set[Pair],
-    attempt: int,
-    is_allowed: Callable[[Row], bool],
+    pair: Pair, counts: Sequence[int], uncovered: set[Pair], attempt: int, is_allowed: Callable[[Row], bool]
 ) -> Row | None:
     """Return a row with `pair` and, chosen greedily, many of `uncovered`; None if it is not allowed.
 
