@@ -52,7 +52,7 @@ def _goal(name: str, entry: "GoalEntry | NewGoal", spec: ScenarioSpec) -> Goal:
 
 
 def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, str]:
-    """Return the expected failures, such as "NO_VALID_PATH", by name of the goal, of the result of `scenario_goals`."""
+    """Return the expected failures, such as "NO_VALID_PATH", by name of the goals, which are from `scenario_goals`."""
     through = spec.navigation.mode == "navigate_through_poses"
     found = {}
     for number, goal in enumerate(goals):

@@ -39,7 +39,7 @@ class WorldCache:
     _shortest_paths: list[tuple[Solids, object, ShortestPaths]] = field(default_factory=list)
 
     def world(self, loaded: LoadedScenario) -> World:
-        """Return the built world of a scenario, and record all files read for it, also earlier. Raises InvalidInput."""
+        """Return the built world of a scenario, and record its files even if it is cached. Raises InvalidInput."""
         known = next((entry for entry in self._worlds if entry[0] == loaded.world), None)
         if known is None:
             with collect_read_files() as read:

@@ -57,7 +57,7 @@ HEIGHT_PARAMETERS = ("min_obstacle_height", "max_obstacle_height")
 def _translate_observation_sources(
     parameters: Parameters, layers: Mapping[str, str], section: str
 ) -> Iterator[Translation]:
-    """Translate the ranges of the first laser scan source, and the heights of the first point cloud or else scan."""
+    """Translate the ranges of the first laser scan source, and the heights of the first point cloud source or that scan."""
     types = {
         source: parameters.get(f"{source}.data_type", LASER_SCAN) for source in _observation_sources(parameters, layers)
     }

@@ -113,7 +113,7 @@ def _parameter_node(value: Any, position: Position) -> Node:
 
 
 def _notes(translations: Mapping[str, list[Translation]], parameters: Nav2Parameters) -> Iterator[Problem]:
-    """Yield warnings about changed and ignored parameters (without note: one per node), and about unknown nodes."""
+    """Yield warnings about changed and ignored parameters, and about nodes without a counterpart."""
     used = {parameters.positions[node, one.parameter] for node, own in translations.items() for one in own if one.keys}
     for node, own in translations.items():
         ignored = []

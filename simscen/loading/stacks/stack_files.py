@@ -76,7 +76,7 @@ def _read_tree(file: Path, library: Library) -> tuple[Node | None, list[Problem]
 
 
 def recognize_stack_file(tree: Node | None, text: str, display_name: str) -> str:
-    """Return STACK_FILE_KIND, NAV2_FILE_KIND, or "" for a file with this tree and text, which is no stack file."""
+    """Return the kind of a file with this tree and text: STACK_FILE_KIND, NAV2_FILE_KIND, or "" for other files."""
     if is_nav2_parameter_file(text, display_name):
         return NAV2_FILE_KIND
     keys = entries_of(tree).keys()

@@ -82,7 +82,7 @@ def undefined_stack(
 
 
 def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config_file: Path) -> list[Problem]:
-    """Return a problem if the robots of a scenario have several of the stacks of `--stack` options (`given`)."""
+    """Return a problem if a scenario has several of the external stacks `given` by `--stack` options."""
     own = {name: view for view in loaded.robots.values() if (name := external_stack_name(view.tree)) is not None}
     conflicting = [name for name in given if name in own]
     stacks = " and ".join(map(quoted, conflicting))

@@ -31,7 +31,7 @@ _DESCRIPTIVE_KEYS = frozenset({"description", "tags", "expected", "skip"})
 
 @dataclass(frozen=True)
 class Variation:
-    """Variation of a scenario: its YAML `tree` contains the new values in `changes`. `name` is "" for a single one."""
+    """Variation of a scenario: its `tree` contains the new values in `changes`. Without `variations`, `name` is ""."""
 
     name: str
     tree: MappingNode = field(repr=False)

@@ -141,7 +141,7 @@ class _Composer:
         return MappingNode(self._position_of(start), self._apply_merge_keys(start, entries, merged))
 
     def _apply_merge_keys(self, start: ev.Event, entries: dict[str, Entry], merged: list[Node]) -> dict[str, Entry]:
-        """Return `entries` with the keys of `merged`, the values of the merge key `<<`. Earlier keys have priority."""
+        """Return `entries` with the keys of `merged`, the values of the key `<<`. The first of equal keys is used."""
         for other in merged:
             if not isinstance(other, MappingNode):
                 self.problems.append(self._problem(start, "SC003", "`<<` expects a mapping or a list of mappings"))
