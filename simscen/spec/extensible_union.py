@@ -45,9 +45,9 @@ class ExtensibleUnion:
         return members if self.untyped is None else {**members, UNTYPED_TAG: self.untyped}
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        members: dict[Hashable, CoreSchema] = {
-            tag: handler.generate_schema(Annotated[BaseModel, member]) for tag, member in self.members().items()
-        }
+        members: dict[Hashable, CoreSchema] = {}
+        for tag, member in self.members().items():
+            members[tag] = handler.generate_schema(Annotated[BaseModel, member])
         union: CoreSchema = core_schema.tagged_union_schema(members, self._tag)
         if self.allows_names:
             names = core_schema.literal_schema([entry.name for entry in built_in_types(self.group)])

@@ -244,9 +244,8 @@ def _type_problem(entry: RegisteredType, installed: list[RegisteredType]) -> str
     if entry.name in group.reserved:
         return f"the name `{entry.name}` is reserved"
     others = [other for other in installed if (other.group, other.name) == (entry.group, entry.name)]
-    if not entry.is_shipped and any(
-        own.is_shipped and own.name == entry.name for own in (*built_in_types(entry.group), *others)
-    ):
+    shipped = {own.name for own in (*built_in_types(entry.group), *others) if own.is_shipped}
+    if not entry.is_shipped and entry.name in shipped:
         return "simscen ships a type with the same name, which takes precedence"
     others = [other for other in others if other.is_shipped == entry.is_shipped]
     if len(others) > 1:

@@ -57,9 +57,7 @@ class RobotRoutes:
         def is_inside(point: tuple[float, float]) -> bool:
             return distance(Pose2(*point)) <= 0
 
-        if approximate is not None and any(
-            approximate.can_enter(start[:2], towards[:2], is_inside) for start in starts
-        ):
+        if approximate and any(approximate.can_enter(start[:2], towards[:2], is_inside) for start in starts):
             return True
         return self._exact_paths(self.scene.world.solids).may_enter(starts, distance)
 
@@ -113,9 +111,8 @@ def trigger_areas(scene: Scene) -> list[TriggerArea]:
     conditions: list[tuple[Keys, str, AnyCondition | None, bool]] = [
         ((*step.keys, "when"), step.name, step.when, step.required) for step in spec.steps
     ]
-    conditions += [
-        (("faults", k, "when"), fault.label, fault.when, fault.required) for k, fault in enumerate(spec.faults)
-    ]
+    for k, fault in enumerate(spec.faults):
+        conditions.append((("faults", k, "when"), fault.label, fault.when, fault.required))
     return [
         area._replace(required=required)
         for keys, name, condition, required in conditions

@@ -43,9 +43,8 @@ def check_in_world(
     problems = list(dict.fromkeys(found))  # the robots share most problems
     if not _has_errors(problems):
         views = [_with_robot_spec(view) for view in loaded.robots.values()]
-        problems += placement.overlapping_start_problems(
-            [Scene(view, world, robot_size(view), cache) for view in views]
-        )
+        scenes = [Scene(view, world, robot_size(view), cache) for view in views]
+        problems += placement.overlapping_start_problems(scenes)
     return problems
 
 

@@ -57,10 +57,9 @@ HEIGHT_PARAMETERS = ("min_obstacle_height", "max_obstacle_height")
 def _translate_observation_sources(
     parameters: Parameters, layers: Mapping[str, str], section: str
 ) -> Iterator[Translation]:
-    """Translate the ranges of the first laser scan source, and the heights of the first point cloud source or that scan."""
-    types = {
-        source: parameters.get(f"{source}.data_type", LASER_SCAN) for source in _observation_sources(parameters, layers)
-    }
+    """Translate the ranges of the first laser scan, and the heights of the first point cloud or else laser scan."""
+    sources = _observation_sources(parameters, layers)
+    types = {source: parameters.get(f"{source}.data_type", LASER_SCAN) for source in sources}
     first: dict[str, str] = {}
     for source in sorted(types, key=lambda source: types[source] == LASER_SCAN):  # point clouds first
         is_scan = types[source] == LASER_SCAN

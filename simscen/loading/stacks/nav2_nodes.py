@@ -121,9 +121,8 @@ def _translate_critics(name: str, written: Any, kind: str) -> Iterator[Translati
     """Translate the list `written` of critics: MPPI gets the supported ones, DWB the weight 0 for all others."""
     listed = strings(written)
     supported = MPPI_CRITICS if kind == "mppi" else (*DWB_CRITICS, *DWB_CRITICS_WITHOUT_WEIGHT)
-    names = {
-        critic: class_of(critic).removesuffix("Critic") + ("Critic" if kind == "mppi" else "") for critic in listed
-    }
+    suffix = "Critic" if kind == "mppi" else ""
+    names = {critic: class_of(critic).removesuffix("Critic") + suffix for critic in listed}
     unknown = [critic for critic in listed if names[critic] not in supported]
     used = [names[critic] for critic in listed if names[critic] in supported]
     if kind == "mppi" and used:

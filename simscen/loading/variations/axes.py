@@ -67,9 +67,8 @@ class AxisBuilder:
 
     def _build_axes(self, block: "VariationBlock", node: Node, conditions: Sequence[Condition]) -> list[Axis]:
         """Return the axes of a block: one for each path under `grid`, and one for each other kind, such as `pairs`."""
-        found: list[Axis] = [
-            [Option((change,)) for change in changes] for changes in self._changes_by_path(child(node, "grid"), True)
-        ]
+        grid = self._changes_by_path(child(node, "grid"), True)
+        found: list[Axis] = [[Option((change,)) for change in changes] for changes in grid]
         if block.pairwise is not None:
             found.append(self._pairwise_options(child(node, "pairwise"), conditions))
         if block.pairs is not None:

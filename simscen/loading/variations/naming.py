@@ -33,9 +33,8 @@ def short_names(targets: Sequence[Target]) -> dict[str, str]:
     while True:
         short = {path: ".".join(parts[path][-count:]) for path, count in part_counts.items()}
         occurrences = Counter(short.values())
-        ambiguous = [
-            path for path, name in short.items() if occurrences[name] > 1 and part_counts[path] < len(parts[path])
-        ]
+        longer = {path for path, count in part_counts.items() if count < len(parts[path])}
+        ambiguous = [path for path, name in short.items() if occurrences[name] > 1 and path in longer]
         if not ambiguous:
             return {path: _sanitize(name) for path, name in short.items()}
         part_counts |= {path: part_counts[path] + 1 for path in ambiguous}
