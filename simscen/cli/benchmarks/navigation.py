@@ -87,7 +87,7 @@ def command(
     message. Failed runs are printed on standard error, each with a command to repeat the run. An interrupted session
     prints its results so far; use --resume with the same options to continue.
 
-    Exit code 0: all runs were completed; 3: a run could not be completed; 5: no experiment matches --only.
+    Exit code 0: all runs were completed; 3: a run could not be completed; 5: no experiment matches --only and has runs.
     """
     from simscen.bench.navigation.summary import compare_experiment
     from simscen.cli.benchmarks.navigation_experiments import Sizes, experiment_groups
@@ -108,10 +108,14 @@ def command(
             print(f"{group.name}: skipped, {group.missing}", file=sys.stderr)
             continue
         experiments += [
-            experiment for experiment in group.write_experiments() if is_whole or _is_selected(experiment.name, only)
+            experiment
+            for experiment in group.write_experiments()
+            if experiment.drives and (is_whole or _is_selected(experiment.name, only))
         ]
     if not experiments:
-        raise NothingSelected("no experiment matches --only, or its data is missing")
+        raise NothingSelected(
+            "no experiment matches --only, its data is missing, or its number of fields or drives is 0"
+        )
     others = [] if stack is None else with_stack(stack, experiments, generated, project)
     all_experiments = [*experiments, *others]
     trials, stopped = execute_experiments(all_experiments, journal, workers or len(os.sched_getaffinity(0)))
@@ -157,5 +161,4 @@ def with_stack(file: Path, experiments: list["Experiment"], generated: Path, pro
 
 
 def _is_selected(name: str, only: list[str] | None) -> bool:
-    """Return whether --only selects the name of an experiment or group."""
     return not only or any(part.casefold() in name.casefold() for part in only)

@@ -1,6 +1,7 @@
 """Runs of the experiments of `simscen bench nav`."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -45,6 +46,12 @@ def test_nav2_parameter_file_is_a_valid_stack_and_ignored_parameters_are_reporte
     assert stack.controller.lookahead_dist == 0.77
     assert "mine.yaml:5:" in (output := capsys.readouterr().err)
     assert "warning[SC341] controller_server: simscen has no unheard_of (5)" in output
+
+
+def test_experiments_without_fields_select_nothing(simscen: Any) -> None:
+    ended = simscen("bench", "nav", "--only", "generated fields", "--fields", "0")
+    assert ended.code == 5
+    assert "its number of fields or drives is 0" in ended.err
 
 
 def test_experiments_with_duplicate_runs_are_rejected(tmp_path: Path) -> None:
