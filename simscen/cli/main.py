@@ -215,7 +215,6 @@ def _run_command() -> int:
 
 
 def _print_error(error: SimscenError) -> Exit:
-    """Print an expected error, and return its exit code."""
     from simscen.cli.diagnostics import as_text, escaped, print_text
 
     text = as_text(error.problems) if isinstance(error, InvalidInput) else f"simscen: {escaped(str(error))}"

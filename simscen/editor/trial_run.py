@@ -22,7 +22,6 @@ WALL_LIMIT_S = 300.0
 """Maximum wall time of a run."""
 STOP_TIMEOUT_S = 5.0
 """Maximum wall time to wait for a run to stop."""
-REPLAY_FILE = "replay.html"
 
 
 class _Canceled(Exception):
@@ -68,7 +67,7 @@ class TrialRun:
     @property
     def replay(self) -> Path:
         """Path of the replay page of the run."""
-        return self.folder / REPLAY_FILE
+        return self.folder / "replay.html"
 
 
 class TrialRuns:

@@ -80,7 +80,6 @@ def command(
 
 
 def _measure_sparse_logs(numbers: range, workers: int, only: list[str] | None, format_: TextOrJson) -> None:
-    """Run the benchmark with --sparse on the buildings with these numbers, and print the table."""
     from simscen.bench.localization.sparse_logs import run_sparse_logs, sparse_table
 
     if only:

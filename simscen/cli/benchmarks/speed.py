@@ -123,7 +123,6 @@ def suite_command(
 
 
 def _suite_text(suite: "SuiteResult") -> str:
-    """Return the printed lines about a suite: wall time, CPU time, and memory."""
     figures, baseline = suite.figures, suite.baseline * suite.simulated
     duration = f"{suite.simulated:.0f} s simulated in {suite.wall:.1f} s of wall time, {suite.workers} at a time"
     return "\n".join([

@@ -200,7 +200,6 @@ _DRIVES: dict[str, type[BaseModel]] = {
 
 
 def _models(group: str, models: Mapping[str, type[BaseModel]]) -> Iterator[Topic]:
-    """Yield the topics of models by name."""
     return (_topic(group, name, model) for name, model in models.items())
 
 

@@ -74,7 +74,6 @@ def _topics_named(name: str) -> list[Topic]:
 
 
 def _overview(width: int) -> str:
-    """Return the text for a call without a name: all names by group."""
     groups: dict[str, list[str]] = {}
     for topic in all_topics():
         groups.setdefault(topic.group, []).append(topic.name)

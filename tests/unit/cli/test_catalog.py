@@ -51,11 +51,6 @@ def test_every_topic_has_a_description(topic: Topic) -> None:
     assert first.rstrip().endswith((".", ":"))
 
 
-@pytest.mark.parametrize("topic", WORDS, ids=_id)
-def test_every_key_of_a_topic_has_a_description(topic: Topic) -> None:
-    assert [field.key for field in topic.fields if not field.text] == []
-
-
 @pytest.mark.parametrize("topic", SINGLE, ids=_id)
 def test_every_topic_has_a_valid_example(topic: Topic) -> None:
     example = load_yaml(topic.example)

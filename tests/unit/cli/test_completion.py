@@ -69,13 +69,6 @@ def test_help_has_a_short_option(simscen, arguments: tuple[str, ...]) -> None:
     assert (ended.code, "Usage:" in ended.out) == (0, True)
 
 
-def test_module_runs_the_command(simscen) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "simscen", "validate", "good.scenario.yaml"], capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stdout) == (0, "1 scenario is valid\n")
-
-
 def test_an_unknown_home_folder_is_no_error(simscen, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def no_home(_: Path) -> Path:
         raise RuntimeError("Could not determine home directory.")

@@ -248,7 +248,3 @@ def test_program_is_searched_in_the_path_of_its_environment(project: Path) -> No
     (project / "bin/only-here").chmod(0o755)
     configure(project, f"stacks: {{mine: {{command: only-here, env: {{PATH: {project}/bin}}}}}}\n")
     assert loaded("mine")[0].external_command.argv == ("only-here",)
-
-
-def test_schema_of_the_configuration_is_written(simscen, project: Path) -> None:
-    assert '"title": "simscen config"' in simscen("schema", "config").out

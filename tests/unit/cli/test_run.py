@@ -64,17 +64,6 @@ def test_unsupported_sdf_is_an_error_or_with_lenient_a_warning(simscen, tmp_path
         assert "shop.sdf: warning[SC311] world[w]/include/uri: skipped: model://nowhere" in lenient.out
 
 
-def test_undefined_stack_runs_nothing(simscen, tmp_path: Path) -> None:
-    (tmp_path / "good.scenario.yaml").write_text(
-        (tmp_path / "good.scenario.yaml").read_text() + "stack: {external: mine}\n"
-    )
-    ended = simscen("run", "good.scenario.yaml", "--out", "out")
-    assert ended.code == 2
-    assert "good.scenario.yaml:11:19: error[SC060] the external stack `mine` has no command" in ended.err
-    assert "--stack mine='COMMAND'" in ended.err
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.parametrize(
     ("arguments", "expected_text"),
     [

@@ -12,10 +12,6 @@ def test_valid_files_are_counted_by_kind(simscen, tmp_path: Path) -> None:
     assert ended == (0, "1 world and 1 scenario are valid\n", "")
 
 
-def test_count_of_one_file_is_singular(simscen) -> None:
-    assert simscen("validate", "good.scenario.yaml").out == "1 scenario is valid\n"
-
-
 def test_every_problem_is_shown_with_its_line(simscen, tmp_path: Path) -> None:
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub/bad.scenario.yaml").write_text(BAD)
