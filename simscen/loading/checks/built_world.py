@@ -26,10 +26,12 @@ def check_built_world(world: World, source: LoadedWorld) -> list[Problem]:
 @BUILT_WORLD.check("SC314", severity="warning")
 def places_in_obstacles(world: World, spec: WorldSpec) -> Iterator[CheckProblem]:
     """Find places inside obstacles."""
-    from simscen.worlds.geometry.drive_obstacles import drive_obstacles
+    solids = world.solids
+    if spec.ramps:
+        from simscen.worlds.geometry.drive_obstacles import drive_obstacles  # imports NumPy
 
-    limits = RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_MAX_SLOPE_RAD, RAMP_ROBOT_MAX_STEP_M
-    solids = drive_obstacles(world.solids, *limits) if spec.ramps else world.solids
+        limits = RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_MAX_SLOPE_RAD, RAMP_ROBOT_MAX_STEP_M
+        solids = drive_obstacles(solids, *limits)
     for name, place in spec.places.items():
         solid = first_solid_in_disc(solids, (place.x, place.y), TOUCH_M, BLOCKING_HEIGHTS_M)
         if solid is not None:
