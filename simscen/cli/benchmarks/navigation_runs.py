@@ -14,7 +14,7 @@ from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.pending_runs import plan_session
 from simscen.core.errors import Exit, InvalidInput
 from simscen.core.records.run_result import Outcome, RunKey
-from simscen.core.records.session_events import RunFinished, SessionEvent
+from simscen.core.records.session_events import RunFinished, SessionEvent, broadcast
 from simscen.loading.checks.scene_runner import world_problems
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
@@ -72,14 +72,9 @@ def execute_experiments(
     jobs, drives = _plan_jobs(experiments, journal.folder)
     pending = plan_session(journal, jobs, workers)
     progress = _Progress(len(jobs), len(pending.reused))
-
-    def listen(event: SessionEvent) -> None:
-        journal(event)
-        progress(event)
-
     options = SessionOptions(workers=workers, wall_limit=WALL_LIMIT_S)
     with interrupt_on_signals(), backend_of(options) as backend:
-        finished_runs, stopped = run_session(pending.jobs, options, backend, listen)
+        finished_runs, stopped = run_session(pending.jobs, options, backend, broadcast(journal, progress))
     print_progress("")
     results = {finished.key: finished for finished in (*pending.reused, *finished_runs)}
     trials: list[list[Trial]] = [[] for _ in experiments]

@@ -19,7 +19,7 @@ from simscen.cli.session.terminal import Screen, open_screen
 from simscen.cli.shared_options import OutputOptions
 from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, UsageError
 from simscen.core.records.run_result import Outcome, RunResult
-from simscen.core.records.session_events import RunFinished, SessionEvent, SessionStarted
+from simscen.core.records.session_events import RunFinished, SessionStarted, broadcast
 from simscen.core.records.verdict import Status
 from simscen.core.version import __version__
 from simscen.judge.finding_text import run_margin
@@ -135,11 +135,7 @@ class Falsification:
         """
         start, stopped, empty_batches = time.monotonic(), None, 0
         error: SimscenError | None = None
-
-        def listen(event: SessionEvent) -> None:
-            journal(event)
-            screen(event)
-
+        listen = broadcast(journal, screen)
         workers = self._request.options.workers
         runs = self._request.runs
         screen(SessionStarted(__version__, runs, 1, workers, str(reports.folder), seeds=runs))

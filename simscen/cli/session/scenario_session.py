@@ -19,7 +19,7 @@ from simscen.cli.shared_options import OutputOptions
 from simscen.core.errors import Exit, UsageError
 from simscen.core.records.comparison import Comparison
 from simscen.core.records.run_store import RunStore
-from simscen.core.records.session_events import Listener, RunFinished, SessionEvent
+from simscen.core.records.session_events import Listener, RunFinished, broadcast
 from simscen.core.records.study import Study
 from simscen.judge.metrics.comparison import compare_stacks
 from simscen.loading.loaded import LoadedScenario
@@ -83,7 +83,7 @@ def execute_session(
     pending = plan_session(journal, jobs, options.workers, request.selection.shard)
     with open_screen(output.format_, request.durations) as screen:
         live = [LivePage(reports)] if output.open_ else []
-        code = _run(pending, options, reports, [screen, *listeners, *live], unused_server)
+        code = _run(pending, options, reports, broadcast(screen, *listeners, *live), unused_server)
     return screen.exit_code(code)
 
 
@@ -91,23 +91,14 @@ def _run(
     pending: PendingRuns,
     options: SessionOptions,
     reports: Reports,
-    listeners: Sequence[Listener],
+    show: Listener,
     unused_server: ForkServerProcess | None,
 ) -> Exit:
     """Execute the pending runs, write the reports, and return the exit code.
 
-    `listeners` receive all events, including the events of reused results.
+    `show` receives all events, including the events of reused results.
     """
-    start = time.monotonic()
-
-    def show(event: SessionEvent) -> None:
-        for each in listeners:
-            each(event)
-
-    def listen(event: SessionEvent) -> None:
-        pending.journal(event)
-        show(event)
-
+    start, listen = time.monotonic(), broadcast(pending.journal, show)
     show(pending.started(reports.folder))
     for finished in pending.reused:
         show(finished)
@@ -154,9 +145,8 @@ def finish_session(
 ) -> bool:
     """Write the reports of a session, send its last event to `listen`, and close the journal.
 
-    Return whether all files were written.
-
-    `start` is the value of time.monotonic() at the start of the session. Without runs, only run.json is written.
+    Return whether all files were written. `start` is the value of time.monotonic() at the start of the session. Without
+    runs, only run.json is written.
     """
     written = not finished_runs or reports.write(finished_runs, comparison, study)
     wall = time.monotonic() - start

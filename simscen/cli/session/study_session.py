@@ -32,7 +32,7 @@ from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, Usage
 from simscen.core.random_streams import MAX_SEED
 from simscen.core.records.run_result import scenario_title
 from simscen.core.records.run_store import RunStore
-from simscen.core.records.session_events import Listener, RunFinished, SessionEvent, SessionStarted
+from simscen.core.records.session_events import Listener, RunFinished, SessionStarted, broadcast
 from simscen.core.records.study import ClaimStatus
 from simscen.core.version import __version__
 from simscen.judge.pass_rate_claims import evaluate_claim
@@ -93,8 +93,8 @@ def execute_study(request: StudyRequest) -> Exit:
     first = study.load_first_batch()
     reports, journal = start_session(request.output, study.inputs, plugins_and_stacks(first))
     with open_screen(request.output.format_) as screen, backend_of(request.options) as backend:
-        listeners: list[Listener] = [screen, *([LivePage(reports)] if request.output.open_ else [])]
-        return screen.exit_code(study.execute(backend, journal, reports, listeners))
+        live = [LivePage(reports)] if request.output.open_ else []
+        return screen.exit_code(study.execute(backend, journal, reports, broadcast(screen, *live)))
 
 
 class _StudySession:
@@ -139,11 +139,10 @@ class _StudySession:
         self._batch = list(islice(self._runs, self._batch_size))
         return self._load([run.number for run in self._batch])
 
-    def execute(self, backend: Backend, journal: Journal, reports: Reports, listeners: Sequence[Listener]) -> Exit:
+    def execute(self, backend: Backend, journal: Journal, reports: Reports, show: Listener) -> Exit:
         """Run batches until the claim is decided or all runs are done, write the reports, and return the exit code.
 
-        `listeners` receive all events. If a later run cannot be loaded, the error is raised after the reports are
-        written.
+        `show` receives all events. If a later run cannot be loaded, the error is raised after the reports are written.
         """
         start, finished_runs, stopped = time.monotonic(), RunStore(), None
         error: SimscenError | None = None
@@ -152,14 +151,7 @@ class _StudySession:
         scenario_id = next(iter(self._loaded.values())).id
         longest_title = scenario_id if self._space is None else scenario_title(scenario_id, f"variation-{self.total}")
 
-        def show(event: SessionEvent) -> None:
-            for each in listeners:
-                each(event)
-
-        def listen(event: SessionEvent) -> None:
-            journal(event)
-            show(event)
-
+        listen = broadcast(journal, show)
         workers = self._request.options.workers
         titles = (longest_title,)
         show(SessionStarted(__version__, self.total, 1, workers, str(reports.folder), titles, seeds=self.total))

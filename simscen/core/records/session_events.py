@@ -147,3 +147,13 @@ class SessionFinished:
 SessionEvent = SessionStarted | RunStarted | RunProgress | RunFinished | SessionFinished
 Listener = Callable[[SessionEvent], None]
 """Function that is called with each event of a session, such as a reporter."""
+
+
+def broadcast(*listeners: Listener) -> Listener:
+    """Return a listener that passes each event to all `listeners` in order."""
+
+    def listen(event: SessionEvent) -> None:
+        for each in listeners:
+            each(event)
+
+    return listen
