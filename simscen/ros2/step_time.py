@@ -46,19 +46,16 @@ class StepTime:
         if self._spin_until(is_done, min(limit_s, self.remaining)):
             return True
         self._count(waiting, start)
-        if not self.remaining:
-            raise AdapterError(self._message())
-        return False
+        if self.remaining:
+            return False
+        slowest = sorted(self._waited, key=lambda node: (-self._waited[node], node))[:MAX_LISTED_NODES]
+        times = ", ".join(f"{node} ({self._waited[node]:.1f} s)" for node in slowest)
+        raise AdapterError(
+            f"a step took more than {self._limit:.3g} s of wall time, because these nodes answered late: {times}; "
+            "if they need that long, increase `answer_limit` of the stack in your configuration"
+        )
 
     def _count(self, nodes: Iterable[str], start: float) -> None:
         """Add the wall time since `start` to the waiting times of these nodes."""
         for node in nodes:
             self._waited[node] = self._waited.get(node, 0.0) + time.monotonic() - start
-
-    def _message(self) -> str:
-        slowest = sorted(self._waited, key=lambda node: (-self._waited[node], node))[:MAX_LISTED_NODES]
-        times = ", ".join(f"{node} ({self._waited[node]:.1f} s)" for node in slowest)
-        return (
-            f"a step took more than {self._limit:.3g} s of wall time, because these nodes answered late: {times}; "
-            "if they need that long, increase `answer_limit` of the stack in your configuration"
-        )

@@ -91,8 +91,9 @@ def scenario_digests(loaded: LoadedScenario) -> ScenarioDigests:
     `run` depends on the paths of files. `definition` depends neither on their folders nor on comments in the scenario.
     """
     texts = {name: text.encode() for name, text in sorted(loaded.sources.items())}
+    root = loaded.root
     files = {
-        _portable_name(file, loaded): file.read_bytes()
+        file.relative_to(root).as_posix() if file.is_relative_to(root) else str(file): file.read_bytes()
         for file in sorted({*referenced_files(loaded), *loaded.read_files})
     }
     run = hashlib.sha256(json.dumps(_run_inputs(loaded), sort_keys=True).encode())
@@ -163,11 +164,6 @@ def referenced_files(loaded: LoadedScenario) -> list[Path]:
         *(found.image for found in maps if isinstance(found, LoadedMap)),
         *(file for file in (loaded.world.sdf, *(view.robot.urdf for view in views)) if file),
     ]
-
-
-def _portable_name(file: Path, loaded: LoadedScenario) -> str:
-    """Return the path of a file relative to the scenario's root folder; the absolute path of a file outside of it."""
-    return file.relative_to(loaded.root).as_posix() if file.is_relative_to(loaded.root) else str(file)
 
 
 def _hash_file(sha: "hashlib._Hash", name: str, data: bytes) -> None:

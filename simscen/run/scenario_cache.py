@@ -51,7 +51,8 @@ class CachedWorldBuilder:
         cached = _map_from_bytes(self._cache.get(key))
         if cached is None:
             cached = draw_map(world, mesh, lidar_height, resolution)
-            self._cache.put(key, _map_to_bytes(cached))
+            header = _MAP_HEADER.pack(*cached.shape, cached.resolution, *cached.origin)
+            self._cache.put(key, header + cached.cells.astype(np.int8).tobytes())
         return BuiltWorld(world, mesh, cached)
 
     def legs(self, built: BuiltWorld, ends: Sequence[tuple[Pose2, Goal]], radius: float) -> list[Leg]:
@@ -102,10 +103,6 @@ def _legs_from_bytes(data: bytes | None, count: int) -> list[Leg] | None:
     except ValidationError:
         return None
     return legs if legs is not None and len(legs) == count else None
-
-
-def _map_to_bytes(grid: OccupancyGrid) -> bytes:
-    return _MAP_HEADER.pack(*grid.shape, grid.resolution, *grid.origin) + grid.cells.astype(np.int8).tobytes()
 
 
 def _map_from_bytes(data: bytes | None) -> OccupancyGrid | None:

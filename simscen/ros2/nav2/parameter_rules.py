@@ -3,7 +3,7 @@
 The rules apply to parameter files and to running nodes. https://docs.nav2.org/configuration/ describes the parameters.
 """
 
-from typing import Any, Collection, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Collection, Iterable, List, Mapping, NamedTuple, Optional, Sequence
 
 MAP, ODOM = "map", "odom"
 
@@ -70,7 +70,10 @@ def check(
         node.check_topic("scan_topic", published.scans, "scans")
         node.check_topic("odom_topic", [published.odometry], "odometry")
         if name in COSTMAPS:
-            _check_costmap_layers(node)
+            for layer in node.items("plugins"):
+                sources = node.get(f"{layer}.observation_sources")
+                for source in sources.split() if isinstance(sources, str) else ():
+                    _check_source(node, f"{layer}.{source}")
         if name == "collision_monitor":
             for source in node.items("observation_sources"):
                 _check_source(node, str(source))
@@ -79,21 +82,20 @@ def check(
 
 def relevant_parameters(node: str, names: Iterable[str]) -> List[str]:
     """Return the parameters among `names` that the rules use for this node."""
-    if node in COSTMAPS:
-        ends: Tuple[str, ...] = (".observation_sources", ".topic", ".data_type", ".enabled")
-        return [name for name in names if name in _CHECKED_PARAMETERS or name == "plugins" or name.endswith(ends)]
-    ends = (".topic", ".type", ".enabled")
+    has_sources = node in COSTMAPS or node == "collision_monitor"
     return [
-        name for name in names if name in _CHECKED_PARAMETERS or (node == "collision_monitor" and name.endswith(ends))
+        name for name in names if name in _CHECKED_PARAMETERS or (has_sources and name.endswith(_SOURCE_PARAMETERS))
     ]
 
 
 _CHECKED_PARAMETERS = frozenset(
     (
         *("use_sim_time", "robot_base_frame", "base_frame_id", "odom_frame_id", "global_frame", "global_frame_id"),
-        *("local_frame", "odom_topic", "scan_topic", "observation_sources"),
+        *("local_frame", "odom_topic", "scan_topic", "observation_sources", "plugins"),
     )
 )
+_SOURCE_PARAMETERS = (".observation_sources", ".topic", ".data_type", ".type", ".enabled")
+"""Ends of the names of parameters that describe observation sources."""
 
 
 class _Node(NamedTuple):
@@ -142,13 +144,6 @@ class _Node(NamedTuple):
         if absolute not in topics and (self.subscribed is None or absolute in self.subscribed):
             available = ", ".join(topics) or "none"
             self.add_problem(key, f"is {value!r}, which no node publishes; simscen's {kind}: {available}")
-
-
-def _check_costmap_layers(node: _Node) -> None:
-    for layer in node.items("plugins"):
-        sources = node.get(f"{layer}.observation_sources")
-        for source in sources.split() if isinstance(sources, str) else ():
-            _check_source(node, f"{layer}.{source}")
 
 
 def _check_source(node: _Node, source: str) -> None:

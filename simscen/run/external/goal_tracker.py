@@ -9,7 +9,7 @@ from typing import Any
 from simscen.core.clock import Clock
 from simscen.core.messages.goals import Goal, Mode
 from simscen.core.messages.navigation import ErrorCode, error_code
-from simscen.core.records.events import Event, EventKind, Value
+from simscen.core.records.events import Event, EventKind
 from simscen.run.external.protocol import ProtocolViolation
 from simscen.stack.tasks import Task
 
@@ -73,7 +73,9 @@ class GoalTracker:
             case "goal.canceled":
                 self._cancel_goal(tick, name)
             case _ if kind in _UNRESTRICTED_KINDS:
-                self._events.append(Event(tick, EventKind(kind), name[:MAX_TEXT_LENGTH], _checked_data(data)))
+                if len(str(data)) > MAX_TEXT_LENGTH:
+                    raise ProtocolViolation("an event with too much data")
+                self._events.append(Event(tick, EventKind(kind), name[:MAX_TEXT_LENGTH], data))
             case _:
                 raise ProtocolViolation(f"an event `{kind[:60]}`, which a stack may not report")
 
@@ -142,9 +144,3 @@ def _to_error_code(value: Any) -> ErrorCode | int:
     if isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= MAX_ERROR_CODE:
         return error_code(value)
     raise ProtocolViolation(f"goal.failed with the error code {str(value)[:60]!r}")
-
-
-def _checked_data(data: dict[str, Any]) -> dict[str, Value]:
-    if len(str(data)) > MAX_TEXT_LENGTH:
-        raise ProtocolViolation("an event with too much data")
-    return data

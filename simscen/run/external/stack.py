@@ -206,7 +206,8 @@ class ExternalStack:
 
     def _decode_answer_frame(self, kind: int, body: bytes, tick: int, is_command_due: bool) -> Answer:
         if kind != wire.ANSWER:
-            raise ProtocolViolation(f"a frame {_frame_name(kind)} instead of an ANSWER")
+            name = wire.KIND_NAMES[kind] if 0 < kind < len(wire.KIND_NAMES) else f"of kind {kind}"
+            raise ProtocolViolation(f"a frame {name} instead of an ANSWER")
         answered_tick, messages = wire.from_answer(body)
         if answered_tick != tick:
             raise ProtocolViolation(f"it answers tick {answered_tick} instead of {tick}")
@@ -243,7 +244,3 @@ class ExternalStack:
     def _send(self, kind: int, content: dict[str, Any]) -> None:
         assert self._process is not None
         self._process.send(wire.json_frame(kind, content))
-
-
-def _frame_name(kind: int) -> str:
-    return wire.KIND_NAMES[kind] if 0 < kind < len(wire.KIND_NAMES) else f"of kind {kind}"

@@ -40,7 +40,9 @@ def _apply_to_robot(prepared: PreparedScenario, streams: Streams) -> PreparedSce
             and entry.sensor not in prepared.robot.sensors
         ):
             disturbed = _disturb_map(grid, entry, streams.generator(f"fault{name}#1"), prepared)
-            changed += [] if _grids_equal(grid, disturbed) else [index]
+            same_frame = (grid.resolution, grid.origin) == (disturbed.resolution, disturbed.origin)
+            if not (same_frame and np.array_equal(grid.cells, disturbed.cells)):
+                changed.append(index)
             grid = disturbed
     return replace(prepared, map=grid, map_faults=tuple(changed)) if changed else prepared
 
@@ -57,8 +59,3 @@ def _disturb_map(
             f"{entry.plugin_suffix}",
         )
     return disturbed
-
-
-def _grids_equal(one: OccupancyGrid, other: OccupancyGrid) -> bool:
-    frames = (one.resolution, one.origin) == (other.resolution, other.origin)
-    return frames and np.array_equal(one.cells, other.cells)

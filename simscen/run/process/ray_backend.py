@@ -80,8 +80,7 @@ class RayBackend:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for runner in self._runners:
-            ray.kill(runner.actor)
+        self._kill_runners()
         ray.shutdown()
 
     def run(

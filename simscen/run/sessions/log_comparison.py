@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from simscen.core.errors import InvalidInput
-from simscen.core.records.run_result import NONDETERMINISTIC, Outcome, RunFailure, RunResult
+from simscen.core.records.run_result import NONDETERMINISTIC, Outcome, RunFailure
 from simscen.core.records.session_events import RunFinished
 from simscen.judge.result_json import from_json
 from simscen.run.sessions.output_folder import run_folder
@@ -73,14 +73,13 @@ def _disagreement(new_path: Path, earlier_path: Path) -> str | None:
     new_log, earlier_log = read_log(new_path), read_log(earlier_path)
     if not earlier_log.result or not new_log.result:
         return f"{earlier_path}: the run did not finish"
-    statuses, earlier_statuses = (_statuses(from_json(log.result)) for log in (new_log, earlier_log))
+    statuses, earlier_statuses = (
+        {verdict.id: verdict.status.value for verdict in from_json(log.result).verdicts}
+        for log in (new_log, earlier_log)
+    )
     changed = [name for name in {**earlier_statuses, **statuses} if statuses.get(name) != earlier_statuses.get(name)]
     differences = [
         f"{name}: {statuses.get(name, 'absent')} instead of {earlier_statuses.get(name, 'absent')}" for name in changed
     ]
     pose_differences = (first_pose_difference(*pair) for pair in zip(new_log.traces, earlier_log.traces, strict=False))
     return "; ".join(differences) or next(filter(None, pose_differences), None)
-
-
-def _statuses(result: RunResult) -> dict[str, str]:
-    return {verdict.id: verdict.status.value for verdict in result.verdicts}
