@@ -1,15 +1,17 @@
 """Sidebar of the picture of a run: error, criteria with their results, and legend."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
+import numpy as np
 from PIL import Image, ImageDraw
 
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.verdict import Status
 from simscen.judge.finding_text import comparison, subject, time_and_place
 from simscen.report.picture import palette
-from simscen.report.picture.canvas import TextItem, draw_text, font, printable
+from simscen.report.picture.canvas import Fill, TextItem, draw_text, font, printable
 from simscen.report.picture.event_layer import DIAMOND, FLAG, SMALL_DIAMOND
 from simscen.report.picture.palette import Color
 from simscen.report.picture.path_layer import round_time_step
@@ -20,8 +22,9 @@ _PADDING_PX = 18
 _LINE_HEIGHT_PX, _TEXT_SIZE_PX = 17, 13
 _STATUS_ORDER = (Status.ERROR, Status.FAIL, Status.INCONCLUSIVE, Status.PASS)
 Pen = ImageDraw.ImageDraw
-DrawSymbol = Callable[[Pen, float, float], None]
-"""Function that draws the symbol of a legend entry. Parameters: pen, x of the left edge and y of the center in px."""
+Points = Sequence[tuple[float, float]]
+Shape = tuple[str, Points, dict[str, Any]]
+"""Part of a symbol: method of ImageDraw, points in px from the center of the symbol's left edge, and options."""
 CriterionRow = tuple[Status, Color, list[str]]
 """Status of a criterion, its color, and lines of text."""
 
@@ -43,9 +46,9 @@ def draw_sidebar(scene: Scene, parts: Sequence[str], min_height: int) -> Image.I
     draw = ImageDraw.Draw(image, "RGBA")
     _draw_criteria(draw, reasons, rows)
     top = image.height - 20 * len(legend) - 50
-    for number, (text, draw_symbol) in enumerate(legend):
+    for number, (text, symbol) in enumerate(legend):
         y = top + 20 * number
-        draw_symbol(draw, _PADDING_PX, y)
+        _draw_shapes(draw, _PADDING_PX, y, symbol)
         draw_text(draw, TextItem(_PADDING_PX + 34, y, text, 12, palette.FAINT_INK))
     _draw_time_bar(draw, scene, image.height - 30)
     return image
@@ -93,7 +96,8 @@ def _draw_criteria(draw: Pen, reasons: list[str], rows: list[CriterionRow]) -> N
     draw_text(draw, TextItem(_PADDING_PX, y, "criteria", 12, palette.FAINT_INK))
     y += 22
     for status, color, lines in rows:
-        (_draw_check_mark if status is Status.PASS else _draw_cross)(draw, _PADDING_PX + 5, y, color)
+        check_mark = [_line(((0, 0), (4, 4), (10, -5)), color)]
+        _draw_shapes(draw, _PADDING_PX, y, check_mark if status is Status.PASS else _cross(5, color))
         for line in lines:
             draw_text(draw, TextItem(_PADDING_PX + 20, y, line, _TEXT_SIZE_PX, palette.INK))
             y += _LINE_HEIGHT_PX
@@ -118,115 +122,74 @@ def _wrap(text: str, left: int = _PADDING_PX + 20) -> list[str]:
     return [*lines, current]
 
 
-def _draw_check_mark(draw: Pen, x: float, y: float, color: Color) -> None:
-    draw.line([(x - 5, y), (x - 1, y + 4), (x + 5, y - 5)], fill=color, width=2)
+def _line(points: Points, color: Color, width: int = 2) -> Shape:
+    return "line", points, {"fill": color, "width": width}
 
 
-def _draw_cross(draw: Pen, x: float, y: float, color: Color) -> None:
-    draw.line([(x - 4, y - 4), (x + 4, y + 4)], fill=color, width=2)
-    draw.line([(x - 4, y + 4), (x + 4, y - 4)], fill=color, width=2)
+def _area(kind: str, points: Points, color: Fill, outline: Color | None = None, width: int = 1) -> Shape:
+    return kind, points, {"fill": color, "outline": outline, **({} if outline is None else {"width": width})}
 
 
-def _legend(step: float) -> list[tuple[str, str, DrawSymbol]]:
+def _cross(x: float, color: Color) -> list[Shape]:
+    return [_line(((x - 4, -4), (x + 4, 4)), color), _line(((x - 4, 4), (x + 4, -4)), color)]
+
+
+def _block(color: Color) -> list[Shape]:
+    return [_area("rectangle", ((3, -6), (21, 6)), (*color, 110), color)]
+
+
+def _goal(color: Color) -> Shape:
+    return _area("ellipse", ((5, -7), (19, 7)), (*color, 46), color, 2)
+
+
+def _draw_shapes(draw: Pen, x: float, y: float, shapes: Iterable[Shape]) -> None:
+    for kind, points, options in shapes:
+        getattr(draw, kind)([(x + dx, y + dy) for dx, dy in points], **options)
+
+
+def _legend(step: float) -> list[tuple[str, str, list[Shape]]]:
     """Return the entries of the legend: word for `_is_drawn` ("": always shown), text, and symbol.
 
     `step` is the time between two dots on the true path in s.
     """
+    p = palette
+    path = [_line(((k, 0), (k + 1, 0)), p.time_color(k / 24), 3) for k in range(24)]
+    path.append(_area("ellipse", ((8, -4), (16, 4)), p.PAGE, p.time_color(0.5), 2))
+    arrow = [_line(((12, 6), (12, -3)), p.AMBER, 3), _area("polygon", ((7, -2), (12, -8), (17, -2)), p.AMBER)]
+    robot = [_area("rectangle", ((4, -6), (20, 6)), p.START, p.ROBOT)]
+    robot.append(_area("polygon", ((13, -3), (18, 0), (13, 3)), p.PAGE))
+    door = [_area("rectangle", ((2, -2), (22, 2)), (*p.OBJECT, 150), p.OBJECT)]
+    door += [_line(((2, -2 - 3 * k), (2, -3 - 3 * k)), p.OBJECT, 1) for k in range(3)]
+    person = [_area("ellipse", ((6, -6), (18, 6)), (*p.PEDESTRIAN, 150), p.PEDESTRIAN)]
+    person.append(_line(((12, 0), (23, 0)), p.PEDESTRIAN))
+    fault = [_line(((0, 0), (24, 0)), p.FAULTY, 10)]
+    fault.append(_area("polygon", ((13, -8), (8, 1), (12, 1), (11, 8), (17, -2), (13, -2)), p.AMBER))
+    corners = [(12 + 7 * math.cos(angle), 7 * math.sin(angle)) for angle in np.radians(range(234, 594, 72)).tolist()]
+    diamond, small_diamond, flag = (
+        [(12 + x, y + down) for x, y in symbol] for symbol, down in ((DIAMOND, 0), (SMALL_DIAMOND, 0), (FLAG, 9))
+    )
     return [
-        ("", f"true path, a dot every {step:g} s", _draw_path_symbol),
-        ("belief", "estimated path", _draw_belief_symbol),
-        ("", "plans", lambda d, x, y: d.line([(x, y), (x + 24, y)], fill=palette.PLAN, width=4)),
-        ("set down", "robot lifted and set down elsewhere", _draw_kidnapping_symbol),
-        ("goal", "goal, its tolerance and heading", _ring_symbol(palette.GREEN, False)),
-        ("failed", "goal that failed", _ring_symbol(palette.RED, True)),
-        ("robot", "robot at the end", _draw_robot_symbol),
-        ("object", "object at the end; before: color of the time", _block_symbol(palette.OBJECT)),
-        ("door", "door at the end; dashed: open and closed", _draw_door_symbol),
-        ("person", "person at the end, with heading", _draw_pedestrian_symbol),
-        ("keepout zone", "keepout zone", _hatched_symbol(palette.RED, -6)),
-        ("speed zone", "zone with a speed limit", _hatched_symbol(palette.AMBER, 6)),
-        ("ground", "ramp or sill; chevrons point uphill", _block_symbol(palette.GROUND)),
-        ("floor", "floor with different friction", _block_symbol(palette.SLIPPERY)),
-        ("fault", "start of a fault; band: fault active", _draw_fault_symbol),
-        ("event", "robot at an event", _polygon_symbol(DIAMOND, palette.INK)),
-        ("mark", "robot at a mark", _polygon_symbol([(x, y + 9) for x, y in FLAG], palette.AMBER)),
-        ("place", "named place", _polygon_symbol(SMALL_DIAMOND, palette.PLACE)),
-        ("collision", "collision", lambda d, x, y: d.regular_polygon((x + 12, y, 7), 5, fill=palette.RED)),
-        ("violation", "violated criterion", lambda d, x, y: _draw_cross(d, x + 12, y, palette.RED)),
+        ("", f"true path, a dot every {step:g} s", path),
+        ("belief", "estimated path", [_line(((10 * k, 0), (10 * k + 5, 0)), p.BELIEF) for k in range(3)]),
+        ("", "plans", [_line(((0, 0), (24, 0)), p.PLAN, 4)]),
+        ("set down", "robot lifted and set down elsewhere", arrow),
+        ("goal", "goal, its tolerance and heading", [_goal(p.GREEN), _line(((12, 0), (25, 0)), p.GREEN)]),
+        ("failed", "goal that failed", [_goal(p.RED), *_cross(12, p.RED)]),
+        ("robot", "robot at the end", robot),
+        ("object", "object at the end; before: color of the time", _block(p.OBJECT)),
+        ("door", "door at the end; dashed: open and closed", door),
+        ("person", "person at the end, with heading", person),
+        ("keepout zone", "keepout zone", [_line(((7 * k, -6), (7 * k + 9, 6)), p.RED, 1) for k in range(3)]),
+        ("speed zone", "zone with a speed limit", [_line(((7 * k, 6), (7 * k + 9, -6)), p.AMBER, 1) for k in range(3)]),
+        ("ground", "ramp or sill; chevrons point uphill", _block(p.GROUND)),
+        ("floor", "floor with different friction", _block(p.SLIPPERY)),
+        ("fault", "start of a fault; band: fault active", fault),
+        ("event", "robot at an event", [_area("polygon", diamond, p.INK)]),
+        ("mark", "robot at a mark", [_area("polygon", flag, p.AMBER)]),
+        ("place", "named place", [_area("polygon", small_diamond, p.PLACE)]),
+        ("collision", "collision", [_area("polygon", corners, p.RED)]),
+        ("violation", "violated criterion", _cross(12, p.RED)),
     ]
-
-
-def _draw_path_symbol(draw: Pen, x: float, y: float) -> None:
-    for k in range(24):
-        draw.line([(x + k, y), (x + k + 1, y)], fill=palette.time_color(k / 24), width=3)
-    draw.ellipse((x + 8, y - 4, x + 16, y + 4), fill=palette.PAGE, outline=palette.time_color(0.5), width=2)
-
-
-def _draw_robot_symbol(draw: Pen, x: float, y: float) -> None:
-    draw.rectangle((x + 4, y - 6, x + 20, y + 6), fill=palette.START, outline=palette.ROBOT)
-    draw.polygon([(x + 13, y - 3), (x + 18, y), (x + 13, y + 3)], fill=palette.PAGE)
-
-
-def _draw_belief_symbol(draw: Pen, x: float, y: float) -> None:
-    for k in range(3):
-        draw.line([(x + 10 * k, y), (x + 10 * k + 5, y)], fill=palette.BELIEF, width=2)
-
-
-def _draw_kidnapping_symbol(draw: Pen, x: float, y: float) -> None:
-    draw.line([(x + 12, y + 6), (x + 12, y - 3)], fill=palette.AMBER, width=3)
-    draw.polygon([(x + 7, y - 2), (x + 12, y - 8), (x + 17, y - 2)], fill=palette.AMBER)
-
-
-def _ring_symbol(color: Color, is_crossed: bool) -> DrawSymbol:
-    def draw_symbol(draw: Pen, x: float, y: float) -> None:
-        draw.ellipse((x + 5, y - 7, x + 19, y + 7), fill=(*color, 46), outline=color, width=2)
-        if is_crossed:
-            _draw_cross(draw, x + 12, y, color)
-        else:
-            draw.line([(x + 12, y), (x + 25, y)], fill=color, width=2)
-
-    return draw_symbol
-
-
-def _block_symbol(color: Color) -> DrawSymbol:
-    def draw_symbol(draw: Pen, x: float, y: float) -> None:
-        draw.rectangle((x + 3, y - 6, x + 21, y + 6), fill=(*color, 110), outline=color)
-
-    return draw_symbol
-
-
-def _draw_door_symbol(draw: Pen, x: float, y: float) -> None:
-    draw.rectangle((x + 2, y - 2, x + 22, y + 2), fill=(*palette.OBJECT, 150), outline=palette.OBJECT)
-    for k in range(3):
-        draw.line([(x + 2, y - 2 - 3 * k), (x + 2, y - 3 - 3 * k)], fill=palette.OBJECT)
-
-
-def _draw_pedestrian_symbol(draw: Pen, x: float, y: float) -> None:
-    draw.ellipse((x + 6, y - 6, x + 18, y + 6), fill=(*palette.PEDESTRIAN, 150), outline=palette.PEDESTRIAN)
-    draw.line([(x + 12, y), (x + 23, y)], fill=palette.PEDESTRIAN, width=2)
-
-
-def _hatched_symbol(color: Color, rise: float) -> DrawSymbol:
-    """Return a function that draws slanted lines, which rise by 2 * `rise` px to the right, or fall if negative."""
-
-    def draw_symbol(draw: Pen, x: float, y: float) -> None:
-        for k in range(3):
-            draw.line([(x + 7 * k, y + rise), (x + 7 * k + 9, y - rise)], fill=color, width=1)
-
-    return draw_symbol
-
-
-def _draw_fault_symbol(draw: Pen, x: float, y: float) -> None:
-    draw.line([(x, y), (x + 24, y)], fill=palette.FAULTY, width=10)
-    draw.polygon([(x + 13, y - 8), (x + 8, y + 1), (x + 12, y + 1), (x + 11, y + 8), (x + 17, y - 2), (x + 13, y - 2)],
-                 fill=palette.AMBER)  # fmt: skip
-
-
-def _polygon_symbol(offsets: Sequence[tuple[float, float]], color: Color) -> DrawSymbol:
-    def draw_symbol(draw: Pen, x: float, y: float) -> None:
-        draw.polygon([(x + 12 + dx, y + dy) for dx, dy in offsets], fill=color)
-
-    return draw_symbol
 
 
 def _draw_time_bar(draw: Pen, scene: Scene, y: float) -> None:

@@ -26,7 +26,7 @@ from simscen.report.picture.palette import css_variables
 from simscen.report.replay.packed_columns import PackedColumns
 from simscen.report.replay.robot_data import moving_objects, occupancy_grid_data, robot_data
 from simscen.report.replay.source_lines import read_source_lines
-from simscen.report.replay.timeline import disturbance_data, is_finite_number, timeline_entries, verdict_data
+from simscen.report.replay.timeline import disturbance_data, is_finite_number, timeline_data, verdict_data
 
 PAGE_FOLDER = PACKAGE / "data" / "replay"
 FORMAT = 1
@@ -151,10 +151,10 @@ def run_data(log: Log, result: RunResult, columns: PackedColumns) -> dict[str, A
     first = next(iter(parts))
     robots = frozenset(log.robots)
     events = [
-        entry.as_data(name)
+        entry
         for name, part in parts.items()
-        for entry in timeline_entries(part.trace, lines[name], with_world=name == first)
-        if entry.name not in robots or not entry.kind.startswith("object.")
+        for entry in timeline_data(part.trace, lines[name], name, with_world=name == first)
+        if entry["name"] not in robots or not entry["kind"].startswith("object.")
     ]
     key = result.key
     return {

@@ -3,8 +3,7 @@
 A disturbance is an event or a fault of the scenario.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
 from math import isfinite
 from typing import Any, TypeGuard
 
@@ -41,85 +40,54 @@ _FAILURE_KINDS = {K.GOAL_FAILED, K.COLLISION_STARTED, K.PLAN_FAILED}
 """Kinds of events that are failures."""
 _HIDDEN_KEYS = {"tick", "entry", "parts", "points", "waypoints", "times", "index", "effects"}
 """Keys of event data that are not shown as text."""
+_OPTIONAL_KEYS = {"until", "ended", "bad", "line", "place", "about", "robot"}
+"""Keys of an entry of the timeline that are omitted for empty values."""
 
 
-@dataclass(frozen=True)
-class TimelineEntry:
-    """Entry of the timeline: an event, or an interval between two events.
+def timeline_data(trace: Trace, lines: SourceLines, robot: str, with_world: bool) -> list[dict[str, Any]]:
+    """Return the JSON data of the events of a robot in order; if `with_world`, also of the events of the world.
 
-    Attributes:
-        tick: Tick of the event, or the first tick of the interval.
-        kind: Kind of the event, as in EventKind.
-        lane: Name of the lane in which the entry is drawn.
-        until: Last tick of an interval; None for a single event.
-        ended: Kind of the event that ended the interval; "" for a single event, or if the run ended first.
-        is_failure: Whether the event is a failure, such as a collision.
-        line: Line in the scenario file; 0 if unknown.
-        name: Name of the goal, fault, object, or event.
-        text: Further data of the event as text.
-        place: Position (x, y) in m; () if the event has none.
-        zone_switch: Data of an event that switches a zone on or off, to draw the zone; {} for other events.
+    `robot` is "" in a run with a single robot. `lane` is the row of an entry. An interval ends at the tick `until` with
+    an event of the kind `ended`, or with the run. `about` is the data of an event that switches a zone on or off.
     """
-
-    tick: int
-    kind: str
-    lane: str
-    name: str
-    text: str
-    until: int | None = None
-    ended: str = ""
-    is_failure: bool = False
-    line: int = 0
-    place: Sequence[float] = field(default=())
-    zone_switch: Mapping[str, Any] = field(default_factory=dict)
-
-    def as_data(self, robot: str) -> dict[str, Any]:
-        """Return the entry as JSON data without empty values. `robot` is "" in a run with a single robot."""
-        data = {"tick": self.tick, "kind": self.kind, "lane": self.lane, "name": self.name, "text": self.text}
-        more: dict[str, Any] = {"until": self.until, "ended": self.ended, "bad": self.is_failure, "line": self.line}
-        more |= {"place": self.place, "about": self.zone_switch}
-        return data | {key: value for key, value in more.items() if value} | ({"robot": robot} if robot else {})
-
-
-def timeline_entries(trace: Trace, lines: SourceLines, with_world: bool) -> list[TimelineEntry]:
-    """Return the entries for the events of a robot in order; if `with_world`, also for the events of the world."""
-    entries: list[TimelineEntry] = []
-    open_intervals: dict[tuple[EventKind, str, Any], int] = {}
+    entries: list[dict[str, Any]] = []
+    open_intervals: dict[tuple[EventKind, str, Any], dict[str, Any]] = {}
     for event in trace.events:
         if _is_world_event(event) and not with_world:
             continue
         entry = event.data.get("entry")  # two faults or events can have the same name
         for start, ends in _INTERVAL_KINDS.items():
-            index = open_intervals.pop((start, event.name, entry), None) if event.kind in ends else None
-            if index is not None:
-                entries[index] = replace(entries[index], until=event.tick, ended=str(event.kind))
+            interval = open_intervals.pop((start, event.name, entry), None) if event.kind in ends else None
+            if interval is not None:
+                interval |= {"until": event.tick, "ended": str(event.kind)}
+        entries.append(_entry(event, lines, robot))
         if event.kind in _INTERVAL_KINDS:
-            open_intervals[event.kind, event.name, entry] = len(entries)
-        entries.append(_entry(event, lines))
-    for index in open_intervals.values():
-        entries[index] = replace(entries[index], until=trace.end)
-    return entries
+            open_intervals[event.kind, event.name, entry] = entries[-1]
+    for interval in open_intervals.values():
+        interval["until"] = trace.end
+    return [{key: value for key, value in one.items() if value or key not in _OPTIONAL_KEYS} for one in entries]
 
 
 def _is_world_event(event: Event) -> bool:
     return str(event.kind).startswith(WORLD_EVENT_PREFIXES) and event.kind != EventKind.RUN_ENDED
 
 
-def _entry(event: Event, lines: SourceLines) -> TimelineEntry:
+def _entry(event: Event, lines: SourceLines, robot: str) -> dict[str, Any]:
     x, y = event.data.get("x"), event.data.get("y")
-    place = (round(x, 3), round(y, 3)) if is_finite_number(x) and is_finite_number(y) else ()
-    details = ", ".join(_details(event))
-    return TimelineEntry(
-        tick=event.tick,
-        kind=str(event.kind),
-        lane=_LANES.get(event.kind, "events"),
-        name=one_line(event.name),
-        text=one_line(details),
-        is_failure=event.kind in _FAILURE_KINDS,
-        line=_line(event, lines),
-        place=place,
-        zone_switch=event.data if event.kind == K.ZONE_SWITCHED else {},
-    )
+    return {
+        "tick": event.tick,
+        "kind": str(event.kind),
+        "lane": _LANES.get(event.kind, "events"),
+        "name": one_line(event.name),
+        "text": one_line(", ".join(_details(event))),
+        "until": None,
+        "ended": "",
+        "bad": event.kind in _FAILURE_KINDS,
+        "line": _line(event, lines),
+        "place": (round(x, 3), round(y, 3)) if is_finite_number(x) and is_finite_number(y) else (),
+        "about": event.data if event.kind == K.ZONE_SWITCHED else {},
+        "robot": robot,
+    }
 
 
 def _details(event: Event) -> Iterator[str]:

@@ -43,7 +43,12 @@ def scene(**changes):
         "belief": None,
         "events": [
             [1, "goal.accepted", "end"],
-            [2, "object.spawned", "box", {"shape": "box", "size": [1, 1, 1], "x": 7, "y": 4.5, "yaw": 0.5}],
+            [
+                2,
+                "object.spawned",
+                "box",
+                {"parts": [[[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]], "x": 7, "y": 4.5, "yaw": 0.5},
+            ],
             [6, "collision.started", "box", {"x": 3.0, "y": 5.0}],
         ],
         **changes,
@@ -156,7 +161,7 @@ def test_outline_has_all_parts_and_unknown_shapes_are_discs():
     assert np.hypot(*found["ghost"][0].T) == pytest.approx(np.full(32, 0.2))
 
 
-@pytest.mark.parametrize("data", [{}, {"shape": "mesh", "size": []}, {"shape": "box", "size": "big"}])
+@pytest.mark.parametrize("data", [{}, {"parts": []}, {"parts": "many"}])
 def test_event_without_a_shape_is_drawn_as_a_default_shape(data):
     event = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "object.spawned", "x", data]]}).events[
         0

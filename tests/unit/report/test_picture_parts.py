@@ -28,6 +28,8 @@ from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 GOLDEN = Path(__file__).parent / "everything.parts.txt"
 PANEL = ((0.0, -0.05), (1.0, -0.05), (1.0, 0.05), (0.0, 0.05))
+DISC = [[0.3 * np.cos(k * np.pi / 16), 0.3 * np.sin(k * np.pi / 16)] for k in range(32)]
+SQUARE = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
 TRUTH = [[0, 1, 1], [4, 1, 3], [4.02, 7, 1], [10, 9, 1]]
 
 
@@ -47,8 +49,8 @@ def everything(**changes):
         "objects": {"door": [[0, 5, 2, 0], [2, 5, 2, 1.5708]], "anna": [[0, 3, 1, 0], [10, 3, 4, 0]]},
         "events": [
             [0, "goal.accepted", "shelf"],
-            [0, "object.spawned", "anna", {"shape": "cylinder", "size": [0.3, 1.7], "person": True}],
-            [1, "object.spawned", "crate", {"shape": "box", "size": [1, 1, 1], "x": 2, "y": 5.2, "yaw": 0}],
+            [0, "object.spawned", "anna", {"parts": [DISC], "person": True}],
+            [1, "object.spawned", "crate", {"parts": [SQUARE], "x": 2, "y": 5.2, "yaw": 0}],
             [1, "event.started", "gate shuts", {"entry": 0}],
             [2, "fault.started", "lidar.off", {"entry": 0}],
             [3, "object.removed", "crate"],
