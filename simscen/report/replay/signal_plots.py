@@ -1,6 +1,5 @@
 """Signal plots on the replay page: signals (quantities over time), and the limits that criteria set on signals."""
 
-from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
@@ -41,29 +40,26 @@ _OTHER_QUANTITIES = frozenset({"localization_error rmse", "localization_error fi
 """Measured quantities of these criteria that do not limit the signal at all times."""
 
 
-@dataclass(frozen=True)
-class SignalPlot:
-    """Signal to plot, and the arguments of the signal by name, such as the object of `distance_to`."""
-
-    signal: SignalName
-    arguments: SignalArguments
-
-    @property
-    def name(self) -> str:
-        """Name of the plot, for example "distance_to cart"."""
-        arguments = [str(getattr(value, "name", value)) for value in self.arguments.values()]
-        return one_line(" ".join((self.signal, *arguments)))
-
-
 def signal_plots(trace: Trace, case: Case, spec: ScenarioSpec | None, columns: PackedColumns) -> list[dict[str, Any]]:
     """Return the data of all plots: signals without arguments, and signals in the temporal criteria of `spec`.
 
     Signals that the trace (recorded run) does not contain are omitted. `spec` is None if the scenario is invalid.
     """
-    without_arguments = [SignalPlot(name, {}) for name, signal in SIGNALS.items() if not signal.alternative_arguments]
-    in_criteria = [] if spec is None else _signals_in_criteria(spec)
-    plots = {plot.name: plot for plot in (*without_arguments, *in_criteria) if plot.signal not in _EXCLUDED_SIGNALS}
-    return [data for plot in plots.values() if (data := _plot_data(plot, trace, case, columns)) is not None]
+    plots: dict[str, tuple[SignalName, SignalArguments]] = {
+        name: (name, {}) for name, signal in SIGNALS.items() if not signal.alternative_arguments
+    }
+    criteria = () if spec is None else (entry.chosen for entry in spec.pass_)
+    conditions = (criterion.condition for criterion in criteria if isinstance(criterion, TemporalCriterion))
+    for one in (one for condition in conditions for one in condition.comparisons()):
+        if one.signal is not None:
+            words = (str(getattr(value, "name", value)) for value in one.arguments.values())
+            plots[one_line(" ".join((one.signal, *words)))] = one.signal, one.arguments
+    data = (
+        _plot_data(title, signal, arguments, trace, case, columns)
+        for title, (signal, arguments) in plots.items()
+        if signal not in _EXCLUDED_SIGNALS
+    )
+    return [plot for plot in data if plot is not None]
 
 
 def signal_limits(verdicts: tuple[Verdict, ...], robot: str) -> list[dict[str, Any]]:
@@ -77,17 +73,20 @@ def signal_limits(verdicts: tuple[Verdict, ...], robot: str) -> list[dict[str, A
     return limits
 
 
-def _plot_data(plot: SignalPlot, trace: Trace, case: Case, columns: PackedColumns) -> dict[str, Any] | None:
-    signal = SIGNALS[plot.signal]
+def _plot_data(
+    title: str, name: SignalName, arguments: SignalArguments, trace: Trace, case: Case, columns: PackedColumns
+) -> dict[str, Any] | None:
+    """Return the data of the plot `title`, such as "distance_to cart"; None if the trace lacks the signal."""
+    signal = SIGNALS[name]
     try:
-        values = read_signal(plot.signal, trace, case, plot.arguments)
+        values = read_signal(name, trace, case, arguments)
     except (MissingEvidence, InvalidTrace):
         return None
     if not len(values) or not np.isfinite(values).any():
         return None
     indices = extreme_indices(np.nan_to_num(values), MAX_SAMPLES)
     return {
-        "name": plot.name,
+        "name": title,
         "text": signal.text,
         "unit": signal.unit,
         "asks": signal.is_boolean,
@@ -102,14 +101,6 @@ def _step(unit: str, values: Array) -> float:
     if unit == "" and np.array_equal(finite, np.rint(finite)):
         return 1.0
     return 1e-3 if unit in _FINE_UNITS else 1e-2
-
-
-def _signals_in_criteria(spec: ScenarioSpec) -> list[SignalPlot]:
-    """Return the signals that temporal criteria compare, with their arguments."""
-    criteria = [entry.chosen for entry in spec.pass_]
-    conditions = [criterion.condition for criterion in criteria if isinstance(criterion, TemporalCriterion)]
-    compared = [one for condition in conditions for one in condition.comparisons()]
-    return [SignalPlot(one.signal, one.arguments) for one in compared if one.signal is not None]
 
 
 def _limit(verdict: Verdict, finding: Finding) -> dict[str, Any] | None:

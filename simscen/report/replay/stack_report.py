@@ -73,27 +73,28 @@ def behavior_tree_data(log: Log, columns: PackedColumns) -> dict[str, Any] | Non
 def _tree_changes(log: Log) -> Iterator[tuple[int, str, str, str]]:
     """Yield tick, node, previous status, and new status of each change of the behavior tree."""
     for tick, line in log.sensors.stack_lines():
-        if line.name == BEHAVIOR_TREE_LOGGER and (found := _TREE_CHANGE.fullmatch(line.text)):
+        if found := _tree_change(line):
             yield tick, found[1], found[2], found[3]
 
 
 def log_lines_data(log: Log, columns: PackedColumns) -> list[list[Any]]:
     """Return the last log lines of the stack (tick, severity, logger, text) without changes of the behavior tree."""
-    lines = [(tick, line) for tick, line in log.sensors.stack_lines() if not _is_tree_change(line)]
+    lines = [(tick, line) for tick, line in log.sensors.stack_lines() if not _tree_change(line)]
     kept = lines[-MAX_LINES:]
     columns.note_reduction("log lines of the stack, the last ones", len(kept), len(lines))
     return [
-        [tick, _severity(line.level), one_line(line.name), _shortened(one_line(line.text), MAX_LINE_CHARACTERS)]
+        [
+            tick,
+            "error" if line.level >= _ERROR else "warning" if line.level >= _WARNING else "info",
+            one_line(line.name),
+            _shortened(one_line(line.text), MAX_LINE_CHARACTERS),
+        ]
         for tick, line in kept
     ]
 
 
-def _is_tree_change(line: LogLine) -> bool:
-    return line.name == BEHAVIOR_TREE_LOGGER and _TREE_CHANGE.fullmatch(line.text) is not None
-
-
-def _severity(level: int) -> str:
-    return "error" if level >= _ERROR else "warning" if level >= _WARNING else "info"
+def _tree_change(line: LogLine) -> re.Match[str] | None:
+    return _TREE_CHANGE.fullmatch(line.text) if line.name == BEHAVIOR_TREE_LOGGER else None
 
 
 def parameters_data(log: Log, columns: PackedColumns) -> list[dict[str, Any]]:
