@@ -42,10 +42,7 @@ def _panel(title: str, drive: DrivePaths, footprint: Array) -> Image.Image:
     half = float(np.ptp(points, axis=0).max()) / 2 + PANEL_MARGIN_M
     x, y = middle.tolist()
     canvas = Canvas((x - half, y - half, x + half, y + half), PANEL_SIZE_PX / (2 * half), PAGE)
-    for line in map_layer.grid_coordinates(x - half, x + half, GRID_SPACING_M):
-        canvas.line(np.array([(line, y - half), (line, y + half)]), RULE, 0.5)
-    for line in map_layer.grid_coordinates(y - half, y + half, GRID_SPACING_M):
-        canvas.line(np.array([(x - half, line), (x + half, line)]), RULE, 0.5)
+    map_layer.draw_grid(canvas, GRID_SPACING_M, RULE)
     for corners in footprints:
         canvas.polygon(corners, None, ROBOT, 1.0)
     canvas.line(_points(paths[2]), GREEN, 3.0)

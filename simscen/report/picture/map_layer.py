@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw
 from simscen.core.environment.occupancy_grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array
 from simscen.report.picture import palette
-from simscen.report.picture.canvas import SUPERSAMPLING, Bounds, Canvas, TextItem, draw_text
+from simscen.report.picture.canvas import SUPERSAMPLING, Bounds, Canvas, Fill, TextItem, draw_text
 
 MAX_MAP_SIZE_PX = (1000, 800)
 """Maximum width and height of the map on a picture."""
@@ -102,14 +102,13 @@ def grid_coordinates(low: float, high: float, step: float) -> list[float]:
     return [round(k * step, 6) for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
 
 
-def draw_grid(canvas: Canvas) -> None:
-    """Draw faint lines at round coordinates."""
+def draw_grid(canvas: Canvas, step: float, color: Fill) -> None:
+    """Draw faint lines at the multiples of `step` in m."""
     x0, y0, x1, y1 = canvas.bounds
-    step = grid_spacing(canvas)
     for x in grid_coordinates(x0, x1, step):
-        canvas.line(np.array([(x, y0), (x, y1)]), palette.GRID, 0.5)
+        canvas.line(np.array([(x, y0), (x, y1)]), color, 0.5)
     for y in grid_coordinates(y0, y1, step):
-        canvas.line(np.array([(x0, y), (x1, y)]), palette.GRID, 0.5)
+        canvas.line(np.array([(x0, y), (x1, y)]), color, 0.5)
     canvas.add_part(f"grid every {step:g} m", [(x0, y0), (x1, y1)])
 
 

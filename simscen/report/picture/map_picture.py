@@ -18,6 +18,7 @@ from simscen.report.picture.map_layer import (
     LEFT_MARGIN_PX,
     draw_grid,
     draw_map,
+    grid_spacing,
     map_extent,
     map_scale,
     write_coordinates,
@@ -83,7 +84,7 @@ def draw_map_canvas(scene: Scene) -> Canvas:
     bounds = map_extent(scene.map, np.vstack((np.array(goals).reshape(-1, 2), *paths)))
     canvas = Canvas(bounds, map_scale(bounds), None)
     draw_map(canvas, scene.map)
-    draw_grid(canvas)
+    draw_grid(canvas, grid_spacing(canvas), palette.GRID)
     labels = [label for draw in _GROUND_LAYERS for label in draw(canvas, scene)]
     labels += [label for draw in _LAYERS_BELOW_ROBOT for robot in scene.per_robot for label in draw(canvas, robot)]
     labels += [label for draw in _OBJECT_LAYERS for label in draw(canvas, scene)]
