@@ -55,45 +55,25 @@ def planned_run_to_data(run: PlannedRun) -> dict[str, Any]:
 
 def planned_run_from_data(data: dict[str, Any]) -> PlannedRun:
     """Read the data of `planned_run_to_data`. Raises KeyError or TypeError if the data is invalid."""
-    stack, definition = intern(data.get("stack", "")), intern(data.get("definition", ""))
-    return PlannedRun(
-        read_key(data),
-        intern(data["path"]),
-        intern(data["digest"]),
-        data["again"],
-        intern(data["file"]),
-        stack,
-        definition,
-        data.get("varied", {}),
-    )
+    texts = {name: intern(data[name]) for name in ("path", "digest", "file")}
+    texts |= {name: intern(data.get(name, "")) for name in ("stack", "definition")}
+    return PlannedRun(read_key(data), **texts, again=data["again"], varied=data.get("varied", {}))
+
+
+_STUDY_FIELDS = ("scenario", "is_random", "is_designed_in_pairs", "drawn", "stops_early")
 
 
 def study_plan_to_data(plan: StudyPlan) -> dict[str, Any]:
     """Return the plan of a study as JSON data, without the varied values."""
     claim = None if plan.claim is None else plan.claim.model_dump(exclude_unset=True)
-    return {
-        "scenario": plan.scenario,
-        "is_random": plan.is_random,
-        "claim": claim,
-        "is_designed_in_pairs": plan.is_designed_in_pairs,
-        "drawn": plan.drawn,
-        "stops_early": plan.stops_early,
-    }
+    return {"claim": claim, **{name: getattr(plan, name) for name in _STUDY_FIELDS}}
 
 
 def _study_plan_from_data(data: dict[str, Any], planned: Sequence[PlannedRun]) -> StudyPlan:
     """Read the data of `study_plan_to_data`. The varied values are taken from the planned runs."""
     claim = None if data["claim"] is None else PassRate.model_validate(data["claim"])
     values = {run.key: run.varied for run in planned if run.varied}
-    return StudyPlan(
-        data["scenario"],
-        data["is_random"],
-        claim,
-        values,
-        data["is_designed_in_pairs"],
-        data["drawn"],
-        data["stops_early"],
-    )
+    return StudyPlan(claim=claim, values=values, **{name: data[name] for name in _STUDY_FIELDS})
 
 
 def finished_run_to_data(run: RunFinished, folder: Path) -> dict[str, Any]:
