@@ -33,7 +33,9 @@ def escape_control(text: str) -> str:
 
     The result contains only characters that XML 1.0 allows.
     """
-    return _CONTROL_CHARACTERS.sub(lambda match: _escaped(match[0]), text)
+    return _CONTROL_CHARACTERS.sub(
+        lambda match: f"\\x{code:02x}" if (code := ord(match[0])) < 256 else f"\\u{code:04x}", text
+    )
 
 
 def one_line(text: str) -> str:
@@ -93,11 +95,6 @@ def encodable_json(document: str, out: TextIO) -> str:
 def escape_ci_markers_in_json(document: str) -> str:
     """Escape the CI commands in a JSON document. The parsed data does not change."""
     return document.replace("##", "#\\u0023")
-
-
-def _escaped(character: str) -> str:
-    code = ord(character)
-    return f"\\x{code:02x}" if code < 256 else f"\\u{code:04x}"
 
 
 def relative_to_checkout(file: str) -> str:

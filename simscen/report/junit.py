@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import islice
 from typing import Literal
 from xml.etree import ElementTree
@@ -28,6 +27,8 @@ from simscen.report.violations import (
 
 Family = Literal["simscen", "xunit2"]
 """Dialect of the format. "xunit2" omits `file`, `line`, and `properties`, which junit-10.xsd of Jenkins forbids."""
+_COUNTS = ("tests", "failures", "errors", "skipped", "time")
+"""Attributes of a testsuite: numbers of runs, and the sum of their wall times in s."""
 MAX_CLAIM_FAILURES = 100
 """Maximum number of failed runs in the testcase of a claim."""
 
@@ -45,9 +46,9 @@ def xml_parts(
     if study is not None and study.claim is not None and ordered:
         yield _claim_xml(root, study, study.claim, ordered, family)
         return
-    counts: dict[str, SuiteCounts] = {}
+    counts: dict[str, dict[str, float]] = {}
     for run in ordered:
-        counts.setdefault(run.result.path, SuiteCounts()).count(run)
+        _add_counts(counts.setdefault(run.result.path, dict.fromkeys(_COUNTS, 0)), run)
     _set_sums(root, counts.values())
     yield b"<?xml version='1.0' encoding='utf-8'?>\n"
     if not counts:
@@ -61,7 +62,7 @@ def xml_parts(
             path, used_names = run.result.path, set()
             element = Element("testsuite", {"name": escape_control(scenario_file(run))})
             _set_sums(element, [counts[path]])
-            element.set("skipped", str(counts[path].skipped))
+            element.set("skipped", str(counts[path]["skipped"]))
             yield b"\n  " + _opening_tag(element)
         parent = Element("testsuite")
         _add_case(parent, run, unique_name(_case_name(run), used_names, " #"), family)
@@ -71,34 +72,20 @@ def xml_parts(
     yield b"\n  </testsuite>\n</testsuites>\n"
 
 
-@dataclass
-class SuiteCounts:
-    """Attributes of a testsuite: numbers of runs by outcome, and sum of the wall times in s.
-
-    `skipped` also counts runs that failed as expected.
-    """
-
-    tests: int = 0
-    failures: int = 0
-    errors: int = 0
-    skipped: int = 0
-    seconds: float = 0.0
-
-    def count(self, run: RunFinished) -> None:
-        """Add a run."""
-        self.tests += 1
-        self.failures += run.outcome is Outcome.FAILED
-        self.errors += run.outcome is Outcome.ERROR
-        self.skipped += bool(reason_without_failure(run))
-        self.seconds += run.wall
+def _add_counts(counts: dict[str, float], run: RunFinished) -> None:
+    """Add a run to the attributes of its testsuite. `skipped` also counts runs that failed as expected."""
+    counts["tests"] += 1
+    counts["failures"] += run.outcome is Outcome.FAILED
+    counts["errors"] += run.outcome is Outcome.ERROR
+    counts["skipped"] += bool(reason_without_failure(run))
+    counts["time"] += run.wall
 
 
-def _set_sums(element: Element, counts: Collection[SuiteCounts]) -> None:
+def _set_sums(element: Element, counts: Collection[dict[str, float]]) -> None:
     """Set the attributes of an element to sums, except `skipped`, which the root element must not have."""
-    element.set("tests", str(sum(each.tests for each in counts)))
-    element.set("failures", str(sum(each.failures for each in counts)))
-    element.set("errors", str(sum(each.errors for each in counts)))
-    element.set("time", f"{sum(each.seconds for each in counts):.3f}")
+    for name in ("tests", "failures", "errors"):
+        element.set(name, str(sum(each[name] for each in counts)))
+    element.set("time", f"{sum(each['time'] for each in counts):.3f}")
 
 
 def _opening_tag(element: Element) -> bytes:

@@ -162,11 +162,11 @@ def _console(out: TextIO, style: TerminalStyle) -> Console:
 
 
 def _rich_text(line: StyledLine, links: bool = False) -> Text:
-    """Convert a line to rich.Text without interpreting markup in it. With `links`, the text links to files."""
-    return Text.assemble(*((piece.text, _style(STYLES[piece.role], piece.file if links else "")) for piece in line))
-
-
-def _style(definition: str, file: str) -> Style:
-    """Return the rich style of a definition such as "bold", with a link (OSC 8) to `file`; "" for no link."""
-    style = Style.parse(definition)
-    return style + Style(link=Path(file).absolute().as_uri()) if file else style
+    """Convert a line to rich.Text without interpreting markup in it. With `links`, the text links to files (OSC 8)."""
+    text = Text()
+    for part in line:
+        style = Style.parse(STYLES[part.role])
+        text.append(
+            part.text, style + Style(link=Path(part.file).absolute().as_uri()) if links and part.file else style
+        )
+    return text

@@ -3,7 +3,7 @@
 Office maps are ROS maps with cells of 5 to 25 cm, thin walls, and some unknown cells, like maps made by SLAM.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -126,20 +126,20 @@ HALL_WIDTH_M = 2.4
 
 def write_two_robots(folder: Path, numbers: Iterable[int]) -> Experiment:
     """Write one scenario for each number, which is its seed: two robots meet in a corridor."""
-    drives = [
-        Drive(write_text(folder / f"corridor_{number}.scenario.yaml", _meeting_scenario(number)), [number])
-        for number in numbers
-    ]
-    return Experiment("two robots in a corridor", tuple(drives), folder)
+    return _numbered_drives("two robots in a corridor", folder, "corridor", _meeting_scenario, numbers)
 
 
 def write_ramps(folder: Path, numbers: Iterable[int]) -> Experiment:
     """Write one scenario for each number, which is its seed: a robot drives up a ramp, along a platform, and down."""
-    drives = [
-        Drive(write_text(folder / f"ramp_{number}.scenario.yaml", _ramp_scenario(number)), [number])
-        for number in numbers
-    ]
-    return Experiment("ramps", tuple(drives), folder)
+    return _numbered_drives("ramps", folder, "ramp", _ramp_scenario, numbers)
+
+
+def _numbered_drives(
+    name: str, folder: Path, stem: str, scenario: Callable[[int], str], numbers: Iterable[int]
+) -> Experiment:
+    files = {number: folder / f"{stem}_{number}.scenario.yaml" for number in numbers}
+    drives = (Drive(write_text(file, scenario(number)), [number]) for number, file in files.items())
+    return Experiment(name, tuple(drives), folder)
 
 
 def _meeting_scenario(number: int) -> str:

@@ -9,14 +9,9 @@ from urllib.parse import quote
 from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished
 from simscen.report.display_text import html_text, relative_path
+from simscen.report.session_lines import SYMBOLS
 
-OUTCOME_SYMBOLS = {
-    Outcome.PASSED: "✓",
-    Outcome.FAILED: "✗",
-    Outcome.ERROR: "!",
-    Outcome.FAILED_AS_EXPECTED: "~",
-    Outcome.SKIPPED: "–",
-}
+OUTCOME_SYMBOLS = {outcome: symbol for outcome, (symbol, _) in SYMBOLS.items()}
 
 
 def outcome_badge(outcome: Outcome) -> str:
