@@ -40,23 +40,20 @@ def random_drives(
     drive is found.
     """
     paths = ShortestPaths(built.mesh, built.world.bounds, radius + WALL_MARGIN_M)
+    movable = [body.pose.plane for body in built.world.bodies]
     free = np.argwhere(built.map.cells == 0)
     for number in numbers if len(free) else ():
         rng = Streams(number).generator("errand")
         for _ in range(MAX_ATTEMPTS):
             ends = built.map.center_of(free[rng.integers(0, len(free), 2)]).tolist()
             start, goal = (Pose2(x, y, float(rng.uniform(-math.pi, math.pi))) for x, y in ends)
-            if start.distance(goal) < min_length / 2 or any(_is_near_movable(end, built) for end in (start, goal)):
+            is_near_movable = any(end.distance(pose) < MOVABLE_MARGIN_M for pose in movable for end in (start, goal))
+            if start.distance(goal) < min_length / 2 or is_near_movable:
                 continue
             length = paths.length(start, goal)
             if math.isfinite(length) and length >= min_length:
                 yield RandomDrive(number, start, goal, length)
                 break
-
-
-def _is_near_movable(pose: Pose2, built: BuiltWorld) -> bool:
-    """Return whether the origin of a door or movable object is within MOVABLE_MARGIN_M."""
-    return any(math.hypot(pose.x - body.pose.x, pose.y - body.pose.y) < MOVABLE_MARGIN_M for body in built.world.bodies)
 
 
 ROBOT_RADIUS_M = 0.22

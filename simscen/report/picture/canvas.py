@@ -78,7 +78,7 @@ class Canvas:
             self.set_image(Image.new("RGB", self.supersampled_size, background))
         self._blocked = Image.new("L", (-(-self.width // LABEL_CELL_PX), -(-self.height // LABEL_CELL_PX)), 0)
         self._block_pen = ImageDraw.Draw(self._blocked)
-        self.texts: list[TextItem] = []
+        self.texts: list[TextItem] = []  # `finish` draws them on top of all shapes
         self.parts: list[DrawnPart] = []
 
     def set_image(self, image: Image.Image) -> None:
@@ -202,10 +202,6 @@ class Canvas:
         self._draw.line(
             [(u * SUPERSAMPLING, v * SUPERSAMPLING) for u, v in (start, end)], fill=color, width=_line_width(0.8)
         )
-
-    def text(self, item: TextItem) -> None:
-        """Add a text, which `finish` draws on top of all shapes."""
-        self.texts.append(item)
 
     def finish(self) -> Image.Image:
         """Return the image in its final size, with all texts."""

@@ -48,10 +48,10 @@ def _panel(title: str, drive: DrivePaths, footprint: Array) -> Image.Image:
     canvas.line(_points(paths[2]), GREEN, 3.0)
     canvas.line(_points(paths[1]), AMBER, 1.5)
     canvas.dashes(_points(paths[0]), INK, 1.0)
-    canvas.text(TextItem(10, 16, printable(f"{title}: {name}"), 15, INK))
+    canvas.texts.append(TextItem(10, 16, printable(f"{title}: {name}"), 15, INK))
     for k, (text, color) in enumerate((("commanded (dashed)", INK), ("odometry", AMBER), ("true", GREEN))):
-        canvas.text(TextItem(10 + (0, 150, 230)[k], PANEL_SIZE_PX - 14, text, 12, color))
-    canvas.text(TextItem(PANEL_SIZE_PX - 10, 16, f"grid {GRID_SPACING_M:g} m", 12, FAINT_INK, "rm"))
+        canvas.texts.append(TextItem(10 + (0, 150, 230)[k], PANEL_SIZE_PX - 14, text, 12, color))
+    canvas.texts.append(TextItem(PANEL_SIZE_PX - 10, 16, f"grid {GRID_SPACING_M:g} m", 12, FAINT_INK, "rm"))
     return canvas.finish().resize((PANEL_SIZE_PX, PANEL_SIZE_PX)) if canvas.width != PANEL_SIZE_PX else canvas.finish()
 
 
@@ -72,5 +72,5 @@ def write_localization_picture(grid: OccupancyGrid, belief: Array, reference: Ar
     canvas.dashes(belief, palette.RED, 2.0)
     for row, (text, color) in enumerate((("belief", palette.RED), ("reference", palette.PLAN))):
         if row == 0 or len(reference):
-            canvas.text(TextItem(12, 16 + 18 * row, text, 13, color, halo=palette.INK if row else None))
+            canvas.texts.append(TextItem(12, 16 + 18 * row, text, 13, color, halo=palette.INK if row else None))
     canvas.finish().save(path, format="PNG", compress_level=3)

@@ -66,7 +66,7 @@ def place_labels(canvas: Canvas, labels: list[Label], walls: Array) -> None:
             canvas.leader((u + fraction * (end[0] - u), v + fraction * (end[1] - v)), end, label.box or label.color)
         halo = None if label.box else palette.FREE
         middle = (left + right) / 2, (top + bottom) / 2
-        canvas.text(TextItem(*middle, label.text, label.size, label.color, "mm", label.box, halo))
+        canvas.texts.append(TextItem(*middle, label.text, label.size, label.color, "mm", label.box, halo))
         canvas.add_part(f"label {label.text}", [(label.x, label.y)])
 
 

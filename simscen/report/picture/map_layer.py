@@ -40,8 +40,10 @@ def map_scale(bounds: Bounds) -> float:
 
 def draw_map(canvas: Canvas, grid: OccupancyGrid) -> None:
     """Draw the map as the image of the canvas, below everything else."""
-    image, resolution = _color_image(grid, 1 / (canvas.scale * SUPERSAMPLING))
     per_pixel = 1 / (canvas.scale * SUPERSAMPLING)
+    merge = max(1, int(per_pixel / grid.resolution))
+    cells = _downsample(grid.cells, merge) if merge > 1 else grid.cells
+    image, resolution = Image.fromarray(_colors()[cells.view(np.uint8)]), grid.resolution * merge
     x0, _, _, y1 = canvas.bounds
     corners = np.array([[x0, y1], [x0 + per_pixel, y1], [x0, y1 - per_pixel]])
     origin, right, down = grid.origin.inverse().apply(corners) / resolution
@@ -54,14 +56,6 @@ def draw_map(canvas: Canvas, grid: OccupancyGrid) -> None:
             canvas.supersampled_size, Image.Transform.AFFINE, tuple(map(float, affine)), fillcolor=palette.UNKNOWN
         )
     )
-
-
-def _color_image(grid: OccupancyGrid, pixel_m: float) -> tuple[Image.Image, float]:
-    """Return the map as a color image, and the size of its pixels in m. Cells smaller than `pixel_m` are merged."""
-    cells, merge = grid.cells, max(1, int(pixel_m / grid.resolution))
-    if merge > 1:
-        cells = _downsample(cells, merge)
-    return Image.fromarray(_colors()[cells.view(np.uint8)]), grid.resolution * merge
 
 
 @cache

@@ -71,16 +71,8 @@ def _draw_floor(canvas: Canvas, name: str, outline: Array, text: str) -> Iterato
     canvas.polygon(outline, (*palette.SLIPPERY, 40), palette.SLIPPERY, 1.0)
     canvas.add_part(f"floor {name}: {text}", outline)
     x, y = outline.mean(axis=0).tolist()
-    yield Label(
-        LABEL_RANK,
-        x,
-        y,
-        printable(f"{name}: {text}"),
-        palette.OBJECT,
-        11,
-        _label_distance(canvas, outline),
-        is_optional=True,
-    )
+    rim = _label_distance(canvas, outline)
+    yield Label(LABEL_RANK, x, y, printable(f"{name}: {text}"), palette.OBJECT, 11, rim, is_optional=True)
 
 
 def draw_zones(canvas: Canvas, scene: Scene) -> Iterator[Label]:
@@ -95,9 +87,8 @@ def draw_zones(canvas: Canvas, scene: Scene) -> Iterator[Label]:
             canvas.add_part(f"{zone.filter} zone {scene.label(text)}", outline)
         if outlines:
             x, y = outlines[0].mean(axis=0).tolist()
-            yield Label(
-                2, x, y, printable(scene.label(text)), color, 12, min(18.0, _label_distance(canvas, outlines[0]))
-            )
+            rim = min(18.0, _label_distance(canvas, outlines[0]))
+            yield Label(2, x, y, printable(scene.label(text)), color, 12, rim)
 
 
 def _active_zones(scene: Scene) -> Iterator[tuple[FilterZone, str]]:
@@ -178,7 +169,8 @@ def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
             canvas.polygon(outline, fill, color, width, blocks_labels=not is_removed)
             canvas.add_part(f"{kind} {name}{' removed' if is_removed else ''}", outline)
         if person:
-            _draw_heading(canvas, last, outlines[0])
+            radius = float(np.hypot(*(outlines[0] - (last.x, last.y)).T).max())
+            canvas.line(last.apply(np.array([(0.0, 0.0), (1.5 * radius, 0.0)])), palette.PEDESTRIAN, 2.0)
         corners = np.concatenate(outlines)
         x, y = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
         text = f"{name} (removed at {trace.seconds(removed[name]):.1f} s)" if is_removed else name
@@ -204,11 +196,6 @@ def _draw_door_positions(canvas: Canvas, door: MovableObject, shape: Outlines) -
             canvas.dashes(np.vstack((corners, corners[:1])), palette.OBJECT, 0.8, 3.0)
     if door.closed is not None:
         canvas.disc(door.closed.x, door.closed.y, 2.6, palette.OBJECT)
-
-
-def _draw_heading(canvas: Canvas, pose: Pose2, outline: Array) -> None:
-    radius = float(np.hypot(*(outline - (pose.x, pose.y)).T).max())
-    canvas.line(pose.apply(np.array([(0.0, 0.0), (1.5 * radius, 0.0)])), palette.PEDESTRIAN, 2.0)
 
 
 def _earlier_poses(samples: Samples) -> list[int]:

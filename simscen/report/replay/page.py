@@ -170,7 +170,7 @@ def run_data(log: Log, result: RunResult, columns: PackedColumns) -> dict[str, A
         "rate": log.trace.tick_rate,
         "end": log.trace.end,
         "again": escape_control(result.again) if result.path else "",
-        "verdicts": verdict_data(result, lines),
+        "verdicts": [verdict_data(verdict, result, lines) for verdict in result.verdicts],
         "disturbances": disturbance_data(result, lines),
         "metrics": {name: value for name, value in sorted(result.metrics.items()) if is_finite_number(value)},
         "events": sorted(events, key=lambda event: event["tick"]),

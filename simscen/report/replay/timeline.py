@@ -53,7 +53,8 @@ def timeline_data(trace: Trace, lines: SourceLines, robot: str, with_world: bool
     entries: list[dict[str, Any]] = []
     open_intervals: dict[tuple[EventKind, str, Any], dict[str, Any]] = {}
     for event in trace.events:
-        if _is_world_event(event) and not with_world:
+        is_world_event = str(event.kind).startswith(WORLD_EVENT_PREFIXES) and event.kind != EventKind.RUN_ENDED
+        if is_world_event and not with_world:
             continue
         entry = event.data.get("entry")  # two faults or events can have the same name
         for start, ends in _INTERVAL_KINDS.items():
@@ -66,10 +67,6 @@ def timeline_data(trace: Trace, lines: SourceLines, robot: str, with_world: bool
     for interval in open_intervals.values():
         interval["until"] = trace.end
     return [{key: value for key, value in one.items() if value or key not in _OPTIONAL_KEYS} for one in entries]
-
-
-def _is_world_event(event: Event) -> bool:
-    return str(event.kind).startswith(WORLD_EVENT_PREFIXES) and event.kind != EventKind.RUN_ENDED
 
 
 def _entry(event: Event, lines: SourceLines, robot: str) -> dict[str, Any]:
@@ -97,12 +94,8 @@ def _details(event: Event) -> Iterator[str]:
         yield from (str(one["what"]) for one in effects if isinstance(one, dict) and one.get("what"))
     for key, value in event.data.items():
         if key not in _HIDDEN_KEYS and value not in ("", None) and not isinstance(value, list | dict):
-            yield f"{key.replace('_', ' ')} {_short(value)}"
-
-
-def _short(value: object) -> str:
-    """Return a value as text, with at most four significant digits of a float."""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+            text = f"{value:.4g}" if isinstance(value, float) else str(value)
+            yield f"{key.replace('_', ' ')} {text}"
 
 
 def is_finite_number(value: object) -> TypeGuard[float]:
@@ -118,11 +111,6 @@ def _line(event: Event, lines: SourceLines) -> int:
     if str(event.kind).startswith("goal."):
         return lines.goals.get(goal_without_loop(event.name), 0)
     return 0
-
-
-def verdict_data(result: RunResult, lines: dict[str, SourceLines]) -> list[dict[str, Any]]:
-    """Return the JSON data of all verdicts in order. `lines` are the line numbers by robot."""
-    return [_verdict(verdict, result, lines) for verdict in result.verdicts]
 
 
 def disturbance_data(result: RunResult, lines: dict[str, SourceLines]) -> list[dict[str, Any]]:
@@ -149,7 +137,8 @@ def disturbance_data(result: RunResult, lines: dict[str, SourceLines]) -> list[d
     return data
 
 
-def _verdict(verdict: Verdict, result: RunResult, lines: dict[str, SourceLines]) -> dict[str, Any]:
+def verdict_data(verdict: Verdict, result: RunResult, lines: dict[str, SourceLines]) -> dict[str, Any]:
+    """Return the JSON data of a verdict. `lines` are the line numbers by robot."""
     robot, _, name = verdict.id.partition("/")
     if robot not in lines or not name:
         robot, name = next(iter(lines)), verdict.id

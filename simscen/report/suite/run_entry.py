@@ -127,9 +127,8 @@ def _criteria_table(run: RunFinished) -> str:
     """Return a table with a row per finding, violations first; "" without findings."""
     rows = [(verdict, each, line) for verdict, line in run.result.verdicts_with_lines for each in verdict.findings]
     rows.sort(key=lambda row: row[1].status is Status.PASS)
-    body = "".join(_criterion_row(run, *row) for row in rows)
-    head = "".join(f'<th scope="col">{name}</th>' for name in ("", "criterion", "measured", "margin", "source"))
-    return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>' if body else ""
+    headings = ("", "criterion", "measured", "margin", "source")
+    return _table(headings, "".join(_criterion_row(run, *row) for row in rows))
 
 
 def _criterion_row(run: RunFinished, verdict: Verdict, finding: Finding, line: int) -> str:
@@ -158,7 +157,12 @@ def _disturbance_table(run: RunFinished) -> str:
         f"<td>{html_text(outcome.effect)}</td></tr>"
         for outcome in run.result.disturbances
     )
-    head = "".join(f'<th scope="col">{name}</th>' for name in ("", "event or fault", "trigger", "started", "effect"))
+    return _table(("", "event or fault", "trigger", "started", "effect"), rows)
+
+
+def _table(headings: Sequence[str], rows: str) -> str:
+    """Return a table, in narrow windows without its heading. `rows` is HTML; "" for no table."""
+    head = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
     return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>' if rows else ""
 
 
