@@ -1,5 +1,6 @@
 """Connect the crowd model of pedestrians to the physics simulation of a run."""
 
+import math
 from collections.abc import Callable
 from functools import cached_property
 
@@ -13,7 +14,7 @@ from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.pedestrians.crowd import Crowd, Point
 from simscen.pedestrians.surroundings import ObservedObject, ObservedRobot, Surroundings, WallMap
-from simscen.sim.body.outline import footprint, outlines_in_z_range
+from simscen.sim.body.outline import convex_hull, footprint, hull_points, outlines_in_z_range
 from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
 from simscen.worlds.geometry.cross_section import CrossSection, cross_section, winds_around
@@ -22,7 +23,9 @@ from simscen.worlds.routes.shortest_paths import ShortestPaths, shortest_paths_i
 OBSTACLE_HEIGHTS_M = (0.15, 0.5, 0.95)
 """Heights at which walls block the way of pedestrians. Walls at the last height also block their view."""
 BODY_HEIGHT_RANGE_M = (0.05, 1.7)
-"""Range of heights above the ground in which objects block the way of pedestrians."""
+"""Range of heights above the floor (z = 0) in which objects block the way of pedestrians."""
+MAX_LEVEL_TILT = 0.01
+"""Sine of half the largest tilt at which an object counts as level."""
 PATH_CELL_M = 0.1
 """Cell size of the grid for path planning."""
 PREFERRED_CLEARANCE_M = 0.2
@@ -88,7 +91,8 @@ class PedestrianSimulation:
         self._step_s = self._period / clock.rate
         self._behaviors: dict[str, str] = {}
         self._hulls: dict[str, Array] = {}
-        self._outlines: dict[str, tuple[tuple[Solid, ...], tuple[Array, ...]]] = {}
+        self._outlines: dict[str, tuple[tuple[Solid, ...] | None, float, tuple[Array, ...]]] = {}
+        """Solids, height in m, and outlines in the body frame of each level object by name."""
         self.listeners: list[Callable[[Event], None]] = []
 
     @cached_property
@@ -160,14 +164,19 @@ class PedestrianSimulation:
         )
 
     def _world_outlines(self, body: Body, pose: Pose3) -> tuple[Array, ...]:
-        cached = self._outlines.get(body.name)
-        if cached is None or cached[0] is not body.solids:
-            cached = (
-                body.solids,
-                tuple(np.array(outline) for outline in outlines_in_z_range(body.solids, BODY_HEIGHT_RANGE_M)),
-            )
-            self._outlines[body.name] = cached
-        return tuple(pose.plane.apply(outline) for outline in cached[1])
+        """Return the outlines, in the world frame, of the solids of a body that block the way of pedestrians."""
+        low, high = BODY_HEIGHT_RANGE_M
+        if math.hypot(pose.qx, pose.qy) > MAX_LEVEL_TILT:
+            corners = [pose.compose(solid.pose).apply(hull_points(solid.shape)) for solid in body.solids]
+            in_range = [each[:, :2] for each in corners if each[:, 2].min() < high and each[:, 2].max() > low]
+            return tuple(np.array(convex_hull(each)) for each in in_range)
+        # Rounded, because the height of an object that rests on the ground varies by some micrometers.
+        z = round(pose.z, 2)
+        solids, cached_z, outlines = self._outlines.get(body.name, (None, 0.0, ()))
+        if solids is not body.solids or cached_z != z:
+            outlines = tuple(np.array(each) for each in outlines_in_z_range(body.solids, (low - z, high - z)))
+            self._outlines[body.name] = body.solids, z, outlines
+        return tuple(pose.plane.apply(outline) for outline in outlines)
 
     def _observe_robot(self, robot: Robot) -> ObservedRobot:
         if robot.name not in self._hulls:

@@ -1,14 +1,19 @@
 """Tests of pedestrians in whole runs."""
 
+import math
+
 import numpy as np
 import pytest
 
+from simscen.core.clock import Clock
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Pose3
-from simscen.core.geometry.shapes import Box, Solid
+from simscen.core.geometry.shapes import Body, Box, Solid
 from simscen.core.records.events import EventKind
-from simscen.run.live_world.pedestrians import PedestrianMap
+from simscen.run.live_world.pedestrians import PedestrianMap, PedestrianSimulation
+from simscen.sim.simulation import Simulation
 from simscen.worlds.built_world import build_world_and_map
+from simscen.worlds.geometry.triangulation import triangulate
 
 STANDING = {
     "stack": "{localizer: {type: ground_truth}}",
@@ -127,3 +132,24 @@ def test_pedestrians_have_no_room_inside_a_solid():
     walls = PedestrianMap(build_world_and_map(world, 0.2))
     places = [(0.0, 0.0), (2.0, 0.0), (2.6, 0.0), (3.0, 0.0), (9.0, 9.0)]
     assert [walls.has_room(place, 0.25) for place in places] == [False, False, False, True, True]
+
+
+def test_objects_block_pedestrians_only_at_the_height_and_tilt_of_their_pose():
+    def has_room(solid: Solid, pose: Pose3, *places: tuple[float, float]) -> list[bool]:
+        body = Body("thing", (solid,), pose)
+        built = build_world_and_map(World("w", (), (body,), bounds=(-4.0, -4.0, 4.0, 4.0)), 0.2)
+        simulation = Simulation(built.mesh, [body], {}, triangulate)
+        try:
+            pedestrians = PedestrianSimulation(built, simulation, Clock(240))
+            return [pedestrians.has_room(place, 0.25, walls_only=False) for place in places]
+        finally:
+            simulation.close()
+
+    lamp = Solid(Box((1.0, 1.0, 0.6)), Pose3(z=0.3))
+    assert has_room(lamp, Pose3(), (0.0, 0.0), (0.7, 0.0), (0.8, 0.0)) == [False, False, True]
+    assert has_room(lamp, Pose3(z=2.5), (0.0, 0.0), (0.7, 0.0)) == [True, True]
+    hanging = Solid(Box((1.0, 1.0, 1.5)), Pose3(z=-0.8))
+    assert has_room(hanging, Pose3(z=1.8), (0.0, 0.0), (0.8, 0.0)) == [False, True]
+    pole = Solid(Box((0.1, 0.1, 3.0)), Pose3(z=1.5))
+    lying = Pose3.from_rpy(0.0, 0.0, 0.1, 0.0, math.pi / 2, math.pi / 2)  # it has fallen to +y
+    assert has_room(pole, lying, (0.0, 2.0), (2.0, 0.0), (0.0, -0.5)) == [False, True, True]
