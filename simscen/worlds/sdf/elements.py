@@ -157,7 +157,8 @@ def reference_frame(pose: Element | None) -> str:
 def read_pose(element: Element | None) -> Pose3:
     """Return the pose in a `<pose>`: x y z and either roll pitch yaw or a quaternion x y z w; identity without one.
 
-    Source: SDF specification, "Specifying pose in SDFormat". Raises OutOfReach if a coordinate exceeds
+    As in Gazebo Classic, the yaw may be missing if roll and pitch are 0; published worlds contain such poses. Source: SDF
+    specification, "Specifying pose in SDFormat". Raises OutOfReach if a coordinate exceeds
     MAX_COORDINATE_M.
     """
     if element is None or not element.text:
@@ -173,7 +174,9 @@ def read_pose(element: Element | None) -> Pose3:
             raise element.unusable("zero quaternion")
         pose = Pose3(x, y, z, *(part / norm for part in quaternion))
     elif rotation_format == "euler_rpy":
-        x, y, z, *angles = read_numbers(element, 6)
+        words = element.text.split()
+        lacks_yaw = len(words) == 5 and not any(word.strip("-.0") for word in words[3:])
+        x, y, z, *angles = (*read_numbers(element, 5), 0.0) if lacks_yaw else read_numbers(element, 6)
         roll, pitch, yaw = (math.radians(angle) if in_degrees else angle for angle in angles)
         pose = Pose3.from_rpy(x, y, z, roll, pitch, yaw)
     else:

@@ -152,10 +152,16 @@ def test_quaternions_are_read_as_xyzw_and_normalized(load):
     np.testing.assert_allclose(world.solids[0].pose, (1, 2, 3, 0, 0, math.sqrt(0.5), math.sqrt(0.5)))
 
 
+def test_a_pose_may_lack_its_yaw_if_roll_and_pitch_are_zero(load):
+    world = load(model(f"<link name='a'><pose>1 2 3 0 -0.0</pose>{BOX}</link>"))
+    assert world.solids[0].pose == (1, 2, 3, 0, 0, 0, 1)
+
+
 @pytest.mark.parametrize(
     ("pose", "message"),
     [
         ("<pose>1 2 3</pose>", "expected 6 numbers, got 3"),
+        ("<pose>1 2 3 0 1.57</pose>", "expected 6 numbers, got 5"),
         ("<pose>1 2 3 0 0 nan</pose>", "must be a finite number"),
         ("<pose>1 2 3 0 0 1e400</pose>", "must be a finite number"),
         ("<pose>1 2 three 0 0 0</pose>", "expected a number, got 'three'"),
