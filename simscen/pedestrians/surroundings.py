@@ -87,11 +87,8 @@ class WallMap:
         candidates = [self._segments_near(column, row) for column, row in cells]
         point_index = np.repeat(np.arange(len(points)), [len(each) for each in candidates])
         segment_index = np.concatenate(candidates) if candidates else np.empty(0, dtype=np.int64)
-        return (
-            point_index,
-            self._owners[segment_index],
-            _nearest_points_on(self._segments[segment_index], points[point_index]),
-        )
+        nearest = _nearest_points_on(self._segments[segment_index], points[point_index])
+        return point_index, self._owners[segment_index], nearest
 
     def _segments_near(self, column: int, row: int) -> Indices:
         """Return the indices of segments that may be within OBSTACLE_RANGE_M of any point of a cell of WALL_CELL_M."""

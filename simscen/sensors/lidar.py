@@ -43,7 +43,10 @@ class LidarSensor:
         """Return a scan. A range is inf if the beam hits nothing, and -inf below the minimum range (REP 117)."""
         pose, spec = self._view.base_pose(), self._spec
         if self._tilted_mount is not None:
-            ranges = self._to_ranges(self._tilted_distances(pose.compose(self._tilted_mount)))
+            lidar = pose.compose(self._tilted_mount)
+            distances = np.asarray(self._rays.sweep(self._fan, lidar, self._cast_range), dtype=np.float64)
+            to_floor = floor_distances(lidar.z, self._directions @ lidar.rotation()[2, :2])
+            ranges = self._to_ranges(np.minimum(distances, to_floor))
             limits = self._first, self._increment, spec.min_range, spec.max_range
             return Scan(self.name, tick, ranges, *limits, self._mount, self._tilted_mount)
         px, py, pz, i, j, k, w = pose
@@ -51,11 +54,6 @@ class LidarSensor:
         origin = Pose3(px + x, py + y, pz + z, i, j, k, w)
         ranges = self._to_ranges(self._rays.sweep(self._fan, origin, self._cast_range))
         return Scan(self.name, tick, ranges, self._first, self._increment, spec.min_range, spec.max_range, self._mount)
-
-    def _tilted_distances(self, lidar: Pose3) -> Array:
-        """Return the true distances (beams,) in m to obstacles and the floor for a lidar at the pose `lidar`."""
-        distances = np.asarray(self._rays.sweep(self._fan, lidar, self._cast_range), dtype=np.float64)
-        return np.minimum(distances, floor_distances(lidar.z, self._directions @ lidar.rotation()[2, :2]))
 
     def _to_ranges(self, distances: Array | Float32Array) -> Array:
         """Return the ranges (beams,) of a scan: true distances in m with noise, rounding, and limits."""

@@ -106,12 +106,7 @@ def kinematics_of(drive: Drive) -> Kinematics:
         return lambda increment: Twist(*increment)
     if isinstance(drive, Mecanum):
         wheels = drive.wheels
-
-        def mecanum_motion(increment: EncoderIncrement) -> Displacement:
-            front_left, front_right, rear_left, rear_right = increment
-            return wheels.motion((front_left, front_right, rear_left, rear_right))
-
-        return mecanum_motion
+        return lambda increment: wheels.motion((increment[0], increment[1], increment[2], increment[3]))
     radius = drive.wheel_radius
     separation = drive.wheel_separation * (drive.turning_scale if isinstance(drive, SkidSteer) else 1.0)
 

@@ -141,11 +141,10 @@ class Stepper:
         if not self._scene.walls.is_complete:
             self._build_walls(ticks)
         no_contact_before = min([robot.no_contact_before for robot in self._robots])
-        return min(no_contact_before, actors.no_push_before(self._scene.tick, self._robot_speed_bound))
-
-    def _robot_speed_bound(self) -> float:
-        """Return an upper bound in m/s of the speed of any point of any robot."""
-        return max([robot.clearance.speed_bound() for robot in self._robots])
+        no_push_before = actors.no_push_before(
+            self._scene.tick, lambda: max([robot.clearance.speed_bound() for robot in self._robots])
+        )
+        return min(no_contact_before, no_push_before)
 
     def _step_with_contact(self) -> None:
         """Simulate one tick: first move the objects that follow a path, afterwards record the contacts of robots."""

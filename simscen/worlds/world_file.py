@@ -135,7 +135,8 @@ def wall_solids(points: list[Point], thickness: float, height: float, name: str)
     for (a, b), direction, previous, following in zip(pairwise(corners), directions, before, after, strict=True):
         start = _miter_end(a, direction, previous, thickness / 2, -1.0)
         end = _miter_end(b, direction, following, thickness / 2, 1.0)
-        if any(_runs_backward(start[side], end[side], direction) for side in (0, 1)):
+        (ux, uy), sides = direction, zip(start, end, strict=True)
+        if any((bx - ax) * ux + (by - ay) * uy <= 0 for (ax, ay), (bx, by) in sides):  # its miters cross
             start, end = _square_end(a, direction, thickness / 2, -1.0), _square_end(b, direction, thickness / 2, 1.0)
         solids.append(Solid(Extrusion((start[1], end[1], end[0], start[0]), height), name=name))
     return solids
@@ -145,11 +146,6 @@ def _direction(a: Point, b: Point) -> Point:
     """Return the unit vector from `a` to `b`."""
     length = math.hypot(b[0] - a[0], b[1] - a[1])
     return (b[0] - a[0]) / length, (b[1] - a[1]) / length
-
-
-def _runs_backward(start: Point, end: Point, direction: Point) -> bool:
-    """Return whether one side of a part of a wall points against `direction`, because its miters cross."""
-    return (end[0] - start[0]) * direction[0] + (end[1] - start[1]) * direction[1] <= 0
 
 
 def _miter_end(corner: Point, direction: Point, other: Point | None, half: float, side: float) -> tuple[Point, Point]:

@@ -132,38 +132,29 @@ def _polygon_moments(polygon: Sequence[tuple[float, float]]) -> tuple[float, flo
     u, v = np.roll(x, -1), np.roll(y, -1)
     cross = x * v - u * y
     area = cross.sum() / 2
-    moments = (
-        area,
-        ((x + u) * cross).sum() / (6 * area),
-        ((y + v) * cross).sum() / (6 * area),
-        ((x * x + x * u + u * u) * cross).sum() / 12,
-        ((y * y + y * v + v * v) * cross).sum() / 12,
-        ((x * v + 2 * x * y + 2 * u * v + u * y) * cross).sum() / 24,
+    return (
+        float(area),
+        float(((x + u) * cross).sum() / (6 * area)),
+        float(((y + v) * cross).sum() / (6 * area)),
+        float(((x * x + x * u + u * u) * cross).sum() / 12),
+        float(((y * y + y * v + v * v) * cross).sum() / 12),
+        float(((x * v + 2 * x * y + 2 * u * v + u * y) * cross).sum() / 24),
     )
-    a, b, c, d, e, f = (float(moment) for moment in moments)
-    return a, b, c, d, e, f
 
 
 def _quaternion(rotation: Array) -> tuple[float, float, float, float]:
     """Return the quaternion (x, y, z, w) of a rotation matrix (Shepperd 1978)."""
     diagonal_and_trace = np.array([*np.diag(rotation), np.trace(rotation)])
     k = int(np.argmax(diagonal_and_trace))
+    # The axis of the rotation, multiplied by 2 sin(angle).
+    scaled_axis = [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
     if k == 3:
-        q = np.array([*_scaled_axis(rotation), 1 + diagonal_and_trace[3]])
+        q = np.array([*scaled_axis, 1 + diagonal_and_trace[3]])
     else:
         i, j = (k + 1) % 3, (k + 2) % 3
         q = np.empty(4)
         q[k] = 1 - diagonal_and_trace[3] + 2 * rotation[k, k]
         q[i], q[j] = rotation[i, k] + rotation[k, i], rotation[j, k] + rotation[k, j]
-        q[3] = _scaled_axis(rotation)[k]
+        q[3] = scaled_axis[k]
     x, y, z, w = (q / np.linalg.norm(q)).tolist()
     return x, y, z, w
-
-
-def _scaled_axis(rotation: Array) -> Vector:
-    """Return the axis of a rotation matrix, multiplied by 2 sin(angle)."""
-    return (
-        float(rotation[2, 1] - rotation[1, 2]),
-        float(rotation[0, 2] - rotation[2, 0]),
-        float(rotation[1, 0] - rotation[0, 1]),
-    )

@@ -143,12 +143,12 @@ class StaticDistance:
         )
 
     def _build_shapes(self, part: int) -> list[int]:
-        vertices, hulls = self._mesh.vertices, self._mesh.hulls
-        if hulls and (own := hulls[self._parts.solids[part]]):
+        vertices, hulls, solid = self._mesh.vertices, self._mesh.hulls, int(self._parts.solids[part])
+        if hulls and (own := hulls[solid]):
             return [collision_shapes.create_convex_shape(self._client, vertices[own])]
         faces = self._mesh.faces[self._parts.faces(part)]
-        if self._parts.is_whole_solid(part) and is_convex(solid := submesh(vertices, faces)):
-            return [collision_shapes.create_convex_shape(self._client, solid.vertices)]
+        if len(self._parts.parts_of_solid(solid)) == 1 and is_convex(mesh := submesh(vertices, faces)):
+            return [collision_shapes.create_convex_shape(self._client, mesh.vertices)]
         return collision_shapes.create_concave_shapes(self._client, vertices, faces)
 
     def enclosing_solids(self, point: Vector, exclude: Collection[int] = ()) -> list[int]:

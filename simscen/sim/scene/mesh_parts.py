@@ -34,10 +34,6 @@ class MeshParts:
         """Return the face indices of a part."""
         return self.order[self.starts[part] : self.starts[part + 1]]
 
-    def is_whole_solid(self, part: int) -> bool:
-        """Return whether a solid consists of only this part."""
-        return len(self.parts_of_solid(int(self.solids[part]))) == 1
-
     def parts_of_solid(self, solid: int) -> range:
         """Return the indices of the parts of a solid."""
         first, last = np.searchsorted(self.solids, (solid, solid + 1)).tolist()

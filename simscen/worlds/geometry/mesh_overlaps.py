@@ -29,20 +29,14 @@ def horizontal_distance(
     middle = (max(bottom, low) + min(top, high)) / 2
     if winds_around(cross_section(mesh, middle).segments, point):
         return 0.0
-    corners, valid = _clip_to_heights(_triangles_near(mesh, point, within), low, high)
+    triangles = mesh.vertices[mesh.faces]
+    offsets = triangles[:, :, :2] - point
+    is_near = np.all((offsets.min(axis=1) <= within) & (offsets.max(axis=1) >= -within), axis=1)
+    corners, valid = _clip_to_heights(triangles[is_near], low, high)
     corners, valid = corners[valid.any(axis=1)] - point, valid[valid.any(axis=1)]
     if not len(corners):
         return math.inf
     return 0.0 if _contains_origin(corners, valid).any() else _distance_from_origin(corners, valid)
-
-
-def _triangles_near(mesh: TriangleMesh, point: Point, distance: float) -> Array:
-    """Return the triangles (m, 3, 3) whose bounding rectangle is at most `distance` m away from the point."""
-    triangles = mesh.vertices[mesh.faces]
-    corners = triangles[:, :, :2] - point
-    is_near = np.all((corners.min(axis=1) <= distance) & (corners.max(axis=1) >= -distance), axis=1)
-    near: Array = triangles[is_near]
-    return near
 
 
 def _clip_to_heights(triangles: Array, low: float, high: float) -> tuple[Array, npt.NDArray[np.bool_]]:

@@ -89,7 +89,11 @@ def _decode_pgm(data: bytes) -> Grays16:
     if not 1 <= maximum <= 65535:
         raise UnreadableImage(f"maxval must be between 1 and 65535, not {maximum}")
     raster = data[match.end() :]
-    values = _ascii_samples(raster) if match[1] == b"P2" else _binary_samples(raster, width * height, maximum)
+    if match[1] == b"P2":
+        values = _ascii_samples(raster)
+    else:
+        sample = np.dtype(">u2" if maximum > 255 else "u1")
+        values = np.frombuffer(raster, dtype=sample, count=min(width * height, len(raster) // sample.itemsize))
     if len(values) < width * height:
         raise UnreadableImage(f"the PGM is truncated: {len(values)} of {width * height} pixels")
     values = values[: width * height].reshape(height, width)
@@ -98,12 +102,6 @@ def _decode_pgm(data: bytes) -> Grays16:
     scale = np.round(np.arange(maximum + 1) * (65535 / maximum)).astype(np.uint16)
     quanta: Grays16 = scale[values]
     return quanta
-
-
-def _binary_samples(raster: bytes, count: int, maximum: int) -> npt.NDArray[np.generic]:
-    """Return the first `count` samples of a P5 raster, or fewer if it is truncated. `maximum` is the PGM's maxval."""
-    sample = np.dtype(">u2" if maximum > 255 else "u1")
-    return np.frombuffer(raster, dtype=sample, count=min(count, len(raster) // sample.itemsize))
 
 
 def _ascii_samples(raster: bytes) -> npt.NDArray[np.generic]:

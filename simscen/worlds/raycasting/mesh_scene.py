@@ -9,7 +9,7 @@ to end at the first triangle that it hits. Several scenes can be swept one after
 import ctypes
 import math
 from ctypes import c_int, c_size_t, c_uint, c_void_p
-from functools import cache
+from functools import cache, cached_property
 from weakref import finalize
 
 import numpy as np
@@ -163,24 +163,18 @@ class MovingMesh:
     def __init__(self, mesh: TriangleMesh, scene: MeshScene, pose: Pose3) -> None:
         """Place a mesh with its `scene` at a `pose` in the world."""
         self.mesh, self.scene, self.pose = mesh, scene, pose
-        self._center: Vector | None = None
-        self._rotation: Array | None = None
 
-    @property
+    @cached_property
     def center(self) -> Vector:
         """Center of the scene in the world frame."""
-        if self._center is None:
-            x, y, z, i, j, k, w = self.pose
-            p, q, r = rotated((i, j, k, w), self.scene.center)
-            self._center = x + p, y + q, z + r
-        return self._center
+        x, y, z, i, j, k, w = self.pose
+        p, q, r = rotated((i, j, k, w), self.scene.center)
+        return x + p, y + q, z + r
 
-    @property
+    @cached_property
     def _world_rotation(self) -> Array:
         """Rotation matrix (3, 3) from the frame of the mesh to the world frame."""
-        if self._rotation is None:
-            self._rotation = self.pose.rotation()
-        return self._rotation
+        return self.pose.rotation()
 
     def min_distance(self, position: Vector) -> float:
         """Return a lower bound of the distance in m between the mesh and a position in the world frame."""

@@ -157,9 +157,8 @@ def reference_frame(pose: Element | None) -> str:
 def read_pose(element: Element | None) -> Pose3:
     """Return the pose in a `<pose>`: x y z and either roll pitch yaw or a quaternion x y z w; identity without one.
 
-    As in Gazebo Classic, the yaw may be missing if roll and pitch are 0; published worlds contain such poses. Source: SDF
-    specification, "Specifying pose in SDFormat". Raises OutOfReach if a coordinate exceeds
-    MAX_COORDINATE_M.
+    As in Gazebo Classic, the yaw may be missing if roll and pitch are 0; published worlds contain such poses. Source:
+    SDF specification, "Specifying pose in SDFormat". Raises OutOfReach if a coordinate exceeds MAX_COORDINATE_M.
     """
     if element is None or not element.text:
         return Pose3()

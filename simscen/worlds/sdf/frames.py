@@ -67,17 +67,14 @@ class FrameScope:
                 raise referrer.unusable(f"the pose of {frame.name!r} depends on itself")
             self._frames_in_progress.append(key)
             try:
-                self._poses[key] = self._compute_pose(frame, referrer)
+                reference = self.pose_of_name(reference_frame(frame.pose) or frame.attached_to, referrer)
+                pose = reference.compose(read_pose(frame.pose))
+                if frame.model_scope is not None and frame.placement_frame:
+                    pose = pose.compose(frame.model_scope.pose_of_name(frame.placement_frame, referrer).inverse())
+                self._poses[key] = pose
             finally:
                 self._frames_in_progress.pop()
         return self._poses[key]
-
-    def _compute_pose(self, frame: Frame, referrer: Element) -> Pose3:
-        reference = self.pose_of_name(reference_frame(frame.pose) or frame.attached_to, referrer)
-        pose = reference.compose(read_pose(frame.pose))
-        if frame.model_scope is not None and frame.placement_frame:
-            pose = pose.compose(frame.model_scope.pose_of_name(frame.placement_frame, referrer).inverse())
-        return pose
 
     def pose_of_name(self, name: str, referrer: Element) -> Pose3:
         """Return the pose of the frame `name`, which may be `model::frame`, relative to the scope's own frame.

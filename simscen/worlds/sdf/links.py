@@ -144,17 +144,12 @@ def _link_mass(inertial: Element | None, collisions: Sequence[tuple[Element, Seq
         return DEFAULT_MASS_KG
     if parse_bool(inertial.attributes.get("auto", "0"), inertial):
         # For a mesh that is not closed, the volume depends on the origin, as in sdformat.
-        mass = sum(
-            _density(element, inertial) * abs(enclosed_volume(triangulate(solid.shape)))
-            for element, solids in collisions
-            for solid in solids
-        )
+        mass = 0.0
+        for collision, solids in collisions:
+            owner = next((owner for owner in (collision, inertial) if owner.child("density")), None)
+            density = read_positive(owner, "density") if owner else DEFAULT_DENSITY_KG_M3
+            for solid in solids:
+                mass += density * abs(enclosed_volume(triangulate(solid.shape)))
         if mass > 0:
             return mass
     return read_positive(inertial, "mass") if inertial.child("mass") else DEFAULT_MASS_KG
-
-
-def _density(collision: Element, inertial: Element) -> float:
-    """Return the density in kg/m³ that a collision or else the `<inertial>` of its link states, or the default."""
-    owner = next((owner for owner in (collision, inertial) if owner.child("density")), None)
-    return read_positive(owner, "density") if owner else DEFAULT_DENSITY_KG_M3

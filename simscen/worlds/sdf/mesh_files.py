@@ -59,7 +59,11 @@ def read_parts(data: bytes, suffix: str) -> tuple[MeshPart, ...]:
     if not parts:
         raise UnusableMesh("the mesh has no triangles")
     _check_parts(parts)
-    return tuple(_without_unused_vertices(part) for part in parts)
+    without_unused_vertices = []
+    for part in parts:
+        used, faces = np.unique(part.faces, return_inverse=True)
+        without_unused_vertices.append(MeshPart(part.names, part.vertices[used], faces.reshape(-1, 3)))
+    return tuple(without_unused_vertices)
 
 
 def _check_parts(parts: tuple[MeshPart, ...]) -> None:
@@ -77,12 +81,6 @@ def _check_parts(parts: tuple[MeshPart, ...]) -> None:
 def _check_face_count(count: int) -> None:
     if count > MAX_FACES:
         raise UnusableMesh(f"more than {MAX_FACES} triangles")
-
-
-def _without_unused_vertices(part: MeshPart) -> MeshPart:
-    """Return the part without the vertices that no triangle uses."""
-    used, faces = np.unique(part.faces, return_inverse=True)
-    return MeshPart(part.names, part.vertices[used], faces.reshape(-1, 3))
 
 
 def _read_stl(data: bytes) -> Iterator[MeshPart]:

@@ -129,7 +129,13 @@ class _Evaluation:
         return whole[self.value(index)]
 
     def _call(self, function: ast.expr, arguments: list[ast.expr], keywords: list[ast.keyword]) -> object:
-        path = _path(function) if isinstance(function, ast.Name) or _is_namespace(function) else ()
+        match function:
+            case ast.Name(name):
+                path: tuple[str, ...] = (name,)
+            case ast.Attribute(ast.Name(space), name) if space in NAMESPACES:
+                path = (space, name)
+            case _:
+                path = ()
         if path in (("isinstance",), ("python", "isinstance")) and len(arguments) == 2:
             kind = _path(arguments[1])[-1]
             if kind not in PYTHON_TYPES:
@@ -184,10 +190,6 @@ def item(whole: Value, key: str) -> Value:
     if not isinstance(whole, dict) or key not in whole:
         raise ExpansionError(f"there is no value {key[:60]!r}")
     return whole[key]
-
-
-def _is_namespace(node: ast.expr) -> bool:
-    return isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in NAMESPACES
 
 
 def _find_builtin(path: tuple[str, ...]) -> Function | float | None:

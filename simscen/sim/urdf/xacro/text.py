@@ -139,19 +139,16 @@ class TextEvaluator:
             case ["optenv", _, *default]:
                 return " ".join(default)  # a run must not depend on the environment
             case ["find", package]:
-                return self._package_path(package)
+                try:
+                    return str(self._folders.package_folder(package, self.file.parent))
+                except UnusableFile as trouble:
+                    raise MissingFile(f"$(find {package[:60]}): {trouble}", trouble.hint) from None
             case ["dirname"]:
                 return str(self.file.parent)
             case ["env", *_]:
                 raise ExpansionError(f"$({command[:60]}): the environment is not read", "write the value into the file")
             case _:
                 raise ExpansionError(f"$({command[:60]}) is not supported", "use arg, find, dirname, or optenv")
-
-    def _package_path(self, name: str) -> str:
-        try:
-            return str(self._folders.package_folder(name, self.file.parent))
-        except UnusableFile as trouble:
-            raise MissingFile(f"$(find {name[:60]}): {trouble}", trouble.hint) from None
 
 
 def required_attribute(element: Element, attribute: str, may_be_empty: bool = False) -> str:
