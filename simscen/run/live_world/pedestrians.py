@@ -5,23 +5,30 @@ from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.clock import Clock
 from simscen.core.environment.world_model import BuiltWorld, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2, Pose3
+from simscen.core.geometry.meshes import submesh
 from simscen.core.geometry.polygons import distance_to_polygon
-from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid
+from simscen.core.geometry.shapes import Body, Cylinder, MotionPath, Solid, TriangleMesh
 from simscen.core.records.events import Event, EventKind, Value
 from simscen.pedestrians.crowd import Crowd, Point
 from simscen.pedestrians.surroundings import ObservedObject, ObservedRobot, Surroundings, WallMap
 from simscen.sim.body.outline import convex_hull, footprint, hull_points, outlines_in_z_range
 from simscen.sim.robots.robot import Robot
 from simscen.sim.simulation import Simulation
-from simscen.worlds.geometry.cross_section import CrossSection, cross_section, winds_around
+from simscen.worlds.geometry.cross_section import CrossSection, cross_section, sections_between, winds_around
 from simscen.worlds.routes.shortest_paths import ShortestPaths, shortest_paths_in
 
 OBSTACLE_HEIGHTS_M = (0.15, 0.5, 0.95)
-"""Heights at which walls block the way of pedestrians. Walls at the last height also block their view."""
+"""Heights at which walls block the way of pedestrians. Walls at the last height also block their view.
+
+Solids whose outline differs from height to height block their way at all heights from the first one on.
+"""
+HEIGHT_TOLERANCE_M = 0.001
+"""Difference up to which heights of vertices count as equal."""
 BODY_HEIGHT_RANGE_M = (0.05, 1.7)
 """Range of heights above the floor (z = 0) in which objects block the way of pedestrians."""
 MAX_LEVEL_TILT = 0.01
@@ -41,7 +48,17 @@ class PedestrianMap:
 
     @cached_property
     def _cuts(self) -> list[CrossSection]:
-        return [cross_section(self._built.mesh, height) for height in OBSTACLE_HEIGHTS_M]
+        """Cross sections of what blocks the way of pedestrians; the last one also blocks their view."""
+        mesh = self._built.mesh
+        cuts = [cross_section(mesh, height) for height in OBSTACLE_HEIGHTS_M]
+        # Most solids are prisms, which are equal in all cuts. Others, such as tables, are cut at more heights.
+        is_complete = _has_two_heights(mesh) & np.isin(
+            np.arange(len(mesh.names)), np.concatenate([cut.owners for cut in cuts])
+        )
+        faces = ~is_complete[mesh.owners]
+        rest = submesh(mesh.vertices, mesh.faces[faces])
+        others = TriangleMesh(rest.vertices, rest.faces, mesh.owners[faces], mesh.names)
+        return [*sections_between(others, (OBSTACLE_HEIGHTS_M[0], BODY_HEIGHT_RANGE_M[1])), *cuts]
 
     @cached_property
     def walls(self) -> WallMap:
@@ -70,6 +87,18 @@ class PedestrianMap:
             if corners is not None:
                 return [(x, y) for x, y in corners[1:].tolist()]
         return [goal]
+
+
+def _has_two_heights(mesh: TriangleMesh) -> npt.NDArray[np.bool_]:
+    """Return for each solid (n,) of a mesh whether all of its vertices are at its lowest or its highest point."""
+    z = mesh.vertices[mesh.faces, 2]
+    lowest, highest = np.full(len(mesh.names), np.inf), np.full(len(mesh.names), -np.inf)
+    np.minimum.at(lowest, mesh.owners, z.min(axis=1))
+    np.maximum.at(highest, mesh.owners, z.max(axis=1))
+    low, high = lowest[mesh.owners, np.newaxis], highest[mesh.owners, np.newaxis]
+    is_between = ((z > low + HEIGHT_TOLERANCE_M) & (z < high - HEIGHT_TOLERANCE_M)).any(axis=1)
+    has_two: npt.NDArray[np.bool_] = np.bincount(mesh.owners[is_between], minlength=len(mesh.names)) == 0
+    return has_two
 
 
 MAX_STEP_S = 0.05

@@ -11,6 +11,7 @@ from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Body, Box, Solid
 from simscen.core.records.events import EventKind
 from simscen.run.live_world.pedestrians import PedestrianMap, PedestrianSimulation
+from simscen.sim.bullet.collision_shapes import fuse_surfaces
 from simscen.sim.simulation import Simulation
 from simscen.worlds.built_world import build_world_and_map
 from simscen.worlds.geometry.triangulation import triangulate
@@ -22,6 +23,11 @@ STANDING = {
     "pass": "[{collisions: {}}]",
 }
 ANNA = "{pedestrian: {name: anna, pose: {x: 3, y: 3}, goals: [[7, 3], [3, 3]], repeat: loop}}"
+
+TABLE = [
+    Solid(Box((1.0, 1.0, 0.04)), Pose3(z=0.72)),
+    *(Solid(Box((0.05, 0.05, 0.7)), Pose3(x, y, 0.35)) for x in (-0.4, 0.4) for y in (-0.4, 0.4)),
+]
 
 
 def events(*lines: str) -> str:
@@ -132,6 +138,22 @@ def test_pedestrians_have_no_room_inside_a_solid():
     walls = PedestrianMap(build_world_and_map(world, 0.2))
     places = [(0.0, 0.0), (2.0, 0.0), (2.6, 0.0), (3.0, 0.0), (9.0, 9.0)]
     assert [walls.has_room(place, 0.25) for place in places] == [False, False, False, True, True]
+
+
+@pytest.mark.parametrize(
+    ("solids", "blocks"),
+    [
+        ((Solid(Box((1.0, 1.0, 0.05)), Pose3(z=0.72)),), True),
+        ((Solid(Box((1.0, 1.0, 0.2)), Pose3(z=1.5)),), True),
+        ((Solid(Box((1.0, 1.0, 0.2)), Pose3(z=1.9)),), False),
+        ((Solid(Box((1.0, 1.0, 0.1)), Pose3(z=0.05)),), False),
+        ((Solid(fuse_surfaces(TABLE, triangulate)),), True),
+    ],
+)
+def test_walls_block_pedestrians_from_their_shins_to_their_heads(solids, blocks):
+    walls = PedestrianMap(build_world_and_map(World("w", solids, bounds=(-2.5, -2.5, 2.5, 2.5)), 0.2))
+    places = [(0.0, 0.0), (0.7, 0.0), (0.8, 0.0)]
+    assert [walls.has_room(place, 0.25) for place in places] == [not blocks, not blocks, True]
 
 
 def test_objects_block_pedestrians_only_at_the_height_and_tilt_of_their_pose():
