@@ -28,7 +28,7 @@ def side_speeds(motion: Twist, wheel_separation: float) -> tuple[float, float]:
 
 
 def twist_from_sides(left: float, right: float, lateral: float, wheel_separation: float) -> Twist:
-    """Return the velocity of the base from the rolling speeds `left` and `right` and the `lateral` speed in m/s."""
+    """Return the velocity of the base from the rolling speeds of its sides and its `lateral` speed in m/s."""
     return Twist((left + right) / 2, lateral, (right - left) / wheel_separation)
 
 

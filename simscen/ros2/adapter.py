@@ -188,7 +188,11 @@ class Adapter:
             self._estimate.process_published(topic, data)
             if topic in self._replaced_topics:
                 self._readiness.use_transforms(UserTransforms(self._graph, self._frames, data))
-        messages = [(topic, self._with_frames(topic, data)) for topic, data in messages]
+        publishers, rename = self._graph.publishers, self._frames.apply
+        messages = [
+            (topic, rename(topic, publishers[topic].msg_type, data) if topic in publishers else data)
+            for topic, data in messages
+        ]
         messages = self._bring_up.hold_initial_pose(messages)
         warming_up = now < self._options.warm_up * NS_PER_S
         if not self.is_ready:
@@ -276,10 +280,7 @@ class Adapter:
         return StackState(now, is_stopped, self._estimate.pose)
 
     def _process(self, message: ReceivedMessage) -> List[Message]:
-        """Process a message of the nodes. Return the messages to send to simscen.
-
-        There are none for a velocity command, and for a message on /tf without map -> odom.
-        """
+        """Process a message of the nodes. Return the messages to send to simscen, if any."""
         if message.topic == COMMAND:
             self._velocity = read_twist(message.data, message.type == TWIST_STAMPED_TYPE)
             return []
@@ -289,7 +290,6 @@ class Adapter:
         return [(message.topic, message.data)] if relevant else []
 
     def _report_plan(self) -> None:
-        """Report a new plan as an event. Its reason is "goal" for the first plan to a goal, otherwise "rate"."""
         goal, plan = self._goals.current, self._estimate.plan
         if goal is None or not plan:
             return
@@ -297,11 +297,6 @@ class Adapter:
         reason = "rate" if self._planned_goal is goal else "goal"
         self._planned_goal = goal
         self._goals.report("plan.made", goal.name, reason=reason, length=round(length, 6))
-
-    def _with_frames(self, topic: str, data: bytes) -> bytes:
-        """Return the serialized message with the frame names of the user's graph."""
-        publisher = self._graph.publishers.get(topic)
-        return data if publisher is None else self._frames.apply(topic, publisher.msg_type, data)
 
     def end(self) -> None:
         """Leave the graph, and end all processes of the launch command."""

@@ -45,13 +45,7 @@ class BringUp:
         unavailable: Sequence[Topic],
         report: Optional[Nav2Report],
     ) -> None:
-        """Create the checks.
-
-        Args:
-            period_s: Control period.
-            unavailable: Topics whose message type is not installed.
-            report: Log of Nav2's nodes, which shows whether they have given up; None without Nav2.
-        """
+        """`unavailable` are the topics whose message type is not installed; `report` is None without Nav2."""
         self._graph, self._readiness, self._options, self._period = graph, readiness, options, period_s
         self._unavailable, self._report = list(unavailable), report
         self._started_at = time.monotonic()

@@ -28,11 +28,11 @@ SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 
 
 class GoalReached(NamedTuple):
-    """Outcome of a sent goal: reached. Outcomes come in the order of the goals."""
+    """Outcome of a sent goal: reached."""
 
 
 class GoalFailed(NamedTuple):
-    """Outcome of a sent goal: failed, with an error code of Nav2. Outcomes come in the order of the goals."""
+    """Outcome of a sent goal: failed, with an error code of Nav2."""
 
     code: int
     message: str

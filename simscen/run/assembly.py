@@ -80,11 +80,7 @@ def assemble(prepared: PreparedScenario, seed: int, stack_log: Path | None = Non
 def _directors(
     prepared: PreparedScenario, streams: Streams, robots: Mapping[str, RobotUnderTest]
 ) -> Iterator[Director]:
-    """Yield the directors of a run. A director starts events and faults.
-
-    A run with a single robot has one director. With several robots, one director starts the events of the scenario,
-    and each robot has another director for its faults.
-    """
+    """Yield one director for the events and faults; with several robots, one for the events and one for each robot."""
     spec = prepared.spec
     first, *_ = robots.values()
     if not prepared.robots:

@@ -110,7 +110,7 @@ def _close(stacks: Collection[ExternalStack]) -> None:
 
 
 def _judge_traces(prepared: PreparedScenario, seed: int, traces: Mapping[str, Trace], log: Path | None) -> Run:
-    """Judge the traces (recorded states and events) of all robots, given by robot name. `log` is the MCAP file."""
+    """Judge the traces of all robots, given by robot name. `log` is the MCAP file."""
     runs = {name: _judge_robot(part, seed, traces[name], log) for name, part in prepared.by_robot.items()}
     first = next(iter(runs.values()))
     if not prepared.robots:

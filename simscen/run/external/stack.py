@@ -49,10 +49,7 @@ class ExternalStack:
         parameters: RunParameters,
         log_file: FilePath | None,
     ) -> None:
-        """`name` is the name of the stack in error messages. The output of `command` goes to `log_file`.
-
-        The stack receives `surroundings` and `parameters` in HELLO.
-        """
+        """`name` is for error messages. The output of `command` goes to `log_file` (None: no file)."""
         self._name, self._command, self._log_file = name, command, log_file
         self._surroundings, self._parameters = surroundings, parameters
         self._time = Clock(surroundings.tick_rate)
@@ -187,7 +184,6 @@ class ExternalStack:
             self._process = None
 
     def _request_answer(self, tick: int, is_command_due: bool) -> Answer:
-        """Send a step and return the answer. `is_command_due` states whether a command is due."""
         assert self._process is not None
         limit = self._command.answer_limit
         if self._awaits_first_answer or tick <= self._welcome.first_answer_until * self._time.rate:

@@ -63,20 +63,14 @@ class HypotheticalSensor:
         now: Callable[[], int],
         ray_caster_without: Callable[[frozenset[str]], RayCaster],
     ) -> None:
-        """`spec` is the sensor's specification. `now` returns the current tick.
-
-        `ray_caster_without` returns a ray caster that ignores the objects with the given names.
-        """
+        """`now` returns the current tick, and `ray_caster_without` a ray caster that ignores objects by their names."""
         self._name, self._spec, self._robot, self._now = name, spec, robot, now
         self._ray_caster_without = ray_caster_without
         mount = getattr(spec, "mount", None)
         self._mount = mount if isinstance(mount, Mount) else Mount()
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """Return the ranges (n,) in m, without noise, that `scan` would have if the lidar's mount had an `error`.
-
-        `error` is a pose in the lidar frame. Beams pass through the objects with the names in `without`.
-        """
+        """Return the ranges as SensorSimulator describes them."""
         mount = self._mount.pose if error is None else self._mount.pose.compose(error)
         pose = self._robot.base_pose().compose(mount)
         angles = scan.angles()

@@ -20,10 +20,7 @@ _IMMEDIATE_TRIGGER = Trigger(time=Time(0.0))
 
 
 class Director:
-    """Evaluates all triggers at each beat (tick at which a sensor, a stack, or a truth sample is due).
-
-    Starts events and faults when their triggers fire, and ends faults.
-    """
+    """Evaluates all triggers at each beat, starts events and faults, and ends faults."""
 
     def __init__(
         self,
@@ -51,7 +48,7 @@ class Director:
 
     @property
     def has_disturbances(self) -> bool:
-        """Whether the director has any event or fault."""
+        """Whether there is any event or fault."""
         return bool(self._steps or self._starts)
 
     def process_beat(self) -> None:

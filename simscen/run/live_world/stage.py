@@ -31,7 +31,7 @@ class LiveStage:
     """Interface of triggers and actions for one robot, as core.stage.Stage describes it. Keeps the robot's events.
 
     An order is what an action tells the robot's stack: a new goal, a cancellation, or a change of zones. Orders are
-    delivered at the beats of the robot (ticks at which a sensor, its stack, or a truth sample is due).
+    delivered at the beats of the robot.
     """
 
     def __init__(
