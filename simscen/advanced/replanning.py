@@ -42,7 +42,6 @@ class ClearancePlan(FollowedPlan):
     """Followed plan that compares its present clearance with its clearance when it was made."""
 
     def __init__(self, path: Path, radius: float, costmap: CostmapView) -> None:
-        """Take the arguments of FollowedPlan."""
         self._initial_clearance = np.minimum(distances(costmap, path.points[:, :2]), np.float32(WATCH_DISTANCE_M))
         super().__init__(path, radius, costmap)
 

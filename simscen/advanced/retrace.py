@@ -176,7 +176,6 @@ class Retrace:
     name = "retrace"
 
     def __init__(self, spec: RetraceSpec, setting: Setting) -> None:
-        """Take the parameters and the setting of the behavior."""
         self._spec, self._footprint = spec, setting.footprint
         self._follower = TrailFollower(setting, spec.backup_speed)
 
@@ -206,5 +205,4 @@ class Retrace:
         return command
 
     def _can_turn(self, pose: Pose2, costmap: CostmapView) -> bool:
-        """Return whether the robot has room to turn in place."""
         return distance_at(costmap, pose.x, pose.y) > self._footprint.circumscribed + costmap.resolution

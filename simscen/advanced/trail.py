@@ -60,7 +60,6 @@ class Trail:
         return trail[indices]
 
     def _without_loops(self, trail: Array) -> Array:
-        """Return the poses without the poses on loops."""
         moved = self._lengths(trail)
         indices, k = [0], 0
         while k < len(trail) - 1:

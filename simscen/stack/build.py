@@ -80,7 +80,6 @@ class StackBuilder:
     """
 
     def __init__(self, spec: StackSpec, setting: Setting) -> None:
-        """Take the specification, and the setting: robot, map, random streams, and callbacks."""
         surroundings = setting.surroundings
         if surroundings.map is not None:
             surroundings = replace(surroundings, map=surroundings.map.refined(spec.costmap.resolution))

@@ -22,7 +22,6 @@ class SimpleGoalChecker:
     """
 
     def __init__(self, spec: GoalSpec, setting: Setting) -> None:
-        """Take the parameters of the specification."""
         self._is_stateful, self._well_inside = spec.stateful, spec.well_inside
         self._is_position_reached, self._standstill_checks = False, 0
 
@@ -50,7 +49,6 @@ class ProgressChecker:
     """
 
     def __init__(self, spec: ProgressSpec) -> None:
-        """Take the parameters of the specification."""
         self._radius, self._angle = spec.required_movement_radius, spec.required_movement_angle
         self._allowance = spec.movement_time_allowance
         self._baseline: Pose2 | None = None

@@ -46,7 +46,6 @@ class CollisionMonitor:
     """Slows the robot down before obstacles (Nav2's "approach" action), and detects lidars without usable scans."""
 
     def __init__(self, spec: MonitorSpec, robot: RobotModel, lidars: tuple[str, ...], tick_rate: int) -> None:
-        """Take the parameters, the robot, the names of its lidars, and the tick rate in Hz."""
         self._spec, self._robot = spec, robot
         self._timeout, self._tick_rate = round(spec.source_timeout * tick_rate), tick_rate
         self._arrivals: dict[str, tuple[int, int]] = {}

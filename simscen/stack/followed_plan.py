@@ -116,7 +116,6 @@ class LocalPathSender:
     """
 
     def __init__(self, controller: Controller) -> None:
-        """Take the controller that follows the path."""
         self._controller = controller
         self._plan: FollowedPlan | None = None
         self._odom_from_map = Pose2(0.0, 0.0)

@@ -125,7 +125,6 @@ class CoveringDiscs:
     """
 
     def __init__(self, robot: RobotModel) -> None:
-        """Compute the discs that cover the footprint of a robot."""
         if robot.radius is not None:
             self.offsets, self.radius, self.reach, self.centered = np.zeros(1), robot.radius, robot.radius, True
             return

@@ -81,7 +81,6 @@ class Navigator:
         self._reset()
 
     def _reset(self) -> None:
-        """Discard the plan, the current recovery behavior, and the record of failures."""
         self.plans.reset(self._clock)
         self._behavior: Behavior | None = None
         self._behavior_since = 0.0
@@ -197,7 +196,6 @@ class Navigator:
         )
 
     def _recover(self, tick: int, frames: Frames, behavior: Behavior) -> StepResult:
-        """Run one step of the current recovery behavior."""
         result: dict[str, Value] = {"outcome": "succeeded"}
         try:
             costmap = self._costmaps.local_costmap.view
@@ -212,5 +210,4 @@ class Navigator:
 
 
 def _failure_data(failure: NavigationFailure) -> dict[str, Value]:
-    """Return the error code, its name, and the message, as data of an event."""
     return {"error_code": int(failure.code), "error_name": failure.code.name, "message": str(failure)}

@@ -168,7 +168,6 @@ class PlanManager:
         return ""
 
     def _is_blocked(self, plan: FollowedPlan) -> bool:
-        """Return whether an obstacle in the current costmap blocks the plan."""
         plan.update_occupied_if_changed(self._costmap)
         return plan.is_blocked()
 
@@ -190,7 +189,6 @@ class PlanManager:
         return PlanResult(path, is_partial, view.origin, view is not self._costmap.view)
 
     def _planning_view(self, pose: Pose2) -> CostmapView:
-        """Return the costmap to plan on."""
         return self._costmap.view
 
     def _compute_leg(self, view: CostmapView, goal: Goal, start: Pose2) -> tuple[Array, bool]:
@@ -211,7 +209,6 @@ class PlanManager:
         return FollowedPlan(path, self._radius, self._costmap.view)
 
     def _adopt(self, tick: int, now: float, result: PlanResult, reason: str) -> Event:
-        """Follow a new plan. Return the event PLAN_MADE."""
         self.plan = self._make_followed_plan(result.path)
         self._adopted_at = self._scheduled_at = now
         details: dict[str, Value] = {"reason": reason, "length": round(result.path.length(), 6)}

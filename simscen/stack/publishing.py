@@ -120,7 +120,6 @@ class StandstillReporter:
     """Reports by an event that a component has kept the robot from driving for REPORT_AFTER_S, and when this ends."""
 
     def __init__(self, tick_rate: int) -> None:
-        """Take the tick rate in Hz."""
         self._after = round(REPORT_AFTER_S * tick_rate)
         self.holder = ""
         """Name of the component that holds the robot; empty if none does."""

@@ -222,7 +222,6 @@ class ReferenceStack:
         return bool(scans)
 
     def _process_scan(self, tick: int, scan: Scan) -> None:
-        """Pass a scan to localizer, collision monitor, and costmaps."""
         if scan.sensor in self._lidars:  # sonars show obstacles, but the localizer cannot match them
             self._localizer_scans.put(tick, scan)
             while tick >= self._localizer_scans.due:
@@ -277,7 +276,6 @@ class ReferenceStack:
     # Control ----------------------------------------------------------------------------------------------------------
 
     def _control_step(self, tick: int) -> Updates:
-        """Run one controller period: costmaps, navigation, publishing."""
         pose = self._believed_pose()
         frames = Frames(pose, self._odometry.now if self._odometry.has_pose else pose)
         self._update_costmaps(tick, frames)
@@ -287,7 +285,6 @@ class ReferenceStack:
         return self._publishing.updates(tick, frames, None if plan is None else plan.path, self._costmaps)
 
     def _update_costmaps(self, tick: int, frames: Frames) -> None:
-        """Apply new zones, and update the costmaps when they are due."""
         if self._zones is not None and self._costmaps.is_global_due(tick):
             self._costmaps.set_zones(self._zones)
             self._speed_filter.set_zones(self._zones)
@@ -326,7 +323,6 @@ class ReferenceStack:
             self._events += self._standstill.report_release(tick)
 
     def _navigate(self, tick: int, frames: Frames) -> None:
-        """Run the navigator once and act on its result."""
         if self._speed_filter.is_used:
             self._controller.set_speed_limit(self._speed_filter.limit(frames.pose, self._controller.full_speed))
         is_held, periods = self._commands.hold_timed_out(tick), self._commands.periods(tick)
@@ -360,12 +356,10 @@ class ReferenceStack:
         return goal
 
     def _fail_goal(self, tick: int, failure: NavigationFailure) -> None:
-        """Record that the current goal has failed, and stop the robot."""
         self._events += self._task.record_failed(tick, failure.code, str(failure))
         self._stop(tick)
 
     def _stop(self, tick: int) -> None:
-        """Stop the robot, and remove the goal from the navigator."""
         self._events += self._standstill.report_release(tick)
         self._navigator.stop()
         self._commands.stop(tick)

@@ -66,12 +66,10 @@ class View:
 
 
 def _without_far_points(view: View) -> View:
-    """Return the points within MAX_RANGE_M."""
     return View(*(points[np.abs(points) < MAX_RANGE_M] for points in (view.ends, view.passed)))
 
 
 def _thin(points: ComplexPoints, count: int) -> ComplexPoints:
-    """Return at most `count` of the points, evenly spaced."""
     if len(points) <= count:
         return points
     return points[evenly_spaced(len(points), count)]

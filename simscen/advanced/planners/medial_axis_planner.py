@@ -123,7 +123,6 @@ class ConfinedPosePlanner(PosePlanner):
     """Plans poses with RRT-Connect, only within the informed set."""
 
     def _attempts(self, costs: TraversalCosts, ends: Endpoints, free_start: Pose2, goal: Pose2) -> Iterator[Attempt]:
-        """Yield the ATTEMPTS."""
         informed = InformedSet(costs, (free_start.x, free_start.y), (goal.x, goal.y))
         for slack, part, fraction, spacing in ATTEMPTS:
             informed.restrict(slack)

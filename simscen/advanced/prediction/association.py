@@ -59,7 +59,6 @@ def _is_last_cluster(track: Track, center: complex, lidar: LidarPose, hidden: fl
 
 
 def _update(track: Track, cluster: Cluster, current: ScanClusters) -> None:
-    """Update a track with a cluster."""
     if cluster.is_fully_visible:
         track.radius += RADIUS_GAIN * (cluster.radius - track.radius)
         guess, hidden = cluster.center, 0.0

@@ -187,7 +187,6 @@ class FreeSpaceMemory:
     """Stores recent scans of one lidar, to compare later scans with."""
 
     def __init__(self, tick_rate: int) -> None:
-        """Take the tick rate in Hz."""
         self._preferred_age, self._min_age = round(PREFERRED_AGE_S * tick_rate), round(MIN_AGE_S * tick_rate)
         self._min_interval = round(MIN_INTERVAL_S * tick_rate)
         self._scans: deque[EarlierScan] = deque(maxlen=MAX_SCANS)

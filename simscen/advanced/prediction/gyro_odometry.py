@@ -23,7 +23,6 @@ class GyroOdometry:
     """
 
     def __init__(self, tick_rate: int) -> None:
-        """Take the tick rate in Hz."""
         self._rate = tick_rate
         self._history = OdometryHistory(tick_rate)
         self._history.add(-1, Pose2(0.0, 0.0))
@@ -46,7 +45,6 @@ class GyroOdometry:
         return self._history.latest_until(tick)
 
     def _integrate(self) -> None:
-        """Integrate the pending readings."""
         for reading in self._pending:
             if isinstance(reading, Odometry):
                 self._add_step(self._last, reading)

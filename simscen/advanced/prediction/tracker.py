@@ -34,7 +34,6 @@ class Tracker:
     """Tracks moving obstacles in the scans of one lidar, in the odom frame."""
 
     def __init__(self, spec: Prediction, tick_rate: int) -> None:
-        """Take the parameters and the tick rate in Hz."""
         self._spec, self._rate = spec, tick_rate
         self._memory = FreeSpaceMemory(tick_rate)
         self._stride = 1
@@ -77,7 +76,6 @@ class Tracker:
         self._memory.add(scan, lidar)
 
     def _set_directions(self, scan: Scan) -> None:
-        """Compute the directions of all beams, and of the CHECKED_BEAMS."""
         self._stride = max(1, len(scan.ranges) // CHECKED_BEAMS)
         self._directions = np.exp(1j * scan.angles())
         self._checked_directions = self._directions[:: self._stride].copy()
@@ -89,7 +87,6 @@ class Tracker:
         return bool((has_appeared & (ranges >= scan.range_min) & (ranges <= self._max_range(scan))).any())
 
     def _max_range(self, scan: Scan) -> float:
-        """Return the range in m up to which hits are processed."""
         return min(scan.range_max, self._spec.max_range)
 
     def _update_tracks(self, current: CurrentScan) -> None:
@@ -127,7 +124,6 @@ class Tracker:
         return segments.has_segment_with(MIN_NEW_HITS, new_hits) and bool(is_checked.any())
 
     def _update_moving(self, moving: list[Track], current: CurrentScan) -> None:
-        """Update the attributes `moving` and `moving_hits` with the moving tracks."""
         scan, ends, lidar = current.scan, current.ends, current.lidar
         obstacles = [
             MovingObstacle(

@@ -156,7 +156,6 @@ class TrackLifecycle:
     """Decides after each scan which tracks are moving, and which have ended."""
 
     def __init__(self, spec: Prediction, tick_rate: int) -> None:
-        """Take the parameters and the tick rate in Hz."""
         self._spec, self._rate = spec, tick_rate
 
     def update_motion(self, track: Track, tick: int, tracks: list[Track], has_left: Callable[[Track], bool]) -> None:

@@ -162,7 +162,6 @@ class RegulatedPurePursuit(PathFollower):
         return command
 
     def _lookahead_distance(self, speed: float) -> float:
-        """Return the lookahead distance in m at this speed."""
         spec = self._spec
         if not spec.use_velocity_scaled_lookahead_dist:
             return spec.lookahead_dist
@@ -172,7 +171,6 @@ class RegulatedPurePursuit(PathFollower):
         return distance
 
     def _should_rotate(self, carrot: Carrot, backward: bool) -> bool:
-        """Return whether the angle to the carrot requires a rotation in place."""
         if not self._spec.use_rotate_to_heading or self._is_car:
             return False
         return abs(carrot.bearing(backward)) > self._spec.rotate_to_heading_min_angle
@@ -231,6 +229,5 @@ def _carrot(tracker: PathTracker, pose: Pose2, distance: float, beyond: bool) ->
 
 
 def _to_robot_frame(pose: Pose2, x: float, y: float) -> Carrot:
-    """Return a point in the base frame of the robot at `pose`."""
     cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
     return Carrot(cosine * (x - pose.x) + sine * (y - pose.y), cosine * (y - pose.y) - sine * (x - pose.x))

@@ -280,11 +280,9 @@ class LayeredCostmap:
 
     @cached_property
     def _transform(self) -> SquaredDistanceTransform:
-        """Distance transform of the whole costmap."""
         return SquaredDistanceTransform(self._frame.shape, self._inflation.reach_cells)
 
     def _refresh_all(self) -> None:
-        """Recompute the distances and costs of all cells."""
         squared = self._transform.transform(self._obstacles(WHOLE_GRID))
         if self._static.has_lethal:
             squared = np.minimum(self._static.squared, squared)

@@ -10,7 +10,6 @@ class SpeedFilter:
     """Speed limits of the current speed zones and speed mask."""
 
     def __init__(self, surroundings: Surroundings) -> None:
-        """Take the initial speed zones and speed mask."""
         self._zones, self._mask = surroundings.speed_zones, surroundings.masks.speed
         self.is_used = bool(self._zones) or self._mask is not None
         """Whether there is or was a zone or a mask."""

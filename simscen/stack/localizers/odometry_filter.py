@@ -43,7 +43,6 @@ class OdometryFilter:
     """
 
     def __init__(self, spec: model.OdometryFilter, tick_rate: int) -> None:
-        """Take the parameters and the tick rate in Hz."""
         self._tick_rate = tick_rate
         self._min_ticks = tick_rate / spec.frequency
         self._process_noise = np.diag([*spec.process_noise_covariance, spec.gyro_bias_walk**2])

@@ -102,7 +102,6 @@ class PosePlanner:
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
 
     def _configure(self, planner: Any) -> None:
-        """Set the parameters of a planner of OMPL."""
         if isinstance(self._spec, PlannerSpec):
             set_parameters(planner, self._spec)
 

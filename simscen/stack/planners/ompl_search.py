@@ -123,7 +123,6 @@ class OmplSearch:
     """One search by a planner of OMPL. Subclasses may override `_make_validity` and `_make_termination`."""
 
     def __init__(self, spec: PlannerSpec, problem: Problem, seed: int) -> None:
-        """Take the planner and its parameters, the problem, and the seed of the random generator."""
         self.spec, self.problem, self.seed = spec, problem, seed
         self._callbacks: list[Any] = []
 
@@ -165,7 +164,6 @@ class OmplSearch:
         return [(state[0], state[1]) for state in path.getStates()]
 
     def _configure(self, planner: Any) -> None:
-        """Set the parameters of a planner of OMPL."""
         if self.spec.type == "bit_star":
             planner.setUseKNearest(False)
             planner.setRewireFactor(DEFAULT_BIT_STAR_REWIRE_FACTOR)
@@ -188,7 +186,6 @@ class OmplSearch:
         return stop_after(spec.max_iterations, is_solved, spec.improving_iterations)
 
     def _make_validity(self) -> StateValidity:
-        """Return the check of states."""
         return StateValidity(self.problem.motion_cost)
 
     def _make_information(self) -> Any:
@@ -247,7 +244,6 @@ def _simplify(simplifier: Any, path: Any, steps: int) -> None:
 
 
 def _state(information: Any, point: Point) -> Any:
-    """Return a point as a state of OMPL."""
     state = information.allocState()
     state[0], state[1] = point
     return state

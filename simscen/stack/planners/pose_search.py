@@ -125,7 +125,6 @@ def _pose(state: Any) -> Pose2:
 
 
 def _make_space(kind: Space, turning_radius: float) -> Any:
-    """Return OMPL's object for a state space."""
     if kind == "dubins":
         return ob.DubinsStateSpace(turning_radius)
     if kind == "reeds_shepp":

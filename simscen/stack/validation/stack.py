@@ -88,7 +88,6 @@ class CheckedStack(CheckedPlugin):
         return decision
 
     def _check_messages(self, decision: Decision, tick: int) -> None:
-        """Raise RunError if costmaps, filtered odometry, or events of a decision are invalid."""
         for name in ("events", "lines", "costmaps", "odometry"):
             if not isinstance(value := getattr(decision, name), tuple | list):
                 self.raise_invalid(f"returned {type(value).__name__} as `Decision.{name}` instead of a tuple")
@@ -104,7 +103,6 @@ class CheckedStack(CheckedPlugin):
                 self.raise_invalid(f"reported `{event.kind}` of tick {event.tick} at tick {tick}")
 
     def _check_costmap(self, costmap: object) -> None:
-        """Raise RunError if the name, the frame, or the cell type (int8) of a published costmap is wrong."""
         if not isinstance(costmap, CostGrid) or not isinstance(costmap.grid, OccupancyGrid):
             self.raise_invalid(f"published {type(costmap).__name__} instead of a CostGrid")
         if costmap.name not in ("global", "local") or costmap.frame not in ("map", "odom"):

@@ -98,7 +98,6 @@ class MppiController(PathFollower):
 
     @property
     def _limits(self) -> VelocityLimits:
-        """The velocity limits under the current speed limit."""
         return self._full_limits.scaled(self._speed_ratio)
 
     @property
