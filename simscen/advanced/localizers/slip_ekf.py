@@ -22,13 +22,11 @@ from simscen.advanced.localizers.slip_model import (
     rate_model,
 )
 from simscen.advanced.spec import SlipEkf
-from simscen.core.geometry import Array, Pose2, wrap
-from simscen.core.messages.navigation import Belief, Estimate
-from simscen.core.messages.sensor_data import Imu, Odometry, Scan
-from simscen.stack.localizers.dead_reckoning import initial_pose
-from simscen.stack.localizers.ekf import MAX_YAW_RATE_RAD_S, MIN_YAW_RATE_STD_RAD_S
-from simscen.stack.localizers.kalman_filters import ExtendedKalmanFilter
-from simscen.stack.odometry_history import OdometryHistory, is_plausible
+from simscen.core.geometry import Pose2
+from simscen.core.messages.navigation import Estimate
+from simscen.core.messages.sensor_data import Odometry, Scan
+from simscen.stack.localizers.ekf import MIN_YAW_RATE_STD_RAD_S, EkfLocalizer
+from simscen.stack.odometry_history import OdometryHistory
 
 
 class ScanMatchingCorrection:
@@ -71,48 +69,29 @@ _GYRO_MEASUREMENT = np.zeros((1, 7))
 _GYRO_MEASUREMENT[0, [RATE, BIAS]] = 1.0
 
 
-class SlipEkfLocalizer:
+class SlipEkfLocalizer(EkfLocalizer):
     """Localizer by dead reckoning with wheels and gyroscope, without a map.
 
     If the turn rates of wheels and gyroscope disagree by more than their noise, the wheels slip. Then only the
     gyroscope determines the turn, and the uncertainty of the translation increases with the speed.
     """
 
-    def __init__(self, spec: SlipEkf, estimate: Estimate, tick_rate: int) -> None:
-        self._spec, self._tick_rate = spec, tick_rate
-        self.reset(estimate)
+    _spec: SlipEkf
+    _bias_index = BIAS
 
     def reset(self, estimate: Estimate) -> None:
         """Restart at an estimate, with the initial uncertainty of the gyroscope's bias."""
-        pose, covariance = initial_pose(estimate)
-        bias = self._spec.gyro_noise if self._spec.gyro_bias is None else self._spec.gyro_bias
-        self._filter = ExtendedKalmanFilter(dim_x=7, dim_z=1)
-        self._filter.predict_x = self._advance
-        self._filter.x = np.array([*pose, 0.0, 0.0, 0.0, 0.0])
-        self._filter.P = np.zeros((7, 7))
-        self._filter.P[:RATE, :RATE] = covariance
-        self._filter.P[BIAS, BIAS], self._filter.P[SLIP_X, SLIP_X] = bias**2, self._spec.wheel_slip**2
-        self._last: Odometry | None = None
-        self._readings: list[float] = []
+        super().reset(estimate)
+        self._filter.P[SLIP_X, SLIP_X] = self._spec.wheel_slip**2
         self._speed, self._slipped = 0.0, False
         self._slip_detector = SlipDetector()
-        self._map_from_odom = pose
         self._scan_correction = ScanMatchingCorrection(self._tick_rate) if self._spec.match_scans else None
 
     def on_odometry(self, odometry: Odometry) -> None:
         """Estimate the turn rate, and move the pose up to an odometry reading."""
-        last = self._last
-        if not is_plausible(odometry.pose) or (last is not None and odometry.tick <= last.tick):
-            return
-        self._last = odometry
-        if last is not None:
-            step = self._step(last.pose.between(odometry.pose), (odometry.tick - last.tick) / self._tick_rate)
-            self._measure(step)
-            self._predict(predict_state(self._filter.x, step), *pose_model(self._spec, self._filter.x, step))
-        self._readings.clear()
-        if self._scan_correction is not None:
+        super().on_odometry(odometry)
+        if self._scan_correction is not None and self._last is odometry:
             self._scan_correction.add_pose(odometry.tick, self.pose)
-        self._map_from_odom = self.pose.compose(odometry.pose.inverse())
 
     def on_scan(self, scan: Scan) -> None:
         """Correct the translation by scan matching, if enabled."""
@@ -123,33 +102,20 @@ class SlipEkfLocalizer:
         self._filter.x[1] += y
         self._map_from_odom = self.pose.compose(self._last.pose.inverse())
 
-    def on_imu(self, imu: Imu) -> None:
-        """Store the turn rate until the next odometry reading."""
-        rate = imu.angular_velocity[2]
-        if abs(rate) < MAX_YAW_RATE_RAD_S:
-            self._readings.append(rate)
+    def _advance(self, step: Pose2, seconds: float) -> None:
+        """Estimate the turn rate, and move the pose by `step`, the motion by the wheels in the last `seconds`."""
+        wheels = self._wheel_step(step, seconds)
+        self._measure(wheels)
+        self._predict(predict_state(self._filter.x, wheels), *pose_model(self._spec, self._filter.x, wheels))
 
-    @property
-    def belief(self) -> Belief:
-        """The estimate at the newest odometry reading."""
-        covariance: Array = self._filter.P[:RATE, :RATE].copy()
-        tick = self._last.tick if self._last is not None else 0
-        return Belief(self.pose, (covariance + covariance.T) / 2, self._map_from_odom, updated=tick)
-
-    @property
-    def pose(self) -> Pose2:
-        """The estimated pose."""
-        x, y, yaw = self._filter.x[:RATE].tolist()
-        return Pose2(x, y, wrap(yaw))
-
-    def _step(self, pose: Pose2, seconds: float) -> WheelStep:
+    def _wheel_step(self, pose: Pose2, seconds: float) -> WheelStep:
         """Return the step in which the wheels measure the motion `pose` in `seconds`, with the detected slip."""
         speed = math.hypot(pose.x, pose.y) / seconds
         without_slip = WheelStep(pose, seconds, speed)
-        if not self._readings:
+        if not self._yaw_rates:
             return without_slip
         turn = self._turn_rate - float(self._filter.x[BIAS])
-        innovation, noise = turn - pose.yaw / seconds, self._wheel_noise(without_slip) + self._gyro_noise
+        innovation, noise = turn - pose.yaw / seconds, self._turn_rate_noise(without_slip) + self._gyro_noise
         undetected = self._slip_detector.update(innovation, noise, float(self._filter.P[BIAS, BIAS]), seconds)
         if undetected == 0.0:
             return without_slip
@@ -159,22 +125,17 @@ class SlipEkfLocalizer:
 
     def _measure(self, step: WheelStep) -> None:
         """Update the turn rate with the wheels, unless they slip, and with the gyroscope."""
-        jacobian, noise = rate_model(self._spec, step, self._wheel_noise(step), self._slipped)
+        jacobian, noise = rate_model(self._spec, step, self._turn_rate_noise(step), self._slipped)
         predicted = jacobian @ self._filter.x
         predicted[RATE] = step.pose.yaw / step.seconds
         self._predict(predicted, jacobian, noise)
-        if self._readings:
-            self._filter.update(
-                np.array([self._turn_rate]),
-                lambda _: _GYRO_MEASUREMENT,
-                lambda state: _GYRO_MEASUREMENT @ state,
-                R=np.array([[self._gyro_noise]]),
-            )
+        if self._yaw_rates:
+            self._update(np.array([self._turn_rate]), _GYRO_MEASUREMENT, np.array([[self._gyro_noise]]))
         self._slipped = step.slips
         if not step.slips:
             self._speed = step.speed
 
-    def _wheel_noise(self, step: WheelStep) -> float:
+    def _turn_rate_noise(self, step: WheelStep) -> float:
         """Return the variance of the turn rate of the wheels in (rad/s)²."""
         turned = step.length + abs(step.pose.yaw)
         return self._spec.rotation_noise**2 * turned / step.seconds**2 + MIN_YAW_RATE_STD_RAD_S**2
@@ -182,18 +143,9 @@ class SlipEkfLocalizer:
     @property
     def _turn_rate(self) -> float:
         """Mean reading of the gyroscope since the last odometry reading, in rad/s."""
-        return sum(self._readings) / len(self._readings)
+        return sum(self._yaw_rates) / len(self._yaw_rates)
 
     @property
     def _gyro_noise(self) -> float:
         """Variance of `_turn_rate` in (rad/s)²."""
-        return self._spec.gyro_noise**2 / len(self._readings)
-
-    def _predict(self, state: Array, jacobian: Array, noise: Array) -> None:
-        """Set the predicted `state` (7,), and propagate the covariance with the process `noise` (7, 7)."""
-        self._filter.F, self._filter.Q = jacobian, noise
-        self._filter.predict(state)
-
-    def _advance(self, state: Array) -> None:
-        """Replace filterpy's linear `predict_x` by setting the predicted `state`."""
-        self._filter.x = state
+        return self._spec.gyro_noise**2 / len(self._yaw_rates)

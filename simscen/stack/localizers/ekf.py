@@ -4,13 +4,14 @@ Sources: Probabilistic Robotics, section 3.3; filterpy's ExtendedKalmanFilter (L
 """
 
 import math
+from typing import ClassVar
 
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
-from simscen.model.localizers import Ekf
+from simscen.model.localizers import EkfParameters
 from simscen.stack.kinematics import mean_velocity
 from simscen.stack.localizers.dead_reckoning import initial_pose
 from simscen.stack.odometry_history import is_plausible
@@ -37,9 +38,13 @@ class EkfLocalizer:
 
     Each odometry reading measures the mean velocity since the previous reading, with noise that grows with the distance
     driven. The gyroscope measures the yaw rate plus a bias, which the filter estimates.
+
+    Subclasses may override `_advance`, with another state of seven values whose first three are the pose.
     """
 
-    def __init__(self, spec: Ekf, estimate: Estimate, tick_rate: int) -> None:
+    _bias_index: ClassVar[int] = BIAS
+
+    def __init__(self, spec: EkfParameters, estimate: Estimate, tick_rate: int) -> None:
         self._spec, self._tick_rate = spec, tick_rate
         self.reset(estimate)
 
@@ -53,21 +58,19 @@ class EkfLocalizer:
         self._filter.predict_x = self._set_state
         self._filter.x = np.array([*pose, 0.0, 0.0, 0.0, 0.0])
         self._filter.P = np.zeros((7, 7))
-        self._filter.P[:VX, :VX], self._filter.P[BIAS, BIAS] = covariance, bias**2
+        self._filter.P[:3, :3], self._filter.P[self._bias_index, self._bias_index] = covariance, bias**2
         self._last: Odometry | None = None
         self._yaw_rates: list[float] = []
         self._map_from_odom = pose
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Update the velocity with the motion since the last reading, and move the pose by this velocity."""
+        """Move the pose up to this reading."""
         last = self._last
         if not is_plausible(odometry.pose) or (last is not None and odometry.tick <= last.tick):
             return
         self._last = odometry
         if last is not None:
-            seconds = (odometry.tick - last.tick) / self._tick_rate
-            self._measure_velocity(last.pose.between(odometry.pose), seconds)
-            self._move(seconds)
+            self._advance(last.pose.between(odometry.pose), (odometry.tick - last.tick) / self._tick_rate)
         self._yaw_rates.clear()
         self._map_from_odom = self.pose.compose(odometry.pose.inverse())
 
@@ -83,15 +86,20 @@ class EkfLocalizer:
     @property
     def belief(self) -> Belief:
         """The pose at the newest odometry reading, with its covariance."""
-        covariance: Array = self._filter.P[:VX, :VX]
+        covariance: Array = self._filter.P[:3, :3]
         tick = self._last.tick if self._last is not None else 0
         return Belief(self.pose, (covariance + covariance.T) / 2, self._map_from_odom, updated=tick)
 
     @property
     def pose(self) -> Pose2:
         """The pose of the belief."""
-        x, y, yaw = self._filter.x[:VX].tolist()
+        x, y, yaw = self._filter.x[:3].tolist()
         return Pose2(x, y, wrap(yaw))
+
+    def _advance(self, step: Pose2, seconds: float) -> None:
+        """Update the velocity with `step`, the motion by odometry in the last `seconds`, and move the pose by it."""
+        self._measure_velocity(step, seconds)
+        self._move(seconds)
 
     def _measure_velocity(self, step: Pose2, seconds: float) -> None:
         """Update the velocity with `step`, the motion by odometry since the last reading, and with the gyroscope."""
