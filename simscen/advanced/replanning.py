@@ -1,7 +1,6 @@
 """Replanning of the advanced stack: additional reasons for a new plan, and plans with more clearance."""
 
 import contextlib
-from collections.abc import Callable
 
 import numpy as np
 
@@ -10,12 +9,10 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import Path
 from simscen.core.records.events import Event
-from simscen.model.planners import PlannerSpec
-from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.followed_plan import WATCH_DISTANCE_M, FollowedPlan
 from simscen.stack.footprint import distances
 from simscen.stack.plan_manager import PlanManager, PlanResult
-from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
+from simscen.stack.protocols import CostmapView, NavigationFailure
 
 MIN_PLAN_AGE_S = 0.5
 """Minimum age of a plan that is checked for lost clearance."""
@@ -76,21 +73,6 @@ class AdvancedPlanManager(PlanManager):
     """
 
     plan: ClearancePlan | None
-
-    def __init__(
-        self,
-        spec: PlannerSpec,
-        planner: Planner,
-        costmap: LayeredCostmap,
-        plan_seed: Callable[[int], int],
-        radius: float,
-        is_car: bool = False,
-        latency: int = 0,
-        speed: float = 0.5,
-    ) -> None:
-        """Take the arguments of PlanManager, and the `speed` in m/s at which plans will be driven."""
-        self._speed = speed
-        super().__init__(spec, planner, costmap, plan_seed, radius, is_car, latency)
 
     def reset(self, now: float) -> None:
         """Prepare for a new goal."""

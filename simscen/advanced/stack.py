@@ -10,11 +10,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 from simscen.stack.build import StackBuilder
-from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames
 from simscen.stack.navigator import ClearingPolicy
-from simscen.stack.plan_manager import PlanManager
-from simscen.stack.protocols import Controller, Planner
 from simscen.stack.reference import ReferenceStack
 
 ROBOT_IN_BASE_FRAME = Pose2(0.0, 0.0)
@@ -91,19 +88,7 @@ class AdvancedStack(ReferenceStack):
 class AdvancedStackBuilder(StackBuilder):
     """Builder of the advanced stack, with its own plan manager and clearing policy."""
 
-    def make_plan_manager(self, planner: Planner, costmaps: Costmaps, controller: Controller) -> PlanManager:
-        """Make the plan manager, for a robot that drives at the controller's full speed."""
-        self._full_speed = controller.full_speed  # `make_stack`, which is called later, needs it
-        return AdvancedPlanManager(
-            self.spec.planner,
-            planner,
-            costmaps.global_costmap,
-            self.plan_seed,
-            self.robot.inscribed_radius,
-            is_car=self.robot.turning_radius > 0.0,
-            latency=self.latency["planner"],
-            speed=controller.full_speed,
-        )
+    plan_manager = AdvancedPlanManager
 
     def make_clearing_policy(self) -> ClearingPolicy:
         """Make the policy for clearing the global costmap: all of it if `recovery.clear_entirely`."""
@@ -113,7 +98,7 @@ class AdvancedStackBuilder(StackBuilder):
         """Make the stack from `parts`, the components of the reference stack."""
         surroundings, spec = self.surroundings, self.spec
         prediction = MotionPrediction(
-            spec.prediction, self.robot, surroundings.lidars, surroundings.tick_rate, self._full_speed
+            spec.prediction, self.robot, surroundings.lidars, surroundings.tick_rate, self.full_speed
         )
         compensates_slip = spec.localizer.fuses_odometry and spec.velocity_smoother.counter_turn_slip
         return AdvancedStack(*parts, prediction=prediction, turn_slip=TurnSlipObserver() if compensates_slip else None)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from simscen.core.clock import Clock
 from simscen.core.messages.goals import Mode
@@ -19,7 +19,7 @@ from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.navigator import ClearingPolicy, Navigator
 from simscen.stack.odometry_history import TRAIL_S, OdometryHistory
 from simscen.stack.plan_manager import PlanManager
-from simscen.stack.protocols import Behavior, Controller, Localizer, Planner, Surroundings
+from simscen.stack.protocols import Behavior, Controller, Localizer, Surroundings
 from simscen.stack.reference import ReferenceStack
 from simscen.stack.setting import Setting
 from simscen.stack.tasks import Task
@@ -73,11 +73,13 @@ def configured_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
 
 
 class StackBuilder:
-    """Builder of the reference stack. Subclasses override the methods `make_…` to replace components.
+    """Builder of the reference stack. Subclasses replace components by `plan_manager` and the methods `make_…`.
 
     If the cells of the map are larger than those of the costmap, the map is refined. Each component has its own random
     stream, for example "localizer". Each plan has one, too: "planner#1", "planner#2", ….
     """
+
+    plan_manager: ClassVar[type[PlanManager]] = PlanManager
 
     def __init__(self, spec: StackSpec, setting: Setting) -> None:
         surroundings = setting.surroundings
@@ -85,7 +87,8 @@ class StackBuilder:
             surroundings = replace(surroundings, map=surroundings.map.refined(spec.costmap.resolution))
         self.spec, self.setting, self.surroundings = spec, setting, surroundings
         self.robot, self.streams = surroundings.robot, setting.streams
-        self.latency = _latency_ticks(spec, setting.clock)
+        latency = spec.latency if isinstance(spec.latency, Latency) else Latency()
+        self.latency = {name: setting.clock.ticks(getattr(latency, name)) for name in Latency.model_fields}
 
     def build(self) -> ReferenceStack:
         """Build all components and the stack."""
@@ -100,9 +103,9 @@ class StackBuilder:
             trail=odometry.trail,
         )
         controller: Controller = build_component(CheckedController, spec.controller, driving)
-        costmaps = Costmaps(
-            spec, self.surroundings, controller.full_speed * spec.controller.lookahead_s, self.latency["costmap"]
-        )
+        self.full_speed = controller.full_speed
+        lookahead_distance = self.full_speed * spec.controller.lookahead_s
+        costmaps = Costmaps(spec, self.surroundings, lookahead_distance, self.latency["costmap"])
         monitor = CollisionMonitor(spec.collision_monitor, robot, self.surroundings.lidars, self.surroundings.tick_rate)
         driving = replace(
             driving,
@@ -111,7 +114,16 @@ class StackBuilder:
             limit_command=monitor.limit_command,
         )
         planning = replace(driving, name="planner", resolution=costmaps.global_costmap.view.resolution)
-        plans = self.make_plan_manager(CheckedPlanner(spec.planner, planning), costmaps, controller)
+        plans = self.plan_manager(
+            spec.planner,
+            CheckedPlanner(spec.planner, planning),
+            costmaps.global_costmap,
+            self.plan_seed,
+            robot.inscribed_radius,
+            robot.turning_radius > 0.0,
+            self.latency["planner"],
+            self.full_speed,
+        )
         navigator = Navigator(
             plans,
             controller,
@@ -145,18 +157,6 @@ class StackBuilder:
             self.make_odometry_filter(),
         )
 
-    def make_plan_manager(self, planner: Planner, costmaps: Costmaps, controller: Controller) -> PlanManager:
-        """Make the plan manager, which requests plans from the planner and monitors them."""
-        return PlanManager(
-            self.spec.planner,
-            planner,
-            costmaps.global_costmap,
-            self.plan_seed,
-            self.robot.inscribed_radius,
-            is_car=self.robot.turning_radius > 0.0,
-            latency=self.latency["planner"],
-        )
-
     def plan_seed(self, number: int) -> int:
         """Return the random seed of the n-th plan of the run."""
         return self.streams.library_seed(f"planner#{number}")
@@ -176,12 +176,6 @@ class StackBuilder:
     def make_stack(self, *arguments: Any) -> ReferenceStack:
         """Call the constructor of the stack with these arguments."""
         return ReferenceStack(*arguments)
-
-
-def _latency_ticks(spec: StackSpec, clock: Clock) -> dict[str, int]:
-    """Return the latency of each component, by its name, in ticks."""
-    latency = spec.latency if isinstance(spec.latency, Latency) else Latency()
-    return {name: clock.ticks(getattr(latency, name)) for name in Latency.model_fields}
 
 
 def _behaviors(spec: Recovery, setting: Setting) -> list[Behavior]:

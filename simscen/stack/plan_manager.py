@@ -62,17 +62,18 @@ class PlanManager:
         costmap: LayeredCostmap,
         plan_seed: Callable[[int], int],
         radius: float,
-        is_car: bool,
-        latency: int,
+        is_car: bool = False,
+        latency: int = 0,
+        speed: float = 0.5,
     ) -> None:
         """Take the planner and the costmap to plan on.
 
         `plan_seed` returns the seed of the n-th plan. `radius` is the inscribed radius of the robot in m. A car cannot
-        turn in place. `latency` is the planning time in ticks.
+        turn in place. `latency` is the planning time in ticks. Subclasses use the `speed` in m/s of driving a plan.
         """
         self._spec, self.planner, self._costmap = spec, planner, costmap
         self._plan_seed, self._radius, self._is_car, self._latency = plan_seed, radius, is_car, latency
-        self._plan_count = 0
+        self._plan_count, self._speed = 0, speed
         self._via: tuple[Goal, ...] = ()
         self.reset(0.0)
 
