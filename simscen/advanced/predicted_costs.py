@@ -5,11 +5,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from simscen.advanced.prediction.avoidance import MIN_DISTANCE_M
 from simscen.advanced.prediction.rollouts import HORIZON_S
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Pose2
 from simscen.stack.moving_obstacles import MAX_INFLATION_M, MovingObstacles
 from simscen.stack.protocols import MAX_NON_OBSTACLE, CostmapView
 
@@ -37,7 +36,10 @@ def add_predicted_costs(costmap: CostmapView, robot: Pose2, speed: float, radius
         high.append(max(first, last))
         centers.append(corner + size * (first + factor * (np.arange(-(-max(0, last - first) // factor)) + 0.5)))
     x, y = np.meshgrid(centers[1], centers[0])
-    predicted = _predicted_costs(costmap.moving, x, y, np.hypot(x - robot.x, y - robot.y) / speed, radius)
+    times = np.hypot(x - robot.x, y - robot.y) / speed
+    near, _ = costmap.moving.nearness(x, y, times, radius, MIN_DISTANCE_M)
+    cost = MAX_NON_OBSTACLE * np.clip(near, 0.0, 1.0) * np.exp(-times / DECAY_TIME_S)
+    predicted = np.where(times > HORIZON_S, 0.0, cost).astype(np.uint8)
     if not predicted.any():
         return costmap
     window = slice(low[0], high[0]), slice(low[1], high[1])
@@ -45,13 +47,6 @@ def add_predicted_costs(costmap: CostmapView, robot: Pose2, speed: float, radius
     costs = costmap.costs.copy()
     np.maximum(costs[window], cells, out=costs[window])
     return replace(costmap, costs=costs)
-
-
-def _predicted_costs(moving: MovingObstacles, x: Array, y: Array, times: Array, radius: float) -> npt.NDArray[np.uint8]:
-    """Return the costs of the points (x, y), at which the robot arrives after `times` in s."""
-    near, _ = moving.nearness(x, y, times, radius, MIN_DISTANCE_M)
-    cost = MAX_NON_OBSTACLE * np.clip(near, 0.0, 1.0) * np.exp(-times / DECAY_TIME_S)
-    return np.where(times > HORIZON_S, 0.0, cost).astype(np.uint8)
 
 
 def meets_moving_obstacle(

@@ -58,7 +58,10 @@ class CollisionMonitor:
         corners = np.array(robot.footprint, dtype=np.float64)
         ends = np.roll(corners, -1, axis=0)
         normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))
-        self._times = np.linspace(0.0, spec.time_before_collision, _time_steps(spec) + 1)
+        steps = DEFAULT_STEPS
+        if spec.simulation_time_step is not None:
+            steps = math.ceil(spec.time_before_collision / spec.simulation_time_step - STEP_TOLERANCE)
+        self._times = np.linspace(0.0, spec.time_before_collision, min(MAX_STEPS, steps) + 1)
         self._stop_radius = robot.circumscribed_radius + spec.stop_margin
         self._normal = normal / np.hypot(normal[:, 0], normal[:, 1])[:, None]
         self._offset = np.sum(self._normal * corners, axis=1)
@@ -199,13 +202,6 @@ class CollisionMonitor:
         body = np.stack((cosine * dx + sine * dy, cosine * dy - sine * dx), axis=-1)
         gaps: Array = (body @ self._normal.T - self._offset).max(axis=-1)
         return gaps
-
-
-def _time_steps(spec: MonitorSpec) -> int:
-    """Return the number of time steps until `time_before_collision`, at most MAX_STEPS."""
-    if spec.simulation_time_step is None:
-        return DEFAULT_STEPS
-    return min(MAX_STEPS, math.ceil(spec.time_before_collision / spec.simulation_time_step - STEP_TOLERANCE))
 
 
 def _miter_factor(normals: Array) -> float:

@@ -63,7 +63,9 @@ class Publisher:
         if plan is not None and tick >= self._local_plan_due:
             local_plan = self._map_local_plan(tick, frames)
         if tick >= self._global_costmap.due or tick >= self._local_costmap.due:
-            grids = self._costmap_updates(tick, costmaps)
+            pairs = (self._global_costmap, costmaps.global_costmap), (self._local_costmap, costmaps.local_costmap)
+            due = (each.update(tick, costmap, self._tick_rate) for each, costmap in pairs if tick >= each.due)
+            grids = tuple(grid for grid in due if grid is not None)
         if plan is None or plan is self._plan:
             return NO_UPDATES if local_plan is None and not grids else (None, local_plan, grids)
         self._plan = plan
@@ -79,12 +81,6 @@ class Publisher:
             return Path(arc_poses(frames.map_from_odom.compose(arc[0]), arc[1], LOCAL_PLAN_TIMES_S))
         plan = self._controller.local_plan
         return None if plan is None else Path(transform_poses(frames.map_from_odom, plan.points), plan.tick)
-
-    def _costmap_updates(self, tick: int, costmaps: Costmaps) -> tuple[CostGrid, ...]:
-        """Return the costmaps that are due and have changed."""
-        pairs = (self._global_costmap, costmaps.global_costmap), (self._local_costmap, costmaps.local_costmap)
-        grids = (each.update(tick, costmap, self._tick_rate) for each, costmap in pairs if tick >= each.due)
-        return tuple(grid for grid in grids if grid is not None)
 
 
 @dataclass

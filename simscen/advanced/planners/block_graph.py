@@ -7,14 +7,12 @@ a wall thinner than a block stays closed.
 import math
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import csr_matrix
 
 from simscen.advanced.cell_blocks import pool_blocks
 from simscen.core.geometry import Array
+from simscen.stack.moving_obstacles import Mask
 from simscen.stack.planners.traversal_costs import TraversalCosts
-
-Mask = npt.NDArray[np.bool_]
 
 
 def block_graph(costs: TraversalCosts, factor: int, by_cost: bool) -> csr_matrix:

@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import dijkstra
 from simscen.advanced.cell_blocks import cells_with_most_clearance
 from simscen.advanced.planners.block_graph import block_graph
 from simscen.core.geometry import Array
+from simscen.stack.moving_obstacles import Mask
 from simscen.stack.planners.ompl_search import Point
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import CostmapView
@@ -26,7 +27,6 @@ PATH_SPACING_M = 0.45
 """Distance between the points of `InformedSet.path` where there is ample clearance."""
 MAX_LEG_M = 30.0
 """Maximum distance between successive `waypoints`."""
-Mask = npt.NDArray[np.bool_]
 
 
 class InformedSet:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from simscen.advanced.cell_blocks import cells_with_most_clearance, pool_blocks
 from simscen.core.geometry import Array
+from simscen.stack.moving_obstacles import Mask
 from simscen.stack.protocols import CostmapView
 
 BLOCK_M = 0.1
@@ -21,7 +22,6 @@ NARROW_SPACING_M, AXIS_SPACING_M, OPEN_SPACING_M = 0.3, 0.8, 1.1
 """Distance between samples in narrow passages, on the rest of the axis, and elsewhere."""
 NARROW_MARGIN_M = 0.15
 """A block of the axis is narrow if its clearance exceeds the smallest clearance of all free cells by less than this."""
-Mask = npt.NDArray[np.bool_]
 
 
 def medial_axis_samples(costmap: CostmapView, free: Mask, seed: int, density: int = 1) -> Array:

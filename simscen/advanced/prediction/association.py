@@ -40,9 +40,11 @@ def associate(tracks: list[Track], current: ScanClusters) -> set[int]:
         for index, cluster in enumerate(current.clusters):
             # The center of a partly hidden obstacle can be off by its radius.
             distance, hidden = abs(expected - cluster.center), 0.0 if cluster.is_fully_visible else track.radius
-            if distance <= gate + hidden and (
-                not cluster.is_static or _is_last_cluster(track, cluster.center, lidar, hidden)
-            ):
+            if distance > gate + hidden:
+                continue
+            # A static cluster updates only a track whose last update was there.
+            last = track.updates[-1].position
+            if not cluster.is_static or abs(lidar.to_lidar(last) - cluster.center) <= GATE_M + hidden:
                 possible.append((distance, number, index))
     updated, used = set[int](), set[int]()
     for _, number, index in sorted(possible):
@@ -51,11 +53,6 @@ def associate(tracks: list[Track], current: ScanClusters) -> set[int]:
             used.add(index)
             _update(tracks[number], current.clusters[index], current)
     return used
-
-
-def _is_last_cluster(track: Track, center: complex, lidar: LidarPose, hidden: float) -> bool:
-    """Return whether a static cluster is near the last update of a track: within GATE_M plus `hidden` in m."""
-    return abs(lidar.to_lidar(track.updates[-1].position) - center) <= GATE_M + hidden
 
 
 def _update(track: Track, cluster: Cluster, current: ScanClusters) -> None:

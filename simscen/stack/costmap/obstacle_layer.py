@@ -18,7 +18,7 @@ from simscen.model.costmaps import DenoiseLayer
 from simscen.stack.costmap.depth_layer import Heights, is_seen_through, project_depth_image
 from simscen.stack.costmap.distance_transform import Squared
 from simscen.stack.costmap.grid_frame import CellIndices, Cells, GridFrame, Mask
-from simscen.stack.costmap.rolling_window import ValueType, shift_layer
+from simscen.stack.costmap.rolling_window import shift_layer
 from simscen.stack.localizers.beams import ComplexPoints, directions
 
 RANGE_TOLERANCE_M = 1e-9
@@ -273,7 +273,8 @@ class ObstacleLayer:
         _set_values(self._heights, marked[is_cleared], np.nan)
         cells, heights, ground = project_depth_image(image, base, self._frame, self._spec, self._ground)
         _set_values(self._ground, ground, True)
-        new = (_values_at(walls, cells) > MAX_WALL_SQUARED_CELLS) & ~self._under_robot(self._frame.centers(cells), base)
+        is_off_walls = walls[cells[:, 0], cells[:, 1]] > MAX_WALL_SQUARED_CELLS
+        new = is_off_walls & ~self._under_robot(self._frame.centers(cells), base)
         cells = cells[new]
         self._heights[cells[:, 0], cells[:, 1]] = heights[new]
         return np.concatenate((marked[is_cleared], cells))
@@ -287,10 +288,6 @@ class ObstacleLayer:
     def _under_robot(self, points: Array, base: Pose2) -> Mask:
         """Return which points (n, 2) are in the inscribed circle of the robot."""
         return np.asarray(np.hypot(points[:, 0] - base.x, points[:, 1] - base.y) < self._inscribed)
-
-
-def _values_at(layer: npt.NDArray[ValueType], cells: Cells) -> npt.NDArray[ValueType]:
-    return layer[cells[:, 0], cells[:, 1]]
 
 
 def _set_values(layer: npt.NDArray[np.generic], cells: Cells, value: float) -> None:

@@ -124,14 +124,12 @@ class AmclLocalizer:
         if odometry is None or not scan.range_max > 0:
             return
         delta = None if self._last_update is None else self._last_update.between(odometry)
-        if delta is not None and self._moved_enough(delta):
-            self._update_due = dict.fromkeys(self._update_due, True)
+        if delta is not None:
+            distance, angle = math.hypot(delta.x, delta.y), abs(delta.yaw)
+            if distance > self._spec.update_min_d or angle > self._spec.update_min_a:
+                self._update_due = dict.fromkeys(self._update_due, True)
         if self._update_due.get(scan.sensor, True):
             self._correct(scan, odometry, delta)
-
-    def _moved_enough(self, delta: Pose2) -> bool:
-        """Return whether the motion since the last update is more than `update_min_d` or `update_min_a`."""
-        return math.hypot(delta.x, delta.y) > self._spec.update_min_d or abs(delta.yaw) > self._spec.update_min_a
 
     def _correct(self, scan: Scan, odometry: Pose2, delta: Pose2 | None) -> None:
         """Update the filter: move the particles by `delta`, and weight them by the scan.

@@ -63,14 +63,6 @@ class Particles:
         return bool((np.abs(positions - positions.mean(axis=0)) <= distance).all())
 
 
-def sample_around(pose: Pose2, std: tuple[float, float, float], count: int, rng: np.random.Generator) -> Array:
-    """Return random poses (count, 3) from a normal distribution about `pose`, as nav2_amcl's pf_init does."""
-    poses = empty_poses(count)
-    poses[:] = rng.normal(pose, std, (count, 3))
-    poses[:, 2] = wrap_array(poses[:, 2])
-    return poses
-
-
 def empty_poses(count: int) -> Array:
     """Return an empty array for poses (count, 3) with contiguous columns."""
     poses: Array = np.empty((3, count)).T
@@ -115,10 +107,13 @@ class FreeSpace:
         return poses
 
     def initial_particles(self, estimate: Estimate, count: int, rng: np.random.Generator) -> Particles:
-        """Return particles around the pose of the estimate, or over all free space if this pose is None."""
+        """Return normally distributed particles around the pose, or particles over all free space without a pose."""
         if estimate.pose is None:
             return Particles.with_equal_weights(self.draw(count, rng))
-        return Particles.with_equal_weights(sample_around(estimate.pose, estimate.std, count, rng))
+        poses = empty_poses(count)
+        poses[:] = rng.normal(estimate.pose, estimate.std, (count, 3))
+        poses[:, 2] = wrap_array(poses[:, 2])
+        return Particles.with_equal_weights(poses)
 
 
 MAX_COMPACT_BINS = 8

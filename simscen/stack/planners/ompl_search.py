@@ -115,10 +115,6 @@ class StateValidity:
         return self.motion_cost(x, y, x, y) < math.inf
 
 
-def _infinite_cost(_ax: float, _ay: float, _bx: float, _by: float) -> float:
-    return math.inf
-
-
 class OmplSearch:
     """One search by a planner of OMPL. Subclasses may override `_make_validity` and `_make_termination`."""
 
@@ -135,7 +131,7 @@ class OmplSearch:
             return self._solve(simplify)
         finally:
             for callback in self._callbacks:  # OMPL's bindings leak their callbacks: release the costmap
-                callback.motion_cost = _infinite_cost
+                callback.motion_cost = lambda *_: math.inf
 
     def _solve(self, simplify: bool) -> list[Point] | None:
         ou.RNG.setSeed(self.seed)  # before any object of OMPL is created: it has one generator for the whole process

@@ -32,8 +32,9 @@ class CheckedPlugin:
         """Build the component. Raises RunError if it lacks a method of `protocol`. `role` is for example "planner"."""
         self.role, self._spec = role, spec
         self.inner: Any = self.call(lambda: spec.implementation()(spec, setting))
-        for name in method_names(protocol):
-            if not callable(getattr(self.inner, name, None)):
+        for name, value in vars(protocol).items():
+            is_method = callable(value) and not name.startswith("_")
+            if is_method and not callable(getattr(self.inner, name, None)):
                 self.raise_invalid(f"{type(self.inner).__name__} has no method `{name}`, which every {role} needs")
 
     @property
@@ -118,11 +119,6 @@ class CheckedPlugin:
         own = [entry for entry in frames if str(entry[0].f_globals.get("__name__", "")).partition(".")[0] == package]
         frame, line = (own or frames)[-1]
         return f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"
-
-
-def method_names(protocol: type) -> list[str]:
-    """Return the names of the public methods of a protocol."""
-    return [name for name, value in vars(protocol).items() if callable(value) and not name.startswith("_")]
 
 
 def are_numbers(values: Iterable[object]) -> bool:
