@@ -83,6 +83,7 @@ class CurrentScan:
 
     def _beam_toward(self, point: complex) -> int | None:
         """Return the index of the beam toward a point in the lidar frame; None outside the field of view."""
-        scan = self.scan
-        beam = round((cmath.phase(point) - scan.angle_min) % (2 * math.pi) / scan.angle_increment)
+        scan, turn = self.scan, 2 * math.pi
+        beams = (cmath.phase(point) - scan.angle_min) % turn / scan.angle_increment
+        beam = round(beams) if beams < turn / scan.angle_increment - 0.5 else 0
         return beam if beam < len(scan.ranges) else None

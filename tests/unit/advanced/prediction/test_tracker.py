@@ -14,7 +14,9 @@ from simscen.advanced.prediction.clusters import (
     find_segments,
     fit_circle,
 )
+from simscen.advanced.prediction.current_scan import CurrentScan
 from simscen.advanced.prediction.tracker import Tracker
+from simscen.advanced.prediction.tracks import Track
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.guards import Prediction
@@ -295,3 +297,10 @@ def test_circle_fit_of_an_arc_converges_from_half_a_radius_away(seen: float) -> 
 def test_too_close_returns_are_ignored() -> None:
     moving = [Watch(crossing, covered=value).run(3.0).tracker.moving.obstacles for value in (-np.inf, np.nan)]
     assert moving[0] == moving[1] != ()
+
+
+@pytest.mark.parametrize("degrees", [-180.4, -179.6, 90.2, 179.4, 179.6, 180.0])
+def test_lidar_with_a_full_circle_sees_past_a_track_in_each_direction(degrees: float) -> None:
+    scan = Scan("lidar", 0, np.full(360, 5.0), -math.pi, math.radians(1.0), 0.1, 30.0)
+    track = Track.start(0, cmath.rect(2.0, math.radians(degrees)), 0.1, 0.3)
+    assert CurrentScan(scan, 5.0 * np.exp(1j * scan.angles()), Pose2(0.0, 0.0), None).sees_past(track)
