@@ -4,7 +4,6 @@ Common parameters:
 
 - `what`: measured quantity, e.g. "path_length".
 - `value`, `limit`: measured value and its limit in `unit`. `measured` is a measured value as text.
-- `at`: the trace and the tick that decided the finding; None if no single tick decided it.
 - `context`: text after the limit, e.g. "after lidar.off".
 - `detail`: lines that explain a failure.
 """
@@ -21,6 +20,9 @@ from simscen.core.records.verdict import Finding, Status
 if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
 
+    At = tuple[Trace, int] | None
+    """The trace and the tick that decided a finding; None if no single tick decided it."""
+
 
 class InvalidTrace(ValueError):
     """The trace contains invalid values, such as nan, so that a criterion cannot be judged."""
@@ -31,42 +33,21 @@ class MissingEvidence(ValueError):
 
 
 def at_most(
-    what: str,
-    value: float,
-    limit: float,
-    unit: str,
-    *,
-    at: tuple[Trace, int] | None = None,
-    context: str = "",
-    detail: Sequence[str] = (),
+    what: str, value: float, limit: float, unit: str, *, at: At = None, context: str = "", detail: Sequence[str] = ()
 ) -> Finding:
     """Return a finding that passes if `value` <= `limit`. Raises InvalidTrace if `value` is nan."""
     return _bound_finding(what, value, limit, unit, limit - value, "≤", at, context, detail)
 
 
 def at_least(
-    what: str,
-    value: float,
-    limit: float,
-    unit: str,
-    *,
-    at: tuple[Trace, int] | None = None,
-    context: str = "",
-    detail: Sequence[str] = (),
+    what: str, value: float, limit: float, unit: str, *, at: At = None, context: str = "", detail: Sequence[str] = ()
 ) -> Finding:
     """Return a finding that passes if `value` >= `limit`. Raises InvalidTrace if `value` is nan."""
     return _bound_finding(what, value, limit, unit, value - limit, "≥", at, context, detail)
 
 
 def counted(
-    what: str,
-    count: int,
-    noun: str,
-    low: int | None,
-    high: int | None,
-    *,
-    at: tuple[Trace, int] | None = None,
-    detail: Sequence[str] = (),
+    what: str, count: int, noun: str, low: int | None, high: int | None, *, at: At = None, detail: Sequence[str] = ()
 ) -> list[Finding]:
     """Return one finding for each bound on a number of events: for the minimum `low`, and for the maximum `high`.
 
@@ -91,14 +72,12 @@ def if_complete(trace: Trace, finding: Finding) -> Finding:
     return undecided(finding.what, f"{finding.measured} so far", finding.limit)
 
 
-def missed(
-    what: str, measured: str, limit: str, at: tuple[Trace, int] | None = None, detail: Sequence[str] = ()
-) -> Finding:
+def missed(what: str, measured: str, limit: str, at: At = None, detail: Sequence[str] = ()) -> Finding:
     """Return a failed finding with text alone: without margin and value."""
     return Finding(Status.FAIL, what, measured, limit, None, "", None, *_tick_and_place(at), detail=tuple(detail))
 
 
-def held(what: str, measured: str, limit: str, at: tuple[Trace, int] | None = None) -> Finding:
+def held(what: str, measured: str, limit: str, at: At = None) -> Finding:
     """Return a passed finding with text alone: without margin and value."""
     return Finding(Status.PASS, what, measured, limit, None, "", None, *_tick_and_place(at))
 
@@ -114,35 +93,27 @@ def _bound_finding(
     limit: float,
     unit: str,
     margin: float,
-    relation: str,
-    at: tuple[Trace, int] | None,
+    sign: str,
+    at: At,
     context: str,
     detail: Sequence[str],
 ) -> Finding:
     if math.isnan(value):
         raise InvalidTrace(f"{what} is not a number")
     digits = decimals(value, limit)
-    text = f"{relation} {format_quantity(limit, unit, digits)} {context}".rstrip()
+    text = f"{sign} {format_quantity(limit, unit, digits)} {context}".rstrip()
     return _finding(what, format_quantity(value, unit, digits), text, margin, unit, value, at, detail)
 
 
 def _finding(
-    what: str,
-    measured: str,
-    limit: str,
-    margin: float,
-    unit: str,
-    value: float,
-    at: tuple[Trace, int] | None,
-    detail: Sequence[str],
+    what: str, measured: str, limit: str, margin: float, unit: str, value: float, at: At, detail: Sequence[str]
 ) -> Finding:
     """Return a finding that passes if the margin is not negative. A passed finding has no details."""
-    if margin >= 0:
-        return Finding(Status.PASS, what, measured, limit, margin, unit, value, *_tick_and_place(at))
-    return Finding(Status.FAIL, what, measured, limit, margin, unit, value, *_tick_and_place(at), tuple(detail))
+    status, shown = (Status.PASS, ()) if margin >= 0 else (Status.FAIL, tuple(detail))
+    return Finding(status, what, measured, limit, margin, unit, value, *_tick_and_place(at), shown)
 
 
-def _tick_and_place(at: tuple[Trace, int] | None) -> tuple[int | None, tuple[float, float] | None]:
+def _tick_and_place(at: At) -> tuple[int | None, tuple[float, float] | None]:
     if at is None:
         return None, None
     trace, tick = at

@@ -45,12 +45,9 @@ def spans(trace: Trace, label: str) -> list[Span]:
     for entry in dict.fromkeys(start.data.get("entry") for start in starts):
         start_ticks = [start.tick for start in starts if start.data.get("entry") == entry]
         end_ticks = [end.tick for end in ends if end.data.get("entry") == entry]
-        found += [_span(trace, *pair) for pair in zip_longest(start_ticks, end_ticks[: len(start_ticks)])]
+        for start, end in zip_longest(start_ticks, end_ticks[: len(start_ticks)]):
+            found.append(Span(start, end, True) if end and end > start else Span(start, trace.end, False))
     return sorted(found, key=lambda span: span.start)
-
-
-def _span(trace: Trace, start: int, end: int | None) -> Span:
-    return Span(start, end, True) if end and end > start else Span(start, trace.end, False)
 
 
 def never_started(trace: Trace, label: str) -> tuple[str, list[str]]:

@@ -56,7 +56,8 @@ def apply_expectation(
     limit = f"a failure: {expected.reason}"
     name = unique_name(EXPECTED, ids)
     if unexpected or not failed:
-        measured = ", ".join(unexpected) or _describe_no_failure(covered)
+        nothing = f"nothing failed, {_names(excused)} undecided" if excused else "everything passed"
+        measured = ", ".join(unexpected) or nothing
         return Outcome.FAILED, Verdict(EXPECTED, name, "fail", (missed(EXPECTED, measured, limit),))
     others = [verdict for verdict in decisive if verdict.status is not Status.PASS and verdict not in excused]
     verdict = Verdict(EXPECTED, name, "fail", (held(EXPECTED, f"{_names(failed)} failed", limit),))
@@ -65,12 +66,6 @@ def apply_expectation(
 
 def _is_expected_to_fail(verdict: Verdict, expected: ExpectedFailure) -> bool:
     return verdict.id in expected.criteria if expected.criteria else verdict.criterion != DISTURBANCE
-
-
-def _describe_no_failure(verdicts: Sequence[Verdict]) -> str:
-    """Return text for a run that was expected to fail, but in which no criterion failed."""
-    undecided_verdicts = [verdict for verdict in verdicts if verdict.status is not Status.PASS]
-    return f"nothing failed, {_names(undecided_verdicts)} undecided" if undecided_verdicts else "everything passed"
 
 
 def _names(verdicts: Sequence[Verdict]) -> str:

@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from sys import intern
 from typing import Any
@@ -43,7 +43,9 @@ def result_data(result: RunResult) -> dict[str, Any]:
         "metrics": {name: _finite_or_none(value) for name, value in result.metrics.items()},
         "undefined": dict(result.undefined),
         "verdicts": [verdict_data(verdict, line, result.tick_rate) for verdict, line in result.verdicts_with_lines],
-        "error": None if error is None else _error_data(error),
+        "error": None
+        if error is None
+        else {key: value for key, value in asdict(error).items() if key != "by_stack" or value},
     }
 
 
@@ -75,7 +77,10 @@ def from_data(data: dict[str, Any]) -> RunResult:
         key=read_key(data),
         path=data["path"],
         outcome=Outcome(data["outcome"]),
-        verdicts=tuple(_read_verdict(verdict) for verdict in data["verdicts"]),
+        verdicts=tuple(
+            Verdict(one["criterion"], one["id"], one["severity"], tuple(map(_read_finding, one["findings"])))
+            for one in data["verdicts"]
+        ),
         lines=lines if any(lines) else (),
         metrics=data["metrics"],
         undefined=data["undefined"],
@@ -113,11 +118,6 @@ def read_key(data: dict[str, Any]) -> RunKey:
     return RunKey(intern(data["scenario"]), data["seed"], variation, intern(stack_name))
 
 
-def _error_data(error: RunFailure) -> dict[str, Any]:
-    by_stack = {"by_stack": True} if error.by_stack else {}
-    return {"kind": error.kind, "message": error.message, "tail": error.tail, **by_stack}
-
-
 def _disturbance_data(one: DisturbanceOutcome, tick_rate: int) -> dict[str, Any]:
     return {
         **asdict(one.disturbance),
@@ -146,11 +146,6 @@ def verdict_data(verdict: Verdict, line: int, tick_rate: int) -> dict[str, Any]:
     }
 
 
-def _read_verdict(data: dict[str, Any]) -> Verdict:
-    findings = tuple(_read_finding(finding) for finding in data["findings"])
-    return Verdict(data["criterion"], data["id"], data["severity"], findings)
-
-
 def _finite_or_none(value: float | None) -> float | None:
     """Return the number, or None for nan and infinity, which JSON cannot represent."""
     return value if value is not None and math.isfinite(value) else None
@@ -159,14 +154,10 @@ def _finite_or_none(value: float | None) -> float | None:
 def _finding_data(verdict: Verdict, finding: Finding, tick_rate: int) -> dict[str, Any]:
     place = finding.place
     return {
+        **vars(finding),
         "status": finding.status.value,
-        "what": finding.what,
-        "measured": finding.measured,
-        "limit": finding.limit,
         "margin": _finite_or_none(finding.margin),
         "value": _finite_or_none(finding.value),
-        "unit": finding.unit,
-        "tick": finding.tick,
         "time": None if finding.tick is None else finding.tick / tick_rate,
         "place": list(place) if place is not None and all(map(math.isfinite, place)) else None,
         "detail": list(finding.detail),
@@ -176,15 +167,9 @@ def _finding_data(verdict: Verdict, finding: Finding, tick_rate: int) -> dict[st
 
 def _read_finding(data: dict[str, Any]) -> Finding:
     place = data["place"]
-    return Finding(
-        status=Status(data["status"]),
-        what=data["what"],
-        measured=data["measured"],
-        limit=data["limit"],
-        margin=data["margin"],
-        unit=data["unit"],
-        value=data["value"],
-        tick=data["tick"],
-        place=None if place is None else (place[0], place[1]),
-        detail=tuple(data["detail"]),
-    )
+    converted = {
+        "status": Status(data["status"]),
+        "place": None if place is None else (place[0], place[1]),
+        "detail": tuple(data["detail"]),
+    }
+    return Finding(**{field.name: data[field.name] for field in fields(Finding)} | converted)
