@@ -57,18 +57,10 @@ def box_robot(length: float = 0.42, width: float = 0.31, speed: float = 2.0) -> 
     )
 
 
-def setting(robot: RobotModel, *, name: str = "test", seed: int = 1, grid: OccupancyGrid | None = None) -> Setting:
-    """Return the Setting for building a component `name`: robot, control at 20 Hz, and costmap cells of 5 cm.
-
-    `grid` is the map; None for mapless navigation.
-    """
-    return Setting(
-        Surroundings(robot, grid, TICK_RATE_HZ, lidars=("lidar",)),
-        name,
-        Streams(seed),
-        CONTROL_PERIOD_TICKS / TICK_RATE_HZ,
-        0.05,
-    )
+def setting(robot: RobotModel, *, name: str = "test") -> Setting:
+    """Return the Setting of a component `name` without a map: control at 20 Hz, costmap cells of 5 cm."""
+    surroundings = Surroundings(robot, None, TICK_RATE_HZ, lidars=("lidar",))
+    return Setting(surroundings, name, Streams(1), CONTROL_PERIOD_TICKS / TICK_RATE_HZ, 0.05)
 
 
 @dataclass

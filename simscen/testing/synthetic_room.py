@@ -106,9 +106,9 @@ def drive(seconds: float, first: int = 0) -> RoomDrive:
     return drive_along(np.array(truth))
 
 
-def surroundings(room: OccupancyGrid | None = None) -> Surroundings:
-    """Return the robot, map, and tick rate for a localizer. `room` is the map, by default `grid()`."""
-    return Surroundings(ROBOT, grid() if room is None else room, TICK_RATE_HZ)
+def surroundings() -> Surroundings:
+    """Return the robot, map, and tick rate for a localizer."""
+    return Surroundings(ROBOT, grid(), TICK_RATE_HZ)
 
 
 def build_localizer(spec: LocalizerSpec, estimate: Estimate, seed: int) -> Localizer:
