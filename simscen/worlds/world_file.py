@@ -143,7 +143,6 @@ def wall_solids(points: list[Point], thickness: float, height: float, name: str)
 
 
 def _direction(a: Point, b: Point) -> Point:
-    """Return the unit vector from `a` to `b`."""
     length = math.hypot(b[0] - a[0], b[1] - a[1])
     return (b[0] - a[0]) / length, (b[1] - a[1]) / length
 

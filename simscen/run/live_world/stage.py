@@ -102,7 +102,7 @@ class LiveStage:
         if truth is not None:
             self._pose, self.twist, self.clearance = truth.pose, truth.twist, truth.clearance
         else:
-            self._pose, self.twist = self._robot.base_pose(), self._robot.base_twist()
+            self._pose, self.twist = self._robot.base_pose(), self._robot.state().twist
 
     def update_from_stack(self, decision: Decision, readings: Readings) -> None:
         """Update belief, events, and ticks of scans from the stack's decision and the readings that it received."""

@@ -119,7 +119,10 @@ class Clearance:
             gap = min(gap, self._search(tick, pose, self._static_distance))
         self._measured_tick = tick
         if self.may_be_enclosed:
-            self.enclosed_by = self._find_enclosing(tick)
+            point = self._center_point()
+            solids = self._static_distance.enclosing_solids(point, exclude=self._buildings)
+            name = self._static_distance.name(solids[0]) if solids else self._actors.find_enclosing(point, tick)
+            self.enclosed_by = name
             self.may_be_enclosed = self.enclosed_by is not None
         if self.enclosed_by is not None:
             self._distance = -abs(self._distance)
@@ -191,12 +194,6 @@ class Clearance:
         """Return a point inside the hull in the world frame."""
         x, y, z = self._state().pose.apply(self._hull_center).tolist()
         return x, y, z
-
-    def _find_enclosing(self, tick: int) -> str | None:
-        """Return the name of an object that encloses the robot, or None."""
-        point = self._center_point()
-        solids = self._static_distance.enclosing_solids(point, exclude=self._buildings)
-        return self._static_distance.name(solids[0]) if solids else self._actors.find_enclosing(point, tick)
 
     def _closing_speed(self, tick: int) -> float:
         """Return an upper bound in m/s of the speed at which the robot and any object approach each other."""

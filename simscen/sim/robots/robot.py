@@ -158,10 +158,6 @@ class Robot:
         state = self.state()
         return state.linear, state.angular
 
-    def base_twist(self) -> Twist:
-        """Return the velocity in the base frame."""
-        return self.state().twist
-
     def encoders(self) -> tuple[float, ...]:
         """Return the accumulated rotation of the wheels; see `SensorView.encoders`."""
         return self._drive.encoders()

@@ -138,7 +138,6 @@ def _decode_png_or_bmp(data: bytes) -> MapImage:
 
 
 def _bmp_size(data: bytes) -> tuple[int, int]:
-    """Return the width and the height in the header of a BMP."""
     (header,) = struct.unpack("<I", data[14:18])
     width, height = struct.unpack("<HH" if header == 12 else "<ii", data[18 : 22 if header == 12 else 26])
     return width, abs(height)

@@ -102,7 +102,6 @@ def _read_model_state(element: Element, report: ImportReport) -> ModelState:
 
 
 def _read_scale(element: Element) -> Scale:
-    """Return the factors for the sizes of shapes."""
     x, y, z = read_numbers(element, 3)
     if min(x, y, z) <= 0:
         raise element.unusable(f"a scale must be positive, got {element.text}")

@@ -16,7 +16,7 @@ def test_pose_is_read_from_the_engine_once_per_tick(simulate, monkeypatch):
         simulation.step(6)
         truth = simulation.truth()
         assert simulation.base_pose() == truth.pose
-        assert simulation.robot.base_twist() == truth.twist
+        assert simulation.robot.state().twist == truth.twist
         simulation.robot.base_velocity()
     assert len(calls) == 10
 

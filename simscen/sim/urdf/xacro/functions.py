@@ -33,10 +33,6 @@ def _tokenize(text: object, separators: str = ",; ", skip_empty: bool = True) ->
     return [word for word in text.split(separators[0]) if word or not skip_empty]
 
 
-def _ignore_message(*_: object) -> str:
-    return ""  # messages of a file are meant for its authors
-
-
 def _fail_with_message(*messages: object) -> str:
     raise ExpansionError(f"error in the file: {' '.join(map(str, messages))[:200]}")
 
@@ -54,7 +50,8 @@ PYTHON_FUNCTIONS: Mapping[str, Function] = {
     "round": _limited_round, "sorted": sorted, "sum": sum,
 }  # fmt: skip
 XACRO_FUNCTIONS: Mapping[str, Function] = {
-    "message": _ignore_message, "warning": _ignore_message, "error": _fail_with_message, "fatal": _fail_with_message,
+    # Messages of a file are meant for its authors.
+    "message": lambda *_: "", "warning": lambda *_: "", "error": _fail_with_message, "fatal": _fail_with_message,
     "tokenize": _tokenize,
 }  # fmt: skip
 NAMESPACES: Mapping[str, Mapping[str, Function | float]] = {
