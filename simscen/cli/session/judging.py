@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 
 from simscen.cli.diagnostics import paths_from_working_folder, relative_to_working_folder
@@ -50,7 +51,6 @@ class LogJudge:
         self.notes: list[str] = []
         self.foreign_count = 0
         self._options, self._scenario = options, scenario
-        self._case: Case | None = None
         self._file_masks: Mapping[str, MaskBlocks] | None = None
         self._file_objects: frozenset[str] | None = None
         self._criteria: LoadedCriteria | None = None
@@ -92,7 +92,7 @@ class LogJudge:
             )
         else:
             foreign, result = self._judge_foreign_log(log, with_sensors=True)
-            case = self._foreign_case()
+            case = self._foreign_case
         self.notes += [f"{log}: {note}" for note in foreign.notes]
         text = "" if self._scenario is None else self._scenario.read_text(encoding="utf-8")
         header = LogHeader(log.stem, 0, case, text, foreign.map)
@@ -143,7 +143,7 @@ class LogJudge:
         assert self._criteria is not None
         with _scenario_errors(self._criteria):
             criteria = self._criteria.for_robot("")
-        case = self._foreign_case()
+        case = self._foreign_case
         goals = tuple(goal.name for goal in case.goals if not goal.via)
         read = read_foreign_log(log, replace(self._options, goals=goals), with_sensors)
         missing = dict(read.coverage.missing)
@@ -176,15 +176,14 @@ class LogJudge:
             )
         return self._file_objects
 
+    @cached_property
     def _foreign_case(self) -> Case:
-        """Return what criteria need from the criteria file, such as goals, regions, and footprint."""
-        assert self._criteria is not None
-        if self._case is None:
-            from simscen.run.criteria_case import case_from_criteria
+        """Goals, regions, footprint, and other data of the criteria file that criteria need."""
+        from simscen.run.criteria_case import case_from_criteria
 
-            with _scenario_errors(self._criteria):
-                self._case = case_from_criteria(self._criteria)
-        return self._case
+        assert self._criteria is not None
+        with _scenario_errors(self._criteria):
+            return case_from_criteria(self._criteria)
 
     def _judge_by_file(
         self,
