@@ -129,7 +129,7 @@ def check_speed() -> str:
 
 def check_run() -> str:
     """Check that two runs of one simulated second pass with equal logs, and return the hash of the log."""
-    from simscen.cli.session.backends import backend_of
+    from simscen.cli.session.backends import backend_of, interrupt_on_signals
     from simscen.core.records.run_result import Outcome
     from simscen.loading.scenario import load_scenario
     from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session
@@ -140,10 +140,12 @@ def check_run() -> str:
         options = SessionOptions(workers=2, twice=True, wall_limit=60.0)
         try:
             jobs = plan_jobs([load_scenario(folder / "doctor.scenario.yaml", folder)], options, folder / "out")
-            with backend_of(options) as backend:
-                finished_runs, _ = run_session(jobs, options, backend, lambda _: None)
+            with interrupt_on_signals(), backend_of(options) as backend:
+                finished_runs, stopped = run_session(jobs, options, backend, lambda _: None)
         except SimscenError as error:
             raise CheckFailed(str(error)) from error
+        if stopped is not None:
+            sys.exit(stopped)
         for finished in finished_runs:
             if finished.outcome is not Outcome.PASSED:
                 failure = finished.result.error

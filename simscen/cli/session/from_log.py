@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from simscen.cli.diagnostics import escaped, paths_from_working_folder, print_text
+from simscen.cli.session.backends import interrupt_on_signals
 from simscen.cli.session.user_files import create_file, save
 from simscen.cli.shared_options import parse_topics
 from simscen.core.errors import Exit, InvalidInput, Problem, RunError
@@ -86,7 +87,7 @@ def _verify(reconstruction: Reconstruction) -> None:
 
 def _run(scenario: Path, log: Path) -> None:
     """Run a scenario in another process, and copy its log to `log`. Raises RunError if the run is not completed."""
-    with tempfile.TemporaryDirectory() as folder:
+    with interrupt_on_signals(), tempfile.TemporaryDirectory(prefix="simscen-") as folder:
         out = Path(folder) / "out"
         command = [sys.executable, "-m", "simscen", "run", str(scenario), "--out", str(out), "-j", "1"]
         done = subprocess.run(command, check=False, capture_output=True, text=True)
