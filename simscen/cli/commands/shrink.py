@@ -32,7 +32,7 @@ from simscen.loading.reduction import changed_values, removed_parts, with_inline
 from simscen.loading.scenario import ChangedScenario
 from simscen.loading.yaml.rewriting import changed_text
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, child, nodes_with_keys
-from simscen.report.journal_reader import JOURNAL_FILE, PlannedRun, read_journal
+from simscen.report.journal_reader import JOURNAL_FILE, read_journal
 from simscen.run.sessions.output_folder import RUNS_FOLDER, write_atomically
 from simscen.run.sessions.results import display_path
 from simscen.run.sessions.run_session import SessionOptions
@@ -131,23 +131,22 @@ class ChosenRun:
 
 
 def _chosen_run(run: Path, seed: int | None, variation: str, stack: str | None) -> ChosenRun:
-    """Return the failed run from the arguments of the command. Raises UsageError and InvalidInput."""
+    """Return the failed run from the arguments of the command; for a folder, from the journal of its session.
+
+    Raises UsageError and InvalidInput.
+    """
     if not run.is_dir():
         return ChosenRun(run, seed, variation, stack)
     if seed is not None or variation or stack is not None:
         raise UsageError("--seed, --variation, and --stack are for a scenario file; the folder of a run has its own")
-    planned = _planned_run(run.absolute())
-    return ChosenRun(Path(planned.file or planned.path), planned.key.seed, planned.key.variation, planned.stack or None)
-
-
-def _planned_run(folder: Path) -> PlannedRun:
-    """Return the run with this folder from the journal of its session. Raises UsageError."""
+    folder = run.absolute()
     for session in folder.parents:
         if (session / JOURNAL_FILE).is_file():
             inside = folder.relative_to(session).as_posix()
             for planned in read_journal(session).planned:
                 if f"{RUNS_FOLDER}/{planned.key.scenario}/{planned.key.folder}" == inside:
-                    return planned
+                    file = Path(planned.file or planned.path)
+                    return ChosenRun(file, planned.key.seed, planned.key.variation, planned.stack or None)
     raise UsageError(f"{folder} is not the folder of a run, such as simscen-out/latest/runs/NAME/seed-1")
 
 
