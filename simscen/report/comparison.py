@@ -177,7 +177,6 @@ def _outcome_table(
 def _comparison_section(
     baseline: str, against: BaselineComparison, prefix: str, links: Links = NO_LINKS
 ) -> Iterator[StyledLine]:
-    """Yield the headline, flips, metrics, and significant changes of one comparison, and notes on excluded runs."""
     yield (StyledText(f"  {comparison_headline(baseline, against)}", "name"),)
     for flip in against.flips[:MAX_FLIPS]:
         better = flip.passed == against.stack

@@ -120,7 +120,6 @@ def _outcome_cell(outcomes: OutcomeCounts) -> str:
 
 
 def _comparison_section_html(baseline: str, against: BaselineComparison) -> str:
-    """Return the flips, metrics, significant changes, and notes on excluded runs of one comparison."""
     flips = "".join(
         f'<tr class="{"" if flip.passed == against.stack else "bad"}">'
         f"<td>{'better' if flip.passed == against.stack else 'worse'}</td><td>{html_text(flip.scenario)}</td>"

@@ -144,5 +144,4 @@ def _escape_message(text: str) -> str:
 
 
 def _escape_property(text: str) -> str:
-    """Escape a property of a workflow command as GitHub's package @actions/core does."""
     return _escape_message(text).replace(":", "%3A").replace(",", "%2C")

@@ -119,12 +119,13 @@ def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[R
     used_names = {name}
     for run in incomplete:
         _add_case(suite, run, unique_name(_case_name(run), used_names, " #"), family)
+    is_refuted, is_open = (
+        claim.status is ClaimStatus.REFUTED,
+        claim.status in (ClaimStatus.UNDECIDED, ClaimStatus.BLOCKED),
+    )
+    counts = {"tests": 1 + len(incomplete), "failures": int(is_refuted), "errors": is_open + len(incomplete)}
     for element in (root, suite):
-        element.set("tests", str(1 + len(incomplete)))
-        element.set("failures", str(int(claim.status is ClaimStatus.REFUTED)))
-        undecided = claim.status in (ClaimStatus.UNDECIDED, ClaimStatus.BLOCKED)
-        element.set("errors", str(int(undecided) + len(incomplete)))
-        element.set("time", seconds)
+        _set_sums(element, [{**counts, "time": sum(run.wall for run in runs)}])
     suite.set("skipped", "0")
     ElementTree.indent(root)
     body: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)

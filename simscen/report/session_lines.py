@@ -127,7 +127,7 @@ def session_footer(session: SessionFinished, unfinished: Mapping[str, int]) -> I
     """
     yield (*outcome_counts(session, unfinished), *_timing_and_junit(session))
     if session.page:
-        yield (StyledText("page: ", "quiet"), StyledText(one_line(session.page), file=session.page))
+        yield _page_link(session)
 
 
 def interruption_lines(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledLine]:
@@ -136,11 +136,13 @@ def interruption_lines(session: SessionFinished, unfinished: Mapping[str, int]) 
     `unfinished` is as in `outcome_counts`.
     """
     yield (StyledText("interrupted: ", "warning"), *outcome_counts(session, unfinished))
-    page = (
-        [StyledText("page: ", "quiet"), StyledText(one_line(session.page), file=session.page)] if session.page else []
-    )
+    page = _page_link(session) if session.page else ()
     resume = StyledText(f"{'   ' if page else ''}resume with --resume {one_line(session.folder)}", "quiet")
     yield (*page, *([resume] if session.folder and session.is_resumable else []))
+
+
+def _page_link(session: SessionFinished) -> StyledLine:
+    return StyledText("page: ", "quiet"), StyledText(one_line(session.page), file=session.page)
 
 
 def outcome_counts(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledText]:

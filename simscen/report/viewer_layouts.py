@@ -2,7 +2,7 @@
 
 import copy
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -46,9 +46,10 @@ def _show_robots(panels: dict[str, Any], scans: Mapping[str, Sequence[str]]) -> 
     defaults, robot = scene["topics"], scene["layers"].pop(_ROBOT_LAYER)
     scene["topics"] = {}
     for number, (name, lidars) in enumerate(scans.items()):
-        for topic, settings in _robot_topics(defaults, lidars):
-            hidden = number > 0 and topic in _SHARED_TOPICS
-            scene["topics"][_with_namespace(name, topic)] = {**settings, "visible": False} if hidden else settings
+        for default, settings in defaults.items():
+            hidden = {"visible": False} if number > 0 and default in _SHARED_TOPICS else {}
+            for topic in lidars if default == _SCAN_TOPIC else [default]:
+                scene["topics"][_with_namespace(name, topic)] = {**copy.deepcopy(settings), **hidden}
         changes = {"topic": _with_namespace(name, robot["topic"]), "framePrefix": RobotFrames(name).log_frame("")}
         key = f"{_ROBOT_LAYER} {name}" if name else _ROBOT_LAYER
         scene["layers"][key] = {**robot, **changes, "instanceId": key, "label": f"{robot['label']} {name}".rstrip()}
@@ -60,13 +61,6 @@ def _show_robots(panels: dict[str, Any], scans: Mapping[str, Sequence[str]]) -> 
                 panel[key] = _with_namespace(first, panel[key])
         if not paths:
             del panel["paths"]
-
-
-def _robot_topics(defaults: Mapping[str, Any], lidars: Sequence[str]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the topics of a robot and their settings. All lidars get the settings of the lidar in `defaults`."""
-    for topic, settings in defaults.items():
-        for name in lidars if topic == _SCAN_TOPIC else [topic]:
-            yield name, copy.deepcopy(settings)
 
 
 def _plot_path(path: Mapping[str, Any], robot: str) -> dict[str, Any]:

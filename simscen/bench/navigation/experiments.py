@@ -97,7 +97,6 @@ SANDBOX_BOX = "obstacles:\n    - {name: cardboard box, box: [0.5, 0.4, 0.3], pos
 
 
 def _sandbox_scenario(name: str, has_box: bool) -> str:
-    """Return the scenario YAML of the drive of Nav2's system test."""
     return f"""\
 simscen: 1
 name: "{name}"

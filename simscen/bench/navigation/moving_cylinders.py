@@ -134,7 +134,6 @@ def dynamic_fields_name(speed: float) -> str:
 
 
 def _world_text(field: DynamicField) -> str:
-    """Return the YAML of a world with the moving cylinders of a field."""
     lines = []
     for number, mover in enumerate(field.movers, start=1):
         keyframes = ", ".join(

@@ -150,7 +150,6 @@ def _field_drive(folder: Path, field: ObstacleField) -> Drive:
 
 
 def _world_text(field: ObstacleField) -> str:
-    """Return the YAML of a world with the cylinders of a field."""
     pillars = "\n".join(
         f"  - {{name: pillar, cylinder: [{CELL_SIZE_M / 2:g}, {HEIGHT_M:g}], pose: {{x: {x:.3f}, y: {y:.3f}}}}}"
         for x, y in field.centers.tolist()

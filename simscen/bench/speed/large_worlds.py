@@ -137,7 +137,6 @@ def _obj_text(solids: list[Solid]) -> str:
 
 
 def _mesh_model(number: int, x: float, y: float) -> str:
-    """Return the SDF of a movable model with one of the mesh files."""
     mesh = f"<mesh><uri>mesh_{number % 4}.obj</uri></mesh>"
     return (
         f'<model name="thing {number}"><pose>{x} {y} 0 0 0 {number}</pose><link name="body">'

@@ -46,7 +46,6 @@ class Stopwatch:
             setattr(instance, name, self._timed(part, getattr(instance, name)))
 
     def _timed(self, part: str, method: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a wrapper of a method that adds its wall time to `part`."""
         seconds, nested, now = self.seconds, self._nested_seconds, time.perf_counter
 
         def timed(*args: Any, **kwargs: Any) -> Any:

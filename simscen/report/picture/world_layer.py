@@ -179,7 +179,6 @@ def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def _draw_object_path(canvas: Canvas, scene: Scene, samples: Samples, shape: Outlines) -> None:
-    """Draw the path of a moving object as a dotted line, and its earlier poses."""
     for segment in split_at_jumps(samples, scene.trace.tick_rate):
         if np.ptp(segment.values[:, :2], axis=0).max() > _MIN_MOTION_M:
             canvas.dashes(segment.values[:, :2], palette.PLACE, 1.0, 2.5)
@@ -190,7 +189,6 @@ def _draw_object_path(canvas: Canvas, scene: Scene, samples: Samples, shape: Out
 
 
 def _draw_door_positions(canvas: Canvas, door: MovableObject, shape: Outlines) -> None:
-    """Draw the closed and open position of a door, and its hinge."""
     for end in (door.closed, door.opened):
         for corners in () if end is None else map(end.apply, shape):
             canvas.dashes(np.vstack((corners, corners[:1])), palette.OBJECT, 0.8, 3.0)

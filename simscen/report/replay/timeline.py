@@ -88,7 +88,6 @@ def _entry(event: Event, lines: SourceLines, robot: str) -> dict[str, Any]:
 
 
 def _details(event: Event) -> Iterator[str]:
-    """Yield the effects and the other data of an event as texts."""
     effects = event.data.get("effects")
     if isinstance(effects, list):
         yield from (str(one["what"]) for one in effects if isinstance(one, dict) and one.get("what"))

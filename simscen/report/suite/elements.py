@@ -91,6 +91,5 @@ def _embedded_picture(path: Path, run: RunFinished) -> str:
 
 
 def _picture_link(path: Path, folder: str) -> str:
-    """Return a link to a picture that is not embedded."""
     target = link(str(path), folder, "picture") or f"picture: <code>{html_text(str(path))}</code>"
     return f'<p class="quiet">{target} (not embedded, because the page would be too large)</p>'

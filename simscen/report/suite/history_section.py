@@ -38,7 +38,6 @@ def history_html(runs: Sequence[RunFinished], past: Sequence[PastSession], good_
 
 
 def _session_row(session: PastSession) -> str:
-    """Return the table row of a session: link, numbers of outcomes, and simulated time."""
     simulated = sum(run.simulated for run in session.runs.values())
     return (
         f'<tr><th scope="row"><a href="../{quote(session.name)}/report.html">{html_text(session.name)}</a></th>'

@@ -203,7 +203,6 @@ def _console_output(run: RunFinished) -> str:
 
 
 def _collapsible(title: str, inside: str) -> str:
-    """Return a section that is initially collapsed. `inside` is HTML."""
     return f'<details class="metrics"><summary>{title}</summary>{inside}</details>'
 
 

@@ -137,5 +137,4 @@ def _range(values: Sequence[float]) -> tuple[float, float]:
 
 
 def _scale(value: float, limits: tuple[float, float], start: float, end: float) -> float:
-    """Map a value linearly so that the two `limits` become `start` and `end`."""
     return start + (value - limits[0]) / (limits[1] - limits[0]) * (end - start)
