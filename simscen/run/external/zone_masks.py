@@ -107,11 +107,8 @@ class _SpeedMask:
         self._percent = file is not None and file.percent
         self._base = 0.0 if file is None else file.base
         self._multiplier = max(SPEED_STEP_M_S, fastest / OCCUPIED) if file is None else file.multiplier
-
-    @property
-    def scale(self) -> dict[str, Any]:
-        """Parameters that convert values of the mask to speeds: `percent`, `base`, and `multiplier` as in Nav2."""
-        return {"percent": self._percent, "base": self._base, "multiplier": self._multiplier}
+        self.scale = {"percent": self._percent, "base": self._base, "multiplier": self._multiplier}
+        """Parameters that convert values of the mask to speeds, as in Nav2."""
 
     def draw(self, grid: OccupancyGrid, zones: Zones) -> OccupancyGrid:
         if not zones.speed and zones.masks.speed is not None and grid is zones.masks.speed.grid:
