@@ -182,27 +182,23 @@ class ClusteredMean:
         If all worlds have the same rate, return the Wilson interval with one trial per world. The bootstrap interval
         would have zero width.
         """
-        rate = self._common_mean()
-        count = len(self.values_by_world)
-        return self.interval() if rate is None else wilson_interval(rate * count, count)
+        interval = self.rate_difference_interval()
+        return None if interval is None else (max(0.0, interval[0]), interval[1])
 
     def rate_difference_interval(self) -> Interval | None:
         """Return the interval of a difference of rates; None with fewer than five worlds.
 
         If all worlds have the same difference, return a Wilson interval, as `rate_interval` does.
         """
-        change = self._common_mean()
-        if change is None:
+        means = {sum(values) / len(values) for values in self.values_by_world}
+        count = len(self.values_by_world)
+        if count < MIN_PAIRS or len(means) > 1:
             return self.interval()
-        low, high = wilson_interval(abs(change) * len(self.values_by_world), len(self.values_by_world))
+        change = means.pop()
+        low, high = wilson_interval(abs(change) * count, count)
         if change == 0.0:
             return -high, high
         return (low, high) if change > 0.0 else (-high, -low)
-
-    def _common_mean(self) -> float | None:
-        """Return the common mean of all worlds; None if the means differ, and with fewer than five worlds."""
-        means = {sum(values) / len(values) for values in self.values_by_world}
-        return means.pop() if len(self.values_by_world) >= MIN_PAIRS and len(means) == 1 else None
 
 
 TrialPair = tuple[Trial, Trial]

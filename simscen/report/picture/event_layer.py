@@ -205,5 +205,5 @@ def draw_places(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     for name, pose in sorted(scene.scenery.places.items()):
         if (round(pose.x, 3), round(pose.y, 3)) not in goal_positions and canvas.shows(pose.x, pose.y):
             canvas.symbol(pose.x, pose.y, SMALL_DIAMOND, palette.PLACE)
-            canvas.add_part(f"place {name}", np.array([(pose.x, pose.y)]))
+            canvas.add_part(f"place {name}", [(pose.x, pose.y)])
             yield Label(9, pose.x, pose.y, printable(name), palette.FAINT_INK, 11, 5.0, is_optional=True)

@@ -169,10 +169,7 @@ def _progress(live: RunningSession, done: int) -> str:
 
 
 def _group_element(group: list[RunFinished], report: SessionReport, totals: Totals, pictures: dict[RunKey, str]) -> str:
-    """Return the entries of the runs of one scenario, below a heading if there are several.
-
-    `pictures` is the HTML of the pictures by run key.
-    """
+    """Return the entries of the runs of one scenario. `pictures` is the HTML of the pictures by run key."""
     ranked = sorted(group, key=_severity_order)
     entries = "\n".join(
         run_element(run, report.folder, pictures.get(run.key, ""), past_outcomes(run, report.past), len(group) > 1)
@@ -194,7 +191,6 @@ def _group_element(group: list[RunFinished], report: SessionReport, totals: Tota
 
 
 def _severity_order(run: RunFinished) -> tuple[int, RunKey]:
-    """Return the sort key of a run: index of its outcome in ORDER, then its key."""
     return ORDER.index(run.outcome), run.key
 
 

@@ -90,14 +90,8 @@ def smallest_margin(run: RunFinished) -> float | None:
     The margin is negative if the limit is violated. Findings without a unit, such as counts, are ignored.
     """
     findings = [finding for verdict in run.result.verdicts for finding in verdict.findings]
-    return min((margin for finding in findings if (margin := _relative_margin(finding)) is not None), default=None)
-
-
-def _relative_margin(finding: Finding) -> float | None:
-    """Return the margin of a finding as a fraction of the limit; None without a margin or a unit."""
-    if finding.margin is None or finding.value is None or not finding.unit:
-        return None
-    return relative_margin(finding)
+    measured = (each for each in findings if each.margin is not None and each.value is not None and each.unit)
+    return min(map(relative_margin, measured), default=None)
 
 
 def _headline(run: RunFinished) -> str:
