@@ -62,17 +62,14 @@ class View:
 
     def thinned(self, count: int) -> "View":
         """Return at most `count` of `ends` and of `passed`, evenly spaced."""
-        return View(_thin(self.ends, count), _thin(self.passed, count))
+        return View(*(
+            points if len(points) <= count else points[evenly_spaced(len(points), count)]
+            for points in (self.ends, self.passed)
+        ))  # fmt: skip
 
-
-def _without_far_points(view: View) -> View:
-    return View(*(points[np.abs(points) < MAX_RANGE_M] for points in (view.ends, view.passed)))
-
-
-def _thin(points: ComplexPoints, count: int) -> ComplexPoints:
-    if len(points) <= count:
-        return points
-    return points[evenly_spaced(len(points), count)]
+    def within_max_range(self) -> "View":
+        """Return the points within MAX_RANGE_M."""
+        return View(*(points[np.abs(points) < MAX_RANGE_M] for points in (self.ends, self.passed)))
 
 
 class GlobalSearch:
@@ -93,7 +90,7 @@ class GlobalSearch:
 
     def search(self, view: View) -> tuple[Array, Array]:
         """Return at most MAX_RESULTS poses (k, 3) in the map frame and their scores (k,) in 0 … 1, best first."""
-        near_view = _without_far_points(view)
+        near_view = view.within_max_range()
         if not len(near_view.ends):
             return np.empty((0, 3)), np.empty(0)
         poses = self._search_coarse_grid(near_view.thinned(COARSE_POINTS))
@@ -104,7 +101,7 @@ class GlobalSearch:
         offsets, turn = (np.arange(-steps, steps + 1) * step for steps, step in NEARBY_STEPS)
         poses = pose + np.stack(np.meshgrid(offsets, offsets, turn, indexing="ij"), axis=-1).reshape(-1, 3)
         steps = (*REFINEMENT_STEPS, REFINEMENT_STEPS[-1])
-        return self._refine(poses, _without_far_points(view), REFINED_NEARBY_POSES, steps)
+        return self._refine(poses, view.within_max_range(), REFINED_NEARBY_POSES, steps)
 
     def _refine(
         self, poses: Array, view: View, max_count: int, steps: tuple[tuple[float, float], ...]

@@ -97,6 +97,7 @@ class RegulatedPurePursuit(PathFollower):
     def _follow(self, tracker: PathTracker, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
         """Return the command for the farthest carrot whose arc is free; if no arc is free, slow down or rotate."""
         spec, lookahead_distance = self._spec, self._lookahead_distance(twist.vx)
+        can_rotate = spec.use_rotate_to_heading and not self._is_car
         fixed_carrot: Carrot | None = None
         if spec.use_fixed_curvature_lookahead:
             beyond = spec.interpolate_curvature_after_goal
@@ -110,8 +111,9 @@ class RegulatedPurePursuit(PathFollower):
             carrot = _carrot(tracker, pose, ratio * lookahead_distance, self._is_car)
             curvature_carrot = carrot if fixed_carrot is None else fixed_carrot
             backward = not tracker.is_forward or (spec.allow_reversing and carrot.x < 0.0)
-            if self._should_rotate(curvature_carrot, backward):
-                rotation = curvature_carrot.bearing(backward)
+            bearing = curvature_carrot.bearing(backward)
+            if can_rotate and abs(bearing) > spec.rotate_to_heading_min_angle:
+                rotation = bearing
                 break
             command = self._drive(tracker, curvature_carrot, backward, pose, costmap)
             arc = self._checked_arc(command, pose, costmap, self._checked_distance(tracker, carrot))
@@ -169,11 +171,6 @@ class RegulatedPurePursuit(PathFollower):
         if self._is_car:
             distance = min(distance, max(spec.min_lookahead_dist, CAR_LOOKAHEAD_RATIO * self._robot.turning_radius))
         return distance
-
-    def _should_rotate(self, carrot: Carrot, backward: bool) -> bool:
-        if not self._spec.use_rotate_to_heading or self._is_car:
-            return False
-        return abs(carrot.bearing(backward)) > self._spec.rotate_to_heading_min_angle
 
     def _drive(self, tracker: PathTracker, carrot: Carrot, backward: bool, pose: Pose2, costmap: CostmapView) -> Twist:
         """Return the command for the arc to a carrot, at the regulated speed."""
