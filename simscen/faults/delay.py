@@ -79,6 +79,7 @@ class _DelayedMessages(FaultEffect):
         return apply_correction(belief, self._correction)
 
     def end(self) -> FaultEffect | None:
+        """Return this effect if messages are still in transit, otherwise None."""
         self._ended = True
         return self if self._readings or self._commands or self._corrections else None
 

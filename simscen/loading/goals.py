@@ -41,6 +41,7 @@ def event_goals(loaded: LoadedScenario) -> dict[Keys, Goal]:
 
 
 def _goal(name: str, entry: "GoalEntry | NewGoal", spec: ScenarioSpec) -> Goal:
+    """Return a goal. Missing tolerances are taken from the goal checker of the stack."""
     checker = spec.stack.goal_checker
     return Goal(
         name=name,

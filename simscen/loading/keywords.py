@@ -85,6 +85,7 @@ class _Parser:
 
 
 def _no_match_message(candidates: Sequence[LoadedScenario], keyword: str, tags: Sequence[str]) -> str:
+    """Return the message that no scenario is selected, with a hint for an unknown tag."""
     known = sorted({tag for scenario in candidates for tag in scenario.spec.tags})
     unknown = [tag for tag in tags if tag not in known]
     if unknown:

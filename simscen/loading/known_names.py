@@ -120,6 +120,7 @@ def _movable_names(world: WorldSpec) -> list[str]:
 
 
 def _object_names(world: WorldSpec) -> list[str]:
+    """Return the names of all solid things of a world file, including its walls."""
     return [
         *_movable_names(world),
         *(obstacle.name for obstacle in world.obstacles),

@@ -62,6 +62,7 @@ def unknown_places(
 
 
 def _poses_of_references(spec: BaseModel, places: Places) -> Iterator[tuple[Reference, Any]]:
+    """Yield the references to places, with the pose or point that replaces each of them."""
     for reference in place_references(spec):
         assert isinstance(reference.annotation, PlaceAllowed)
         yield (

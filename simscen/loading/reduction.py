@@ -180,6 +180,7 @@ def _remove_parts(node: Node, parts: frozenset[Keys], prefix: Keys) -> Node | No
 
 
 def _rounded(value: object, digits: int) -> str | float | int | None:
+    """Return a number or quantity rounded to `digits` significant digits; None if this does not change it."""
     if isinstance(value, bool):
         return None
     if isinstance(value, int | float):

@@ -93,6 +93,7 @@ class RegulatedPurePursuit(Ranged, PathFollowerSpec):
 
     @model_validator(mode="after")
     def _check_interpolation(self) -> "RegulatedPurePursuit":
+        """Raise ValueError for an interpolated curvature without a separate point for the curvature."""
         if self.interpolate_curvature_after_goal and not self.use_fixed_curvature_lookahead:
             raise ValueError("`interpolate_curvature_after_goal` needs `use_fixed_curvature_lookahead: true`")
         return self

@@ -124,6 +124,7 @@ class Amcl(AmclParameters):
     @model_validator(mode="before")
     @classmethod
     def _apply_nav2_values(cls, values: Any) -> Any:
+        """Apply the deprecated `parameters: nav2` to values that are not given."""
         if isinstance(values, Mapping) and values.get("parameters") == "nav2":
             return {"laser_model_type": "likelihood_field", **values}
         return values

@@ -161,6 +161,7 @@ class Recovery(Spec):
         return [self._with_shared_parameters(entry) for entry in self.behaviors]
 
     def _with_shared_parameters(self, entry: str | BehaviorSpec) -> BehaviorSpec:
+        """Return the complete specification of a behavior that is given by name or with some of its parameters."""
         model = _SHIPPED[entry] if isinstance(entry, str) else type(entry)
         shared = type(self).model_fields.keys() & model.model_fields.keys()
         own = {} if isinstance(entry, str) else {name: getattr(entry, name) for name in entry.model_fields_set}

@@ -188,6 +188,7 @@ class ExpectedFailure(Spec):
     @model_validator(mode="before")
     @classmethod
     def _require_reason(cls, value: Any) -> Any:
+        """Raise ValueError for text, to explain how a reason is written."""
         if isinstance(value, str):
             raise ValueError("give the reason for the known failure as `{fail: REASON}`")
         return value

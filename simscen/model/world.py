@@ -168,6 +168,7 @@ class RosMapSpec(Spec):
     @field_validator("free_thresh")
     @classmethod
     def _check_thresholds(cls, free: float, info: ValidationInfo) -> float:
+        """Raise ValueError if a gray value could be both free and occupied."""
         occupied = info.data.get("occupied_thresh", 1.0)
         if free >= occupied:
             raise ValueError(f"free_thresh {free:g} must be less than occupied_thresh {occupied:g}")

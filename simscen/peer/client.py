@@ -85,6 +85,7 @@ class Step:
         self.publish(LOG, messages.log(self.stamp, level, self._peer.name, text))
 
     def _answer(self) -> bytes:
+        """Return the ANSWER frame: command, published messages, and events about goals."""
         if self.command_due or self._commanded:
             self.publish(COMMAND, messages.twist(*self._peer.command))
         for event in self._peer.goals.take_events():

@@ -84,6 +84,7 @@ def from_json(body: bytes) -> dict[str, Any]:
 
 
 def _reject_constant(word: str) -> None:
+    """Raise ValueError for NaN or Infinity in JSON."""
     raise ValueError(f"{word} is not a JSON number")
 
 

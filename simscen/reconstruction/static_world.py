@@ -168,5 +168,6 @@ def _add_scan(odds: Array, origin: Array, ends: Array) -> None:
 
 
 def _index(points: Array, shape: tuple[int, ...]) -> Indices:
+    """Return the indices (n,) of the cells of points (n, 2) in the flattened map."""
     cells = np.clip((points / RESOLUTION_M).astype(np.int64), 0, [shape[1] - 1, shape[0] - 1])
     return cells[:, 1] * shape[1] + cells[:, 0]

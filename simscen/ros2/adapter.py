@@ -290,6 +290,7 @@ class Adapter:
         return [(message.topic, message.data)] if relevant else []
 
     def _report_plan(self) -> None:
+        """Report a new plan as an event. Its reason is "goal" for the first plan to a goal, otherwise "rate"."""
         goal, plan = self._goals.current, self._estimate.plan
         if goal is None or not plan:
             return

@@ -203,6 +203,7 @@ class AdapterRun:
             self._steps_until_ready.append(step)
 
     def _process_frame(self, kind: int, content: Dict[str, Any], now: int) -> None:
+        """Update the goals by a GOAL, PREEMPT, or CANCEL frame."""
         if kind == wire.GOAL:
             self.goals.start([Goal.from_content(goal) for goal in content["goals"]])
             self._adapter.continue_after_failure = content["on_goal_failure"] == "continue"

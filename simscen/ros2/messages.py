@@ -90,6 +90,7 @@ def shift_stamps(type_name: str, message: bytes, offset_ns: int) -> bytes:
 
 @functools.lru_cache(maxsize=None)
 def _has_header(type_name: str) -> bool:
+    """Return whether a message type begins with a std_msgs/Header."""
     fields = find_type(type_name).get_fields_and_field_types()  # type: ignore[union-attr]
     return next(iter(fields.values()), "") == "std_msgs/Header"
 

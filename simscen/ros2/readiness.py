@@ -129,6 +129,7 @@ class Readiness:
         return found
 
     def _other_publishers(self, topic: Topic) -> List[str]:
+        """Return a problem for each other node that publishes a topic of simscen."""
         if topic.name in SHARED_TOPICS:
             return []
         name = self._graph.names(topic.name)

@@ -108,6 +108,7 @@ def _drivable_surfaces(mesh: TriangleMesh, diameter: float) -> Iterator[Drivable
 
 
 def _zones(part: PreparedScenario, robot: str) -> Iterator[FilterZone]:
+    """Yield the keepout and speed zones of a robot's stack at the start of the run."""
     regions, masks = part.built.world.regions, part.masks
     for region in part.stack.keepout:
         yield FilterZone("keepout", region, regions[region], robot=robot)

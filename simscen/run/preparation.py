@@ -184,6 +184,7 @@ def _clearance_range(spec: ScenarioSpec) -> float:
 
 
 def _robot_map(loaded: LoadedScenario, built: BuiltWorld) -> OccupancyGrid | None:
+    """Return the map that the stack receives, or None if it receives none."""
     if loaded.map == "none":
         return None
     return load_map(loaded.map) if loaded.map is not None else built.map

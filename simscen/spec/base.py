@@ -120,6 +120,7 @@ def field_docs(model: type) -> dict[str, str]:
 
 @cache
 def _docs_of_module(module: str) -> dict[str, dict[str, str]]:
+    """Return field docstrings by class name and field name; {} if the source of the module is not installed."""
     try:
         tree = ast.parse(inspect.getsource(sys.modules[module]))
     except OSError:

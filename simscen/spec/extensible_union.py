@@ -60,6 +60,7 @@ class ExtensibleUnion:
         )
 
     def _tag(self, value: Any) -> str | None:
+        """Return the key in `members` for a value; None if its type is missing."""
         if isinstance(value, dict):
             is_untyped = self.untyped is not None and self.untyped_key in value and "type" not in value
             return UNTYPED_TAG if is_untyped else str(value.get("type", self.default)) or None

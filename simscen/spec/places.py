@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 
 def _reject_path(name: str) -> str:
+    """Return the name. Raises PydanticCustomError for a path such as `../x` or `/x`; `1 m/s` is valid."""
     if name[0] in "/\\" or not {".", ".."}.isdisjoint(name.replace("\\", "/").split("/")):
         raise PydanticCustomError("path_name", "must not be a path")
     return name

@@ -90,6 +90,7 @@ class Quantity:
 
 
 def _text(value: str) -> str:
+    """Return a text of a file for messages, shortened to MAX_TEXT_CHARS."""
     return f"the text `{value if len(value) <= MAX_TEXT_CHARS else value[: MAX_TEXT_CHARS - 1] + '…'}`"
 
 

@@ -236,6 +236,7 @@ def search_path() -> list[str]:
 
 
 def _type_problem(entry: RegisteredType, installed: list[RegisteredType]) -> str:
+    """Return the reason why a type cannot be used, found without importing its package; "" if there is none."""
     group = GROUPS.get(entry.group)
     if group is None:
         return f"there is no group `{ENTRY_POINT_PREFIX}{entry.group}`"
@@ -274,6 +275,7 @@ def _load(entry: RegisteredType) -> type[BaseModel]:
 
 
 def _specification_problem(entry: RegisteredType, model: Any) -> str | None:
+    """Return the reason why `model` is not a valid specification class of the group; None if it is valid."""
     if model is None:
         return f"`{entry.value}` does not exist"
     if not isinstance(model, type) or not issubclass(model, tuple(map(_import_address, _BASE_CLASSES))):

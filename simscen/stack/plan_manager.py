@@ -210,6 +210,7 @@ class PlanManager:
         return FollowedPlan(path, self._radius, self._costmap.view)
 
     def _adopt(self, tick: int, now: float, result: PlanResult, reason: str) -> Event:
+        """Follow a new plan. Return the event PLAN_MADE."""
         self.plan = self._make_followed_plan(result.path)
         self._adopted_at = self._scheduled_at = now
         details: dict[str, Value] = {"reason": reason, "length": round(result.path.length(), 6)}

@@ -118,6 +118,7 @@ class MapTrust:
         return self._field.endpoint_cells(poses[::step], beams.ends)
 
     def _classes(self, cells: TableIndices) -> npt.NDArray[np.uint8]:
+        """Return the class of each cell: _UNMAPPED, _FITS, or _MISSES."""
         classes: npt.NDArray[np.uint8] = self._class_table.take(cells, mode="wrap")
         return classes
 

@@ -196,6 +196,7 @@ class Avoidance:
         return np.asarray(self._discs.clearance(costmap, rollouts.x[index], rollouts.y[index], rollouts.yaw[index]))
 
     def _goal(self, pose: Pose2, path: FollowedPath | None, home: Pose2 | None) -> tuple[float, float]:
+        """Return the position (x, y) that the robot should approach."""
         if path is not None:
             return path.ahead(pose, self._speed * HORIZON_S)
         return (pose.x, pose.y) if home is None else (home.x, home.y)

@@ -87,6 +87,7 @@ class Tracker:
         return bool((has_appeared & (ranges >= scan.range_min) & (ranges <= self._max_range(scan))).any())
 
     def _max_range(self, scan: Scan) -> float:
+        """Return the range in m up to which hits are processed."""
         return min(scan.range_max, self._spec.max_range)
 
     def _update_tracks(self, current: CurrentScan) -> None:

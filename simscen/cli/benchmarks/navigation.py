@@ -161,4 +161,5 @@ def with_stack(file: Path, experiments: list["Experiment"], generated: Path, pro
 
 
 def _is_selected(name: str, only: list[str] | None) -> bool:
+    """Return whether --only selects the name of an experiment or group."""
     return not only or any(part.casefold() in name.casefold() for part in only)

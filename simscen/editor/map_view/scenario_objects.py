@@ -86,6 +86,7 @@ def _goals(value: Any, keys: Keys, prefix: str, places: Places) -> Iterator[MapO
 
 
 def _event(event: dict[str, Any], keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
+    """Yield the objects for the triggers and actions of an event."""
     yield from _triggers(event.get("when"), (*keys, "when"), f"trigger of {label}", places)
     actions, own = event.get("do"), (*keys, "do")
     written = [((*own, index), action) for index, action in enumerate(items(actions))]
@@ -151,6 +152,7 @@ def _triggers(value: Any, keys: Keys, label: str, places: Places) -> Iterator[Ma
 
 
 def _zones(data: dict[str, Any], keys: Keys, prefix: str) -> Iterator[MapObject]:
+    """Yield the keepout and speed zones of the stack in the data of a scenario or robot."""
     stack = mapping(data.get("stack"))
     for index, region in enumerate(items(stack.get("keepout"))):
         own = (*keys, "stack", "keepout", index)
@@ -161,6 +163,7 @@ def _zones(data: dict[str, Any], keys: Keys, prefix: str) -> Iterator[MapObject]
 
 
 def _faults(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObject]:
+    """Yield the faults of a scenario or robot, and the objects for their triggers."""
     for index, fault in enumerate(map(mapping, items(data.get("faults")))):
         own = (*keys, "faults", index)
         label = str(fault.get("name", f"{fault.get('sensor', 'fault')} {_kind(fault, FaultEntry)}"))

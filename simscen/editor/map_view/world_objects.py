@@ -67,6 +67,7 @@ def _walls_ramps_doors(data: dict[str, Any], keys: Keys, places: Places) -> Iter
 
 
 def _object(thing: dict[str, Any], keys: Keys, kind: str, places: Places) -> Iterator[MapObject]:
+    """Yield an obstacle or movable object, and its path if it moves."""
     handle = pose_handle(thing.get("pose"), (*keys, "pose"), places)
     label = str(thing.get("name", kind))
     yield MapObject(keys, kind, label, handle, outline(thing))

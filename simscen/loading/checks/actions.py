@@ -50,6 +50,7 @@ def speed_zones_without_effect(loaded: LoadedScenario) -> Iterator[CheckProblem]
 
 
 def _limits_speed(one: LocatedAction) -> bool:
+    """Return whether a zone action enables a speed zone."""
     return one.kind == "speed_zone" and one.spec.enabled and one.spec.region is not None
 
 

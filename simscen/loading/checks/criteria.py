@@ -59,6 +59,7 @@ def impossible_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 
 def _why_impossible(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:
+    """Return the reason why no run can pass a criterion of this kind; None if a run can."""
     needs_goal = kind in GOAL_CRITERIA or (kind == "path_length" and criterion.max_ratio is not None)
     if needs_goal and not goal_names(loaded):
         return "the robot gets no goal"

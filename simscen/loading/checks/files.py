@@ -94,6 +94,7 @@ def file_kind(file: Path, root: Path) -> str:
 
 
 def _base_file_problems(file: Path, library: Library) -> list[Problem]:
+    """Return the problems of a file that scenarios extend, and of the world and robot that it names."""
     tree, problems = library.read(file)
     if problems or tree is None:
         return library.with_source(problems)

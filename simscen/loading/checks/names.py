@@ -56,6 +56,7 @@ def _unknown_references(scope: NameScope) -> Iterator[tuple[Reference, list[str]
 
 
 def _forbidden_robots(scope: NameScope, reference: Reference) -> tuple[str, ...]:
+    """Return the names of the robots that a reference to a movable object must not name."""
     own = (scope.loaded.robot_name,) if reference.target == "movable" else ()
     return (*own, *scope.loaded.other_robots)
 

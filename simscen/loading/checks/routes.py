@@ -195,6 +195,7 @@ def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tu
 
 
 def _requires_success(entry: AnyCriterion) -> bool:
+    """Return whether a criterion fails the run unless all goals are reached."""
     requires = (
         (entry.kind == "result" and entry.chosen.status == "SUCCEEDED")
         or (entry.kind == "goals_reached" and not entry.chosen.goals)

@@ -132,6 +132,7 @@ def world_reader_notes(world: World, source: LoadedWorld, root: Path) -> list[Pr
 
 
 def _with_robot_spec(loaded: LoadedScenario) -> LoadedScenario:
+    """Return the scenario with the specification of its robot, which is inferred for a URDF alone."""
     if loaded.robot.spec is not None:
         return loaded
     return replace(loaded, robot=replace(loaded.robot, spec=load_robot(loaded)[0]))

@@ -121,6 +121,7 @@ def _output_folder_conflicts(files: list[Path], root: Path) -> Iterator[Problem]
 
 
 def _duplicate_ids(files: list[Path], root: Path) -> Iterator[Problem]:
+    """Yield a problem for each scenario with the same id as another scenario, ignoring case."""
     seen: dict[str, Path] = {}
     for file in files:
         other = seen.setdefault(scenario_id(file, root).casefold(), file)

@@ -137,6 +137,7 @@ def _resolved(path: Path) -> Path:
 
 
 def _similar_name_hint(missing: Path) -> str:
+    """Return "did you mean …?" if the folder of a missing file has a file with a similar name; else ""."""
     try:
         names = sorted(entry.name for entry in os.scandir(missing.parent))
     except OSError:

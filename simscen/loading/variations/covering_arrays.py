@@ -87,6 +87,7 @@ def _candidate_row(
 
 
 def _any_row_with(pair: Pair, counts: Sequence[int], is_allowed: Callable[[Row], bool]) -> Row | None:
+    """Return the first allowed row that contains `pair`, among the first MAX_CHECKED_ROWS with the pair; else None."""
     a, x, b, y = pair
     fixed = {a: (x,), b: (y,)}
     choices = [fixed.get(parameter, range(count)) for parameter, count in enumerate(counts)]

@@ -221,6 +221,7 @@ def _too_many_problem(space: VariationSpace, position: Position) -> Problem | No
 
 
 def _position_of_require(tree: MappingNode) -> Position:
+    """Return the position of the first `require` in `variations`; of `variations` if there is none."""
     value = tree.entries[VARIATIONS].value
     for block in items_of(value) or [value]:
         if (require := child(block, "require")) is not None:
@@ -243,6 +244,7 @@ def _option_size(option: Option) -> int:
 
 
 def _node_size(node: Node) -> int:
+    """Return the number of keys and values of a node, including itself."""
     return sum(1 for _ in _positions(node))
 
 

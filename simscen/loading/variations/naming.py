@@ -95,4 +95,5 @@ def _value_text(node: Node) -> str:
 
 
 def _sanitize(text: str) -> str:
+    """Return the text without spaces, and with `_` instead of characters that are invalid in names."""
     return _INVALID_CHARS_PATTERN.sub("_", text.replace(" ", "")).strip("_")

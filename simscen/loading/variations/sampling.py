@@ -111,5 +111,6 @@ def _truncated_normal_quantile(normal: Normal, u: float) -> Any:
 
 
 def _with_unit(number: float, unit: str) -> Any:
+    """Return the rounded number; with a unit as text, such as "0.5 m"."""
     rounded = float(f"{number:.{_SIGNIFICANT_DIGITS}g}")
     return f"{rounded!r} {unit}" if unit else rounded

@@ -111,6 +111,7 @@ class _Composer:
         return node
 
     def _scalar_value(self, event: ev.ScalarEvent) -> str | int | float | bool | None:
+        """Return the value of a scalar; for an integer that is too large, report a problem and return 0."""
         if not event.implicit[0]:
             return str(event.value)
         try:

@@ -49,6 +49,7 @@ def _represent_list(dumper: yaml.SafeDumper, value: list[Any]) -> yaml.Node:
 
 
 def _represent_mapping(dumper: yaml.SafeDumper, value: dict[str, Any]) -> yaml.Node:
+    """Return the YAML node of a mapping, in braces if it contains a scalar and is not the whole file."""
     flat = any(not isinstance(item, dict | list) for item in value.values()) and "simscen" not in value
     return dumper.represent_mapping("tag:yaml.org,2002:map", value, flow_style=flat)
 
@@ -64,6 +65,7 @@ def world_text(spec: WorldSpec) -> str:
 
 
 def _in_order(value: Any) -> Any:
+    """Return the data with the keys `simscen` and `name` at the beginning of each mapping."""
     if isinstance(value, list):
         return [_in_order(item) for item in value]
     if not isinstance(value, dict):

@@ -112,10 +112,12 @@ def median_of_three(values: Array) -> Array:
 
 
 def _median_fraction(fractions: Array) -> float:
+    """Return the median of the fractions that are not nan; 0 if all are."""
     return float(np.nanmedian(fractions)) if np.isfinite(fractions).any() else 0.0
 
 
 def _merge_tracks(tracks: list[ObjectTrack], compared: ComparedScans, usable: Indices) -> list[ObjectTrack]:
+    """Merge tracks of the same standing object."""
     merged: list[ObjectTrack] = []
     for track in tracks:
         same = next((earlier for earlier in merged if _is_same(earlier, track, compared, usable)), None)

@@ -109,6 +109,7 @@ def _associate(active: list[ObjectTrack], clusters: list[ScanCluster]) -> None:
 
 
 def _link_tracks(tracks: list[ObjectTrack]) -> list[ObjectTrack]:
+    """Merge the tracks of an object before and after it was hidden."""
     linked: list[ObjectTrack] = []
     for track in tracks:
         before = [(gap, earlier) for earlier in linked if (gap := _link_distance(earlier, track)) is not None]

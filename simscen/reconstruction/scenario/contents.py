@@ -221,6 +221,7 @@ def _goal_reason(goal: RecordedGoal) -> Reason:
 
 
 def _timeout(goal: RecordedGoal, duration: float) -> float:
+    """Return the timeout of a goal in s. `duration` is the duration of the drive in s."""
     if goal.ended is not None and goal.error == TIMEOUT_CODE:
         return goal.ended - goal.sent
     if goal.ended is None:
@@ -229,6 +230,7 @@ def _timeout(goal: RecordedGoal, duration: float) -> float:
 
 
 def _wait(goal: RecordedGoal, following: RecordedGoal | None) -> float:
+    """Return the time in s that the robot waits at a goal before the following goal."""
     if following is None or goal.ended is None or goal.status not in ("reached", "unknown"):
         return 0.0
     gap = following.sent - goal.ended

@@ -163,6 +163,7 @@ def _world_of_file(file: Path, out: Path, reason: Reason, new: NewFiles) -> Worl
 
 
 def _differs(given: OccupancyGrid, drawn: OccupancyGrid) -> bool:
+    """Return whether the map `given` to the robot and the map `drawn` from the world have different walls."""
     if given.shape != drawn.shape or given.origin.distance(drawn.origin) > 1e-6:
         return True
     return float(np.mean((given.cells > 50) != (drawn.cells > 50))) > MAX_EQUAL_MAP_DIFFERENCE

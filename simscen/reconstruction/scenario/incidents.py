@@ -119,6 +119,7 @@ def _lost(drive: RecordedDrive) -> Iterator[Incident]:
 
 
 def _goals(drive: RecordedDrive) -> Iterator[Incident]:
+    """Yield an incident for each failed goal, and for the last goal if it has no result."""
     for number, goal in enumerate(drive.goals):
         if goal.status == "failed" and goal.ended is not None:
             code = f" with {goal.error}" if goal.error else ""

@@ -157,6 +157,7 @@ def observed_limits(drive: RecordedDrive) -> tuple[float, float]:
 
 
 def _largest(signal: TimedValues, column: int) -> float:
+    """Return the SPEED_PERCENTILE of the absolute values in a column; 0 without values."""
     return float(np.percentile(np.abs(signal.values[:, column]), SPEED_PERCENTILE)) if len(signal) else 0.0
 
 

@@ -168,6 +168,7 @@ def _numbers(name: str, log: float, run: float, unit: str) -> ComparedQuantity:
 
 
 def _outcome(goal: RecordedGoal) -> str:
+    """Return status, time, and error of a goal as text."""
     end = "" if goal.ended is None else f" at {goal.ended:.2f} s"
     return f"{goal.status}{end}{f' ({goal.error})' if goal.error else ''}"
 

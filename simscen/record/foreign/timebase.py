@@ -163,6 +163,10 @@ class Timebase:
 
 
 def _header_times(logged: Ticks, anchor: StampedMessages | None) -> Ticks:
+    """Convert times of logging to the clock of the anchor's stamps, by interpolation between the anchor's messages.
+
+    Before and after these messages, the difference of the two clocks is constant.
+    """
     return logged if anchor is None else to_clock_of_stamps(logged, anchor.logged, anchor.stamps)
 
 

@@ -227,6 +227,7 @@ class ForeignTraceReader:
             self._add_role(role, ticks, values)
 
     def _short_reason(self, role: str) -> str:
+        """Return the reason why the log has no messages with a role, without other topics."""
         return self._reason_missing(role, self._options.topic(role)).split(";")[0]
 
     def _add_role(self, role: str, ticks: Ticks, values: list[Any]) -> None:

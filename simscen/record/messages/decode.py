@@ -258,9 +258,11 @@ POSE_DECODERS: dict[str, Callable[[MessageReader], StampedPose]] = {
 
 
 def _planar_twist(reader: MessageReader) -> Numbers:
+    """Return vx, vy, wz of the next geometry_msgs/msg/Twist."""
     values = reader.take("6d")
     return tuple(values[i] for i in _PLANAR_TWIST_INDICES)
 
 
 def _planar_covariance(covariance: Numbers) -> Numbers:
+    """Return xx, xy, xyaw, yy, yyaw, yawyaw of a 6 x 6 covariance."""
     return tuple(covariance[i] for i in _COVARIANCE_INDICES)

@@ -133,6 +133,7 @@ def _outlines(event: Event) -> list[list[tuple[float, float]]]:
 
 
 def _corners(part: Value) -> list[tuple[float, float]]:
+    """Return the corners of an outline in an event, without invalid ones."""
     corners = []
     for corner in part if isinstance(part, list) else []:
         match corner:

@@ -192,6 +192,7 @@ def _path(messages: MessagesByTopic, name: str, tick: int, time: Clock) -> Path 
 
 
 def _costmaps(messages: MessagesByTopic) -> Iterator[CostGrid]:
+    """Yield the last global costmap and the last local costmap, if there are any."""
     for name, topic in (("global", topics.GLOBAL_COSTMAP.name), ("local", topics.LOCAL_COSTMAP.name)):
         if messages.get(topic):
             yield _decode_message(topic, partial(_decode_costmap, name), messages[topic][-1])

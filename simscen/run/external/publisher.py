@@ -120,6 +120,7 @@ class StepPublisher:
             self._queue.append((self._numbers[topic.name], data))
 
     def _publish_exact(self, reading: Scan | Odometry) -> None:
+        """Publish a reading in full precision, if the stack has subscribed to the exact topic."""
         name = self._sensors.topic_of(reading).name + EXACT_SUFFIX
         if name in self._requested_topics:
             data = _exact_scan(reading) if isinstance(reading, Scan) else messages.pose2d(*reading.pose)

@@ -106,6 +106,7 @@ class ReferenceStackPeer(Peer):
         return self._stack
 
     def _readings(self, received: list[Message]) -> Iterator[Reading]:
+        """Yield the readings in the received messages in full precision."""
         exact = {m.topic: iter([e.content for e in received if e.topic == m.topic + EXACT_SUFFIX]) for m in received}
         for message in received:
             sensor = self._sensors[message.topic]

@@ -184,6 +184,7 @@ class ExternalStack:
             self._process = None
 
     def _request_answer(self, tick: int, is_command_due: bool) -> Answer:
+        """Send a step and return the answer. `is_command_due` states whether a command is due."""
         assert self._process is not None
         limit = self._command.answer_limit
         if self._awaits_first_answer or tick <= self._welcome.first_answer_until * self._time.rate:

@@ -205,6 +205,7 @@ class StackProcess:
         return received >= wire.SIZE.size and received >= wire.SIZE.size + self._frame_size()
 
     def _frame_size(self) -> int:
+        """Return the size of the next frame in bytes. Raises RunError if it is invalid."""
         (size,) = wire.SIZE.unpack_from(self._receive_buffer)
         if not 1 <= size <= wire.MAX_FRAME_BYTES:
             raise self.error(

@@ -163,6 +163,7 @@ class FaultInjector:
         return self._last_belief[2]
 
     def _in_order(self) -> list[_ActiveFault]:
+        """Return the active faults in the order of the scenario."""
         return [self.active[key] for key in sorted(self.active)]
 
     def _delayed_readings(self, active: _ActiveFault) -> Sequence[Reading]:

@@ -125,6 +125,7 @@ class TriggerState:
         return not self._remaining and not self._scheduled
 
     def _has_edge(self, now: Situation) -> bool:
+        """Return whether the condition has changed in the direction that fires the trigger."""
         before, self._was_true = self._was_true, self._condition.holds(now)
         return self._was_true != before and self._was_true == (self._trigger.edge == "rising")
 
@@ -196,4 +197,5 @@ class RelativeSituation:
         return (0 if last is None else last) - self._start_tick
 
     def __getattr__(self, name: str) -> Any:
+        """Return any other attribute of the situation, such as the robot's pose."""
         return getattr(self._now, name)

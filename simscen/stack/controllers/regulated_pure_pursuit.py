@@ -164,6 +164,7 @@ class RegulatedPurePursuit(PathFollower):
         return command
 
     def _lookahead_distance(self, speed: float) -> float:
+        """Return the lookahead distance in m at this speed."""
         spec = self._spec
         if not spec.use_velocity_scaled_lookahead_dist:
             return spec.lookahead_dist

@@ -95,6 +95,7 @@ class FreeSpace:
 
     @cached_property
     def _cells(self) -> npt.NDArray[np.int32]:
+        """Flat indices of the cells to draw from."""
         free = np.flatnonzero(self._grid.cells == FREE)
         return (free if len(free) else np.arange(self._grid.cells.size)).astype(np.int32)
 

@@ -145,6 +145,7 @@ class LikelihoodFieldProb:
         return 1 / max(1, int(np.count_nonzero(beams.ranges < beams.range_max))) / self.exponent
 
     def _beam_exponents(self, count: int) -> Float32:
+        """Return an array (count,) filled with `exponent`."""
         if count != len(self._exponents):
             self._exponents = np.full(count, self.exponent, dtype=np.float32)
         return self._exponents

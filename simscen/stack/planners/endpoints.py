@@ -60,6 +60,7 @@ def reachable_cells(costs: TraversalCosts, start: tuple[float, float]) -> npt.ND
 
 
 def _raise_if_blocked(costs: TraversalCosts, pose: Pose2, outside: ErrorCode, occupied: ErrorCode, name: str) -> None:
+    """Raise the error `outside` if a pose is outside the map, or `occupied` if it is in an obstacle."""
     row, column = costs.cell((pose.x, pose.y))
     if not (0 <= row < costs.height and 0 <= column < costs.width):
         raise NavigationFailure(outside, f"{name} ({pose.x:.2f}, {pose.y:.2f}) is outside the map")

@@ -103,6 +103,7 @@ class CheckedStack(CheckedPlugin):
                 self.raise_invalid(f"reported `{event.kind}` of tick {event.tick} at tick {tick}")
 
     def _check_costmap(self, costmap: object) -> None:
+        """Raise RunError if the name, the frame, or the cell type (int8) of a published costmap is wrong."""
         if not isinstance(costmap, CostGrid) or not isinstance(costmap.grid, OccupancyGrid):
             self.raise_invalid(f"published {type(costmap).__name__} instead of a CostGrid")
         if costmap.name not in ("global", "local") or costmap.frame not in ("map", "odom"):
