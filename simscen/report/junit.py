@@ -119,10 +119,8 @@ def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[R
     used_names = {name}
     for run in incomplete:
         _add_case(suite, run, unique_name(_case_name(run), used_names, " #"), family)
-    is_refuted, is_open = (
-        claim.status is ClaimStatus.REFUTED,
-        claim.status in (ClaimStatus.UNDECIDED, ClaimStatus.BLOCKED),
-    )
+    is_refuted = claim.status is ClaimStatus.REFUTED
+    is_open = claim.status in (ClaimStatus.UNDECIDED, ClaimStatus.BLOCKED)
     counts = {"tests": 1 + len(incomplete), "failures": int(is_refuted), "errors": is_open + len(incomplete)}
     for element in (root, suite):
         _set_sums(element, [{**counts, "time": sum(run.wall for run in runs)}])

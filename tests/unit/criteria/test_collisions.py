@@ -82,3 +82,12 @@ def test_later_samples_do_not_decide_an_early_contact():
     trace.velocity.values[41:, 0] = 1.0
     late = replace(trace, velocity=Samples(trace.velocity.ticks[40:], trace.velocity.values[40:]))
     assert verdict({"caused_by_robot": True}, late).status is Status.PASS
+
+
+@pytest.mark.parametrize(("objects", "status"), [(None, Status.PASS), ({"shelf"}, Status.PASS), ({"cart"}, None)])
+def test_contacts_with_an_object_that_nothing_names_are_inconclusive(objects, status):
+    """The object is unknown only if the names of all objects are known."""
+    trace = synthetic_trace({"seconds": 8, "truth": [[0, 0, 0], [8, 2, 0]], "events": HIT})
+    case = replace(synthetic_case({}), objects=objects)
+    (found,) = judge([AnyCriterion.model_validate({"collisions": {"with": "shelf"}})], trace, case)
+    assert found.status is (status or Status.INCONCLUSIVE)
