@@ -30,6 +30,8 @@ NODE_SEARCH_PERIOD_S = 5.0
 CONNECT_TIMEOUT_S = 5.0
 START_TIMEOUT_S = 120.0
 """Time to wait until the first runner has started."""
+CLOSE_TIMEOUT_S = 10.0
+"""Time to wait until the runners have deleted their files."""
 POLL_PERIOD_S = 0.5
 MAX_UNREAD_UPDATES = 64
 """Number of unread updates after which a runner pauses."""
@@ -80,6 +82,8 @@ class RayBackend:
         return self
 
     def __exit__(self, *_: object) -> None:
+        if closing := [runner.actor.close.remote() for runner in self._runners if runner.call is None]:
+            ray.wait(closing, num_returns=len(closing), timeout=CLOSE_TIMEOUT_S)
         self._kill_runners()
         ray.shutdown()
 

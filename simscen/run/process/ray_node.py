@@ -94,6 +94,11 @@ class NodeRunner:
                 shutil.rmtree(folder, ignore_errors=True)
             yield update
 
+    def close(self) -> None:
+        """End the processes of this runner, and delete its files."""
+        self._supervisor.close()
+        self._temporary.cleanup()
+
     def _take_job(self, queue: Any, runner: str) -> Job | None:
         packed: PackedJob | None = self._receive(queue.take.remote(runner))
         return None if packed is None else self._unpacker.unpack(packed, self._output_folder(packed.number))

@@ -118,3 +118,10 @@ def test_a_runner_reports_the_version_and_the_code_of_its_simscen() -> None:
     from simscen.run.platform_fingerprint import source_digest
 
     assert NodeRunner(1, (), receive).software() == (__version__, source_digest())
+
+
+def test_a_closed_runner_leaves_no_files() -> None:
+    runner = NodeRunner(1, (), receive)
+    (runner._folder / "inputs").mkdir()
+    runner.close()
+    assert not runner._folder.exists()
