@@ -272,6 +272,39 @@ def test_short_state_counts_at_the_next_sample():
     assert not signal("in_collision", words, **{"with": "wall"}).any()
 
 
+@pytest.mark.parametrize(
+    ("name", "arguments", "known"),
+    [
+        ("in_collision", {}, {"objects": {"cart"}}),
+        ("in_collision", {"with": "cart"}, {"objects": {"cart"}}),
+        ("event_active", {"event": "rush hour"}, {"labels": {"rush hour"}}),
+        ("event_active", {"event": "rush hour"}, {"labels": None}),
+    ],
+)
+def test_signal_of_a_known_name_is_read(name, arguments, known):
+    case = replace(synthetic_case({}), **known)
+    assert not read_signal(name, synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]}), case, arguments).any()
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "known"),
+    [
+        ("in_collision", {"with": "box"}, {"objects": {"cart"}}),
+        ("event_active", {"event": "rush hour"}, {"labels": {"lunch"}}),
+    ],
+)
+def test_signal_of_an_unknown_name_is_refused(name, arguments, known):
+    case = replace(synthetic_case({}), **known)
+    with pytest.raises(MissingEvidence):
+        read_signal(name, synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]]}), case, arguments)
+
+
+def test_goals_that_are_accepted_at_the_same_tick_are_active_together():
+    events = [[1, "goal.accepted", "a"], [1, "goal.accepted", "b"], [2, "goal.reached", "a"]]
+    values = signal("goal_active", {"seconds": 3, "truth": [[0, 0, 0]], "events": events}, goal="a")
+    assert [at(values, t) for t in (0.975, 1, 1.975, 2)] == [0, 1, 1, 0]
+
+
 def test_contacts_with_two_objects_end_independently():
     events = [
         [1, "collision.started", "a"],

@@ -39,6 +39,22 @@ def test_teleportation_of_an_object_is_not_a_speed():
     ]
 
 
+def test_speed_is_averaged_from_the_first_sample_after_a_teleportation():
+    placed = with_event("crate jumps", 1.9, [1.9, "object.placed", "crate", {}])
+    fast_at_first = {"crate": [[0, 2, 4], [1.9, 2, 4], [1.925, 2.0, 0.3], [1.95, 2.1, 0.3], [2, 2.15, 0.3]]}
+    assert why("collisions", [*box(0, "crate", 2, 4, 0.4, 0.4), *placed, HIT], at=2, objects=fast_at_first) == [
+        "why: crate: event `crate jumps` had moved it 0.10 s before, it moved at 2.00 m/s"
+    ]
+
+
+def test_object_without_a_sample_between_its_teleportation_and_the_contact_has_no_speed():
+    placed = with_event("crate jumps", 1.985, [1.985, "object.placed", "crate", {}])
+    trajectory = {"crate": [[0, 2, 4], [1.985, 2, 4], [2, 2, 0.3]]}
+    assert why("collisions", [*box(0, "crate", 2, 4, 0.4, 0.4), *placed, HIT], at=2, objects=trajectory) == [
+        "why: crate: event `crate jumps` had moved it 0.02 s before"
+    ]
+
+
 def test_event_that_pushed_the_object_is_named():
     pushed = with_event("crate slides", 1, [1, "object.pushed", "crate", {"impulse": [0, -50]}])
     trajectory = {"crate": [[0, 2, 4], [1, 2, 4], [2, 2, 0.5], [10, 2, 0.5]]}
