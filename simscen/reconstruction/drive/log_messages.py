@@ -5,6 +5,7 @@ A role is the purpose of a topic, such as `odom` or `goal`. Each role has a defa
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +16,7 @@ from simscen.record.foreign.decoded_messages import DECODERS
 from simscen.record.foreign.options import TOPICS
 from simscen.record.foreign.raw_messages import (
     Decoders,
+    InvalidPose,
     RawMessage,
     UnusableLog,
     open_messages,
@@ -128,12 +130,19 @@ def collect_messages(path: Path, named: Mapping[str, str], has_truth: bool = Fal
     stream = open_messages(path, _TopicsToRead(roles) if path.is_dir() else roles)
     messages = LogMessages()
     other_scans: dict[str, list[LoggedMessage]] = {}
+    invalid_poses: Counter[str] = Counter()
     for raw in stream:
         for role in roles.get(raw.topic, ()):
             if raw.type in _DECODERS[role]:
-                messages.by_role.setdefault(role, []).append(_decode(raw, role, frame_prefix))
+                try:
+                    messages.by_role.setdefault(role, []).append(_decode(raw, role, frame_prefix))
+                except InvalidPose:
+                    invalid_poses[raw.topic] += role == roles[raw.topic][0]
         if raw.topic not in roles and raw.type == topics.SCAN_TYPE and raw.topic.startswith(namespace):
             other_scans.setdefault(raw.topic, []).append(_decode(raw, "scan", frame_prefix))
+    messages.notes += [
+        f"{count} poses on {topic}, whose orientation is invalid" for topic, count in invalid_poses.items()
+    ]
     for role in named:
         if not messages.of(role):
             topic, hint = absolute[role], f"its topics: {', '.join(sorted(stream.topics)[:12]) or 'none'}"

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from simscen.record import topics
 from simscen.record.foreign.options import TOPICS, ForeignLogOptions
-from simscen.record.foreign.raw_messages import Decoders, RawMessage
+from simscen.record.foreign.raw_messages import Decoders, InvalidPose, RawMessage
 from simscen.record.messages import decode
 from simscen.record.messages.decode import MessageReader
 
@@ -42,11 +42,13 @@ DECODERS: dict[str, Decoders] = {
 class DecodedMessages:
     """Times of logging in ns and decoded messages, by role.
 
-    `problems` are the reasons why messages of a role could not be decoded.
+    `problems` are the reasons why messages of a role could not be decoded. `invalid_poses` are the numbers of messages
+    by topic that are ignored because of an invalid orientation.
     """
 
     by_role: dict[str, list[tuple[int, Any]]] = field(default_factory=lambda: defaultdict(list))
     problems: dict[str, str] = field(default_factory=dict)
+    invalid_poses: Counter[str] = field(default_factory=Counter)
 
 
 def topic_roles(options: ForeignLogOptions) -> dict[str, list[str]]:
@@ -67,10 +69,17 @@ def decode_messages(raw: Iterable[RawMessage], roles: Mapping[str, Sequence[str]
     """
     decoded = DecodedMessages()
     for message in raw:
-        for role in roles.get(message.topic, ()):
+        message_roles = roles.get(message.topic, ())
+        for role in message_roles:
             messages = decoded.by_role[role]
             if mismatch := message.mismatch(DECODERS[role]):
                 decoded.problems[role] = mismatch
-            else:
+                continue
+            try:
                 messages.append((message.time, message.decode(DECODERS[role], f"message {len(messages) + 1}")))
+            except InvalidPose:
+                decoded.invalid_poses[message.topic] += role == message_roles[0]
+    for topic in decoded.invalid_poses:
+        without = [role for role in roles[topic] if not decoded.by_role[role]]
+        decoded.problems |= dict.fromkeys(without, f"all messages of {topic} have an invalid orientation")
     return decoded

@@ -13,7 +13,7 @@ from simscen.record.foreign.bag_metadata import read_bag_metadata
 from simscen.record.log_header import ROBOTS_KEY
 from simscen.record.log_reader import invalid_log, unreadable_log_as_invalid_input
 from simscen.record.mcap_reader import RecordReader, is_mcap, open_log
-from simscen.record.messages.decode import MessageReader, decode_checked
+from simscen.record.messages.decode import InvalidOrientation, MessageReader, decode_checked
 
 Decoders = Mapping[str, Callable[[MessageReader], Any]]
 """Functions that decode a message, by ROS message type."""
@@ -25,6 +25,15 @@ class UnusableLog(ValueError):
     def __init__(self, message: str, hint: str = "") -> None:
         self.hint = hint
         super().__init__(message)
+
+
+class InvalidPose(UnusableLog):
+    """Message whose orientation is not a rotation, as from a tracking system that has lost the robot. It is ignored."""
+
+
+def invalid_pose_notes(counts: Mapping[str, int]) -> list[str]:
+    """Return notes on the ignored messages. `counts` are their numbers by topic."""
+    return [f"{topic}: messages with an invalid orientation are ignored ({count})" for topic, count in counts.items()]
 
 
 @contextmanager
@@ -55,12 +64,14 @@ class RawMessage(NamedTuple):
     def decode(self, decoders: Decoders, label: str = "a message", frame_prefix: str = "") -> Any:
         """Return the decoded message. Raises UnusableLog, with the `label` of the message, if this is impossible.
 
-        `frame_prefix` is removed from the names of frames.
+        Raises InvalidPose for an invalid orientation. `frame_prefix` is removed from the names of frames.
         """
         if mismatch := self.mismatch(decoders):
             raise UnusableLog(mismatch)
         try:
             return decode_checked(decoders[self.type], self.data, frame_prefix)
+        except InvalidOrientation as error:
+            raise InvalidPose(f"{label} of {self.topic}: {error}") from error
         except (ValueError, OverflowError) as error:
             raise UnusableLog(f"{label} of {self.topic} cannot be read as {self.type}: {error}") from error
 

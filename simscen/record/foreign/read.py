@@ -16,7 +16,12 @@ from simscen.core.records.verdict import LogCoverage
 from simscen.record import topics
 from simscen.record.foreign.decoded_messages import DecodedMessages, decode_messages, topic_roles
 from simscen.record.foreign.options import ForeignLogOptions
-from simscen.record.foreign.raw_messages import RawMessage, open_messages, unusable_log_as_invalid_input
+from simscen.record.foreign.raw_messages import (
+    RawMessage,
+    invalid_pose_notes,
+    open_messages,
+    unusable_log_as_invalid_input,
+)
 from simscen.record.foreign.timebase import Timebase
 from simscen.record.foreign.trace_reader import ForeignTraceReader
 from simscen.record.foreign.transforms import is_upside_down, lidar_mount
@@ -54,6 +59,7 @@ def read_foreign_log(path: Path, options: ForeignLogOptions, with_sensors: bool 
         decoded = decode_messages(messages if collector is None else collector.collect(messages), roles)
         with np.errstate(all="ignore"):  # the judge reports numbers that are not finite
             reader = ForeignTraceReader(decoded, messages.topics, options)
+        reader.notes += invalid_pose_notes(decoded.invalid_poses)
         end = reader.time.end
         if messages.complete:
             reader.rows.events.append(Event(end, EventKind.RUN_ENDED, "the recording ends"))

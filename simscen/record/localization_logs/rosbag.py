@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,7 +13,13 @@ from simscen.core.clock import NS_PER_SECOND
 from simscen.core.geometry import Pose3
 from simscen.record import topics
 from simscen.record.foreign.options import parse_frame_pair
-from simscen.record.foreign.raw_messages import UnusableLog, open_messages
+from simscen.record.foreign.raw_messages import (
+    InvalidPose,
+    RawMessage,
+    UnusableLog,
+    invalid_pose_notes,
+    open_messages,
+)
 from simscen.record.foreign.transforms import TransformTree, UnknownTransform, is_upside_down, lidar_mount
 from simscen.record.localization_logs.rows import (
     MAX_COORDINATE_M,
@@ -48,6 +55,7 @@ class _Messages:
     tf_indices: dict[int, int] = field(default_factory=dict)
     topics: dict[str, str] = field(default_factory=dict)
     is_complete: bool = True
+    notes: list[str] = field(default_factory=list)
 
     def sort_by_time(self) -> None:
         """Sort all messages by the time of logging, and number them again: an MCAP file may have any order.
@@ -95,7 +103,8 @@ def read_rosbag_rows(path: Path, odometry: str, scan: str, reference: str | None
     names = ", ".join(sorted(messages.topics)[:12]) or "none"
     rows = LocalizationRows(hint=f"its topics: {names}; name others with --odom, --scan and --reference")
     if reference is not None and not messages.truth:
-        raise UnusableLog(f"it has no messages on {reference}", rows.hint)
+        raise UnusableLog("; ".join((f"it has no messages on {reference}", *messages.notes)), rows.hint)
+    rows.notes += messages.notes
     if not messages.is_complete:
         rows.notes.append("the log is truncated")
     truth = reference or topics.TRUTH.name
@@ -120,23 +129,33 @@ def _collect_messages(path: Path, odometry: str, scan: str, truth: str) -> _Mess
     tf = [topics.TF.name] if needs_tf else []
     stream = open_messages(path, {odometry, scan, truth, topics.TF_STATIC.name, INITIAL_POSE_TOPIC, *tf})
     messages = _Messages()
+    invalid_poses: Counter[str] = Counter()
     for index, raw in enumerate(stream):
-        if raw.topic in (topics.TF_STATIC.name, topics.TF.name):
-            links, is_static = raw.decode({topics.TF.type: transforms}), raw.topic == topics.TF_STATIC.name
-            messages.transforms.add(raw.time, links, is_static)
-            messages.tf_indices[raw.time] = index
-            messages.static_transforms.update({link.child: link for link in links if is_static})
-        elif raw.topic == INITIAL_POSE_TOPIC:
-            messages.initial.append((raw.time, index, raw.decode(POSE_DECODERS)))
-        elif raw.topic == scan:
-            messages.scans.append((raw.time, index, raw.decode({topics.SCAN_TYPE: laser_scan})))
-        elif raw.topic in (odometry, truth):
-            pose = raw.time, index, raw.decode(POSE_DECODERS)
-            messages.odometry += [pose] if raw.topic == odometry else []
-            messages.truth += [pose] if raw.topic == truth else []
+        try:
+            _add_message(messages, index, raw, odometry, scan, truth)
+        except InvalidPose:
+            invalid_poses[raw.topic] += 1
     messages.topics, messages.is_complete = stream.topics, stream.complete
+    messages.notes += invalid_pose_notes(invalid_poses)
     messages.sort_by_time()
     return messages
+
+
+def _add_message(messages: _Messages, index: int, raw: RawMessage, odometry: str, scan: str, truth: str) -> None:
+    """Decode a message with this index in the log, and add it. Raises InvalidPose, and UnusableLog."""
+    if raw.topic in (topics.TF_STATIC.name, topics.TF.name):
+        links, is_static = raw.decode({topics.TF.type: transforms}), raw.topic == topics.TF_STATIC.name
+        messages.transforms.add(raw.time, links, is_static)
+        messages.tf_indices[raw.time] = index
+        messages.static_transforms.update({link.child: link for link in links if is_static})
+    elif raw.topic == INITIAL_POSE_TOPIC:
+        messages.initial.append((raw.time, index, raw.decode(POSE_DECODERS)))
+    elif raw.topic == scan:
+        messages.scans.append((raw.time, index, raw.decode({topics.SCAN_TYPE: laser_scan})))
+    elif raw.topic in (odometry, truth):
+        pose = raw.time, index, raw.decode(POSE_DECODERS)
+        messages.odometry += [pose] if raw.topic == odometry else []
+        messages.truth += [pose] if raw.topic == truth else []
 
 
 def _time(logged: int, message: Any, use_log_time: bool) -> float:

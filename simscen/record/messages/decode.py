@@ -27,9 +27,15 @@ _PLANAR_TWIST_INDICES = (0, 1, 5)
 """Indices of vx, vy, wz in the six numbers of a twist."""
 _MAX_QUATERNION_NORM_ERROR = 0.1
 """Maximum difference of the length of a quaternion from 1."""
-_NOT_A_ROTATION = "an orientation is not a quaternion of length 1"
 NO_COVARIANCE: Numbers = (0.0,) * 6
 """Covariance of a pose whose message has none: xx, xy, xyaw, yy, yyaw, yawyaw."""
+
+
+class InvalidOrientation(ValueError):
+    """A pose of a message has an orientation that is not a quaternion of length 1."""
+
+    def __init__(self) -> None:
+        super().__init__("an orientation is not a quaternion of length 1")
 
 
 class MessageReader(Reader):
@@ -62,11 +68,11 @@ class MessageReader(Reader):
     def pose(self) -> Numbers:
         """Return x, y, z and the quaternion of a geometry_msgs/msg/Pose or Transform.
 
-        Raises ValueError if the length of the quaternion is not 1. A quaternion with nan is allowed.
+        Raises InvalidOrientation if the length of the quaternion is not 1. A quaternion with nan is allowed.
         """
         pose = self.take("7d")
         if abs(math.hypot(*pose[3:]) - 1.0) > _MAX_QUATERNION_NORM_ERROR:
-            raise ValueError(_NOT_A_ROTATION)
+            raise InvalidOrientation
         return pose
 
 
@@ -83,11 +89,11 @@ class CheckedReader(MessageReader):
         return self.string().lstrip("/").removeprefix(self.frame_prefix)
 
     def pose(self) -> Numbers:
-        """Return the next pose with a normalized quaternion. Raises ValueError if its length is not 1 or is nan."""
+        """Return the next pose with a normalized quaternion. Raises InvalidOrientation unless its length is 1."""
         pose = self.take("7d")
         norm = math.hypot(*pose[3:])
         if not abs(norm - 1.0) < _MAX_QUATERNION_NORM_ERROR:
-            raise ValueError(_NOT_A_ROTATION)
+            raise InvalidOrientation
         return (*pose[:3], *(value / norm for value in pose[3:]))
 
 

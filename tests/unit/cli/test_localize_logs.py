@@ -290,6 +290,18 @@ def test_invalid_poses_are_skipped_and_counted(simscen, tmp_path: Path) -> None:
     assert found["error"]["max"] < 0.3
 
 
+def test_poses_with_an_invalid_orientation_are_skipped_and_counted(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    broken = drive_log()
+    for k in (60, 90):
+        broken[3 * k + 2].message.pose.orientation.w = 0.0
+        broken[3 * k + 2].message.pose.orientation.z = 0.0
+    write_mcap(tmp_path / "drive.mcap", broken)
+    found = localized(simscen, "drive.mcap")
+    assert "/gt: messages with an invalid orientation are ignored (2)" in found["err"]
+    assert found["error"]["max"] < 0.3
+
+
 def test_scans_with_another_clock_are_rejected(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     other = [

@@ -324,6 +324,16 @@ def test_log_before_the_first_goal_is_ignored(tmp_path):
     assert any("before the first goal" in note for note in drive.notes)
 
 
+def test_poses_with_an_invalid_orientation_are_named(tmp_path):
+    said = logs.drive()
+    turned = [one.message.pose.orientation for one in said if one.topic == "/mocap"][3:5]
+    for orientation in turned:
+        orientation.w = 0.0
+    drive = read_drive(logs.write_mcap(tmp_path / "a.mcap", said), "/mocap")
+    assert "2 poses on /mocap, whose orientation is invalid" in drive.notes
+    assert len(drive.poses.times) > 190
+
+
 def test_a_log_without_poses_is_refused_with_a_hint(tmp_path):
     only_scans = [said for said in messages() if said.topic == "/scan"]
     with pytest.raises(InvalidInput, match="no poses of the robot") as error:

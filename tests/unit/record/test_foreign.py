@@ -168,6 +168,17 @@ def test_messages_that_are_not_cdr_are_ignored_with_a_note(refused: Callable[...
     assert "/mocap is encoded as json, not as CDR" in refused(drive(), encoding="json")
 
 
+def test_poses_with_an_invalid_orientation_are_ignored(tmp_path: Path) -> None:
+    """A tracking system that has lost the robot sends zeros."""
+    messages = drive()
+    lost = [k for k, one in enumerate(messages) if one.topic == "/mocap"][40:44]
+    for k in lost:
+        messages[k] = replace(messages[k], message=replace_orientation(messages[k].message))
+    log = read_foreign_log(write_mcap(tmp_path / "a.mcap", messages), MOCAP)
+    assert len(log.trace.truth) == 201 - 4
+    assert list(log.notes) == ["/mocap: messages with an invalid orientation are ignored (4)"]
+
+
 def test_messages_that_do_not_match_their_type_are_refused(refused: Callable[..., str]) -> None:
     only = [one for one in drive() if one.topic == "/mocap"]
     cut = refused(only, change=lambda data: data[:40])
@@ -175,7 +186,7 @@ def test_messages_that_do_not_match_their_type_are_refused(refused: Callable[...
     assert "longer than its type" in refused(only, change=lambda data: data + bytes(8))
     assert "not plain CDR" in refused(only, change=lambda data: b"\x28\xb5\x2f\xfd" + data[4:])
     zero = [Message("/mocap", BEGIN, replace_orientation(stamped_pose(BEGIN, "map", 0.0)))]
-    assert "not a quaternion" in refused(zero)
+    assert "all messages of /mocap have an invalid orientation" in refused(zero)
 
 
 def replace_orientation(message: Any) -> Any:
