@@ -1,5 +1,6 @@
 """The advanced stack and its builder: the reference stack with motion prediction and compensation of turn slip."""
 
+import math
 from typing import Any
 
 from simscen.advanced.costmap_clearing import ClearingBackoff
@@ -69,16 +70,21 @@ class AdvancedStack(ReferenceStack):
     def _adjust_controller_command(self, tick: int, frames: Frames, command: Twist) -> Twist:
         if self._prediction.is_idle:
             return command
-        return self._prediction.steer(
-            tick, command, frames.pose, self._twist, self._costmaps.global_costmap.view, self.plan
-        )
+        costmap, limit = self._costmaps.global_costmap.view, self._max_speed(frames.pose)
+        return self._prediction.steer(tick, command, frames.pose, self._twist, costmap, self.plan, limit)
+
+    def _max_speed(self, pose: Pose2) -> float:
+        """Return the limit in m/s of speed zones and masks at a pose; inf without a limit."""
+        limit = self._speed_filter.limit(pose, self._controller.full_speed) if self._speed_filter.is_used else None
+        return math.inf if limit is None else limit
 
     def _adjust_sent_command(self, command: Twist) -> Twist:
         return command if self._turn_slip is None else self._turn_slip.compensate(command)
 
     def _on_idle(self, tick: int, pose: Pose2) -> None:
         """Make the standing robot step aside for moving obstacles, and drive back to its position afterward."""
-        command = self._prediction.stand(tick, pose, self._twist, self._costmaps.global_costmap.view)
+        costmap = self._costmaps.global_costmap.view
+        command = self._prediction.stand(tick, pose, self._twist, costmap, self._max_speed(pose))
         if command == STOP or self._monitor.is_silent(tick):
             self._commands.stop(tick)
         elif not self._commands.is_busy(tick):

@@ -75,10 +75,12 @@ class Avoidance:
         costmap: CostmapView,
         path: FollowedPath | None,
         home: Pose2 | None = None,
+        max_speed: float = math.inf,
     ) -> Twist:
         """Return `command` itself if it is safe, otherwise the first command of the best trajectory.
 
         All arguments are in one frame. A robot without a path stays near `home`, or near `pose` if `home` is None.
+        `max_speed` is the speed limit in m/s at the pose.
         """
         near = moving.near(pose.x, pose.y, self._robot.circumscribed_radius + MAX_INFLATION_M, self._speed, HORIZON_S)
         followed = path if path is not None and len(path) >= 2 and command.vx != 0.0 else None
@@ -86,7 +88,7 @@ class Avoidance:
             self._last = None
             return command
         own = self._controller_rollouts(command, pose, twist, followed, SPEED_FRACTIONS)
-        self._last = self._best_command(own, pose, twist, near, costmap, self._goal(pose, path, home))
+        self._last = self._best_command(own, pose, twist, near, costmap, self._goal(pose, path, home), max_speed)
         return self._last
 
     def _is_safe(
@@ -113,6 +115,7 @@ class Avoidance:
         moving: MovingObstacles,
         costmap: CostmapView,
         goal: tuple[float, float],
+        max_speed: float,
     ) -> Twist:
         """Return the first command of the cheapest trajectory, among the controller's (`own`) and the sampled ones.
 
@@ -134,6 +137,7 @@ class Avoidance:
         )
         base += BACKWARD_WEIGHT * self._backward(fan.vx)[fan.speed_profile]
         order = base.argsort(kind="stable")
+        order = order[np.abs(fan.commands[order, 0]) <= max_speed]
         for begin in range(0, len(order), BATCH_SIZE):
             batch = order[begin : begin + BATCH_SIZE]
             if base[batch[0]] > best[0] + ROUNDING_TOLERANCE:

@@ -93,16 +93,25 @@ class MotionPrediction:
         return cached[3]
 
     def steer(
-        self, tick: int, command: Twist, pose: Pose2, twist: Twist, costmap: CostmapView, plan: Path | None
+        self,
+        tick: int,
+        command: Twist,
+        pose: Pose2,
+        twist: Twist,
+        costmap: CostmapView,
+        plan: Path | None,
+        max_speed: float,
     ) -> Twist:
-        """Return `command`, or a command that avoids moving obstacles. `pose`, `costmap`, and `plan` share a frame."""
+        """Return `command`, or a command that avoids moving obstacles. `pose`, `costmap`, and `plan` share a frame.
+
+        `max_speed` is the limit in m/s of speed zones and masks.
+        """
         if not self._active:
-            return command if self.is_idle else _limit_speed(command)
+            return command if self.is_idle else _limit_speed(command, WARM_UP_SPEED_M_S)
         if plan is not self._plan:
             self._plan, self._followed = plan, None if plan is None else FollowedPath(plan.points)
-        return self._avoidance.steer(
-            command, pose, twist, self.moving_obstacles_in_frame(tick, pose), costmap, self._followed
-        )
+        moving = self.moving_obstacles_in_frame(tick, pose)
+        return self._avoidance.steer(command, pose, twist, moving, costmap, self._followed, max_speed=max_speed)
 
     def on_drive(self) -> None:
         """Forget the position to which a standing robot returns, because the robot drives now."""
@@ -113,25 +122,27 @@ class MotionPrediction:
         """Stay in place until the robot drives again, even if an obstacle approaches."""
         self._must_stay = True
 
-    def stand(self, tick: int, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
-        """Return the command for a standing robot: step aside for moving obstacles, or drive back, or stop."""
+    def stand(self, tick: int, pose: Pose2, twist: Twist, costmap: CostmapView, max_speed: float) -> Twist:
+        """Return the command for a standing robot: step aside for moving obstacles, or drive back, or stop.
+
+        `max_speed` is the limit in m/s of speed zones and masks.
+        """
         if self._must_stay:
             return STOP
         home = self._stand_position.remember(pose, bool(self._active))
         if home is None:
             return STOP
-        command = self._stand_position.return_command(pose)
+        command = _limit_speed(self._stand_position.return_command(pose), max_speed)
         if not self._active:
             return command
-        return self._avoidance.steer(
-            command, pose, twist, self.moving_obstacles_in_frame(tick, pose), costmap, None, home
-        )
+        moving = self.moving_obstacles_in_frame(tick, pose)
+        return self._avoidance.steer(command, pose, twist, moving, costmap, None, home, max_speed)
 
 
-def _limit_speed(command: Twist) -> Twist:
-    """Return the command with the speed limit of the warm-up."""
+def _limit_speed(command: Twist, max_speed: float) -> Twist:
+    """Return the command with at most this speed in m/s, and the same curvature."""
     speed = math.hypot(command.vx, command.vy)
-    if speed <= WARM_UP_SPEED_M_S:
+    if speed <= max_speed:
         return command
-    scale = WARM_UP_SPEED_M_S / speed
+    scale = max_speed / speed
     return Twist(scale * command.vx, scale * command.vy, scale * command.wz)

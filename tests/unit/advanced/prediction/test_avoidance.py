@@ -204,3 +204,12 @@ def test_slow_robot_avoids_obstacles_within_its_speed() -> None:
     avoidance_of_slow_robot = Avoidance(Prediction(), replace(box_robot(), max_linear=0.2), 0.2)
     command = avoidance_of_slow_robot.steer(STOP, Pose2(0.0, 0.0), STOP, moving, costmap, None)
     assert 0.0 < command.vx <= 0.2
+
+
+@pytest.mark.parametrize(("limit", "is_reached"), [(math.inf, True), (0.15, False)])
+def test_avoidance_keeps_the_limit_of_a_speed_zone(limit: float, is_reached: bool) -> None:
+    moving = MovingObstacles([MovingObstacle(-0.9 + 0.0j, 0.5 + 0.0j, 0.3, 1e-4, 0.0, 1e-3)], 1.0)
+    costmap = CostmapView(np.zeros((200, 200), np.uint8), np.full((200, 200), 2.0, np.float32), 0.05, (-5.0, -5.0))
+    avoidance_of_robot = Avoidance(Prediction(), box_robot(), 1.0)
+    command = avoidance_of_robot.steer(STOP, Pose2(0.0, 0.0), STOP, moving, costmap, None, max_speed=limit)
+    assert (abs(command.vx) > 0.15) is is_reached
