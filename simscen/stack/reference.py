@@ -72,7 +72,7 @@ class ReferenceStack:
         self._events: list[Event] = []
         self._tick = 0
         self._twist = STOP
-        self._odometry, self._wheel_sensor = odometry, ""
+        self._odometry, self._wheel_sensor, self._imu_sensor = odometry, "", ""
         self._zones: Zones | None = None
         self._standstill = StandstillReporter(surroundings.tick_rate)
         self._last_decision = Decision(STOP)
@@ -206,11 +206,7 @@ class ReferenceStack:
                 case Odometry():
                     self._process_odometry(reading)
                 case Imu():
-                    imu = imu_in_base_frame(reading)
-                    if self._odometry_filter is not None:
-                        self._odometry_filter.on_imu(imu)
-                    self._localizer.on_imu(imu)
-                    self._on_motion(imu)
+                    self._process_imu(reading)
                 case Scan():
                     scans.append(level_scan(reading))
                 case Image() if reading.field_of_view > 0.0:
@@ -229,6 +225,17 @@ class ReferenceStack:
         processed = self._on_lidar_scan(tick, scan)
         self._monitor.on_scan(processed, self._odometry.latest_until(scan.tick), tick)
         self._costmaps.add_reading(processed)
+
+    def _process_imu(self, reading: Imu) -> None:
+        """Pass a reading to the odometry filter and the localizer. Of several IMUs, only the first one counts."""
+        self._imu_sensor = self._imu_sensor or reading.sensor
+        if reading.sensor != self._imu_sensor:
+            return
+        imu = imu_in_base_frame(reading)
+        if self._odometry_filter is not None:
+            self._odometry_filter.on_imu(imu)
+        self._localizer.on_imu(imu)
+        self._on_motion(imu)
 
     def _process_odometry(self, reading: Odometry) -> None:
         """Filter an odometry reading, pass it to the localizer, and add the pose to the odometry history."""

@@ -169,28 +169,21 @@ def _diagonal_matrix(values: list[float]) -> Array:
 
 
 class GyroscopeIntegral:
-    """Integrates the yaw rate of the first gyroscope between any two ticks, with the trapezoidal rule.
+    """Integrates the yaw rate of a gyroscope between any two ticks, with the trapezoidal rule.
 
     Up to `MAX_GYRO_GAP_S` after the newest reading, the yaw rate is assumed to be constant.
     """
 
     def __init__(self, tick_rate: int) -> None:
         self._tick_rate, self._max_gap = tick_rate, MAX_GYRO_GAP_S * tick_rate
-        self._sensor: str | None = None
         self._tick: int | None = None  # of the newest reading
         self._rate, self._angle, self._variance = 0.0, 0.0, 0.0
         self._read: tuple[int, float] | None = None  # tick and angle at the end of the last increment
 
     def add(self, imu: Imu) -> None:
-        """Add the yaw rate of a reading. Ignore it if it is invalid, not newer, or of another gyroscope."""
+        """Add the yaw rate of a reading. Ignore it if it is invalid or not newer."""
         tick, rate = imu.tick, imu.angular_velocity[2]
-        if self._sensor is None:
-            self._sensor = imu.sensor
-        if (
-            imu.sensor != self._sensor
-            or not abs(rate) < MAX_YAW_RATE_RAD_S
-            or (self._tick is not None and tick <= self._tick)
-        ):
+        if not abs(rate) < MAX_YAW_RATE_RAD_S or (self._tick is not None and tick <= self._tick):
             return
         if self._tick is None or tick - self._tick > self._max_gap:
             self._read = None

@@ -280,16 +280,6 @@ def test_meaningless_yaw_rates_are_ignored(rate: float) -> None:
     assert abs(error(end, end.filtered)[2]) < 0.02
 
 
-def test_only_the_first_gyroscope_counts() -> None:
-    alone, accompanied = OdometryFilter(Spec(), RATE), OdometryFilter(Spec(), RATE)
-    for tick in range(0, 2 * RATE, 4):
-        for subject in (alone, accompanied):
-            subject.on_imu(imu(tick, 0.3))
-        accompanied.on_imu(replace(imu(tick + 2, 5.0), sensor="imu of the arm"))
-        measured = odometry(tick, Pose2(0.0, 0.0, 0.3 * tick / RATE))
-        assert alone.fuse(measured) == accompanied.fuse(measured)
-
-
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e30])
 def test_meaningless_odometry_is_refused(value: float) -> None:
     subject = OdometryFilter(Spec(frequency=40), RATE)
@@ -344,7 +334,7 @@ def test_motion_is_complete_after_lost_odometry_messages() -> None:
 def decisions(spec: StackSpec, has_imu: bool = True, turn: float = 0.2, has_spare: bool = False) -> list[Any]:
     """Half a second of a robot that stands, while its wheels report a turn and its gyroscope does not.
 
-    `has_spare`: a second odometry sensor reports a motion.
+    `has_spare`: a second odometry sensor reports a motion, and a second gyroscope reports a turn.
     """
     surroundings = Surroundings(round_robot(), None, RATE, has_imu=has_imu)
     stack = build_stack(spec, surroundings, Streams(1), Clock(RATE))
@@ -354,7 +344,8 @@ def decisions(spec: StackSpec, has_imu: bool = True, turn: float = 0.2, has_spar
         yaw = turn * tick / RATE
         wheels = odometry(tick, Pose2(0.0, 0.0, yaw), (0.0, 0.0, 1e-2))
         spare = Odometry("spare", tick, Pose2(0.01 * tick, -2.0, 1.0), Twist(2.4))
-        made.append(stack.decide(tick, (imu(tick, 0.0), wheels, *([spare] if has_spare else []))))
+        spares = [replace(imu(tick, 1.5), sensor="spare imu"), spare] if has_spare else []
+        made.append(stack.decide(tick, (imu(tick, 0.0), wheels, *spares)))
     return made
 
 
@@ -379,9 +370,10 @@ def test_odometry_is_not_filtered_without_an_imu_or_by_other_fusing_localizers(s
         assert [each.belief for each in made if each.belief is not None][-1].pose.yaw > 0.05
 
 
-@pytest.mark.parametrize("has_imu", [True, False])
-def test_a_second_odometry_sensor_does_not_move_the_robot(has_imu: bool) -> None:
-    one, two = decisions(StackSpec(), has_imu), decisions(StackSpec(), has_imu, has_spare=True)
+@pytest.mark.parametrize(("localizer", "has_imu"), [("amcl", True), ("amcl", False), ("ekf", True), ("slip_ekf", True)])
+def test_a_second_odometry_sensor_and_a_second_gyroscope_do_not_move_the_robot(localizer: str, has_imu: bool) -> None:
+    spec = StackSpec.model_validate({"localizer": {"type": localizer}})
+    one, two = decisions(spec, has_imu), decisions(spec, has_imu, has_spare=True)
     assert [decision.command for decision in one] == [decision.command for decision in two]
     poses = [[each.belief.pose for each in made if each.belief is not None] for made in (one, two)]
     assert poses[0] == poses[1]
