@@ -12,6 +12,7 @@ from simscen.worlds.sdf.report import OutOfReach, SourceLocation, UnusableElemen
 
 MAX_NAME_LENGTH = 120
 """Maximum number of characters of the name of a model, link or frame. In messages, longer tags and names are cut."""
+STAGE_HINT = "an SDF world is XML; a world of Stage is not, so use its floor plan as a ROS map instead"
 MAX_COORDINATE_M = 1e4
 """Maximum absolute value of coordinates and sizes."""
 
@@ -56,7 +57,8 @@ def parse(data: bytes, file: str, folder: str) -> Element:
         return markup.parse(data, markup.Source.of(data, file, folder), Element)
     except markup.MalformedXml as error:
         location = SourceLocation(file, error.line, error.col, source=error.source)
-        raise UnusableElement(location, error.message, error.hint) from error
+        is_text_without_tags = b"<" not in data and b"\0" not in data
+        raise UnusableElement(location, error.message, STAGE_HINT if is_text_without_tags else error.hint) from error
 
 
 def _printable(name: str) -> str:

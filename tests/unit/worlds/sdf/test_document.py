@@ -40,6 +40,13 @@ def test_invalid_sdf_is_refused_with_a_line(refuse, content, line, message):
     assert message in problem.message
 
 
+def test_world_of_stage_has_a_hint(tmp_path):
+    (tmp_path / "x.world").write_text('floorplan( bitmap "cave.png" size [16 16 0.8] )\n')
+    with pytest.raises(InvalidInput, match="not well-formed XML") as caught:
+        load_sdf(tmp_path / "x.world", root=tmp_path)
+    assert "a world of Stage is not, so use its floor plan as a ROS map" in caught.value.problems[0].hint
+
+
 def test_binary_files_are_refused(tmp_path):
     (tmp_path / "x.world").write_bytes(bytes(range(256)))
     with pytest.raises(InvalidInput, match="not well-formed XML"):
