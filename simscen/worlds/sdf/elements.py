@@ -57,7 +57,7 @@ def parse(data: bytes, file: str, folder: str) -> Element:
         return markup.parse(data, markup.Source.of(data, file, folder), Element)
     except markup.MalformedXml as error:
         location = SourceLocation(file, error.line, error.col, source=error.source)
-        is_text_without_tags = b"<" not in data and b"\0" not in data
+        is_text_without_tags = bool(data.strip()) and b"<" not in data and b"\0" not in data
         raise UnusableElement(location, error.message, STAGE_HINT if is_text_without_tags else error.hint) from error
 
 
