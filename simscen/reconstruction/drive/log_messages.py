@@ -148,6 +148,8 @@ def collect_messages(path: Path, named: Mapping[str, str], has_truth: bool = Fal
             topic, hint = absolute[role], f"its topics: {', '.join(sorted(stream.topics)[:12]) or 'none'}"
             if topic not in stream.topics:
                 raise UnusableLog(f"it has no topic {topic}", hint)
+            if topic in invalid_poses:
+                raise UnusableLog(f"all messages of {topic} have an invalid orientation", hint)
             raise UnusableLog(type_mismatch(topic, stream.topics[topic], _DECODERS[role]) or f"{topic} is empty", hint)
     if not messages.of("scan") and other_scans:
         topic = min(other_scans)

@@ -332,6 +332,11 @@ def test_poses_with_an_invalid_orientation_are_named(tmp_path):
     drive = read_drive(logs.write_mcap(tmp_path / "a.mcap", said), "/mocap")
     assert "2 poses on /mocap, whose orientation is invalid" in drive.notes
     assert len(drive.poses.times) > 190
+    for one in said:
+        if one.topic == "/mocap":
+            one.message.pose.orientation.w = 0.0
+    with pytest.raises(InvalidInput, match="all messages of /mocap have an invalid orientation"):
+        read_drive(logs.write_mcap(tmp_path / "b.mcap", said), "/mocap")
 
 
 def test_a_log_without_poses_is_refused_with_a_hint(tmp_path):
