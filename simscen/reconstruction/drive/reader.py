@@ -29,7 +29,7 @@ from simscen.reconstruction.drive.recorded_drive import (
 )
 from simscen.record import topics
 from simscen.record.foreign.raw_messages import UnusableLog, is_simscen_log, unusable_log_as_invalid_input
-from simscen.record.foreign.transforms import TransformTree, UnknownTransform, is_upside_down, lidar_mount
+from simscen.record.foreign.transforms import TransformTree, UnknownTransform, is_upside_down
 from simscen.record.messages.decode import ScanMessage, StampedPose
 
 NO_TRUTH = "none"
@@ -235,15 +235,8 @@ class _DriveReader:
         return Scans(times[order], arrivals[order], ranges, angles, *limits, mount, height, is_malformed)
 
     def _mount(self, frame: str) -> tuple[Pose2, float, bool]:
-        """Return the pose of the lidar on the base, its height in m, and whether it is upside down.
-
-        The first transform of each frame counts.
-        """
-        links: dict[str, StampedPose] = {}
-        for message in (*self._messages.of("tf_static"), *self._messages.of("tf")):
-            for link in message.content:
-                links.setdefault(link.child, link)
-        mount = lidar_mount(frame, self._base_frames[0], links)
+        """Return the pose of the lidar on the base, its height in m, and whether it is upside down."""
+        mount = self._transforms.sensor_mount(frame, self._base_frames[0])
         if mount is None:
             self._notes.append(f"the mount of the lidar `{frame}`; the lidar is assumed at the base")
             return Pose2(0.0, 0.0, 0.0), DEFAULT_LIDAR_HEIGHT_M, False

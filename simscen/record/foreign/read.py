@@ -24,7 +24,8 @@ from simscen.record.foreign.raw_messages import (
 )
 from simscen.record.foreign.timebase import Timebase
 from simscen.record.foreign.trace_reader import ForeignTraceReader
-from simscen.record.foreign.transforms import is_upside_down, lidar_mount
+from simscen.record.foreign.tracks import transform_tree
+from simscen.record.foreign.transforms import is_upside_down
 from simscen.record.sensor_messages import SensorMessages
 
 
@@ -103,15 +104,15 @@ class SensorMessageCollector:
             yield message
 
     def sensors(self, time: Timebase, decoded: DecodedMessages) -> SensorMessages:
-        """Return the collected messages with ticks of the timebase, and the mounts of lidars from static transforms."""
+        """Return the collected messages with ticks of the timebase, and the mounts of lidars."""
         ticks = time.ticks_of_logged(np.array([message.time for message in self._messages], dtype=np.int64))
         for tick, message in zip(ticks.tolist(), self._messages, strict=True):
             handler = self._sensors.handler(message.topic, message.type)
             assert handler is not None
             handler(tick, message.data)
-        links = {pose.child: pose for _, poses in decoded.by_role["tf_static"] for pose in poses}
-        for frame in links:
-            if (mount := lidar_mount(frame, BASE_FRAME, links)) is not None:
+        transforms = transform_tree(decoded)
+        for frame in transforms.child_frames:
+            if (mount := transforms.sensor_mount(frame, BASE_FRAME)) is not None:
                 level = Pose3.planar(mount.plane)
                 self._sensors.mounts[frame] = level.compose(_UPSIDE_DOWN) if is_upside_down(mount) else level
         return self._sensors

@@ -81,12 +81,17 @@ def track_from_topic(topic: str, messages: Sequence[tuple[int, StampedPose]], op
 
 def track_from_tf(outer: str, inner: str, decoded: DecodedMessages, options: ForeignLogOptions) -> Track:
     """Return the track of the frame `inner` in the frame `outer` from tf. Raises UnknownTransform, or UnusableLog."""
+    source, times, stamped, poses = transform_tree(decoded).between(outer, inner, use_log_time=options.clock == "log")
+    return Track(source, outer, times, stamped, poses, np.tile(NO_COVARIANCE, (len(poses), 1)), None)
+
+
+def transform_tree(decoded: DecodedMessages) -> TransformTree:
+    """Return all transforms of a log."""
     tree = TransformTree()
     for role in ("tf_static", "tf"):
         for logged, links in decoded.by_role[role]:
             tree.add(logged, links, is_static=role == "tf_static")
-    source, times, stamped, poses = tree.between(outer, inner, use_log_time=options.clock == "log")
-    return Track(source, outer, times, stamped, poses, np.tile(NO_COVARIANCE, (len(poses), 1)), None)
+    return tree
 
 
 def velocity_from_poses(ticks: Ticks, poses: Array, rate: int) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -48,6 +48,9 @@ class TransformTrack(NamedTuple):
     poses: Array
 
 
+_BASE_FRAMES = ("base_link", "base_footprint")
+
+
 class UnknownTransform(UnusableLog):
     """Transform between two frames that tf does not contain. The message states the reason."""
 
@@ -72,6 +75,11 @@ class TransformTree:
             link.stamps.append(transform.stamp)
             link.poses.append(transform.pose)
 
+    @property
+    def child_frames(self) -> Collection[str]:
+        """All frames that have a parent frame."""
+        return self._links.keys()
+
     def between(self, outer: str, inner: str, use_log_time: bool = False) -> TransformTrack:
         """Return the poses of the frame `inner` in `outer`. Raises UnknownTransform, or UnusableLog.
 
@@ -95,6 +103,23 @@ class TransformTree:
         for link in chain:
             poses = _compose(_latest_poses(link, times, use_log_time), poses)
         return TransformTrack(source, logged, None if use_log_time else StampedMessages(source, logged, times), poses)
+
+    def sensor_mount(self, frame: str, base: str) -> Pose3 | None:
+        """Return the pose of a sensor's frame on the frame `base`, or else on base_link or base_footprint.
+
+        Returns None if no transforms connect the frames. The latest message of a static transform counts, and the first
+        message of a transform on /tf: some robots publish the mounts of their sensors there.
+        """
+        pose, visited, nearest = Pose3(), set(), None
+        while frame != base:
+            if nearest is None and frame.rpartition("/")[2] in _BASE_FRAMES:
+                nearest = pose
+            if frame not in self._links or frame in visited:
+                return nearest
+            visited.add(frame)
+            link = self._links[frame]
+            pose, frame = Pose3(*link.poses[-1 if link.is_static else 0]).compose(pose), link.parent
+        return pose
 
     def _chain(self, outer: str, inner: str) -> list[_Link]:
         """Return the transforms from `inner` up to `outer`. Raises UnknownTransform if they are not connected."""
@@ -136,27 +161,6 @@ def _compose(outer: Array, inner: Array) -> Array:
     cross = 2 * np.cross(axis, inner[:, :3])
     rotated = inner[:, :3] + w * cross + np.cross(axis, cross)
     return np.column_stack((outer[:, :3] + rotated, rotations))
-
-
-_BASE_FRAMES = ("base_link", "base_footprint")
-
-
-def lidar_mount(frame: str, base: str, links: Mapping[str, StampedPose]) -> Pose3 | None:
-    """Return the pose of a lidar with the frame `frame` on the frame `base`, or else on base_link or base_footprint.
-
-    `links` are the static transforms by child frame. Returns None if they do not connect the frames.
-    """
-    pose, visited, nearest = Pose3(), set(), None
-    while True:
-        if frame == base:
-            return pose
-        if nearest is None and frame.rpartition("/")[2] in _BASE_FRAMES:
-            nearest = pose
-        if frame not in links or frame in visited:
-            return nearest
-        visited.add(frame)
-        link = links[frame]
-        pose, frame = Pose3(*link.pose).compose(pose), link.frame
 
 
 def is_upside_down(mount: Pose3) -> bool:

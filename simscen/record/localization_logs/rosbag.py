@@ -20,7 +20,7 @@ from simscen.record.foreign.raw_messages import (
     invalid_pose_notes,
     open_messages,
 )
-from simscen.record.foreign.transforms import TransformTree, UnknownTransform, is_upside_down, lidar_mount
+from simscen.record.foreign.transforms import TransformTree, UnknownTransform, is_upside_down
 from simscen.record.localization_logs.rows import (
     MAX_COORDINATE_M,
     LocalizationRows,
@@ -42,15 +42,14 @@ LoggedMessage = tuple[int, int, Any]
 class _Messages:
     """Decoded messages of a log, and message types of all topics.
 
-    `static_transforms` are by child frame. `tf_indices` are the indices of the messages with transforms by time of
-    logging. `is_complete` is False for a truncated log.
+    `tf_indices` are the indices of the messages with transforms by time of logging. `is_complete` is False for a
+    truncated log.
     """
 
     odometry: list[LoggedMessage] = field(default_factory=list)
     scans: list[LoggedMessage] = field(default_factory=list)
     truth: list[LoggedMessage] = field(default_factory=list)
     initial: list[LoggedMessage] = field(default_factory=list)
-    static_transforms: dict[str, StampedPose] = field(default_factory=dict)
     transforms: TransformTree = field(default_factory=TransformTree)
     tf_indices: dict[int, int] = field(default_factory=dict)
     topics: dict[str, str] = field(default_factory=dict)
@@ -89,7 +88,7 @@ def read_rosbag_rows(path: Path, odometry: str, scan: str, reference: str | None
     """Read an MCAP file or a rosbag2 folder. Raises UnusableLog if messages cannot be used.
 
     Times are stamps. If all stamps of a topic are zero, the times of all topics are times of logging instead. The mount
-    of the lidar is on /tf_static.
+    of the lidar is on /tf_static or /tf.
 
     odometry:   topic, or pair of frames on /tf such as `odom:base_link`
     scan:       topic
@@ -125,9 +124,7 @@ def read_rosbag_rows(path: Path, odometry: str, scan: str, reference: str | None
 
 
 def _collect_messages(path: Path, odometry: str, scan: str, truth: str) -> _Messages:
-    needs_tf = any(map(parse_frame_pair, (odometry, truth)))
-    tf = [topics.TF.name] if needs_tf else []
-    stream = open_messages(path, {odometry, scan, truth, topics.TF_STATIC.name, INITIAL_POSE_TOPIC, *tf})
+    stream = open_messages(path, {odometry, scan, truth, topics.TF.name, topics.TF_STATIC.name, INITIAL_POSE_TOPIC})
     messages = _Messages()
     invalid_poses: Counter[str] = Counter()
     for index, raw in enumerate(stream):
@@ -144,10 +141,9 @@ def _collect_messages(path: Path, odometry: str, scan: str, truth: str) -> _Mess
 def _add_message(messages: _Messages, index: int, raw: RawMessage, odometry: str, scan: str, truth: str) -> None:
     """Decode a message with this index in the log, and add it. Raises InvalidPose, and UnusableLog."""
     if raw.topic in (topics.TF_STATIC.name, topics.TF.name):
-        links, is_static = raw.decode({topics.TF.type: transforms}), raw.topic == topics.TF_STATIC.name
-        messages.transforms.add(raw.time, links, is_static)
+        links = raw.decode({topics.TF.type: transforms})
+        messages.transforms.add(raw.time, links, is_static=raw.topic == topics.TF_STATIC.name)
         messages.tf_indices[raw.time] = index
-        messages.static_transforms.update({link.child: link for link in links if is_static})
     elif raw.topic == INITIAL_POSE_TOPIC:
         messages.initial.append((raw.time, index, raw.decode(POSE_DECODERS)))
     elif raw.topic == scan:
@@ -183,10 +179,10 @@ def _scans(topic: str, messages: _Messages, use_log_time: bool, notes: list[str]
         if any(math.isnan(value) for value in layout) or not all_within(layout[:2], MAX_COORDINATE_M):
             raise UnusableLog(f"a scan of {topic} has invalid angles or range limits: {layout}")
         if scan.frame not in mounts:
-            mounts[scan.frame] = lidar_mount(scan.frame, base, messages.static_transforms)
+            mounts[scan.frame] = messages.transforms.sensor_mount(scan.frame, base)
             if mounts[scan.frame] is None:
                 frames = f"{scan.frame!r} and {base or 'base_link'!r}"
-                notes.append(f"/tf_static does not connect {frames}; the lidar is assumed to be at the base")
+                notes.append(f"tf does not connect {frames}; the lidar is assumed to be at the base")
         mount, ranges = mounts[scan.frame] or Pose3(), scan.ranges
         if is_upside_down(mount):
             ranges = ranges[::-1]

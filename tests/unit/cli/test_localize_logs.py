@@ -180,11 +180,13 @@ def test_start_is_initialpose_without_a_reference(simscen, tmp_path: Path) -> No
     [((0.25, 0.0, 0.0), "base_link"), ((0.1, 2.0, 0.0), "chassis"), ((-0.2, 0.5, ROLL), "robot1/base_footprint")],
     ids=["in front", "rotated, with another base frame", "upside down"],
 )
-def test_lidar_mount_is_read_from_tf_static(
-    simscen, tmp_path: Path, mount: tuple[float, float, float], base: str
+@pytest.mark.parametrize("topic", ["/tf_static", "/tf"])
+def test_lidar_mount_is_read_from_tf(
+    simscen, tmp_path: Path, mount: tuple[float, float, float], base: str, topic: str
 ) -> None:
     write_map(tmp_path)
-    write_bag(tmp_path / "bag", drive_log(mount, base))
+    log = drive_log(mount, base)
+    write_bag(tmp_path / "bag", [replace(one, topic=topic) if one.topic == "/tf_static" else one for one in log])
     (tmp_path / "stack.yaml").write_text(WITHOUT_SETTLING)
     found = localized(simscen, "bag", "--scenario", "stack.yaml")
     assert found["error"]["max"] < 0.2
@@ -252,7 +254,7 @@ def test_lidar_without_mount_is_reported(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     write_mcap(tmp_path / "drive.mcap", drive_log(frame="velodyne"))
     found = localized(simscen, "drive.mcap")
-    assert "/tf_static does not connect 'velodyne' and 'base_link'" in found["err"]
+    assert "tf does not connect 'velodyne' and 'base_link'" in found["err"]
     assert found["error"]["max"] < 0.2
 
 

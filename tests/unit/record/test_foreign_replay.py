@@ -52,13 +52,13 @@ def a_map() -> Message:
     return Message("/map", BEGIN, T["nav_msgs/msg/OccupancyGrid"](header=header(BEGIN, "map"), info=info, data=cells))
 
 
-def mounted() -> Message:
-    return Message("/tf_static", BEGIN, link(BEGIN, "base_link", "laser", 0.2))
+def mounted(topic: str = "/tf_static") -> Message:
+    return Message(topic, BEGIN, link(BEGIN, "base_link", "laser", 0.2))
 
 
-@pytest.mark.parametrize("write", [write_mcap, write_bag])
-def test_scans_map_and_lidar_mounts_are_read(tmp_path: Path, write: Callable[..., object]) -> None:
-    write(tmp_path / "log.mcap", [a_map(), mounted(), *drive(2.0)])
+@pytest.mark.parametrize(("write", "topic"), [(write_mcap, "/tf_static"), (write_bag, "/tf")])
+def test_scans_map_and_lidar_mounts_are_read(tmp_path: Path, write: Callable[..., object], topic: str) -> None:
+    write(tmp_path / "log.mcap", [a_map(), mounted(topic), *drive(2.0)])
     read = read_foreign_log(tmp_path / "log.mcap", ForeignLogOptions("/mocap"), with_sensors=True)
     assert read.map is not None and read.map.shape == (3, 4) and read.map.origin[:2] == (-1.0, -2.0)
     (messages,) = read.sensors.scans.values()
