@@ -44,6 +44,7 @@ from simscen.sim.scene import walls
 from simscen.spec.base import Component
 from simscen.worlds.raycasting.mesh_scene import cached_mesh_scene
 
+gc.freeze()  # imported modules live until the end, so the garbage collector need not scan them
 gc.enable()
 
 
