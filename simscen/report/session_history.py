@@ -1,6 +1,7 @@
 """Earlier sessions: outcomes of their runs for the HTML report, and failed runs for `simscen run --last-failed`."""
 
 import json
+import stat
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
@@ -8,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.errors import InvalidInput
-from simscen.core.records.run_result import INTERRUPTED, NOT_RUN, Outcome, RunKey
+from simscen.core.records.run_result import Outcome, RunKey
 from simscen.core.records.session_events import RunFinished
 from simscen.judge.result_json import read_key
 from simscen.report.journal_reader import JOURNAL_FILE, read_journal
@@ -84,20 +85,28 @@ def outcome_change(run: RunFinished, past: Sequence[PastSession]) -> str:
 
 MAX_SEARCHED_SESSIONS = 50
 """Maximum number of sessions to search for failures."""
-UNFINISHED_KINDS = frozenset({INTERRUPTED, NOT_RUN})
-"""Error kinds of runs that were not finished. `last_failed` uses the outcome of such a run in an earlier session."""
 
 
 def sessions_in(folder: Path) -> list[Path]:
-    """Return the session output folders in `folder`, newest first, without symbolic links such as `latest`."""
-    if not folder.is_dir():
+    """Return the session output folders in `folder`, newest first, without symbolic links such as `latest`.
+
+    Folders that cannot be read, for example those of other users, are omitted.
+    """
+    try:
+        entries = list(folder.iterdir())
+    except OSError:
         return []
-    sessions = [each for each in folder.iterdir() if (each / JOURNAL_FILE).is_file() and not each.is_symlink()]
-    return sorted(
-        sessions,
-        key=lambda each: (_session_time(each), (each / JOURNAL_FILE).stat().st_mtime_ns, each.name),
-        reverse=True,
-    )
+    times = {each: time for each in entries if not each.is_symlink() and (time := _journal_time(each)) is not None}
+    return sorted(times, key=lambda each: (_session_time(each), times[each], each.name), reverse=True)
+
+
+def _journal_time(session: Path) -> int | None:
+    """Return when the journal in a folder was last written, in ns; None without a readable journal."""
+    try:
+        status = (session / JOURNAL_FILE).stat()
+    except OSError:
+        return None
+    return status.st_mtime_ns if stat.S_ISREG(status.st_mode) else None
 
 
 def last_failed(folder: Path) -> frozenset[RunKey] | None:
@@ -118,13 +127,16 @@ def last_failed(folder: Path) -> frozenset[RunKey] | None:
 
 
 def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:
-    """Yield the key of each finished run and whether its outcome is good. Yield nothing for an invalid journal."""
+    """Yield the key of each finished run and whether its outcome is good. Yield nothing for an invalid journal.
+
+    For a run that was not finished, `last_failed` uses the outcome in an earlier session.
+    """
     try:
         runs = read_journal(session).runs
     except InvalidInput:
         return
     for run in runs:
-        if run.result.error is None or run.result.error.kind not in UNFINISHED_KINDS:
+        if not run.result.is_unfinished:
             yield run.key, run.outcome.is_good
 
 

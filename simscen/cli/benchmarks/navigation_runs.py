@@ -21,7 +21,6 @@ from simscen.loading.scenario import load_scenario
 from simscen.record.log_reader import read_log
 from simscen.report.display_text import plain_text
 from simscen.report.journal import Journal
-from simscen.report.session_history import UNFINISHED_KINDS
 from simscen.report.session_lines import RunNaming, run_lines
 from simscen.run.kept_files import WrittenFor
 from simscen.run.process.jobs import Job
@@ -87,11 +86,7 @@ def execute_experiments(
 
 def finished_trials(trials: Sequence[Trial]) -> list[Trial]:
     """Return the trials, without runs that were interrupted or not started."""
-    return [trial for trial in trials if not _is_unfinished(trial.run)]
-
-
-def _is_unfinished(run: RunFinished) -> bool:
-    return run.result.error is not None and run.result.error.kind in UNFINISHED_KINDS
+    return [trial for trial in trials if not trial.run.result.is_unfinished]
 
 
 def _plan_jobs(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job], dict[RunKey, tuple[int, Drive]]]:
@@ -133,7 +128,7 @@ class _Progress:
 
     def __call__(self, event: SessionEvent) -> None:
         """Handle an event of the session."""
-        if not isinstance(event, RunFinished) or _is_unfinished(event):
+        if not isinstance(event, RunFinished) or event.result.is_unfinished:
             return
         self._done += 1
         if event.outcome is not Outcome.PASSED:

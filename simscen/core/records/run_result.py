@@ -155,6 +155,11 @@ class RunResult:
         return list(zip(self.verdicts, self.lines or (0,) * len(self.verdicts), strict=True))
 
     @property
+    def is_unfinished(self) -> bool:
+        """Whether the session ended before the run was finished or started, so that the run says nothing."""
+        return self.error is not None and self.error.kind in (INTERRUPTED, NOT_RUN)
+
+    @property
     def again(self) -> str:
         """Command that repeats the run if it is executed in the root."""
         varied = ["--variation", self.key.variation] if self.key.variation else []

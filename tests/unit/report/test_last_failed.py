@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -75,6 +76,18 @@ def test_unreadable_journals_and_the_latest_link_are_ignored(session, tmp_path):
     (tmp_path / "latest").symlink_to(folder.name)
     assert len(sessions_in(tmp_path)) == 2
     assert failed_in(tmp_path) == {"a"}
+
+
+def test_folder_of_another_user_beside_the_sessions_is_ignored(session, tmp_path, monkeypatch):
+    folder, foreign, read = session(1, a="failed"), session(2, a="failed"), Path.stat
+
+    def stat(path, **options):
+        if foreign in path.parents:
+            raise PermissionError(13, "Permission denied", str(path))
+        return read(path, **options)
+
+    monkeypatch.setattr(Path, "stat", stat)
+    assert sessions_in(tmp_path) == [folder]
 
 
 def test_expected_failure_is_not_a_failure(session, tmp_path, failed):
