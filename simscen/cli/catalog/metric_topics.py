@@ -24,8 +24,9 @@ SESSION_METRICS_TEXT = """\
 A session reports these numbers in results.json under `suite`, and `simscen report DIR` prints most of them. With
 several `--stack`, `suites` contains them for each stack:
 
-- `runs`: number of runs, without skipped runs and the second runs of `--check-determinism`.
-- `success_rate`: share of successful runs in all runs, including errors, with its 95 % Wilson interval.
+- `runs`: number of runs, without the second runs of `--check-determinism`, and without runs that were skipped,
+  interrupted, or not started.
+- `success_rate`: share of successful runs in these runs, including errors, with its 95 % Wilson interval.
 - `spl`, `soft_spl`: means over all robots that have these metrics. `spl_runs` is the number of values of `spl`.
 - `collisions_per_km`, `collisions_per_hour`: collisions per driven kilometer and per simulated hour. `measured_runs` is
   the number of completed runs, and `kilometres` and `hours` are their sums.

@@ -12,7 +12,7 @@ class SessionSummary:
     """Statistics of a session. A value is None if no run has it.
 
     Attributes:
-        runs: Number of runs that were not skipped.
+        runs: Number of runs that were neither skipped nor left unfinished because the session ended.
         success_rate: Share of the `runs` in which all robots succeeded.
         success_interval: 95 % Wilson interval of the success rate.
         spl: Mean of the metric `spl` over all robots.
@@ -54,8 +54,8 @@ class SessionSummaryBuilder:
         self._measured: list[tuple[RunKey, _RunNumbers]] = []
 
     def add(self, result: RunResult) -> None:
-        """Add a run. Skipped runs are ignored."""
-        if result.outcome is Outcome.SKIPPED:
+        """Add a run. Skipped runs, and runs that the end of the session interrupted or prevented, are ignored."""
+        if result.outcome is Outcome.SKIPPED or result.is_unfinished:
             return
         self._runs += 1
         if result.metrics:

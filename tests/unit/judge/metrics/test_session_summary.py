@@ -41,6 +41,12 @@ def test_rates_are_over_all_runs_and_means_over_runs_with_the_metric():
     assert (figures.runs, figures.measured_runs, figures.kilometers, figures.hours) == (4, 3, 2.0, 1.5)
 
 
+@pytest.mark.parametrize("kind", ["interrupted", "not-run"])
+def test_runs_that_the_end_of_the_session_prevented_are_not_failures(kind):
+    unfinished = RunResult(RunKey("a", 5), "a.yaml", Outcome.ERROR, error=RunFailure(kind, "the session ended"))
+    assert summarize_session([*RUNS, unfinished]) == summarize_session(RUNS)
+
+
 def test_order_of_runs_does_not_change_the_summary():
     assert summarize_session(RUNS) == summarize_session(reversed(RUNS))
 
