@@ -14,6 +14,7 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.core.geometry.polygon_separation import POINT, separation
 from simscen.core.records.events import EventKind
+from simscen.core.records.trace import Samples
 from simscen.criteria.findings import MissingEvidence
 from simscen.criteria.trace_signals.ground_truth import check_samples
 from simscen.criteria.trace_signals.readers import goal_distance, true_poses
@@ -51,24 +52,27 @@ def distance_to(query: SignalQuery) -> Array:
 
 
 def object_positions(trace: Trace, name: str) -> Array:
-    """Return the poses (n, 3) of an object at the samples of the truth, or the position (1, 2) of a static object.
+    """Return the positions (n, 2) of an object at the samples of the truth.
 
     Raises MissingEvidence if the trace does not contain the object.
     """
-    spawned = [event for event in trace.of_kind(EventKind.OBJECT_SPAWNED) if event.name == name]
+    spawned = [
+        (event.tick, (x, y))
+        for event in trace.of_kind(EventKind.OBJECT_SPAWNED)
+        if event.name == name
+        and isinstance(x := event.data.get("x"), int | float)
+        and isinstance(y := event.data.get("y"), int | float)
+    ]
+    samples = Samples(np.empty(0, dtype=np.int64), np.empty((0, 2)))
     if name in trace.objects:
-        samples, clock = check_samples(trace.objects[name], f"the pose of {name}", trace), trace.truth.ticks
-        poses = samples.at(clock)
-        for event in spawned:  # until its next sample, the newest one is from before it was removed
-            first = int(np.searchsorted(samples.ticks, event.tick, side="right"))
-            if first < len(samples):
-                poses[(clock >= event.tick) & (clock < samples.ticks[first])] = samples.values[first]
-        return poses
-    for event in spawned:
-        x, y = event.data.get("x"), event.data.get("y")
-        if isinstance(x, int | float) and isinstance(y, int | float):
-            return np.array([[x, y]], dtype=np.float64)
-    raise MissingEvidence(f"`{name}` never existed, or does not move")
+        samples = check_samples(trace.objects[name], f"the pose of {name}", trace)
+        spawned = spawned[1:]  # the first sample is of the object that was spawned first
+    elif not spawned:
+        raise MissingEvidence(f"`{name}` never existed, or does not move")
+    ticks = np.concatenate((samples.ticks, np.array([tick for tick, _ in spawned], dtype=np.int64)))
+    positions = np.concatenate((samples.values[:, :2], np.array([at for _, at in spawned]).reshape(-1, 2)))
+    order = np.argsort(ticks, kind="stable")  # the sample at the tick of an event precedes the event
+    return Samples(ticks[order], positions[order]).at(trace.truth.ticks)
 
 
 def is_present(trace: Trace, name: str) -> Array:
@@ -181,8 +185,7 @@ def pedestrian_gap(trace: Trace, case: Case) -> Array:
     poses = true_poses(trace)
     nearest = np.full(len(poses), np.inf)
     for name, radius in sorted(radii.items()):
-        positions = np.broadcast_to(object_positions(trace, name)[:, :2], (len(poses), 2))
-        gap = _footprint_distance(poses, positions, case) - radius
+        gap = _footprint_distance(poses, object_positions(trace, name), case) - radius
         nearest = np.minimum(nearest, np.where(is_present(trace, name), np.maximum(gap, 0.0), np.inf))
     return nearest
 

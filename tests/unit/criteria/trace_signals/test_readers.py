@@ -397,12 +397,41 @@ def test_a_state_that_ends_at_the_tick_of_its_start_counts_at_one_sample(name, s
     assert np.flatnonzero(signal(name, words)).tolist() == [40]
 
 
-def test_object_that_is_spawned_again_is_at_its_new_position_at_once():
-    events = [[0, "object.spawned", "box"], [1, "object.removed", "box"], [2, "object.spawned", "box"]]
+def _distance_to_box(events, samples):
+    """Return the distance from the origin to `box`, with samples [tick, x]."""
     trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0]], "events": events})
-    box = Samples(np.array([6, 486], dtype=np.int64), np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]]))
-    values = read_signal("distance_to", replace(trace, objects={"box": box}), synthetic_case({}), {"object": "box"})
-    assert [at(values, seconds) for seconds in (0, 0.5, 1.5, 2, 3)] == [0, 0, math.inf, 5, 5]
+    ticks, x = np.array(samples).T
+    box = Samples(ticks, np.column_stack((x, 0 * x, 0 * x)).astype(float))
+    return read_signal("distance_to", replace(trace, objects={"box": box}), synthetic_case({}), {"object": "box"})
+
+
+def test_object_that_is_spawned_again_is_at_its_new_position_at_once():
+    events = [
+        [0, "object.spawned", "box", {"x": 1, "y": 0}],
+        [1, "object.removed", "box"],
+        [2, "object.spawned", "box", {"x": 5, "y": 0}],
+    ]
+    values = _distance_to_box(events, [[0, 2], [240, 2], [600, 6]])
+    assert [at(values, t) for t in (0, 0.975, 1, 1.975, 2, 2.475, 2.5)] == [2, 2, math.inf, math.inf, 5, 5, 6]
+
+
+def test_object_that_replaces_another_has_its_own_position_before_its_first_sample():
+    events = [[0, "object.spawned", "box", {"x": 1, "y": 0}], [1, "object.spawned", "box", {"x": 3, "y": 4}]]
+    values = _distance_to_box([*events, [3, "object.spawned", "box", {"x": 6, "y": 8}]], [[0, 1], [240, 1], [480, 7]])
+    assert [at(values, t) for t in (0.975, 1, 1.975, 2, 2.975, 3, 4)] == [1, 5, 5, 7, 7, 10, 10]
+
+
+def test_object_without_samples_is_where_it_was_spawned_last():
+    events = [[t, "object.spawned", "box", {"x": x, "y": y}] for t, x, y in ((0, 3, 4), (2, 0, 1))]
+    words = {"seconds": 4, "truth": [[0, 0, 0]], "events": [*events, [1, "object.spawned", "cart", {"x": 9, "y": 9}]]}
+    assert [at(signal("distance_to", words, object="box"), t) for t in (0, 1.975, 2, 4)] == [5, 5, 1, 1]
+
+
+@pytest.mark.parametrize("data", [{"x": 1.0}, {"y": 1.0}, {"x": "1", "y": "1"}, {}])
+def test_object_spawned_without_a_position_is_missing_evidence(data):
+    words = {"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "object.spawned", "box", data]]}
+    with pytest.raises(MissingEvidence, match="`box` never existed, or does not move"):
+        signal("distance_to", words, object="box")
 
 
 def test_deviation_from_a_long_plan_needs_little_memory():
