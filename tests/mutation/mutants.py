@@ -110,10 +110,12 @@ def _mutable_nodes(tree: ast.Module) -> Iterator[tuple[str, ast.AST, ast.AST]]:
 
 
 def _has_no_effect(node: ast.AST) -> bool:
-    """Return whether a node is not mutated: docstrings, imports, assertions for the type checker, raised errors."""
+    """Return whether a node is not mutated: docstrings, imports, assertions, raised errors."""
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
         return True
     if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+        return True
+    if isinstance(node, ast.keyword) and node.arg == "strict":  # asserts that the arguments of zip are equally long
         return True
     return isinstance(node, ast.Import | ast.ImportFrom | ast.Assert | ast.Raise)
 
