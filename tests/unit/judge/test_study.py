@@ -231,6 +231,11 @@ def test_effect_needs_enough_runs_and_differences(values: Sequence[Any], margins
 def test_eight_runs_and_three_groups_are_enough_for_an_effect() -> None:
     assert len(study_of("x", list(range(8)), [float(k) for k in range(8)]).effects) == 1
     assert len(study_of("x", list("abcabcab"), [float(k) for k in range(8)]).effects) == 1
+
+
+def test_two_different_numbers_are_enough_for_an_effect() -> None:
+    (effect,) = study_of("x", ["1 m", "2 m"] * 4, [0.1, 0.2] * 4).effects
+    assert (effect.effect, effect.is_ordered) == (pytest.approx(1.0), True)
     assert len(study_of("x", list(range(8)), [0.0, 1.0] * 4).effects) == 1
 
 
