@@ -9,6 +9,7 @@ from simscen.loading import multirobot
 from simscen.loading.checks.registry import ROBOT_NAMES
 from simscen.loading.checks.runner import check_scenario
 from simscen.loading.codes import UNSUPPORTED_BY_STACK
+from simscen.loading.file_kinds import kind_of_content, not_a_scenario
 from simscen.loading.files.assets import Assets, find_criterion_masks
 from simscen.loading.files.paths import PathSandbox, is_unusable_name, scenario_id
 from simscen.loading.loaded import KEEPOUT_MASK_KEYS, SPEED_MASK_KEYS, LoadedMap, LoadedScenario
@@ -17,7 +18,6 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.schema.validate import check, not_a_mapping
 from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.stacks.nav2_expansion import with_nav2_parameters
-from simscen.loading.stacks.stack_files import not_a_scenario, recognize_stack_file
 from simscen.loading.variations.expand import VARIATIONS, Variation, VariationSpace, expand_variations, variation_space
 from simscen.loading.variations.naming import number_of
 from simscen.loading.variations.options import Change
@@ -140,7 +140,8 @@ def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Pat
         return [Problem(sandbox.display_name(file), 0, 0, "SC041", message, hint)]
     tree, problems = library.read(file, defaults=True)
     display_name = sandbox.display_name(file)
-    if kind := recognize_stack_file(tree, library.texts.get(display_name, ""), display_name):
+    kind = kind_of_content(tree, library.texts.get(display_name, ""), display_name)
+    if kind != "scenario":
         return [not_a_scenario(kind, display_name)]
     if choice is not None:
         library.add(choice.texts, choice.files)

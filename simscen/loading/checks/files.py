@@ -5,7 +5,8 @@ from pathlib import Path
 
 from simscen.core.errors import Problem
 from simscen.loading.checks.runner import check_world_file
-from simscen.loading.files.assets import SDF_SUFFIXES, URDF_SUFFIXES, Assets, is_ros_map
+from simscen.loading.file_kinds import NAV2_FILE_KIND, kind_of_content
+from simscen.loading.files.assets import SDF_SUFFIXES, URDF_SUFFIXES, Assets
 from simscen.loading.files.discovery import (
     BASE_SUFFIXES,
     ROBOT_SUFFIXES,
@@ -20,20 +21,16 @@ from simscen.loading.multirobot import has_valid_robots, split_by_robot
 from simscen.loading.scenario import try_variations
 from simscen.loading.schema.validate import check_partial
 from simscen.loading.stacks.nav2_expansion import with_nav2_parameters
-from simscen.loading.stacks.stack_files import NAV2_FILE_KIND, STACK_FILE_KIND, read_stack_file, recognize_stack_file
+from simscen.loading.stacks.stack_files import read_stack_file
 from simscen.loading.variations.variation_problems import VariationProblems, merge_problems
 from simscen.loading.yaml.library import APPEND_SUFFIX, DEFAULTS_FILE, Library
-from simscen.loading.yaml.tree import MappingNode, ScalarNode, child, entries_of, existing_keys, items_of, node_at
+from simscen.loading.yaml.tree import MappingNode, ScalarNode, child, existing_keys, items_of, node_at
 from simscen.model.scenario import ScenarioSpec
 
 CHECKED_DRAWS = range(1, 21)
 """Numbers of the variations of a study that are checked, from 1."""
 STACK_KINDS = ("stack", NAV2_FILE_KIND)
 """Kinds of files with the parameters of a stack."""
-_ROBOT_KEYS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
-_WORLD_KEYS = frozenset({"walls", "obstacles", "objects", "doors", "places", "regions", "map_height", "sdf"})
-_SCENARIO_KEYS = frozenset({"world", "robot", "goals", "pass", "events", "faults", "stack"})
-"""Top-level keys that only files of this kind have."""
 _SUFFIXES_BY_KIND = (
     ("scenario", SCENARIO_SUFFIXES),
     ("study", STUDY_SUFFIXES),
@@ -82,15 +79,9 @@ def file_kind(file: Path, root: Path) -> str:
             return kind
     library = Library(PathSandbox.around(root))
     tree, _ = library.read(file.absolute())
-    if is_ros_map(tree):
-        return "map"
     display_name = library.sandbox.display_name(file.absolute())
-    if kind := recognize_stack_file(tree, "".join(library.texts.values()), display_name):
-        return "stack" if kind == STACK_FILE_KIND else kind
-    keys = entries_of(tree).keys()
-    if keys & _SCENARIO_KEYS:
-        return "scenario"
-    return "robot" if keys & _ROBOT_KEYS else "world" if keys & _WORLD_KEYS else "scenario"
+    kind = kind_of_content(tree, "".join(library.texts.values()), display_name)
+    return "scenario" if kind == "xml" else kind
 
 
 def _base_file_problems(file: Path, library: Library) -> list[Problem]:

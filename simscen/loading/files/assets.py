@@ -1,5 +1,6 @@
 """Loading of the files that a scenario names: worlds, maps, robots, and filter masks."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,7 +26,6 @@ Loaded = TypeVar("Loaded", LoadedMap, LoadedRobot, LoadedWorld)
 
 SDF_SUFFIXES = (".sdf", ".world", ".sdf.xacro", ".world.xacro")
 """Suffixes of the files of Gazebo worlds."""
-XML_STARTS = ("<?xml", "<sdf", "<!--")
 URDF_SUFFIXES = (".urdf", ".xacro")
 SHIPPED_ROBOT_SUFFIX = ".robot.yaml"
 """Suffix of the files of robots that ship with simscen."""
@@ -60,7 +60,7 @@ class Assets:
             return LoadedWorld(path.name.split(".")[0], path, sdf=path)
         name = self.library.sandbox.display_name(path)
         text = read_text(path, name)
-        if isinstance(text, str) and text.lstrip().startswith(XML_STARTS):
+        if isinstance(text, str) and is_xml(text):
             hint = "if it is SDF, rename it to .sdf or .world"
             self.problems.append(Problem(name, 1, 1, "SC004", "this is an XML file, expected a world in YAML", hint))
             return None
@@ -181,6 +181,11 @@ class Assets:
             self.problems.append(found)
             return None
         return found
+
+
+def is_xml(text: str) -> bool:
+    """Return whether a text is XML instead of YAML. The merge key `<<` of YAML does not count."""
+    return re.match(r"\s*<[?!\w]", text) is not None
 
 
 def is_ros_map(tree: Node | None) -> bool:

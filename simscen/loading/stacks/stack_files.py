@@ -1,4 +1,4 @@
-"""Reading and recognition of files with the parameters of a stack: `*.stack.yaml` files and Nav2 parameter files."""
+"""Reading of files with the parameters of a stack: `*.stack.yaml` files and Nav2 parameter files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,11 +13,6 @@ from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.textfile import read_text
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, child, entries_of
 from simscen.model.stack_files import StackFileSpec
-
-STACK_FILE_KIND, NAV2_FILE_KIND = "stack file", "parameter file of Nav2"
-"""Kinds of files with the parameters of a stack, as in messages."""
-_STACK_FILE_KEYS = frozenset({"simscen", "name", "description", "stack"})
-"""Top-level keys that a stack file can have."""
 
 
 def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: Sequence[Path] = ()) -> StackChoice:
@@ -73,18 +68,3 @@ def _read_tree(file: Path, library: Library) -> tuple[Node | None, list[Problem]
     stack = MappingNode(start, {NAV2_PARAMS: Entry(start, ScalarNode(start, file.name))})
     entries = {"simscen": Entry(start, ScalarNode(start, 1)), "stack": Entry(start, stack)}
     return MappingNode(start, entries), []
-
-
-def recognize_stack_file(tree: Node | None, text: str, display_name: str) -> str:
-    """Return the kind of a file with this tree and text: STACK_FILE_KIND, NAV2_FILE_KIND, or "" for other files."""
-    if is_nav2_parameter_file(text, display_name):
-        return NAV2_FILE_KIND
-    keys = entries_of(tree).keys()
-    return STACK_FILE_KIND if "stack" in keys and keys <= _STACK_FILE_KEYS else ""
-
-
-def not_a_scenario(kind: str, display_name: str) -> Problem:
-    """Return the problem that a stack file is used as a scenario. `kind` is STACK_FILE_KIND or NAV2_FILE_KIND."""
-    alternative = f", or name it in a scenario: `stack: {{nav2_params: {display_name.rpartition('/')[2]}}}`"
-    hint = f"run scenarios with `--stack NAME={display_name}`{alternative if kind == NAV2_FILE_KIND else ''}"
-    return Problem(display_name, 0, 0, "SC025", f"this is a {kind}, not a scenario", hint)

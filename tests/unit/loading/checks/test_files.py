@@ -74,15 +74,26 @@ def test_ignored_and_wrong_nav2_parameters_are_reported(write: Write, tmp_path: 
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "kind", "hint"),
     [
-        (PARAMETERS, "this is a parameter file of Nav2, not a scenario"),
-        ("simscen: 1\nstack: {}", "this is a stack file, not a scenario"),
+        (PARAMETERS, "a parameter file of Nav2", "run scenarios with `--stack NAME=mine.yaml`"),
+        ("simscen: 1\nstack: {}", "a stack file", "run scenarios with `--stack NAME=mine.yaml`"),
+        ("simscen: 1\nwalls: []\nplaces: {}", "a world file", "name it in a scenario: `world: mine.yaml`"),
+        ("simscen: 1\ndrive: {}\nlimits: {}", "a robot file", "name it in a scenario: `robot: {model: mine.yaml}`"),
+        ("image: a.pgm\nresolution: 1", "a ROS map", "name it in a scenario: `world: mine.yaml`"),
+        ("<?xml version='1.0'?>\n<sdf/>", "an XML file", "name a world or a robot in a scenario: `world: mine.yaml`"),
+        ("<robot name='x'/>", "an XML file", "name a world or a robot in a scenario: `world: mine.yaml`"),
     ],
 )
-def test_stack_parameter_file_is_no_scenario_and_gets_a_hint(
-    write: Write, tmp_path: Path, text: str, told: str
+def test_file_of_another_kind_is_no_scenario_and_gets_a_hint(
+    write: Write, tmp_path: Path, text: str, kind: str, hint: str
 ) -> None:
     (problem,) = check_file("scenario", write("mine.yaml", text), tmp_path)
+    told = f"this is {kind}, not a scenario"
     assert (problem.place, problem.code, problem.message) == ("mine.yaml", "SC025", told)
-    assert "--stack NAME=mine.yaml" in problem.hint
+    assert problem.hint.startswith(hint)
+
+
+def test_merge_key_of_yaml_is_no_xml(write: Write, tmp_path: Path) -> None:
+    problems = check_file("scenario", write("a.yaml", "<<: {simscen: 1}"), tmp_path)
+    assert "SC025" not in [problem.code for problem in problems]
