@@ -9,6 +9,7 @@ from yaml import events as ev
 from simscen.core.errors import Problem
 from simscen.loading.yaml.lookalikes import LOOKALIKES, describe_lookalike, find_lookalike
 from simscen.loading.yaml.scalars import parse_scalar
+from simscen.loading.yaml.syntax_messages import MISSING_COLON, syntax_message, unclosed_part
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode, nodes_with_keys
 
 MAX_DEPTH = 40
@@ -213,15 +214,15 @@ class _Composer:
         start = error.context_mark
         if (lookalike := self._lookalike(lines, start.line if start else mark.line, mark.line)) is not None:
             return lookalike
-        if start is not None and mark.index >= len(self.text.rstrip()) and start.index < mark.index:
-            subject = (error.context or "this").removeprefix("while parsing a ").removeprefix("while scanning a ")
-            return Problem(self.path, start.line + 1, start.column + 1, "SC003", f"this {subject} is not closed")
-        message = error.problem or "cannot be read as YAML"
-        if start is not None and error.context and start.index != mark.index:
-            message += f" ({error.context} that starts at {start.line + 1}:{start.column + 1})"
+        is_at_end = mark.index >= len(self.text.rstrip())
+        if start is not None and is_at_end and start.index < mark.index and (part := unclosed_part(error)):
+            return Problem(self.path, start.line + 1, start.column + 1, "SC003", f"this {part} is not closed")
+        message, hint = syntax_message(error)
+        if start is not None and error.problem == MISSING_COLON:
+            mark = start
         if mark.line < len(lines):
-            return Problem(self.path, mark.line + 1, mark.column + 1, "SC003", message)
-        return Problem(self.path, len(lines), len(lines[-1]) + 1, "SC003", message)
+            return Problem(self.path, mark.line + 1, mark.column + 1, "SC003", message, hint)
+        return Problem(self.path, len(lines), len(lines[-1]) + 1, "SC003", message, hint)
 
     def _lookalike(self, lines: list[str], first: int, last: int) -> Problem | None:
         """Return a problem for the first lookalike character in the lines `first` to `last` (from 0), or None."""

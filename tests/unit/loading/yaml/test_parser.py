@@ -145,3 +145,30 @@ def test_position_of_a_syntax_error_is_inside_the_file() -> None:
         lines = text.split("\n")
         assert 1 <= problem.line <= len(lines)
         assert 1 <= problem.col <= len(lines[problem.line - 1]) + 1
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "message", "hint"),
+    [
+        ("a: 1\nb 2\nc: 3\n", (2, 1), "`:` is missing after this key", "write `key: value`"),
+        ("a: 1\nb\n", (2, 1), "`:` is missing after this key", "write `key: value`"),
+        ("a:1\nb: 2\n", (2, 2), "unexpected `:`", "write a space after each `:`"),
+        ("name: one: two\n", (1, 10), "unexpected `:`", "quote texts that contain `: `"),
+        ("a: 1\n b: 2\n", (2, 3), "unexpected `:`", "indent all keys of a mapping alike"),
+        ("a:\n  b: 1\n c: 2\n", (3, 2), "expected a key in the mapping that starts at 1:1", "indent all keys"),
+        ("a: 'it's'\n", (1, 8), "expected a key in the mapping that starts at 1:1", "nothing after a closing quote"),
+        ("a:\n  - 1\n  -2\n", (3, 3), "`:` is missing after this key", "or `- value` for an item of a list"),
+        ("a:\n  - b: 1\n  -c: 2\n", (3, 3), "begins with `- ` in the list that starts at 2:3", "indent all items"),
+        ("a: - 1\n", (1, 4), "unexpected `- `", "on a line of its own"),
+        ("a: @home\n", (1, 4), "a value cannot begin with this character", "put the value in quotes"),
+        ("a: {b: 1\nc: 2\n", (2, 2), "expected `,` or `}` in the mapping that starts at 1:4", ""),
+        ("a: [1, , 2]\n", (1, 8), "expected a value", ""),
+        ("a: {b: 1\n", (1, 4), "this flow mapping is not closed", ""),
+        ("a: &\n", (1, 5), "while scanning an anchor that starts at 1:4", ""),
+    ],
+)
+def test_common_syntax_errors_say_what_to_write(text: str, place: tuple[int, int], message: str, hint: str) -> None:
+    problem = _problem(text)
+    assert (problem.line, problem.col) == place
+    assert message in problem.message
+    assert hint in problem.hint
