@@ -154,7 +154,8 @@ def read_journal(folder: Path) -> JournaledSession:
     """Read the last session of the journal in `folder`. Raises InvalidInput if there is no valid journal."""
     if not (folder / JOURNAL_FILE).is_file():
         hint = "name the folder that `simscen run` wrote, e.g. simscen-out/latest"
-        raise _invalid_journal(folder, f"the folder has no {JOURNAL_FILE}", hint)
+        message = f"the folder has no {JOURNAL_FILE}" if folder.is_dir() else "no such folder"
+        raise _invalid_journal(folder, message, hint)
     try:
         lines = _last_session_lines(folder)
         first = next(lines, None)

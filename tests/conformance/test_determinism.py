@@ -148,4 +148,4 @@ def test_run_that_differs_from_another_session_is_an_error(pair: Path, simscen) 
     assert missing.code == 3
     assert "seed-99/run.mcap: No such file or directory" in missing.out
     no_folder = simscen("run", "a.scenario.yaml", "--out", "never", "--check-against", "no_folder")
-    assert (no_folder.code, no_folder.err) == (2, "simscen: --check-against no_folder: the folder contains no runs\n")
+    assert (no_folder.code, no_folder.err) == (2, "simscen: --check-against no_folder: no such folder\n")

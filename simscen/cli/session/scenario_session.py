@@ -68,7 +68,8 @@ def execute_session(
     if warnings:
         print_text(as_text(warnings), sys.stderr)
     if options.against is not None and not (options.against / RUNS_FOLDER).is_dir():
-        raise UsageError(f"--check-against {options.against}: the folder contains no runs")
+        reason = "the folder contains no runs" if options.against.is_dir() else "no such folder"
+        raise UsageError(f"--check-against {options.against}: {reason}")
     for scenario in scenarios:
         scenario_seeds(scenario, options)
     if request.last_failed:

@@ -13,7 +13,7 @@ import pytest
         (("--out", "good.scenario.yaml/out"), "cannot use the output folder"),
         (("--junit", "good.scenario.yaml/junit.xml"), "cannot write good.scenario.yaml/junit.xml"),
         (("--out", "a", "--resume", "b"), "--out and --resume exclude each other"),
-        (("--resume", "nowhere"), "nowhere: error[SC810] the folder has no events.jsonl"),
+        (("--resume", "nowhere"), "nowhere: error[SC810] no such folder"),
         (("--shard", "3/2"), "cannot read --shard 3/2"),
         (("--shard", "half"), "cannot read --shard half"),
         (("--seed", "4294967295", "--repeat", "2"), "above the largest seed, 4294967295"),
