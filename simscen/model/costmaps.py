@@ -5,8 +5,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from simscen.spec.base import Ranged, Spec, by_default
-from simscen.spec.quantities import Frequency, NonNegativeAngle, NonNegativeLength, PositiveLength, Quantity
+from simscen.spec.quantities import Frequency, Length, NonNegativeAngle, NonNegativeLength, PositiveLength, Quantity
 
+ObstacleHeight = Annotated[Length, Field(ge=-100, le=100)]
 PublishFrequency = Annotated[float, Field(ge=0, le=1000), Quantity("frequency")]
 
 
@@ -46,7 +47,7 @@ class Costmap(Ranged):
     """Maximum distance up to which beams clear cells."""
     raytrace_min_range: NonNegativeLength = 0.0
     """Minimum distance from which beams clear cells."""
-    min_obstacle_height: NonNegativeLength = 0.05
+    min_obstacle_height: ObstacleHeight = 0.05
     """Minimum height of obstacles in camera data; lower points are ground. Lidar data is not filtered."""
     max_ground_slope: Annotated[NonNegativeAngle, Field(le=1)] = 0.2
     """Maximum slope of the ground in camera data between two successive points, going outward from the robot. Steeper
@@ -92,7 +93,7 @@ class LocalCostmap(Spec):
     """Maximum distance up to which beams clear cells."""
     raytrace_min_range: NonNegativeLength | None = None
     """Minimum distance from which beams clear cells."""
-    min_obstacle_height: NonNegativeLength | None = None
+    min_obstacle_height: ObstacleHeight | None = None
     """Minimum height of obstacles in camera data; lower points are ground."""
     max_ground_slope: Annotated[NonNegativeAngle, Field(le=1)] | None = None
     """Maximum slope of the ground in camera data between two successive points, going outward from the robot."""

@@ -15,7 +15,7 @@ from simscen.model.recovery import Recovery
 from simscen.model.stack_base import Latency, StackBase
 from simscen.spec.base import Typed, by_default, text_or_mapping
 from simscen.spec.places import FilePath
-from simscen.spec.quantities import Quantity
+from simscen.spec.quantities import NonNegativeAngularSpeed, NonNegativeSpeed, Quantity
 
 _LatencyOrRobot = Annotated[
     Annotated[Literal["robot"], Tag("a text")] | Annotated[Latency, Tag("a mapping")], Discriminator(text_or_mapping)
@@ -54,6 +54,12 @@ class StackSpec(InProcessStack):
     failure_tolerance: Annotated[float, Field(ge=-1, le=86400), Quantity("duration")] = 0.3
     """Time without a valid command after which the controller fails with PATIENCE_EXCEEDED. 0: the controller fails
     immediately with NO_VALID_CONTROL. -1: the controller never fails."""
+    min_x_velocity_threshold: NonNegativeSpeed = 0.0
+    """Measured forward speed up to which controller and goal checker get 0 instead (Nav2: 0.0001)."""
+    min_y_velocity_threshold: NonNegativeSpeed = 0.0
+    """The same for the sideways speed (Nav2: 0.0001)."""
+    min_theta_velocity_threshold: NonNegativeAngularSpeed = 0.0
+    """The same for the turn rate (Nav2: 0.0001)."""
     goal_checker: GoalChecker = by_default()
     """Checker that decides whether a goal is reached."""
     progress_checker: ProgressChecker = by_default()

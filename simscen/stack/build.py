@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from simscen.core.clock import Clock
+from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.goals import Mode
 from simscen.core.random_streams import Streams
 from simscen.model.recovery import Recovery
@@ -133,6 +134,7 @@ class StackBuilder:
             costmaps,
             setting.control_period,
             spec.failure_tolerance,
+            Twist(spec.min_x_velocity_threshold, spec.min_y_velocity_threshold, spec.min_theta_velocity_threshold),
             self.make_clearing_policy(),
         )
         commands = CommandPipeline(

@@ -65,15 +65,20 @@ class Navigator:
         costmaps: Costmaps,
         period: float,
         failure_tolerance: float,
+        velocity_thresholds: Twist,
         clearing: ClearingPolicy,
     ) -> None:
-        """Take the components, the `period` of the steps in s, and Nav2's `failure_tolerance` in s (-1: forever)."""
+        """Take the components, the `period` of the steps in s, and Nav2's `failure_tolerance` in s (-1: forever).
+
+        Measured velocities up to `velocity_thresholds` count as 0.
+        """
         self.plans = plans
         """The manager of the plan that is being followed."""
         self._controller, self._recovery = controller, recovery
         self._goal_checker, self._progress, self._costmaps = goal_checker, progress, costmaps
         self._local_path, self._clearing = LocalPathSender(controller), clearing
         self._period, self._failure_tolerance = period, failure_tolerance
+        self._velocity_thresholds = velocity_thresholds
         self._clock = 0.0
         self.goal: Goal | None = None
         self.via: tuple[Goal, ...] = ()
@@ -112,6 +117,8 @@ class Navigator:
         self._clock += periods * self._period
         if self._behavior is not None:
             return self._recover(tick, frames, self._behavior)
+        if any(self._velocity_thresholds):
+            twist = _above_thresholds(twist, self._velocity_thresholds)
         if not self.via and self._goal_checker.reached(goal, frames.pose, twist):
             return StepResult(reached=True)
         events: tuple[Event, ...] = ()
@@ -207,6 +214,11 @@ class Navigator:
         self._behavior = None
         self._progress.reset()
         return StepResult(events=(Event(tick, EventKind.RECOVERY_ENDED, behavior.name, result),))
+
+
+def _above_thresholds(velocity: Twist, thresholds: Twist) -> Twist:
+    """Return the velocity with 0 for each component up to its threshold (getThresholdedTwist of nav2_controller)."""
+    return Twist(*(0.0 if abs(value) <= limit else value for value, limit in zip(velocity, thresholds, strict=True)))
 
 
 def _failure_data(failure: NavigationFailure) -> dict[str, Value]:

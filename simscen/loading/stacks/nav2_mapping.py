@@ -28,6 +28,8 @@ DWB_CRITICS = {
 """Parameters in simscen for the weights of DWB's critics, by critic in Nav2."""
 DWB_CRITICS_WITHOUT_WEIGHT = ("Oscillation", "ObstacleFootprint")
 """DWB critics that only reject trajectories. They are always active in simscen."""
+DWB_FORWARD_POINT_M = 0.1
+"""Default of `forward_point_distance` in simscen, which has one value for both alignment critics of DWB."""
 DWB_OPTIONAL_LIMITS = ("min_speed_xy", "max_speed_xy", "min_speed_theta")
 """Limits of DWB that are off if they are negative."""
 MPPI_OMNI_PARAMETERS = ("vy_std", "ay_max", "ay_min")
@@ -65,7 +67,8 @@ IGNORED_NAME_PARTS = (
 EQUIVALENT_VALUES: Mapping[str, tuple[object, ...]] = {
     "enabled": (True,), "marking": (True,), "clearing": (True,), "use_astar": (False,), "scale_velocities": (False,),
     "feedback": ("OPEN_LOOP",), "base_shift_correction": (True,), "deadband_velocity": ([0.0, 0.0, 0.0],),
-    "combination_method": (1,), "footprint_clearing_enabled": (True,),
+    "combination_method": (1,), "footprint_clearing_enabled": (True,), "stateful": (True,), "lookahead_time": (-1.0,),
+    **dict.fromkeys(("short_circuit_trajectory_evaluation", "debug_trajectory_details"), (True, False)),
 }  # fmt: skip
 """Parameters that simscen does not have, with the values for which Nav2 behaves like simscen."""
 SCENARIO_PARAMETERS: Mapping[str, str] = {

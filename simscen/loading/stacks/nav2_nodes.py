@@ -13,6 +13,7 @@ from simscen.loading.stacks.nav2_mapping import (
     CONTROLLERS,
     DWB_CRITICS,
     DWB_CRITICS_WITHOUT_WEIGHT,
+    DWB_FORWARD_POINT_M,
     DWB_OPTIONAL_LIMITS,
     EQUIVALENT_VALUES,
     IGNORED_NAME_PARTS,
@@ -33,10 +34,16 @@ from simscen.loading.stacks.nav2_mapping import (
     translate_same_name,
 )
 
+CONTROLLER_SERVER_PARAMETERS = (
+    "controller_frequency", "failure_tolerance",
+    "min_x_velocity_threshold", "min_y_velocity_threshold", "min_theta_velocity_threshold",
+)  # fmt: skip
+"""Parameters of the controller server itself, which have the same names under `stack`."""
+
 
 def _translate_controller_server(parameters: Parameters) -> Iterator[Translation]:
     """Translate the parameters of the first progress checker, goal checker, and controller."""
-    for name in ("controller_frequency", "failure_tolerance"):
+    for name in CONTROLLER_SERVER_PARAMETERS:
         if name in parameters:
             yield Translation(name, (name,), parameters[name])
     for kind in ("progress_checker", "goal_checker"):
@@ -91,6 +98,11 @@ def _translate_plugin(
         own, value = RENAMED_PARAMETERS.get((kind, key), key), written
         if key == "motion_model":
             value = model
+        elif (kind, key) == ("dwb", "GoalAlign.forward_point_distance"):
+            is_same = written == parameters.get(f"{prefix}.PathAlign.forward_point_distance", DWB_FORWARD_POINT_M)
+            why = "" if is_same else "simscen uses the value of PathAlign"
+            yield Translation(f"{prefix}.{key}", (), written, why)
+            continue
         elif key.rpartition(".")[2] == "min_turning_r":
             own = key if model != "Ackermann" else "min_turning_r"
         elif key == "critics" and kind in ("mppi", "dwb"):

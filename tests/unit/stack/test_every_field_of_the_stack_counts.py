@@ -208,6 +208,10 @@ ELSEWHERE = {
     **dict.fromkeys(
         ("Costmap.publish_frequency", "LocalCostmap.publish_frequency"), "tests/unit/stack/test_publishing.py"
     ),
+    **dict.fromkeys(
+        (f"StackSpec.min_{axis}_velocity_threshold" for axis in ("x", "y", "theta")),
+        "tests/unit/stack/test_navigator.py",
+    ),
     "Costmap.lethal_cost_threshold": "tests/unit/stack/costmap/test_costmap.py",
     **dict.fromkeys(
         (

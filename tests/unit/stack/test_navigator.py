@@ -176,3 +176,29 @@ def test_navigator_passes_a_wall_displaced_by_centimeters(off: float) -> None:
     d = drive(world, Pose2(3.5, 3.2, math.pi), goal, grid=mapped.grid((-0.5, -0.5, 12.5, 5.5)), spec=spec).run(61)
     assert d.result == "SUCCEEDED"
     assert len(d.events_of_kind("recovery.started")) <= 2
+
+
+def test_slow_measured_motion_counts_as_rest() -> None:
+    """The controller server of Nav2 replaces components of the measured velocity up to their thresholds by 0."""
+    spec = StackSpec(
+        localizer=TRUTH,
+        min_x_velocity_threshold=0.1,
+        min_y_velocity_threshold=0.2,
+        min_theta_velocity_threshold=0.3,
+    )
+    d = start(rooms(), spec=spec)
+    controller, given = d.stack.inner._navigator._controller, list[Twist]()
+    command = controller.command
+
+    def record(pose: Pose2, twist: Twist, *rest: object) -> Twist:
+        given.append(twist)
+        return command(pose, twist, *rest)
+
+    controller.command = record
+    d.run(1.0)
+    given.clear()
+    for moving in (Twist(0.1, -0.2, 0.3), Twist(0.2, 0.1, -0.4), Twist(-0.2, -0.3, 0.0)):
+        d._move = lambda _command, _dt, moving=moving: setattr(d, "twist", moving)
+        d.run(0.2)
+    measured = list(dict.fromkeys(given))[1:]  # the first one is from before
+    assert measured == [STOP, Twist(0.2, 0.0, -0.4), Twist(-0.2, -0.3, 0.0)]

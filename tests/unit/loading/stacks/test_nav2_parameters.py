@@ -137,22 +137,6 @@ def test_unknown_controller_is_replaced_by_the_default_with_a_note(tmp_path: Pat
     )
 
 
-def test_mppis_motion_model_is_found_by_the_name_of_its_plugin(tmp_path: Path) -> None:
-    params = """\
-controller_server:
-  ros__parameters:
-    controller_plugins: ["FollowPath"]
-    FollowPath:
-      plugin: "nav2_mppi_controller::MPPIController"
-      motion_model: "any"
-      any: {plugin: "mppi::OmniMotionModel"}
-      CostCritic: {cost_weight: 2.5}
-"""
-    stack = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", params).spec.stack
-    assert (stack.controller.motion_model, stack.controller.CostCritic.cost_weight) == ("Omni", 2.5)
-    assert stack.controller.CostCritic.consider_footprint is False
-
-
 def test_each_robot_can_have_its_own_file(tmp_path: Path) -> None:
     (tmp_path / "nav2.yaml").write_text(PARAMS)
     file = tmp_path / "two.scenario.yaml"
@@ -258,25 +242,6 @@ def test_every_parameter_that_changes_nothing_here_is_named_with_its_line(tmp_pa
     ]  # fmt: skip
 
 
-def test_a_rotation_shim_leaves_its_controller_to_drive_alone(tmp_path: Path) -> None:
-    shimmed = """\
-controller_server:
-  ros__parameters:
-    FollowPath:
-      plugin: "nav2_rotation_shim_controller::RotationShimController"
-      primary_controller:
-        plugin: "nav2_mppi_controller::MPPIController"
-        motion_model: "Ackermann"
-        AckermannConstraints: {min_turning_r: 0.6}
-        critics: ["CostCritic", "GoalCritic", "MineCritic"]
-"""
-    found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", shimmed)
-    drives = found.spec.stack.controller
-    assert (drives.type, drives.motion_model, drives.min_turning_r) == ("mppi", "Ackermann", 0.6)
-    assert drives.critics == ["CostCritic", "GoalCritic"]
-    assert [note.line for note in found.notes] == [6, 9]
-
-
 SOURCES = """\
 local_costmap:
   local_costmap:
@@ -342,40 +307,6 @@ def test_values_with_a_special_meaning_in_nav2_are_accepted(tmp_path: Path) -> N
     stack = found.spec.stack
     assert (stack.localizer.laser_min_range, stack.localizer.max_used_range) == (1.44, float("inf"))
     assert (stack.recovery.simulate_ahead_time, stack.recovery.min_rotational_vel) == (0.0, 0.0)
-
-
-CONTROLLER = """\
-controller_server:
-  ros__parameters:
-    controller_plugins: [FollowPath]
-    FollowPath: {{plugin: "{plugin}", {parameters}}}
-"""
-DWB, MPPI = "dwb_core::DWBLocalPlanner", "nav2_mppi_controller::MPPIController"
-
-
-def test_negative_speed_limits_of_dwb_are_off(tmp_path: Path) -> None:
-    limits = "min_speed_xy: -0.26, max_speed_xy: -1, min_speed_theta: -1.0"
-    found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", CONTROLLER.format(plugin=DWB, parameters=limits))
-    dwb = found.spec.stack.controller
-    assert (dwb.min_speed_xy, dwb.max_speed_xy, dwb.min_speed_theta) == (0.0, None, 0.0)
-    assert not found.notes
-
-
-@pytest.mark.parametrize("model", ["", "motion_model: DiffDrive, ", "motion_model: Ackermann, "])
-def test_zeros_of_mppi_for_sideways_motion_are_ignored_without_sideways_motion(tmp_path: Path, model: str) -> None:
-    parameters = f"{model}vy_std: 0.0, ay_max: 0.0, ay_min: 0"
-    found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", CONTROLLER.format(plugin=MPPI, parameters=parameters))
-    mppi = found.spec.stack.controller
-    assert (mppi.vy_std, mppi.ay_max, mppi.ay_min) == (0.2, 3.0, -3.0)  # defaults of Nav2
-    assert not found.notes
-
-
-@pytest.mark.parametrize("parameter", ["vy_std: 0.0", "ay_max: 0.0", "ay_min: 0"])
-def test_zeros_of_mppi_for_sideways_motion_are_refused_for_the_omni_model(tmp_path: Path, parameter: str) -> None:
-    parameters = f"motion_model: Omni, {parameter}"
-    with pytest.raises(InvalidInput) as wrong:
-        loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", CONTROLLER.format(plugin=MPPI, parameters=parameters))
-    assert [(problem.path, problem.line) for problem in wrong.value.problems] == [("nav2.yaml", 4)]
 
 
 @pytest.mark.parametrize(("physics", "rate"), [("", 48.0), ("physics: {tick_rate: 200 Hz}", 50.0)])
