@@ -56,21 +56,19 @@ def object_positions(trace: Trace, name: str) -> Array:
 
     Raises MissingEvidence if the trace does not contain the object.
     """
-    spawned = [
-        (event.tick, (x, y))
+    parts = [
+        Samples(np.array([event.tick]), np.array([[x, y]], dtype=np.float64))
         for event in trace.of_kind(EventKind.OBJECT_SPAWNED)
         if event.name == name
         and isinstance(x := event.data.get("x"), int | float)
         and isinstance(y := event.data.get("y"), int | float)
     ]
-    samples = Samples(np.empty(0, dtype=np.int64), np.empty((0, 2)))
-    if name in trace.objects:
-        samples = check_samples(trace.objects[name], f"the pose of {name}", trace)
-        spawned = spawned[1:]  # the first sample is of the object that was spawned first
-    elif not spawned:
+    if name in trace.objects:  # its first sample is of the object that was spawned first
+        parts[:1] = [check_samples(trace.objects[name], f"the pose of {name}", trace)]
+    if not parts:
         raise MissingEvidence(f"`{name}` never existed, or does not move")
-    ticks = np.concatenate((samples.ticks, np.array([tick for tick, _ in spawned], dtype=np.int64)))
-    positions = np.concatenate((samples.values[:, :2], np.array([at for _, at in spawned]).reshape(-1, 2)))
+    ticks = np.concatenate([part.ticks for part in parts])
+    positions = np.concatenate([part.values[:, :2] for part in parts])
     order = np.argsort(ticks, kind="stable")  # the sample at the tick of an event precedes the event
     return Samples(ticks[order], positions[order]).at(trace.truth.ticks)
 
