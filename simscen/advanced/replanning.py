@@ -78,11 +78,11 @@ class AdvancedPlanManager(PlanManager):
         """Prepare for a new goal."""
         super().reset(now)
         self._checked_revision, self._max_obstacle_cells = -1, 0
-        self._avoids_moving, self._moving_checked_at = False, now
+        self._avoids_moving, self._moving_replanned_at = False, now
         self._is_cautious = False
 
     def report_control_failure(self) -> None:
-        """With `cautious`, add CAUTIOUS_CLEARANCES_M to plans until the next goal, because control has failed."""
+        """With `cautious`, keep more clearance in plans until the next goal, because control has failed."""
         self._is_cautious = self._spec.cautious
 
     def _scheduled_reason(self, now: float, plan: FollowedPlan) -> str:
@@ -116,13 +116,13 @@ class AdvancedPlanManager(PlanManager):
     def _should_avoid_moving(self, now: float, pose: Pose2, plan: FollowedPlan) -> bool:
         """Return whether to replan: the plan meets a moving obstacle, or avoids one that may have moved away."""
         moving = self._costmap.moving
-        if not (self._avoids_moving or len(moving)) or now - self._moving_checked_at < MOVING_PERIOD_S:
+        if not (self._avoids_moving or len(moving)) or now - self._moving_replanned_at < MOVING_PERIOD_S:
             return False
         if not self._avoids_moving and not meets_moving_obstacle(
             moving, pose, plan.sampled_points(4), self._speed, self._radius
         ):
             return False
-        self._moving_checked_at = now
+        self._moving_replanned_at = now
         return True
 
     def _accepts(self, reason: str, result: PlanResult) -> bool:
@@ -151,7 +151,7 @@ class AdvancedPlanManager(PlanManager):
 
     def _adopt(self, tick: int, now: float, result: PlanResult, reason: str) -> Event:
         event = super()._adopt(tick, now, result, reason)
-        self._avoids_moving, self._moving_checked_at = result.avoids_moving, now
-        self._checked_revision = self._costmap.view.revision
+        self._avoids_moving, self._moving_replanned_at = result.avoids_moving, now
+        self._checked_revision = self._costmap.revision
         self._max_obstacle_cells = self._costmap.obstacle_cell_count
         return event

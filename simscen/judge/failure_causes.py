@@ -30,7 +30,7 @@ MAX_LINES = 6
 
 
 def explain_failures(verdicts: Sequence[Verdict], trace: Trace, case: Case) -> tuple[Verdict, ...]:
-    """Return the verdicts. Failed findings with a tick have lines about likely causes before their other details."""
+    """Return the verdicts, with likely causes before the other details of each failed finding that has a tick."""
     return tuple(
         replace(
             verdict, findings=tuple(_with_causes(verdict.criterion, each, trace, case) for each in verdict.findings)
@@ -117,7 +117,7 @@ def diagnose_collision(trace: Trace, tick: int) -> Diagnosis:
 
 
 def _describe_hit(trace: Trace, touched: MovableObject, hit: Event) -> str:
-    """Return a sentence on how an object came into contact with the robot; "" if it stands and no event changed it."""
+    """Return a sentence on how an object came to touch the robot; "" if it stands still and no event changed it."""
     ago = f"{trace.seconds(hit.tick - touched.since):.2f} s before"
     parts = []
     if touched.event:
@@ -151,7 +151,7 @@ def _speed(trace: Trace, touched: MovableObject, tick: int) -> float:
 ODOMETRY_FAULTS = frozenset({"bias", "slip", "scale", "drift", "noise"})
 """Kinds of faults that leave an error in the odometry after their end."""
 ODOMETRY_TARGETS = frozenset({"Odometry", WHEELS})
-"""Kinds of targets at which these faults falsify the odometry."""
+"""Values of `affects` for which these faults falsify the odometry."""
 LOST_DISTANCE_M = 0.5
 """Localization error from which a robot counts as lost."""
 
@@ -193,9 +193,9 @@ def _position_error(trace: Trace, tick: int) -> float:
     return float(np.hypot(bx - x, by - y))
 
 
-def _falsified_quantity(trace: Trace, label: str) -> str:
+def _falsified_quantity(trace: Trace, fault: str) -> str:
     """Return the quantity that a fault falsified: "its belief", "its odometry", or "" for other quantities."""
-    starts = [event.data for event in trace.of_kind(EventKind.FAULT_STARTED) if event.name == label]
+    starts = [event.data for event in trace.of_kind(EventKind.FAULT_STARTED) if event.name == fault]
     if not starts:
         return ""
     affects = starts[0].get("affects", "Odometry")  # older logs lack it

@@ -87,7 +87,7 @@ ADVANCED: Values = {
 }  # fmt: skip
 """Parameters of the profile `advanced`, by section, that differ from the defaults."""
 PROFILES: Mapping[str, Values] = {"reference": {}, "advanced": ADVANCED, "nav2": NAV2, "simscen": ADVANCED}
-"""Parameters that each profile sets, by profile and section."""
+"""Parameters that each profile sets, by profile and section. `simscen` is the deprecated name of `advanced`."""
 
 
 def apply_profile(parameters: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -84,8 +84,8 @@ def outcome_text(outcomes: OutcomeCounts) -> str:
 def exclusion_notes(against: BaselineComparison) -> list[str]:
     """Return notes on pairs with different arrivals, on pairs with an error, and on runs without a partner."""
     notes = []
-    if against.pairs_with_one_arrival:
-        pairs = number_with_noun(against.pairs_with_one_arrival, "pair")
+    if against.pairs_with_different_arrivals:
+        pairs = number_with_noun(against.pairs_with_different_arrivals, "pair")
         notes.append(f"the arrivals differ in {pairs}, so only their collisions are compared")
     excluded = []
     if against.error_pairs:

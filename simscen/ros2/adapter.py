@@ -77,8 +77,11 @@ class Adapter:
         self._barrier = NodeBarrier(self._graph, options.answer)
         self._velocity: Tuple[float, ...] = STOP
         self.is_ready = False
-        self.mode, self.continue_after_failure = "", True
-        self._sent = 0
+        self.mode = ""
+        """Nav2 action by which the scenario sends goals. The caller sets it with the goals."""
+        self.continue_after_failure = True
+        """Whether to send the next goal after a failed one. The caller sets it with the goals."""
+        self._open_goal_count = 0
         self._planned_goal: Optional[Goal] = None
         self._unused_masks: List[str] = []
         self.restart_reason = restart_reason
@@ -121,14 +124,14 @@ class Adapter:
 
     def run_facts(self) -> Dict[str, Any]:
         """Return facts about the nodes and the synchronization for the run's log."""
-        synchronized: Any = self._lockstep if self._options.sync == "lockstep" else self._paced
+        synchronization: Any = self._lockstep if self._options.sync == "lockstep" else self._paced
         facts = {
             "sync": self._options.sync,
             "rclpy": version("rclpy"),
             "distribution": os.environ.get("ROS_DISTRO", "unknown"),
             "rmw": rclpy.get_rmw_implementation_identifier(),
             "nodes": self._barrier.nodes,
-            **synchronized.counters,
+            **synchronization.counters,
         }
         if self._options.sync == "paced":
             facts["factor"] = self._options.factor
@@ -159,7 +162,7 @@ class Adapter:
             self._begin()
 
     def preempt(self, now: int, goal: Goal) -> None:
-        """Cancel the current goal, and send `goal` before the remaining goals. `now` is simulated time in ns."""
+        """Send `goal` now, so that it preempts the current goal. `now` is simulated time in ns."""
         self._goals.preempt(goal)
         self._send(now)
 
@@ -197,17 +200,18 @@ class Adapter:
         warming_up = now < self._options.warm_up * NS_PER_S
         if not self.is_ready:
             warming_up = warming_up or self._bring_up.lacks_scan(now, messages)
-            self._bring_up.keep(messages)
+            self._bring_up.remember_latest(messages)
             if not warming_up:
                 self._bring_up.wait(now, MAX_WAIT_FRACTION * limit_s)
+                # `wait` has published the others.
                 messages = [message for message in messages if message[0] not in LATCHED_TOPICS]
                 self._begin()
         messages = [*messages, *self._bring_up.due_initial_pose()]
         self._barrier.step_time.begin(MAX_WAIT_FRACTION * limit_s)
-        synchronized: Any = self._lockstep if self._options.sync == "lockstep" and not warming_up else self._paced
+        synchronization: Any = self._lockstep if self._options.sync == "lockstep" and not warming_up else self._paced
         if not warming_up and self._goals.current is None:
             self._send(now)
-        received = synchronized.step(now, messages, is_command_due, self._goals.current is not None)
+        received = synchronization.step(now, messages, is_command_due, self._goals.current is not None)
         commanded = any(message.topic == COMMAND for message in received)
         # The order of messages on different topics is random.
         answers = sorted((each for message in received for each in self._process(message)), key=lambda each: each[0])
@@ -245,7 +249,7 @@ class Adapter:
         """Send the next batch of goals. If it is rejected, report its first goal as failed, and send the next batch."""
         while self._sender is not None and self._goals.accept() is not None:
             batch = self._next_batch()
-            self._sent = 1 if self._sender.takes_single_goals else len(batch)
+            self._open_goal_count = 1 if self._sender.takes_single_goals else len(batch)
             failed = self._sender.send(batch, now, self._barrier)
             if failed is None:
                 self._recoveries.begin_goal()
@@ -265,13 +269,13 @@ class Adapter:
         for outcome in self._sender.outcomes(self._state(now)) if self._goals.current is not None else ():
             if self._goals.current is None:
                 return
-            self._sent -= 1
+            self._open_goal_count -= 1
             if isinstance(outcome, GoalFailed):
-                self._sent -= len(self._goals.ahead)
+                self._open_goal_count -= len(self._goals.ahead)
                 self._goals.failed(outcome.code, outcome.message, go_on=self.continue_after_failure)
             else:
                 self._goals.reached()
-            if self._sent <= 0:
+            if self._open_goal_count <= 0:
                 return
             self._goals.accept()
 

@@ -83,8 +83,8 @@ class BringUp:
         is_settled = self._graph.spin_until(_throttled(settled), min(self._options.ready, PREPARE_S))
         return is_settled and not missing and not self._options.warm_up
 
-    def keep(self, messages: Sequence[Message]) -> None:
-        """Keep the latest message of each topic for `wait`."""
+    def remember_latest(self, messages: Sequence[Message]) -> None:
+        """Remember the latest message of each topic for `wait`."""
         self._latest.update(messages)
 
     def hold_initial_pose(self, messages: Sequence[Message]) -> List[Message]:

@@ -92,7 +92,7 @@ class AnyCondition(Choice):
         return now if self.robot is None else now.of(self.robot)
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the condition is true in the current situation, regardless of `for`.
+        """Return whether the condition is true in the current situation, regardless of `for` (see ConditionState).
 
         Raises RunError if a condition of a plug-in does not return a boolean.
         """

@@ -111,7 +111,7 @@ COLUMN_NAMES = {
     "tracked": "tracked", "unknown": "start unknown", "outdated": "half rebuilt", "half": "half a map",
     "kidnapped": "kidnapped",
 }  # fmt: skip
-"""Columns of the table: heading by circumstance of the logs (a key of CIRCUMSTANCES in generated_logs)."""
+"""Circumstances with a column in the table, with its heading. Other circumstances only count for the consistency."""
 
 
 def as_text(rows: "Sequence[ParameterSetResults]", columns: int | None = None) -> str:

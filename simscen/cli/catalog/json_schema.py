@@ -34,10 +34,10 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 """Identifier of the version of JSON Schema."""
 
 
-def schema_of(name: str, installed: bool = False) -> Schema:
-    """Return the JSON Schema of a kind of file (a key of MODELS). `installed` adds the types of installed packages."""
+def schema_of(name: str, with_plugins: bool = False) -> Schema:
+    """Return the JSON Schema of a kind of file, a key of MODELS. `with_plugins` adds types of installed packages."""
     model = MODELS[name]
-    generated = model.model_json_schema(schema_generator=_InstalledTypesGenerator if installed else _Generator)
+    generated = model.model_json_schema(schema_generator=_InstalledTypesGenerator if with_plugins else _Generator)
     definitions = generated.get("$defs", {})
     if name == "stack":
         for definition in definitions.values():

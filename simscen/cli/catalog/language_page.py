@@ -3,7 +3,7 @@
 from itertools import groupby
 
 from simscen.cli.catalog.fields import OPTIONAL, Field
-from simscen.cli.catalog.topics import HEADINGS, Topic, installed_types, topics
+from simscen.cli.catalog.topics import HEADINGS, Topic, entry_point_topics, topics
 from simscen.criteria.base import AnyMeasure
 from simscen.criteria.trace_signals.catalog import SIGNALS
 from simscen.spec.quantities import UNITS
@@ -63,9 +63,9 @@ key for a task, see [All keys by task](../guides/words.md). In a terminal, `sims
 _SIGNAL_NAMES = " | ".join(f"`{name}`" for name in SIGNALS)
 
 
-def language_page(installed: bool = False) -> str:
-    """Return the text of docs/reference/language.md. With `installed`, include the types of installed packages."""
-    all_topics = [*topics(installed), *installed_types(AnyMeasure.group, installed)]
+def language_page(with_plugins: bool = False) -> str:
+    """Return the text of docs/reference/language.md. With `with_plugins`, include the types of installed packages."""
+    all_topics = [*topics(with_plugins), *entry_point_topics(AnyMeasure.group, with_plugins)]
     parts = [f"{GENERATED_NOTE}# Language reference\n", _LANGUAGE_INTRO, _index(all_topics), _units_section()]
     for group, members in groupby(all_topics, key=lambda topic: topic.group):
         title, text = _GROUPS[group]

@@ -1,7 +1,7 @@
 """Topics of `simscen explain` and reference page about metrics."""
 
 from simscen.cli.catalog.fields import OPTIONAL, Field
-from simscen.cli.catalog.topics import Topic, installed_types
+from simscen.cli.catalog.topics import Topic, entry_point_topics
 from simscen.criteria.base import AnyMeasure
 from simscen.judge.metrics.catalog import METRICS, Metric
 
@@ -47,17 +47,17 @@ The compared metrics are `time_to_goal`, `path_length`, `min_clearance`, `mean_j
 `recoveries`, and `collisions` (of each robot: `a/collisions`), and those of installed packages."""
 
 
-def metric_topics(installed: bool = False) -> list[Topic]:
+def metric_topics(with_plugins: bool = False) -> list[Topic]:
     """Return a topic that lists all metrics, then a topic for each metric.
 
-    `installed` adds the metrics of installed packages.
+    `with_plugins` adds the metrics of installed packages.
     """
     rows = tuple(Field(name, metric.unit or "number", OPTIONAL, metric.text) for name, metric in METRICS.items())
     single = [Topic("metric", name, None, _metric_text(metric)) for name, metric in METRICS.items()]
     return [
         Topic("metric", "metrics", None, f"{METRICS_TEXT}\n\n{METRICS_CAVEATS}\n\n{SESSION_METRICS_TEXT}", rows=rows),
         *single,
-        *installed_types(AnyMeasure.group, installed),
+        *entry_point_topics(AnyMeasure.group, with_plugins),
     ]
 
 

@@ -17,7 +17,7 @@ from simscen.spec.choice import Choice
 
 def all_topics() -> list[Topic]:
     """Return all topics in the order of the overview. Problem codes, such as SC012, are no topics."""
-    return [*topics(installed=True), *signal_topics(), *metric_topics(installed=True), *code_topics()]
+    return [*topics(with_plugins=True), *signal_topics(), *metric_topics(with_plugins=True), *code_topics()]
 
 
 def known_names(keys: bool = False) -> list[str]:

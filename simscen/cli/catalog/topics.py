@@ -90,34 +90,34 @@ class Topic:
         return ""
 
 
-def topics(installed: bool = False) -> list[Topic]:
-    """Return all topics of the language reference in order. `installed` adds the topics of installed packages."""
+def topics(with_plugins: bool = False) -> list[Topic]:
+    """Return the topics of the scenario language in order. `with_plugins` adds the topics of installed packages."""
     return [
-        *_choices(AnyCondition, installed),
+        *_choices(AnyCondition, with_plugins),
         _topic("trigger", "when", Trigger),
-        *_choices(AnyAction, installed),
-        *_choices(AnyFault, installed),
+        *_choices(AnyAction, with_plugins),
+        *_choices(AnyFault, with_plugins),
         _topic("fault", "faults", FaultEntry),
-        *_choices(AnyCriterion, installed),
+        *_choices(AnyCriterion, with_plugins),
         _topic("criterion", "pass", AnyCriterion),
         *_models("scenario", _SCENARIO),
         *_models("stack", _STACK),
-        *installed_types("stack", installed),
+        *entry_point_topics("stack", with_plugins),
         *_models("stack file", _STACK_FILES),
         *_models("localizer", registry.built_in_specs("localizer")),
-        *installed_types("localizer", installed),
+        *entry_point_topics("localizer", with_plugins),
         *_models("planner", _PLANNERS),
-        *installed_types("planner", installed),
+        *entry_point_topics("planner", with_plugins),
         *_models("controller", registry.built_in_specs("controller")),
         *_models("controller", _MPPI_SECTIONS),
-        *installed_types("controller", installed),
+        *entry_point_topics("controller", with_plugins),
         *_models("behavior", registry.built_in_specs("behavior")),
-        *installed_types("behavior", installed),
-        *installed_types("goal_checker", installed),
+        *entry_point_topics("behavior", with_plugins),
+        *entry_point_topics("goal_checker", with_plugins),
         *_models("world", _WORLD),
         *_models("robot", _ROBOT),
         *_models("drive", _DRIVES),
-        *_choices(sensors.Sensor, installed),
+        *_choices(sensors.Sensor, with_plugins),
     ]
 
 
@@ -203,8 +203,8 @@ def _models(group: str, models: Mapping[str, type[BaseModel]]) -> Iterator[Topic
     return (_topic(group, name, model) for name, model in models.items())
 
 
-def _choices(choice: type[Choice], installed: bool) -> Iterator[Topic]:
-    """Yield a topic for each main key of a Choice, including the keys of installed packages if `installed`."""
+def _choices(choice: type[Choice], with_plugins: bool) -> Iterator[Topic]:
+    """Yield a topic for each main key of a Choice, including the keys of installed packages if `with_plugins`."""
     group = choice.group
     docs = field_docs(choice)
     for key, name in choice.choices().items():
@@ -215,13 +215,13 @@ def _choices(choice: type[Choice], installed: bool) -> Iterator[Topic]:
             yield _topic(group, key, model)
         else:
             yield Topic(group, key, None, docs.get(name, ""), EXAMPLES.get(f"{group}.{key}", ""))
-    yield from installed_types(group, installed)
+    yield from entry_point_topics(group, with_plugins)
 
 
-def installed_types(group: str, installed: bool) -> Iterator[Topic]:
-    """Yield the topics of the types with an entry point; only those of simscen itself if `installed` is false."""
+def entry_point_topics(group: str, with_plugins: bool) -> Iterator[Topic]:
+    """Yield the topics of the types with an entry point; only those of simscen without `with_plugins`."""
     origins = {entry.name: entry.origin for entry in registry.plugin_types(group)}
-    for name, model in registry.installed_specs(group, with_plugins=installed).items():
+    for name, model in registry.installed_specs(group, with_plugins=with_plugins).items():
         yield replace(_topic(group, name, model), origin=origins.get(name, ""))
 
 

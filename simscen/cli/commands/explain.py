@@ -36,7 +36,7 @@ def command(
     if page:
         from simscen.cli.catalog.language_page import language_page
 
-        print_text(language_page(installed=True).rstrip())
+        print_text(language_page(with_plugins=True).rstrip())
         return
     width = max(40, min(100, shutil.get_terminal_size().columns))
     print_text(explanation(name, width) if name else _overview(width))

@@ -60,7 +60,7 @@ def _row(entry: RegisteredType) -> dict[str, Any]:
         "class": entry.value,
         "text": text,
         "broken": broken,
-        "hint": hint if "simscen plugins" not in hint else "",
+        "hint": hint if "simscen plugins" not in hint else "",  # not the hint to run this command
     }
 
 

@@ -48,5 +48,5 @@ def schema_text(kind: str) -> str:
     if any(plugin_types(group) for group in GROUPS):
         from simscen.cli.catalog.json_schema import as_text, schema_of
 
-        return as_text(schema_of(kind, installed=True))
+        return as_text(schema_of(kind, with_plugins=True))
     return (PACKAGE / "data" / "schemas" / f"{kind}.schema.json").read_text(encoding="utf-8")

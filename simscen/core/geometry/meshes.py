@@ -1,4 +1,4 @@
-"""Operations on triangle meshes: submeshes, convexity, search of nearby faces, and solids that a robot can climb.
+"""Operations on triangle meshes: submeshes, convexity, search for nearby faces, and solids that a robot can climb.
 
 `vertices` are (n, 3) in m. `faces` are (m, 3) indices of vertices.
 """
@@ -32,7 +32,7 @@ CONVEX_TOLERANCE_M = 1e-6
 
 def submesh(vertices: Array, faces: Faces) -> Mesh:
     """Return a mesh of these faces, without unused vertices."""
-    if faces.size < len(vertices) // 8:
+    if faces.size < len(vertices) // 8:  # faster for few faces
         used, indices = np.unique(faces, return_inverse=True)
         return Mesh(vertices[used], indices.reshape(-1, 3).astype(np.int32))
     needed = np.zeros(len(vertices), dtype=np.bool_)
@@ -62,7 +62,7 @@ def is_convex(mesh: Mesh) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class FaceTiles:
-    """Faces of a mesh, grouped by square tiles of the xy plane for a fast search of nearby faces.
+    """Faces of a mesh, grouped by square tiles of the xy plane for a fast search for nearby faces.
 
     The faces of tile k are `faces[starts[k]:starts[k + 1]]`. Their bounding box extends from `low[k]` to `high[k]`,
     given as (x, y) in m.

@@ -88,8 +88,8 @@ class BaselineComparison:
         pairs: Number of pairs in which both runs were completed.
         error_pairs: Number of pairs in which a run could not be completed.
         unpaired_runs: Number of runs without a partner.
-        pairs_with_one_arrival: Number of completed pairs in which not the same robots reached their last goals, for a
-            single robot: in which only one run did. Only `collisions` is compared for these pairs.
+        pairs_with_different_arrivals: Number of completed pairs in which a robot reached its last goal in only one of
+            the two runs. Only `collisions` is compared for these pairs.
         flips: Pairs in which only one run passed.
         p: P-value of the sign test of the flips.
         differences: Difference of each metric.
@@ -100,7 +100,7 @@ class BaselineComparison:
     pairs: int
     error_pairs: int
     unpaired_runs: int
-    pairs_with_one_arrival: int
+    pairs_with_different_arrivals: int
     flips: tuple[Flip, ...]
     p: float
     differences: tuple[MetricDifference, ...]

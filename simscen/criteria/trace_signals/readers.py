@@ -198,14 +198,14 @@ def _finite_difference(trace: Trace, values: Array, order: int) -> Array:
         raise MissingEvidence(f"the run is too short: {len(even)} samples of the truth")
     step = float(even.ticks[1] - even.ticks[0]) / trace.tick_rate
     first = np.diff(even.values[:, 0]) / step
-    placed = [k - 1 for k in teleport_samples(trace, even.ticks) if 0 < k < len(even)]
-    first[placed] = 0.0
+    jumps = [k - 1 for k in teleport_samples(trace, even.ticks) if 0 < k < len(even)]
+    first[jumps] = 0.0
     if order == 1:
         found = np.concatenate((first[:1], first))
     else:
         second = np.diff(first) / step
-        for k in placed:
-            second[max(k - 1, 0) : k + 1] = 0.0
+        for jump in jumps:
+            second[max(jump - 1, 0) : jump + 1] = 0.0
         found = np.concatenate((second[:1], second, second[-1:]))
     return Samples(even.ticks, found[:, np.newaxis]).at(ticks)[:, 0]
 

@@ -31,7 +31,7 @@ TIME_BOUNDS = {
 
 
 @MEANING.check("SC036")
-def undecidable_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+def criteria_beyond_time_limit(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find criteria that need more time than the time limit of the run."""
     limit = loaded.spec.time_limit
     for index, entry in enumerate(loaded.spec.pass_):

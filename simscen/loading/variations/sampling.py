@@ -12,7 +12,7 @@ _SIGNIFICANT_DIGITS = 6
 
 
 def probability(sampled: Sampled, path: str, index: int) -> float:
-    """Return the cumulative probability, in (0, 1), of the value of a path in the variation `index`, from 0.
+    """Return the cumulative probability, in (0, 1), of the value of a path in variation number `index` (≥ 0).
 
     With the method `random`, the index may exceed `sampled.count`.
     """
@@ -58,9 +58,10 @@ def _hashed_uniform(seed: int, path: str, purpose: str, number: int) -> float:
 
 
 def quantile(distribution: Draw, u: float) -> Any:
-    """Return the quantile of a distribution at the cumulative probability `u`, 0 < u < 1. Raises ValueError.
+    """Return the quantile of a distribution at the cumulative probability `u`, 0 < u < 1.
 
-    A quantity is text with its unit. For a `choice`, the quantile is the index of an item.
+    A quantity is text with its unit. For a `choice`, the quantile is the index of an item. Raises ValueError if the
+    parameters of the distribution are invalid.
     """
     match distribution.chosen:
         case Uniform(root=ends):

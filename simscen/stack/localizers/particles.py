@@ -10,7 +10,7 @@ import numpy.typing as npt
 from simscen.core.environment.occupancy_grid import FREE, OccupancyGrid
 from simscen.core.geometry import Array, Pose2, wrap, wrap_array
 from simscen.core.messages.navigation import Estimate
-from simscen.stack.localizers.resampling import BIN_SIZE_M, YAW_BINS, Keys, bin_keys, decode_bins, encode_bins
+from simscen.stack.localizers.resampling import BIN_SIZE_M, YAW_BINS, Integers, bin_keys, decode_bins, encode_bins
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +122,7 @@ MAX_COMPACT_BINS = 8
 _NEIGHBORS = np.array([(x, y, a) for x in (-1, 0, 1) for y in (-1, 0, 1) for a in (-1, 0, 1)])
 
 
-def cluster_labels(keys: Keys) -> Keys:
+def cluster_labels(keys: Integers) -> Integers:
     """Return a cluster label (n,) for each particle, given the keys (n,) of their histogram bins.
 
     Adjacent bins form a cluster. Bins are also adjacent at corners, and across ±180° of the heading.

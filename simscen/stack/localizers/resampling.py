@@ -12,10 +12,10 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 
-Indices = npt.NDArray[np.int64]
+Integers = npt.NDArray[np.int64]
 
 
-def systematic_resampling(weights: Array, count: int, rng: np.random.Generator) -> Indices:
+def systematic_resampling(weights: Array, count: int, rng: np.random.Generator) -> Integers:
     """Return ascending indices (count,), drawn in proportion to `weights` (n,).
 
     Source: the low-variance sampler of Probabilistic Robotics, table 4.4.
@@ -24,7 +24,7 @@ def systematic_resampling(weights: Array, count: int, rng: np.random.Generator) 
     positions = (np.arange(count) + rng.random()) * (cumulative[-1] / count)
     drawn = cumulative.searchsorted(positions, side="right")
     # The last position can be rounded up to the total; it then belongs to the last index with any weight.
-    clipped: Indices = np.minimum(drawn, cumulative.searchsorted(cumulative[-1]))
+    clipped: Integers = np.minimum(drawn, cumulative.searchsorted(cumulative[-1]))
     return clipped
 
 
@@ -34,23 +34,21 @@ YAW_BINS = 36
 """Number of histogram bins of the heading, 10° each."""
 _OFFSET = 1 << 21
 """Number that is added to the coordinates x and y of a bin, so that both are positive in the key."""
-Keys = npt.NDArray[np.int64]
-"""Keys of histogram bins: numbers that encode the integer coordinates x, y, yaw."""
 
 
-def bin_keys(poses: Array) -> Keys:
+def bin_keys(poses: Array) -> Integers:
     """Return the keys (n,) of the histogram bins of `poses` (n, 3). Headings need not be wrapped."""
     cells = np.clip(np.floor(poses[:, :2] / BIN_SIZE_M), -_OFFSET + 2, _OFFSET - 2).astype(np.int64)
     yaw = np.floor(poses[:, 2] * (YAW_BINS / (2 * np.pi))).astype(np.int64) % YAW_BINS
     return encode_bins(cells[:, 0], cells[:, 1], yaw)
 
 
-def encode_bins(x: Keys, y: Keys, yaw: Keys) -> Keys:
-    """Return the keys of bins with these integer coordinates."""
+def encode_bins(x: Integers, y: Integers, yaw: Integers) -> Integers:
+    """Return the keys of bins, which encode these integer coordinates."""
     return ((x + _OFFSET) * (2 * _OFFSET) + (y + _OFFSET)) * YAW_BINS + yaw
 
 
-def decode_bins(keys: Keys) -> tuple[Keys, Keys, Keys]:
+def decode_bins(keys: Integers) -> tuple[Integers, Integers, Integers]:
     """Return the integer coordinates x, y, yaw of bins."""
     cells, yaw = np.divmod(keys, YAW_BINS)
     x, y = np.divmod(cells, 2 * _OFFSET)
@@ -70,7 +68,7 @@ class KldBound:
     min_samples: int
     max_samples: int
 
-    def samples(self, occupied: npt.ArrayLike) -> Keys:
+    def samples(self, occupied: npt.ArrayLike) -> Integers:
         """Return the number of samples needed for each number of occupied bins.
 
         The result is between `min_samples` and `max_samples`; `min_samples` for a single bin.
@@ -80,7 +78,7 @@ class KldBound:
         needed = np.where(degrees >= 1, degrees / (2 * self.error) * (1 - spread + np.sqrt(spread) * self.z) ** 3, 0)
         return np.clip(np.ceil(needed), self.min_samples, self.max_samples).astype(np.int64)
 
-    def sufficient_count(self, keys: Keys) -> int | None:
+    def sufficient_count(self, keys: Integers) -> int | None:
         """Return the smallest sufficient number of samples, given the bin keys (n,); None if n are not sufficient."""
         if len(keys) == self.min_samples:  # no smaller number can be sufficient
             return self.min_samples if self.min_samples >= self.samples(len(np.unique(keys))) else None

@@ -196,7 +196,7 @@ def test_a_behavior_of_a_package_is_named_in_triggers_criteria_and_the_schema(od
     events = "events: [{name: e, when: {recovery: {name: nod}}, do: {cancel_goal: {}}}]\n"
     file.write_text(text + events)
     schema = tmp_path / "schema.json"
-    schema.write_text(as_text(schema_of("scenario", installed=True)))
+    schema.write_text(as_text(schema_of("scenario", with_plugins=True)))
     assert load_scenario(file, tmp_path).spec.stack.recovery.names == ["nod", "nod"]
     checked = [sys.executable, "-m", "check_jsonschema", "--schemafile", str(schema), str(file)]
     assert subprocess.run(checked, check=False, capture_output=True).returncode == 0

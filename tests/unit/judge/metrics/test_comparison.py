@@ -100,7 +100,7 @@ def test_flip_states_the_failing_stack_and_the_reason() -> None:
 def test_aborted_run_is_not_compared_by_path_length() -> None:
     gave_up = run("mine", 1, outcome=Outcome.FAILED, time_to_goal=None, path_length=1.0, collisions=2.0)
     one = against(run("ref", 1), gave_up, run("ref", 2), run("mine", 2, path_length=5.5))
-    assert one.pairs_with_one_arrival == 1
+    assert one.pairs_with_different_arrivals == 1
     assert (of(one, "path_length").pairs, of(one, "path_length").difference) == (1, 0.5)
     assert (of(one, "collisions").pairs, of(one, "collisions").difference) == (2, 1.0)
 
@@ -179,7 +179,7 @@ def test_metrics_of_each_robot_are_compared() -> None:
 
 def test_pair_in_which_different_robots_arrived_is_compared_only_by_collisions() -> None:
     one = against(fleet("ref", a_time_to_goal=None), fleet("mine", b_time_to_goal=None, a_collisions=1.0))
-    assert one.pairs_with_one_arrival == 1
+    assert one.pairs_with_different_arrivals == 1
     assert {found.metric: found.difference for found in one.differences} == {"a/collisions": 1.0, "b/collisions": 0.0}
 
 
@@ -264,7 +264,7 @@ def test_pairs_with_a_robot_that_arrived_in_one_run_only_are_excluded() -> None:
     one = against(
         run("ref", 1, **both), run("mine", 1, **{**both, "b/time_to_goal": None}), run("ref", 2), run("mine", 2)
     )
-    assert (one.pairs, one.pairs_with_one_arrival) == (2, 1)
+    assert (one.pairs, one.pairs_with_different_arrivals) == (2, 1)
 
 
 @pytest.mark.parametrize(("count", "more"), [(1, ""), (2, " (and 1 more)"), (3, " (and 2 more)")])
