@@ -53,20 +53,20 @@ def try_variations(
     root: Path,
     world_path: Sequence[Path] = (),
     choice: StackChoice | None = None,
-    numbers: Sequence[int] | None = None,
+    variation_numbers: Sequence[int] | None = None,
     unsaved: Mapping[Path, str] | None = None,
 ) -> tuple[LoadedScenario, ...] | list[Problem]:
     """Return all variations of the scenario in a file; or all problems if one of them has errors.
 
-    A file without variations has one. `numbers` selects variations from 1; unknown numbers are ignored. `unsaved`
-    are texts that replace the content of files. The other parameters are those of `load_scenario`.
+    A file without variations has one. `variation_numbers` selects variations from 1; unknown numbers are ignored.
+    `unsaved` are texts that replace the content of files. The other parameters are those of `load_scenario`.
     """
     library = Library(PathSandbox.around(root, world_path), unsaved=unsaved or {})
     read = _read(path, library, choice)
     if isinstance(read, list):
         return read
     file, tree = read
-    expanded = expand_variations(tree, numbers)
+    expanded = expand_variations(tree, variation_numbers)
     variations = [variation for variation in expanded if isinstance(variation, Variation)]
     if problems := [problem for problem in expanded if isinstance(problem, Problem)]:
         return library.with_source(sorted(problems))

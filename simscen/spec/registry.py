@@ -164,7 +164,10 @@ def find_type(group: str, name: str) -> RegisteredType | None:
 
 
 def unknown_groups() -> tuple[RegisteredType, ...]:
-    """Return the entry points of installed packages in groups `simscen.…` that do not exist, and damaged ones."""
+    """Return the entry points of installed packages in groups `simscen.…` that do not exist.
+
+    For each package with a damaged entry_points.txt, also return an entry with the problem.
+    """
     return tuple(entry for entry in _all_installed_types() if entry.group not in GROUPS)
 
 
@@ -181,7 +184,7 @@ def plugins_with_spec(spec: type) -> tuple[RegisteredType, ...]:
 
 @cache
 def _all_installed_types() -> tuple[RegisteredType, ...]:
-    """Return all types of installed packages, sorted by group, name, and package. Those of simscen come first."""
+    """Return all types of installed packages, sorted by group and name; of equal names, simscen's first."""
     found = sorted(
         set(_read_installed_types()),
         key=lambda e: (e.group, e.name, not e.is_shipped, e.distribution, e.version, e.value),

@@ -14,7 +14,14 @@ from functools import cached_property
 import numpy as np
 
 from simscen.advanced.prediction.followed_path import FollowedPath
-from simscen.advanced.prediction.rollouts import HORIZON_S, TIMES, Rollouts, TrajectorySampler, arc_rollouts
+from simscen.advanced.prediction.rollouts import (
+    HORIZON_S,
+    MAX_TURN_RATE_RAD_S,
+    TIMES,
+    Rollouts,
+    TrajectorySampler,
+    arc_rollouts,
+)
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.model.guards import Prediction
@@ -42,6 +49,8 @@ SPEED_FRACTIONS = (1.0, 0.75, 0.5, 0.25, 0.0)
 """Fractions of the controller's speed that are tried on the controller's trajectory."""
 BATCH_SIZE, ROUNDING_TOLERANCE = 64, 1e-9
 """Number of trajectories that are evaluated together, and the tolerance for rounding errors of costs."""
+MIN_FULL_SPEED_M_S = 0.3
+"""Lower limit of the full speed, to which sampled speeds and costs are relative."""
 MAX_ROUND_DIFFERENCE_M = 0.15
 """A robot is treated as a disc if its circumscribed and inscribed radius differ by less than this."""
 
@@ -52,7 +61,7 @@ class Avoidance:
     def __init__(self, spec: Prediction, robot: RobotModel, full_speed: float) -> None:
         """Take the parameters, the robot, and the full speed of the controller in m/s."""
         self._spec, self._robot = spec, robot
-        self._speed = min(max(full_speed, 0.3), robot.max_linear)
+        self._speed = min(max(full_speed, MIN_FULL_SPEED_M_S), robot.max_linear)
         is_round = robot.circumscribed_radius - robot.inscribed_radius < MAX_ROUND_DIFFERENCE_M
         self._discs = CoveringDiscs(replace(robot, radius=robot.circumscribed_radius) if is_round else robot)
         self._last: Twist | None = None
@@ -79,8 +88,8 @@ class Avoidance:
     ) -> Twist:
         """Return `command` itself if it is safe, otherwise the first command of the best trajectory.
 
-        All arguments are in one frame. A robot without a path stays near `home`, or near `pose` if `home` is None.
-        `max_speed` is the speed limit in m/s at the pose.
+        `pose`, `moving`, `costmap`, `path`, and `home` are in the same frame. A robot without a path stays near `home`,
+        or near `pose` if `home` is None. `max_speed` is the speed limit in m/s at the pose.
         """
         near = moving.near(pose.x, pose.y, self._robot.circumscribed_radius + MAX_INFLATION_M, self._speed, HORIZON_S)
         followed = path if path is not None and len(path) >= 2 and command.vx != 0.0 else None
@@ -124,6 +133,7 @@ class Avoidance:
         """
         fan = self._sampler.sample(pose, twist)
         all_indices = np.arange(len(fan.commands))
+        # Less than STATIC_DISTANCE_M if no trajectory keeps it after 0.2 s, so that the robot can leave a wall.
         second_step = np.s_[:, 1]
         clearance = max(
             self._clearance(each, costmap, second_step).max() for each in (own, fan.rollouts(all_indices, 2))
@@ -189,10 +199,8 @@ class Avoidance:
 
     def _static_costs(self, rollouts: Rollouts, costmap: CostmapView, min_clearance: float) -> Array:
         """Return the costs (n,) of trajectories for static obstacles that are closer than `min_clearance` m."""
-        is_close = (self._clearance(rollouts, costmap, np.s_[:, 1::2]) < min_clearance) * np.exp(
-            -TIMES[1::2] / (2 * DECAY_TIME_S)
-        )
-        cost: Array = STATIC_WEIGHT * is_close.max(axis=1)
+        is_close = self._clearance(rollouts, costmap, np.s_[:, 1::2]) < min_clearance
+        cost: Array = STATIC_WEIGHT * (is_close * np.exp(-TIMES[1::2] / (2 * DECAY_TIME_S))).max(axis=1)
         return cost
 
     def _clearance(self, rollouts: Rollouts, costmap: CostmapView, index: tuple[slice, int | slice]) -> Reals:
@@ -220,4 +228,4 @@ class Avoidance:
         if self._last is None:
             return np.zeros(len(commands))
         change = np.abs(commands[:, 0] - self._last.vx) / self._speed
-        return np.asarray(CHANGE_WEIGHT * (change + np.abs(commands[:, 2] - self._last.wz) / 3.0))
+        return np.asarray(CHANGE_WEIGHT * (change + np.abs(commands[:, 2] - self._last.wz) / MAX_TURN_RATE_RAD_S))

@@ -13,7 +13,7 @@ from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.stacks import parse_stacks
 from simscen.cli.shared_options import Format, RootOption, WorldPathOption
 from simscen.core.errors import Exit, Problem
-from simscen.loading.checks.files import CHECKED_DRAWS, STACK_KINDS, check_file, file_kind
+from simscen.loading.checks.files import CHECKED_VARIATIONS, STACK_KINDS, check_file, file_kind
 from simscen.loading.files.discovery import SUFFIXES, default_root, discover
 
 
@@ -72,8 +72,9 @@ def command(
 def _problems(kind: str, file: Path, checker: FileChecker) -> list[Problem]:
     """Return the problems of a file. A world or robot without errors in the text is also built and checked."""
     if kind in ("scenario", "study"):
-        numbers = CHECKED_DRAWS if kind == "study" else None
-        found = [problem for choice in checker.choices for problem in checker.check_scenario(file, choice, numbers)[1]]
+        variation_numbers = CHECKED_VARIATIONS if kind == "study" else None
+        checked = [checker.check_scenario(file, choice, variation_numbers) for choice in checker.choices]
+        found = [problem for _, problems in checked for problem in problems]
         return list(dict.fromkeys(found))
     found = check_file(kind, file, checker.root, checker.world_path)
     if kind in (*STACK_KINDS, "base") or any(problem.severity == "error" for problem in found):

@@ -46,13 +46,13 @@ class FileChecker:
         return self.stacks.chosen or (None,)
 
     def check_scenario(
-        self, file: Path, choice: StackChoice | None = None, numbers: Sequence[int] | None = None
+        self, file: Path, choice: StackChoice | None = None, variation_numbers: Sequence[int] | None = None
     ) -> tuple[Sequence[LoadedScenario], list[Problem]]:
         """Return the variations of a scenario and their problems. If a problem is an error, return no variations.
 
-        `choice` is one of `choices`. `numbers` are the numbers of the variations to check; None for all variations.
+        `choice` is one of `choices`. `variation_numbers` selects the variations to check; None for all variations.
         """
-        loaded = try_variations(file, self.root, self.world_path, choice, numbers)
+        loaded = try_variations(file, self.root, self.world_path, choice, variation_numbers)
         if isinstance(loaded, list):
             return (), loaded
         checked = [self.check_variation(one) for one in loaded]

@@ -27,7 +27,7 @@ from simscen.loading.yaml.library import APPEND_SUFFIX, DEFAULTS_FILE, Library
 from simscen.loading.yaml.tree import MappingNode, ScalarNode, child, existing_keys, items_of, node_at
 from simscen.model.scenario import ScenarioSpec
 
-CHECKED_DRAWS = range(1, 21)
+CHECKED_VARIATIONS = range(1, 21)
 """Numbers of the variations of a study that are checked, from 1."""
 STACK_KINDS = ("stack", NAV2_FILE_KIND)
 """Kinds of files with the parameters of a stack."""
@@ -44,7 +44,9 @@ _SUFFIXES_BY_KIND = (
 def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = ()) -> list[Problem]:
     """Return the errors and warnings of a file of this kind (see `file_kind`) and of the files that it names."""
     if kind in ("scenario", "study"):
-        loaded = try_variations(file, root, world_path, numbers=CHECKED_DRAWS if kind == "study" else None)
+        loaded = try_variations(
+            file, root, world_path, variation_numbers=CHECKED_VARIATIONS if kind == "study" else None
+        )
         if isinstance(loaded, list):
             return loaded
         return merge_problems([VariationProblems(one.variation, one.varied_paths, one.notes) for one in loaded])

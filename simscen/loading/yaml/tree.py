@@ -75,7 +75,7 @@ class MappingNode:
     def with_value(self, keys: "Keys", value: "Node", position: Position) -> "MappingNode":
         """Return a copy with `value` at `keys`, which are not empty. Added keys and mappings get `position`."""
         changed = _with_value(self, keys, value, position)
-        assert isinstance(changed, MappingNode), "`keys` are empty"
+        assert isinstance(changed, MappingNode)
         return changed
 
 
@@ -116,7 +116,7 @@ def nodes_with_keys(node: Node, keys: Keys = ()) -> Iterator[tuple[Keys, Node]]:
 
 
 def _with_value(node: Node | None, keys: Keys, value: Node, position: Position) -> Node:
-    """Return a copy of a tree with `value` at `keys`; missing mappings are added."""
+    """Return a copy of a tree with `value` at `keys`. Nodes on the way without keys become mappings."""
     if not keys:
         return value
     key, rest = keys[0], keys[1:]

@@ -56,7 +56,7 @@ def _set_up_process(parent: int, output: int) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     null = os.open(os.devnull, os.O_RDONLY)
-    for descriptor, target in ((null, 0), (output, 1), (output, 2)):  # also of C libraries
+    for descriptor, target in ((null, 0), (output, 1), (output, 2)):  # redirects the output of C libraries, too
         os.dup2(descriptor, target)
     os.close(null)
     os.close(output)
@@ -84,7 +84,7 @@ def _end_record(job: Job, report: int, execute: ExecuteJob) -> dict[str, Any]:
     except MemoryError:
         return _OUT_OF_MEMORY
     except SystemExit as error:
-        return {"error": "crashed", "message": f"exited {error.code} by itself ({_innermost_frame(error)})"}
+        return {"error": "crashed", "message": f"called sys.exit({error.code}) ({_innermost_frame(error)})"}
     except OSError as error:
         if error.errno == errno.ENOMEM:
             return _OUT_OF_MEMORY

@@ -34,14 +34,15 @@ class CollisionChecker:
         """Return the time in s, at most `horizon`, until the command leads to a collision with a static obstacle."""
         return horizon if command == STOP else time_to_collision(self._footprint, costmap, pose, command, horizon)
 
-    def slow_down(self, command: Twist, free_time: float, horizon: float, required: float) -> Twist:
-        """Return the command if its `free_time` is at least `horizon`; otherwise scaled by `free_time` / `required`.
+    def slow_down(self, command: Twist, free_time: float, horizon: float, full_speed_time: float) -> Twist:
+        """Return the command if its `free_time` is at least `horizon`; otherwise scaled.
 
-        All times are in s. Raises NO_VALID_CONTROL if the scaled command is slower than the minimum speed.
+        The scale is `free_time` / `full_speed_time`. All times are in s. Raises NO_VALID_CONTROL if the scaled command
+        is slower than the minimum speed.
         """
         if free_time >= horizon:
             return command
-        scale = free_time / required
+        scale = free_time / full_speed_time
         if max(abs(command.vx), abs(command.vy)) * scale < self._min_speed:
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, f"collision ahead in {free_time:.2f} s")
         return Twist(command.vx * scale, command.vy * scale, command.wz * scale)

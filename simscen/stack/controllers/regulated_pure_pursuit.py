@@ -125,9 +125,9 @@ class RegulatedPurePursuit(PathFollower):
         if rotation is not None:
             return self._rotate(rotation, pose, twist, costmap)
         command, free_time, horizon = max(arcs, key=lambda arc: arc.free_time)
-        required = spec.max_allowed_time_to_collision_up_to_carrot
+        full_speed_time = spec.max_allowed_time_to_collision_up_to_carrot
         try:
-            slowed = self._collision_checker.slow_down(command, free_time, horizon, required)
+            slowed = self._collision_checker.slow_down(command, free_time, horizon, full_speed_time)
         except NavigationFailure:
             if escape_rotation is None:
                 raise

@@ -125,9 +125,9 @@ class MppiController(PathFollower):
                 tolerance=goal.xy_tolerance,
             )  # fmt: skip
             command = self._optimize(twist, critic_data)
-        required = self._spec.command_free_time
-        free_time = self._collision_checker.free_time(costmap, pose, command, required)
-        return self._collision_checker.slow_down(command, free_time, required, required)
+        horizon = self._spec.command_free_time
+        free_time = self._collision_checker.free_time(costmap, pose, command, horizon)
+        return self._collision_checker.slow_down(command, free_time, horizon, horizon)
 
     def _optimize(self, twist: Twist, critic_data: Callable[[Rollouts], CriticData]) -> Twist:
         """Optimize the sequence, and return its first command. If the result collides, reset the sequence and retry.

@@ -65,7 +65,7 @@ def test_successful_run_returns_its_result(session):
         ("segfault", "crashed", "crashed: SIGSEGV"),
         ("kill", "crashed", "killed (SIGKILL; possibly out of memory; peak memory"),
         ("exit-0", "crashed", "exited 0 without a result"),
-        ("sys-exit", "crashed", "exited 0"),
+        ("sys-exit", "crashed", "called sys.exit(0)"),
         ("exception", "crashed", "ZeroDivisionError: the controller divided by zero (faulty_fork_server.py:"),
         ("memory", "out-of-memory", "exceeded its memory limit"),
         ("garbled", "crashed", "its result cannot be read"),
@@ -73,7 +73,7 @@ def test_successful_run_returns_its_result(session):
         ("daemon", "crashed", "left a process behind"),
         ("daemon-crash", "crashed", "crashed: SIGSEGV"),
         ("prepare-segfault", "crashed", "was killed (SIGSEGV) while it prepared this one, in string_at (__init__.py:"),
-        ("prepare-exit", "crashed", "exited 0"),
+        ("prepare-exit", "crashed", "called sys.exit(0)"),
         ("prepare-memory", "out-of-memory", "exceeded its memory limit"),
     ],
 )
