@@ -5,9 +5,12 @@ import os
 import re
 import shutil
 import signal
+import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import settings
@@ -148,6 +151,19 @@ def packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Instal
         if str(getattr(sys.modules[module], "__file__", "")).startswith(str(site)):
             del sys.modules[module]
     clear_package_caches()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def preloaded_fork_server() -> Iterator[None]:
+    """Fork the fork servers of sessions in this process from one process that has imported their modules."""
+    from simscen.run.process import fork_server_process
+    from tests.preloaded_fork_server import PreloadedForkServer
+
+    server = PreloadedForkServer()
+    with pytest.MonkeyPatch.context() as patch, closing(server):
+        stand_in = SimpleNamespace(Popen=server.popen, TimeoutExpired=subprocess.TimeoutExpired)
+        patch.setattr(fork_server_process, "subprocess", stand_in)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -2,9 +2,12 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -75,16 +78,40 @@ def simscen(folder: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest
     """Return a function that runs the command line in this process."""
 
     def call(*arguments: object) -> Ended:
-        monkeypatch.setattr(sys, "argv", ["simscen", *map(str, arguments)])
-        code = 0
-        try:
-            main()
-        except SystemExit as end:
-            code = int(end.code or 0)
+        code = _exit_code(monkeypatch, *arguments)
         out, err = capfd.readouterr()
         return Ended(code, out, err)
 
     return call
+
+
+def _exit_code(patch: pytest.MonkeyPatch, *arguments: object) -> int:
+    patch.setattr(sys, "argv", ["simscen", *map(str, arguments)])
+    try:
+        main()
+    except SystemExit as end:
+        return int(end.code or 0)
+    return 0
+
+
+@pytest.fixture(scope="session")
+def finished_session(tmp_path_factory: pytest.TempPathFactory, texts: dict[str, str]) -> Path:
+    """Run the valid scenario once for all tests; return the output folder."""
+    home = tmp_path_factory.mktemp("finished") / "home"
+    home.mkdir()
+    for name, text in texts.items():
+        (home / name).write_text(text)
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(StringIO()):
+        patch.chdir(home)
+        assert _exit_code(patch, "run", "a.scenario.yaml", "--out", "out") == 0
+    return home / "out"
+
+
+@pytest.fixture
+def log(folder: Path, finished_session: Path) -> Path:
+    """Copy the finished session of the valid scenario to the folder; return its log."""
+    shutil.copytree(finished_session, folder / "out")
+    return folder / "out/runs/a/seed-7/run.mcap"
 
 
 @pytest.fixture

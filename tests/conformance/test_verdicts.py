@@ -15,6 +15,8 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
 
+from simscen import simulate
+
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit/cli"))
 from recorded_drives import write_csv, write_map
 
@@ -27,14 +29,16 @@ T: dict[str, Any] = STORE.types
 Keep = Callable[[str, float], bool]
 
 
-@pytest.fixture
-def passed_log(simscen, folder: Path) -> Path:
+@pytest.fixture(scope="module")
+def passed_log(tmp_path_factory: pytest.TempPathFactory, texts: dict[str, str]) -> Path:
     """Record a run that passes all its criteria, and return its log."""
-    scenario = folder / "a.scenario.yaml"
+    home = tmp_path_factory.mktemp("passed")
     criteria = "pass: [{goals_reached: {}}, {collisions: {max: 0}}, {clearance: {min: 0.1}}, {speed: {max: 1}}]"
-    scenario.write_text(scenario.read_text().replace("pass: [{goals_reached: {}}]", criteria))
-    assert simscen("run", "a.scenario.yaml", "--out", "out").code == 0
-    return folder / "out/runs/a/seed-7/run.mcap"
+    for name, text in texts.items():
+        (home / name).write_text(text.replace("pass: [{goals_reached: {}}]", criteria))
+    run = simulate(home / "a.scenario.yaml", log=home / "run.mcap")
+    assert run.passed and run.log is not None
+    return run.log
 
 
 def rewrite(log: Path, target: Path, keep: Keep, backwards: bool) -> Path:
@@ -135,27 +139,24 @@ def test_104_a_run_of_a_single_sample_is_refused(with_scenario) -> None:
     assert "bad.scenario.yaml:4:13: error[SC036] nothing can be judged: the second sample" in message
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize(
-    "criterion",
-    [
-        "whenever: {signal: speed, op: '>', value: 5}\n    then: {signal: speed, op: '<', value: 9}",
-        "always: {whenever: {signal: speed, op: '>', value: 5}, then: {signal: speed, op: '<', value: 9}}",
-        "always: {all: [{whenever: {signal: speed, op: '>', value: 5}, then: {signal: speed, op: '<', value: 9}}]}",
-        "whenever: {eventually: {signal: speed, op: '>', value: 5, within: 9 s}}\n"
-        "    then: {signal: speed, op: '<', value: 9}",
-    ],
-    ids=["top level", "nested", "nested twice", "premise looks beyond the end"],
-)
-def test_105_a_premise_that_was_never_known_to_be_true_is_inconclusive(simscen, folder: Path, criterion: str) -> None:
-    head, _, rest = criterion.partition("\n    ")
-    entry = f"{{{head}, {rest}}}" if rest else f"{{{head}}}"
-    kind, _, body = entry[1:-1].partition(": ")
-    written = f"  - {kind}: {body}\n" if kind == "always" else f"  - {{always: {entry}}}\n"
-    (folder / "a.scenario.yaml").write_text(f"simscen: 1\n{ROOM}time_limit: 1 s\npass:\n{written}")
-    ended = simscen("run", "a.scenario.yaml", "--out", "out")
+def test_105_a_premise_that_was_never_known_to_be_true_is_inconclusive(simscen, folder: Path) -> None:
+    whenever = "{whenever: {signal: speed, op: '>', value: 5}, then: {signal: speed, op: '<', value: 9}}"
+    beyond_the_end = "{eventually: {signal: speed, op: '>', value: 5, within: 9 s}}"
+    criteria = {
+        "top-level": f"always: {whenever}",
+        "nested": f"always: {{always: {whenever}}}",
+        "nested-twice": f"always: {{all: [{whenever}]}}",
+        "beyond": f"always: {{whenever: {beyond_the_end}, then: {{signal: speed, op: '<', value: 9}}}}",
+    }
+    (folder / "a.scenario.yaml").unlink()
+    for name, criterion in criteria.items():
+        text = f"simscen: 1\n{ROOM}time_limit: 1 s\npass: [{{{criterion}}}]\n"
+        (folder / f"{name}.scenario.yaml").write_text(text)
+    ended = simscen("run", ".", "--out", "out")
     assert ended.code == 1, ended
-    assert "inconclusive" in (folder / "out/results.json").read_text()
+    runs = json.loads((folder / "out/results.json").read_text())["runs"]
+    statuses = {run["scenario"]: [verdict["status"] for verdict in run["verdicts"]] for run in runs}
+    assert statuses == {name: ["inconclusive"] for name in criteria}
 
 
 def test_106_an_object_that_turns_too_far_in_a_tick_is_refused(simscen, folder: Path) -> None:

@@ -1,7 +1,10 @@
-"""Fixture that calls the command line without a new process."""
+"""Fixtures that call the command line without a new process."""
 
+import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -34,20 +37,43 @@ pass: [{goals_reached: {}}]
 """
 
 
+@pytest.fixture(scope="session")
+def simscen_in() -> Call:
+    """Return a function that runs `simscen ARGUMENTS` in a folder: `simscen_in(folder, *arguments)`."""
+
+    def call(folder: Path, *arguments: object) -> CommandResult:
+        with (
+            pytest.MonkeyPatch.context() as patch,
+            redirect_stdout(StringIO()) as out,
+            redirect_stderr(StringIO()) as err,
+        ):
+            patch.chdir(folder)
+            return CommandResult(_exit_code(patch, arguments), out.getvalue(), err.getvalue())
+
+    return call
+
+
+def _exit_code(patch: pytest.MonkeyPatch, arguments: tuple[object, ...]) -> int:
+    patch.setattr(sys, "argv", ["simscen", *map(str, arguments)])
+    try:
+        main()
+    except SystemExit as end:
+        return int(end.code or 0)
+    return 0
+
+
 @pytest.fixture
-def simscen(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Call:
+def simscen(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Call]:
     """Return a function that runs `simscen ARGUMENTS` in a folder with a valid scenario `good.scenario.yaml`."""
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     monkeypatch.chdir(tmp_path)
     (tmp_path / "good.scenario.yaml").write_text(GOOD)
 
     def call(*arguments: object) -> CommandResult:
-        monkeypatch.setattr(sys, "argv", ["simscen", *map(str, arguments)])
-        code = 0
-        try:
-            main()
-        except SystemExit as end:
-            code = int(end.code or 0)
+        code = _exit_code(monkeypatch, arguments)
         out, err = capsys.readouterr()
         return CommandResult(code, out, err)
 
-    return call
+    yield call
+    for number, handler in handlers.items():  # an interrupted command does not restore them
+        signal.signal(number, handler)

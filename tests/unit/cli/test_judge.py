@@ -2,12 +2,10 @@
 
 import json
 import shutil
-import sys
 from pathlib import Path
 
 import pytest
 
-from simscen.cli.main import main
 from simscen.cli.session import logs
 from simscen.core.records.run_result import RunKey, RunResult
 from simscen.judge.run_result import judge_run
@@ -32,17 +30,12 @@ BAD = SCENARIO + "pass:\n  - speed: {max: 0.05 m/s}\n"
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def recorded(simscen_in, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the output folder of a passed and a failed run."""
     folder = tmp_path_factory.mktemp("recorded")
     (folder / "good.scenario.yaml").write_text(GOOD)
     (folder / "bad.scenario.yaml").write_text(BAD)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        patch.setattr(sys, "argv", ["simscen", "run", ".", "--out", "out"])
-        with pytest.raises(SystemExit) as end:
-            main()
-    assert end.value.code == 1
+    assert simscen_in(folder, "run", ".", "--out", "out").code == 1
     return folder / "out"
 
 

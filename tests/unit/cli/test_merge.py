@@ -2,13 +2,12 @@
 
 import json
 import re
-import sys
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from simscen.cli.main import app, main
+from simscen.cli.main import app
 from simscen.cli.session.selection import PARALLEL_JOBS, scenarios_of_shard, shard_of
 from simscen.core.errors import InvalidInput, NothingSelected, UsageError
 
@@ -17,39 +16,27 @@ simscen: 1
 world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}
 robot: {pose: {x: 1, y: 1}}
 goals: [{pose: {x: 5, y: 3}}]
-time_limit: 0.5 s
+time_limit: 0.1 s
 pass: [{collisions: {max: 0}}, {clearance: {min: LIMIT}}]
 """
 
 
-def simscen(*arguments: object) -> int:
-    """Return the exit code of a command."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["simscen", *map(str, arguments)])
-        try:
-            main()
-        except SystemExit as end:
-            return int(end.code or 0)
-    return 0
-
-
 @pytest.fixture(scope="module")
-def sessions(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Five scenarios, of which one fails, in a single session `whole` and in the shards `s1` and `s2`."""
+def sessions(simscen_in, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three scenarios, of which one fails, in a single session `whole` and in the shards `s1` and `s2`."""
     folder = tmp_path_factory.mktemp("sessions")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        for name in "abcde":
-            Path(f"{name}.scenario.yaml").write_text(SCENARIO.replace("LIMIT", "3 m" if name == "c" else "0.1 m"))
-        assert simscen("run", ".", "--repeat", 2, "--out", "whole") == 1
-        shards = [simscen("run", ".", "--repeat", 2, "--out", f"s{k}", "--shard", f"{k}/2") for k in (1, 2)]
-        assert shards == [1, 0]
+    for name in "abc":
+        text = SCENARIO.replace("LIMIT", "3 m" if name == "c" else "0.1 m")
+        (folder / f"{name}.scenario.yaml").write_text(text)
+    assert simscen_in(folder, "run", ".", "--repeat", 2, "--out", "whole").code == 1
+    shards = [simscen_in(folder, "run", ".", "--repeat", 2, "--out", f"s{k}", "--shard", f"{k}/2") for k in (1, 2)]
+    assert [shard.code for shard in shards] == [1, 0]
     return folder
 
 
-def test_merged_results_are_those_of_a_single_session(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_merged_results_are_those_of_a_single_session(simscen, sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(sessions)
-    assert simscen("merge", "s2", "s1", "--out", "all") == 1
+    assert simscen("merge", "s2", "s1", "--out", "all").code == 1
     assert Path("all/results.json").read_bytes() == Path("whole/results.json").read_bytes()
     times = re.compile(rb' time="[0-9.]+"')
     merged, whole = (times.sub(b"", Path(name, "junit.xml").read_bytes()) for name in ("all", "whole"))
@@ -61,21 +48,23 @@ def test_merged_results_are_those_of_a_single_session(sessions: Path, monkeypatc
 
 
 @pytest.mark.slow
-def test_merged_folder_can_be_reported_again(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_merged_folder_can_be_reported_again(simscen, sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(sessions)
     simscen("merge", "s1", "s2", "--out", "again")
     before = Path("again/results.json").read_bytes()
-    assert simscen("report", "again") == 1
+    assert simscen("report", "again").code == 1
     assert Path("again/results.json").read_bytes() == before
 
 
-def test_unfinished_runs_of_a_shard_are_errors(sessions: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unfinished_runs_of_a_shard_are_errors(
+    simscen, sessions: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(sessions)
     killed = tmp_path / "killed"
     killed.mkdir()
     lines = Path("s1/events.jsonl").read_bytes().splitlines(keepends=True)
     (killed / "events.jsonl").write_bytes(b"".join(lines[:3]))  # the plan, and that a run started
-    assert simscen("merge", killed, "s2", "--out", tmp_path / "all") == 3
+    assert simscen("merge", killed, "s2", "--out", tmp_path / "all").code == 3
     kinds = [
         run["error"]["kind"] for run in json.loads((tmp_path / "all/results.json").read_text())["runs"] if run["error"]
     ]
@@ -91,14 +80,16 @@ def test_runs_that_are_in_two_shards_are_refused(sessions: Path, monkeypatch: py
     assert not Path("twice").exists()
 
 
-def test_missing_shard_is_an_error_unless_it_is_allowed(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_shard_is_an_error_unless_it_is_allowed(
+    simscen, sessions: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The merged session would otherwise pass without the scenario that fails."""
     monkeypatch.chdir(sessions)
     done = CliRunner().invoke(app, ["merge", "s2", "--out", "partial"])
     assert isinstance(done.exception, InvalidInput)
     assert [problem.message for problem in done.exception.problems] == ["shard 1/2 is missing"]
     assert not Path("partial").exists()
-    assert simscen("merge", "s2", "--out", "partial", "--allow-missing") == 0
+    assert simscen("merge", "s2", "--out", "partial", "--allow-missing").code == 0
 
 
 def test_output_folder_must_be_empty(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,15 +25,14 @@ GOOD, BAD = (SCENARIO.replace("CRITERION", text) for text in ("goals_reached: {}
 
 
 @pytest.fixture(scope="module")
-def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def out(simscen_in, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the output folder of a session with a passed and a failed run."""
     home = tmp_path_factory.mktemp("home")
     (home / "good.scenario.yaml").write_text(GOOD)
     (home / "bad.scenario.yaml").write_text(BAD)
-    command = [sys.executable, "-m", "simscen", "run", ".", "-j1", "--out", "out"]
-    done = subprocess.run(command, cwd=home, capture_output=True, text=True, check=False)
-    assert done.returncode == 1, done.stderr
-    assert "replay    out/runs/bad/seed-1/replay.html" in done.stdout
+    done = simscen_in(home, "run", ".", "-j1", "--out", "out")
+    assert done.code == 1, done.err
+    assert "replay    out/runs/bad/seed-1/replay.html" in done.out
     return home / "out"
 
 

@@ -4,13 +4,11 @@ import errno
 import json
 import os
 import shutil
-import sys
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
-from simscen.cli.main import main
 from simscen.report.journal import Journal
 
 SCENARIO = """\
@@ -28,16 +26,11 @@ pass: [{collisions: {max: 0}}, {goals_reached: {}}]
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def recorded(simscen_in, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the output folder of a failed run."""
     folder = tmp_path_factory.mktemp("recorded")
     (folder / "short.scenario.yaml").write_text(SCENARIO)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        patch.setattr(sys, "argv", ["simscen", "run", "short.scenario.yaml", "--out", "out", "--repeat", "2"])
-        with pytest.raises(SystemExit) as end:
-            main()
-    assert end.value.code == 1
+    assert simscen_in(folder, "run", "short.scenario.yaml", "--out", "out", "--repeat", "2").code == 1
     (folder / "short.scenario.yaml").unlink()  # reports print relative paths of existing files
     return folder / "out"
 

@@ -2,8 +2,6 @@
 
 import json
 import shutil
-import subprocess
-import sys
 from xml.etree import ElementTree
 
 import pytest
@@ -23,13 +21,12 @@ RUN = ("run", "a.scenario.yaml", "b.scenario.yaml", "-j", "1")
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def finished(simscen_in, tmp_path_factory):
     """Return a folder with two scenarios and their finished session."""
     folder = tmp_path_factory.mktemp("finished")
     for name, seconds in (("a", "0.2"), ("b", "0.3")):
         (folder / f"{name}.scenario.yaml").write_text(SCENARIO.replace("TIME", seconds))
-    command = [sys.executable, "-m", "simscen", *RUN, "--out", "out"]
-    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    assert simscen_in(folder, *RUN, "--out", "out").code == 0
     return folder
 
 

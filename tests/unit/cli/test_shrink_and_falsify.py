@@ -4,6 +4,8 @@ The robot is stationary, and its clearance to crate-3 is too small. All other pa
 """
 
 import json
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,7 +17,9 @@ import pytest
 import yaml
 
 from simscen.cli.commands import shrink
+from simscen.cli.session import falsification
 from simscen.cli.session.falsification import Falsification, summary_lines
+from simscen.core.errors import UsageError
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
 from simscen.core.records.session_events import RunFinished
 from simscen.run.sessions.search import SearchMethod
@@ -251,51 +255,74 @@ def test_unsearchable_scenario_is_an_error(
     assert message in done.err
 
 
-BETWEEN_BATCHES = """
+TORQUES = "variations: {sampled: {count: 4, values: {robot.motor_torque: {uniform: [50 %, 100 %]}}}}\n"
+SOBOL = ("falsify", "crates.scenario.yaml", "--method", "sobol", "--runs", "4", "--out", "out")
+
+
+def change_before_batch(monkeypatch: pytest.MonkeyPatch, number: int, change: Callable[[], object]) -> None:
+    """Make batches of two runs, and call `change` before the batch `number` (from 0)."""
+    make_jobs = Falsification._make_jobs
+
+    def make_jobs_after_change(search: Any, points: Any, folder: Path) -> Any:
+        if len(search.finished_runs) == 2 * number:
+            change()
+        return make_jobs(search, points, folder)
+
+    monkeypatch.setattr(falsification, "BATCH_SIZE", 2)
+    monkeypatch.setattr(Falsification, "_make_jobs", make_jobs_after_change)
+
+
+def test_runs_before_an_error_during_a_search_are_reported(
+    simscen: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail() -> None:
+        raise UsageError("something is wrong")
+
+    text = SCENARIO.replace("clearance: {min: 1 m}", "clearance: {min: 0.1 m}")
+    (tmp_path / "crates.scenario.yaml").write_text(text + TORQUES)
+    change_before_batch(monkeypatch, 1, fail)
+    assert simscen(*SOBOL).code == 2
+    assert len(runs_of(tmp_path / "out")) == 2
+
+
+SIGNAL_BETWEEN_BATCHES = f"""
 import os, signal, sys
 from simscen.cli.session import falsification
-from simscen.core.errors import UsageError
 
 make_jobs = falsification.Falsification._make_jobs
 
-def make_jobs_after_a_change(self, points, folder):
+def make_jobs_after_signal(self, points, folder):
     if self.finished_runs:
-        {change}
+        os.kill(os.getpid(), signal.SIGTERM)
     return make_jobs(self, points, folder)
 
 falsification.BATCH_SIZE = 2
-falsification.Falsification._make_jobs = make_jobs_after_a_change
-sys.argv = ["simscen", "falsify", "crates.scenario.yaml", "--method", "sobol", "--runs", "4", "--out", "out"]
+falsification.Falsification._make_jobs = make_jobs_after_signal
+sys.argv = {["simscen", *SOBOL]}
 from simscen.cli.main import main
 main()
 """
 
 
-@pytest.mark.parametrize(
-    ("change", "code"),
-    [("raise UsageError('something is wrong')", 2), ("os.kill(os.getpid(), signal.SIGTERM)", 143)],
-)
-def test_runs_before_an_error_or_a_signal_during_a_search_are_reported(tmp_path: Path, change: str, code: int) -> None:
+def test_runs_before_a_signal_during_a_search_are_reported(tmp_path: Path) -> None:
     text = SCENARIO.replace("clearance: {min: 1 m}", "clearance: {min: 0.1 m}")
-    sampled = "variations: {sampled: {count: 4, values: {robot.motor_torque: {uniform: [50 %, 100 %]}}}}\n"
-    (tmp_path / "crates.scenario.yaml").write_text(text + sampled)
-    program = [sys.executable, "-c", BETWEEN_BATCHES.format(change=change)]
+    (tmp_path / "crates.scenario.yaml").write_text(text + TORQUES)
+    program = [sys.executable, "-c", SIGNAL_BETWEEN_BATCHES]
     done = subprocess.run(program, cwd=tmp_path, check=False, capture_output=True, text=True)
-    assert done.returncode == code, done.stderr
+    assert done.returncode == 143, done.stderr
     assert len(runs_of(tmp_path / "out")) == 2
 
 
-def test_an_interrupted_search_without_runs_names_no_report(tmp_path: Path) -> None:
-    sampled = "variations: {sampled: {count: 4, values: {robot.motor_torque: {uniform: [50 %, 100 %]}}}}\n"
-    (tmp_path / "crates.scenario.yaml").write_text(SCENARIO + sampled)
-    program = BETWEEN_BATCHES.format(change="pass").replace(
-        "if self.finished_runs:", "os.kill(os.getpid(), signal.SIGTERM)\n    if self.finished_runs:"
-    )
-    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=False, capture_output=True, text=True)
-    assert done.returncode == 143, done.stderr
-    assert "interrupted: 0 passed" in done.stdout
-    assert "--resume" not in done.stdout  # simscen falsify has no such option
-    assert "report.html" not in done.stdout and not (tmp_path / "out/report.html").exists()
+def test_an_interrupted_search_without_runs_names_no_report(
+    simscen: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "crates.scenario.yaml").write_text(SCENARIO + TORQUES)
+    change_before_batch(monkeypatch, 0, lambda: os.kill(os.getpid(), signal.SIGTERM))
+    done = simscen(*SOBOL)
+    assert done.code == 143, done.err
+    assert "interrupted: 0 passed" in done.out
+    assert "--resume" not in done.out  # simscen falsify has no such option
+    assert "report.html" not in done.out and not (tmp_path / "out/report.html").exists()
 
 
 def test_the_junit_report_of_a_search_does_not_replace_its_world(simscen: Callable[..., Any], tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from PIL import Image
 
 from simscen.cli.session.selection import Selection, load_selection
 from simscen.run import reproducibility as module
-from simscen.run.reproducibility import scenario_digests
+from simscen.run.reproducibility import ScenarioDigests, scenario_digests
 
 SCENARIO = """\
 extends: base.yaml
@@ -99,27 +100,51 @@ FILES = {
 Digest = Callable[..., str]
 
 
-@pytest.fixture
-def project(tmp_path: Path) -> Path:
-    """A scenario that reads everything a scenario can."""
+def write_project(folder: Path) -> Path:
+    """Write a scenario that reads everything a scenario can."""
     for name, text in FILES.items():
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text(text)
-    Image.new("L", (3, 3), 100).save(tmp_path / "p/hill.png")
-    return tmp_path
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    Image.new("L", (3, 3), 100).save(folder / "p/hill.png")
+    return folder
+
+
+def digests(project: Path, *world_path: str, lenient: bool = False) -> ScenarioDigests:
+    """Return the digests as `simscen run` makes them."""
+    folders = [project / folder for folder in world_path or ("models",)]
+    file = project / "p/a.scenario.yaml"
+    (loaded,), _ = load_selection([file], project / "p", folders, lenient, Selection())
+    return scenario_digests(loaded)
+
+
+def digest(project: Path, *world_path: str, lenient: bool = False) -> str:
+    """Return the digest of a run."""
+    return digests(project, *world_path, lenient=lenient).run
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the project, the same for all tests because digests contain paths."""
+    return tmp_path_factory.mktemp("home")
+
+
+@pytest.fixture(scope="module")
+def unchanged(home: Path) -> ScenarioDigests:
+    """The digests of the scenario without changes."""
+    return digests(write_project(home))
+
+
+@pytest.fixture
+def project(home: Path, unchanged: ScenarioDigests) -> Path:
+    """A scenario that reads everything a scenario can, without the changes of earlier tests."""
+    shutil.rmtree(home)
+    return write_project(home)
 
 
 @pytest.fixture
 def of(project: Path) -> Digest:
-    """The digest as `simscen run` makes it."""
-
-    def made(*world_path: str, name: str = "a", lenient: bool = False) -> str:
-        folders = [project / folder for folder in world_path or ("models",)]
-        file = project / f"p/{name}.scenario.yaml"
-        (loaded,), _ = load_selection([file], project / "p", folders, lenient, Selection())
-        return scenario_digests(loaded).run
-
-    return made
+    """Return the function `digest` for the project of this test."""
+    return partial(digest, project)
 
 
 @pytest.mark.sample(6)
@@ -142,44 +167,45 @@ def of(project: Path) -> Digest:
         *((f"p/{name}.pgm", "254 254 254", "254 0 254") for name in MASKS),
     ],
 )
-def test_any_file_that_a_run_reads_changes_the_digest(project: Path, of: Digest, file: str, old: str, new: str) -> None:
+def test_any_file_that_a_run_reads_changes_the_digest(
+    project: Path, of: Digest, unchanged: ScenarioDigests, file: str, old: str, new: str
+) -> None:
     """However deep it is included; a moved model let --resume say passed where a fresh run failed."""
-    before = of()
     text = (project / file).read_text()
     assert old in text
     (project / file).write_text(text.replace(old, new, 1))
-    assert of() != before
+    assert of() != unchanged.run
     (project / file).write_text(text)
-    assert of() == before
+    assert of() == unchanged.run
 
 
-def test_a_heightmap_changes_the_digest(project: Path, of: Digest) -> None:
+def test_a_heightmap_changes_the_digest(project: Path, of: Digest, unchanged: ScenarioDigests) -> None:
     """An image that an SDF file names is read like a mesh."""
-    before = of()
     Image.new("L", (3, 3), 0).save(project / "p/hill.png")
-    assert of() != before
+    assert of() != unchanged.run
 
 
-def test_unused_file_does_not_change_the_digest(project: Path, of: Digest) -> None:
+def test_unused_file_does_not_change_the_digest(project: Path, of: Digest, unchanged: ScenarioDigests) -> None:
     """Otherwise `--resume` would keep no verdicts."""
-    before = of()
     (project / "p/notes.txt").write_text("hello")
     (project / "models/other").mkdir()
-    assert of() == before
+    assert of() == unchanged.run
 
 
-def test_order_of_the_world_path_changes_the_digest_if_it_selects_another_model(project: Path, of: Digest) -> None:
+def test_order_of_the_world_path_changes_the_digest_if_it_selects_another_model(
+    project: Path, of: Digest, unchanged: ScenarioDigests
+) -> None:
     """The first folder can contain another shelf."""
     (project / "mine/shelf").mkdir(parents=True)
     (project / "mine/shelf/model.config").write_text(MODEL_CONFIG)
     (project / "mine/shelf/model.sdf").write_text(SHELF.replace("1 1 1", "2 2 2"))
     assert of("mine", "models") != of("models", "mine")
-    assert of("models", "mine") == of("models")
+    assert of("models", "mine") == unchanged.run
 
 
-def test_lenient_option_changes_the_digest(of: Digest) -> None:
+def test_lenient_option_changes_the_digest(of: Digest, unchanged: ScenarioDigests) -> None:
     """It leaves out unusable elements."""
-    assert of(lenient=True) != of()
+    assert of(lenient=True) != unchanged.run
 
 
 def test_scenarios_of_one_world_list_all_its_files(project: Path, of: Digest) -> None:
@@ -192,11 +218,12 @@ def test_scenarios_of_one_world_list_all_its_files(project: Path, of: Digest) ->
 
 
 @pytest.mark.parametrize("what", ["software_versions", "cpu_flags", "arithmetic_fingerprints", "source_digest"])
-def test_software_and_processor_change_the_digest(of: Digest, monkeypatch: pytest.MonkeyPatch, what: str) -> None:
+def test_software_and_processor_change_the_digest(
+    of: Digest, unchanged: ScenarioDigests, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
     """Another release of Bullet, other vector instructions or another simscen may change last bits."""
-    before = of()
     monkeypatch.setattr(module, what, lambda: {"pybullet": "0"})
-    assert of() != before
+    assert of() != unchanged.run
 
 
 @pytest.mark.sample(4)
@@ -218,27 +245,13 @@ def test_software_and_processor_change_the_digest(of: Digest, monkeypatch: pytes
     ],
 )
 def test_definition_is_the_scenario_without_its_stack(
-    project: Path, file: str, old: str, new: str, is_other_definition: bool
+    project: Path, unchanged: ScenarioDigests, file: str, old: str, new: str, is_other_definition: bool
 ) -> None:
-    def definition() -> str:
-        (loaded,), _ = load_selection(
-            [project / "p/a.scenario.yaml"], project / "p", [project / "models"], False, Selection()
-        )
-        return scenario_digests(loaded).definition
-
-    before, text = definition(), (project / file).read_text()
+    text = (project / file).read_text()
     assert old in text
     (project / file).write_text(text.replace(old, new, 1))
-    assert (definition() != before) == is_other_definition
+    assert (digests(project).definition != unchanged.definition) == is_other_definition
 
 
-def test_definition_does_not_depend_on_the_folder_of_the_project(
-    project: Path, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    copy = tmp_path_factory.mktemp("elsewhere") / "copy"
-    shutil.copytree(project, copy)
-    digests = []
-    for home in (project, copy):
-        (loaded,), _ = load_selection([home / "p/a.scenario.yaml"], home / "p", [home / "models"], False, Selection())
-        digests.append(scenario_digests(loaded))
-    assert digests[0].definition == digests[1].definition
+def test_definition_does_not_depend_on_the_folder_of_the_project(tmp_path: Path, unchanged: ScenarioDigests) -> None:
+    assert digests(write_project(tmp_path)).definition == unchanged.definition

@@ -67,4 +67,4 @@ def test_planner_that_improves_its_path_stops_before_the_maximum_of_iterations(p
         assert poses is not None
         return len(checked)
 
-    assert max(checks(100_000, 200), checks(1000, 200)) < 0.5 * checks(1000, 1000)
+    assert max(checks(100_000, 50), checks(250, 50)) < 0.5 * checks(250, 250)
