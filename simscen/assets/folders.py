@@ -189,8 +189,8 @@ class AllowedFolders:
             return f"did you mean `{similar}`?"
         if parse_fuel_uri(uri) and not self.search_folders:
             return "allow Fuel's cache with --world-path ~/.gz/fuel, or a folder that holds the downloaded model"
-        searched = ", ".join(dict.fromkeys(self.display_path(folder) or "." for folder, _ in tried)) or "no folder"
-        return f"looked in {searched}; allow its folder with --world-path"
+        searched = ", ".join(dict.fromkeys(self.display_path(folder) or "." for folder, _ in tried))
+        return f"{f'looked in {searched}; ' if searched else ''}allow its folder with --world-path"
 
 
 def _to_unusable_file(error: OSError) -> UnusableFile:

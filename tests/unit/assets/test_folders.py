@@ -146,6 +146,12 @@ def test_missing_file_message_lists_similar_files(folders: AllowedFolders) -> No
     assert caught.value.hint == f"looked in ., {models}; allow its folder with --world-path"
 
 
+def test_hint_without_allowed_folders_lists_none(tmp_path: Path) -> None:
+    with pytest.raises(NoSuchFile) as caught:
+        AllowedFolders.of([tmp_path]).find("model://cart", tmp_path)
+    assert caught.value.hint == "allow its folder with --world-path"
+
+
 def test_a_package_name_that_is_too_long_for_a_folder_is_refused(folders: AllowedFolders) -> None:
     with pytest.raises(UnusableFile, match="is not the name of a package"):
         folders.package_folder("a" * 300, folders.roots[0])
