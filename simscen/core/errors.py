@@ -1,5 +1,6 @@
 """Exceptions of simscen with their exit codes, and problems in input files."""
 
+import traceback
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -102,3 +103,16 @@ class Problem:
     def place(self) -> str:
         """Position as path:line:col, or the path alone if the problem concerns the whole file."""
         return f"{self.path}:{self.line}:{self.col}" if self.line else self.path
+
+
+def exception_place(error: BaseException, component: str = "") -> str:
+    """Return "file:line" of the innermost entry of the traceback of an exception.
+
+    `component` is the name of a module or class, such as "package.module:Class". If there are entries in its package,
+    the innermost of these is returned.
+    """
+    package = component.partition(":")[0].partition(".")[0]
+    frames = list(traceback.walk_tb(error.__traceback__))
+    own = [entry for entry in frames if str(entry[0].f_globals.get("__name__", "")).partition(".")[0] == package]
+    frame, line = (own or frames)[-1]
+    return f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence, Set
 from dataclasses import replace
 
+from simscen.core.errors import exception_place
 from simscen.core.records.case import Case
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Trace
@@ -67,7 +68,8 @@ def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: LogCovera
     except MissingEvidence as missing_evidence:
         return (undecided(entry.kind, str(missing_evidence)),)
     except Exception as error:  # the boundary: one criterion must not affect the others
-        return (_error(entry, f"{type(error).__name__}: {error}"),)
+        place = "" if entry.original_class is None else f", at {exception_place(error, type(criterion).__module__)}"
+        return (_error(entry, f"{type(error).__name__}: {error}{place}"),)
     if defect := findings_defect(findings):
         return (_error(entry, defect),)
     if not has_ended(trace):

@@ -1,6 +1,5 @@
 """Build the sensors of a robot, and check the readings of sensors from plug-ins."""
 
-import traceback
 from collections.abc import Callable
 from dataclasses import fields
 from typing import Any, NoReturn, TypeVar
@@ -8,7 +7,7 @@ from typing import Any, NoReturn, TypeVar
 import numpy as np
 
 from simscen.core.clock import Clock
-from simscen.core.errors import BROKEN_COMPONENT, RunError
+from simscen.core.errors import BROKEN_COMPONENT, RunError, exception_place
 from simscen.core.geometry.ray_fans import RayCaster
 from simscen.core.messages import sensor_data
 from simscen.core.messages.sensor_data import Reading
@@ -79,8 +78,7 @@ class PluginSensor:
         except (RunError, MemoryError):
             raise
         except Exception as error:  # a plug-in can raise anything
-            frame, line = list(traceback.walk_tb(error.__traceback__))[-1]
-            place = f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"
+            place = exception_place(error, self._spec.component)
             raise RunError("crashed", f"{self._label}: {type(error).__name__}: {error} ({place})") from error
 
     def _fail(self, problem: str) -> NoReturn:

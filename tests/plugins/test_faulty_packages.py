@@ -58,6 +58,8 @@ HEADS = {
     "    reading_type: ClassVar = 'Scan'\n\n"
     "class Device:\n    def __init__(self, spec, setting): self.setting = setting\n    def read(self, tick):\n        ",
 }
+LINE = len(f"{HEAD}\n\n".splitlines()) + 3
+"""Line of the code of a criterion or metric in its file."""
 USES = {
     "criterion": (", {mine: {}}", ""),
     "metric": ("]\nmetrics: [{mine: {}}", ""),
@@ -100,7 +102,7 @@ FINDING = "Finding(Status.{}, 'mine', '1', '2', {})"
         (f"return [{FINDING.format('PASS', -1.0)}]", "mine has the status pass but a margin of -1"),
         (f"return [{FINDING.format('FAIL', 1.0)}]", "mine has the status fail but a margin of 1"),
         ("return [Finding(Status.PASS, 'mine', 1, '2')]", "a text of its finding is not a string"),
-        ("raise KeyError('gone')", "KeyError: 'gone' (criterion `mine` of mines 0.3)"),
+        ("raise KeyError('gone')", f"KeyError: 'gone', at mine.py:{LINE} (criterion `mine` of mines 0.3)"),
     ],
 )
 def test_criterion_without_findings_makes_the_run_an_error(run, text: str, message: str) -> None:
@@ -119,7 +121,8 @@ def test_criterion_without_findings_makes_the_run_an_error(run, text: str, messa
         ),
         ("return None", "metric mine is not a finite number: None"),
         ("return True", "metric mine is not a finite number: True"),
-        ("return 1 / 0", "metric mine: ZeroDivisionError: division by zero (metric `mine` of mines 0.3)"),
+        ("return 1 / 0", f"division by zero, at mine.py:{LINE} (metric `mine` of mines 0.3)"),
+        ("return np.array([1]) @ np.zeros(2)", f"at mine.py:{LINE} (metric `mine` of mines 0.3)"),
     ],
 )
 def test_nonnumeric_metric_makes_the_run_an_error(run, text: str, message: str) -> None:

@@ -8,6 +8,7 @@ from itertools import accumulate
 
 import numpy as np
 
+from simscen.core.errors import exception_place
 from simscen.core.geometry import Array
 from simscen.core.records.case import CLEARANCE_RANGE_M, Case
 from simscen.core.records.events import EventKind
@@ -250,7 +251,9 @@ def _value(entry: AnyMeasure, trace: Trace, case: Case, coverage: LogCoverage) -
     except MissingEvidence as missing:
         return str(missing)
     except Exception as error:  # a plug-in can raise anything
-        raise InvalidTrace(f"metric {entry.kind}: {type(error).__name__}: {error}{entry.plugin_suffix}") from error
+        place = exception_place(error, type(entry.measure).__module__)
+        message = f"metric {entry.kind}: {type(error).__name__}: {error}, at {place}{entry.plugin_suffix}"
+        raise InvalidTrace(message) from error
     if isinstance(found, str) and found:
         return found
     if isinstance(found, bool) or not isinstance(found, int | float) or not math.isfinite(found):

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
-from simscen.core.errors import InvalidInput, RunError
+from simscen.core.errors import InvalidInput, RunError, exception_place
 from simscen.core.records.trace import Moment
 from simscen.run.process.isolation import adopt_orphans, die_with_parent, has_running_children, limit_resources
 from simscen.run.process.jobs import Job, json_line
@@ -84,7 +84,7 @@ def _end_record(job: Job, report: int, execute: ExecuteJob) -> dict[str, Any]:
     except MemoryError:
         return _OUT_OF_MEMORY
     except SystemExit as error:
-        return {"error": "crashed", "message": f"called sys.exit({error.code}) ({_innermost_frame(error)})"}
+        return {"error": "crashed", "message": f"called sys.exit({error.code}) ({exception_place(error)})"}
     except OSError as error:
         if error.errno == errno.ENOMEM:
             return _OUT_OF_MEMORY
@@ -94,12 +94,7 @@ def _end_record(job: Job, report: int, execute: ExecuteJob) -> dict[str, Any]:
     except Exception as error:
         # The boundary of the process: any exception becomes the error of this run.
         traceback.print_exc()
-        return {"error": "crashed", "message": f"{type(error).__name__}: {error} ({_innermost_frame(error)})"}
-
-
-def _innermost_frame(error: BaseException) -> str:
-    frame = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{Path(frame.filename).name}:{frame.lineno}"
+        return {"error": "crashed", "message": f"{type(error).__name__}: {error} ({exception_place(error)})"}
 
 
 class ProgressReporter:

@@ -1,13 +1,12 @@
 """Base class of the wrappers that call a component or a stack, and check what it returns."""
 
 import math
-import traceback
 from collections.abc import Callable, Iterable
 from typing import Any, ClassVar, NoReturn, ParamSpec, TypeVar
 
 import numpy as np
 
-from simscen.core.errors import BROKEN_COMPONENT, RunError
+from simscen.core.errors import BROKEN_COMPONENT, RunError, exception_place
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief, ErrorCode, Path
@@ -61,7 +60,7 @@ class CheckedPlugin:
             if not isinstance(error.code, ErrorCode):
                 self.raise_invalid(f"failed with {error.code!r}, which is not an ErrorCode")
             raise error
-        message = f"{self.label}: {type(error).__name__}: {error} ({self._location(error)})"
+        message = f"{self.label}: {type(error).__name__}: {error} ({exception_place(error, self._spec.component)})"
         raise RunError("crashed", message, by_stack=True) from error
 
     def raise_invalid(self, problem: str) -> NoReturn:
@@ -111,14 +110,6 @@ class CheckedPlugin:
         if not is_checked and not _is_finite_table(belief.particles, 4):
             self.raise_invalid("returned a Belief whose particles are not a finite array (n, 4)")
         return belief
-
-    def _location(self, error: Exception) -> str:
-        """Return "file:line" of the traceback: if possible, of the innermost entry in the component's package."""
-        package = self._spec.component.partition(":")[0].partition(".")[0]
-        frames = list(traceback.walk_tb(error.__traceback__))
-        own = [entry for entry in frames if str(entry[0].f_globals.get("__name__", "")).partition(".")[0] == package]
-        frame, line = (own or frames)[-1]
-        return f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"
 
 
 def are_numbers(values: Iterable[object]) -> bool:

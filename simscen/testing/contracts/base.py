@@ -148,7 +148,7 @@ def call_component(action: str, call: Callable[..., T], *args: Any, **kwargs: An
     except PromiseBroken:
         raise
     except Exception as error:  # plug-ins can raise anything
-        message = f"raises {type(error).__name__} when it {action}, not a NavigationFailure: {error}"
+        message = f"raises {type(error).__name__} when it {action}: {error}"
         raise PromiseBroken(message) from error
 
 

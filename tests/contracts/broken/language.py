@@ -27,7 +27,7 @@ class ReturnsNoFinding(Spec, Criterion):
         return []
 
 
-@breaks_contract("every trace yields", "raises IndexError when it judges the trace of a stationary robot")
+@breaks_contract("every trace yields", "raises IndexError when it judges the trace of a stationary robot: index")
 class RequiresBelief(Spec, Criterion):
     def judge(self, trace, case):
         trace.belief.values[0]

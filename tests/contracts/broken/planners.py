@@ -51,7 +51,7 @@ class IgnoresObstacles(Wrapper):
 @breaks(
     PLANNER,
     "an impossible request fails with its error code",
-    "raises ValueError when it plans, not a NavigationFailure",
+    "raises ValueError when it plans",
 )
 class RaisesValueError(Wrapper):
     def plan(self, *arguments):

@@ -68,7 +68,9 @@ def test_invalid_metric_makes_the_run_an_error(answer: object) -> None:
 
 
 def test_exception_in_a_metric_makes_the_run_an_error() -> None:
-    with pytest.raises(InvalidTrace, match=r"metric mine: KeyError: 'x' \(my-package 1\.0\)"):
+    with pytest.raises(
+        InvalidTrace, match=r"metric mine: KeyError: 'x', at test_plugin_metrics\.py:\d+ \(my-package 1\.0\)"
+    ):
         add(PluginMetric(KeyError("x")))
 
 
