@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from simscen.core.records.events import Event, EventKind
 from simscen.record.messages.decode import GoalState
@@ -14,7 +14,7 @@ _FINAL_STATES = {
     CANCELED: (EventKind.GOAL_CANCELED, "CANCELED"),
     ABORTED: (EventKind.GOAL_FAILED, "FAILED"),
 }
-"""Event of a goal, and result of the navigation after the last goal, by the final status of the goal."""
+"""Event of a goal, and result of a navigation with this goal alone, by the final status of the goal."""
 
 
 def goal_events(messages: Sequence[tuple[int, list[GoalState]]], names: Sequence[str]) -> list[Event] | str:
@@ -43,10 +43,26 @@ def goal_events(messages: Sequence[tuple[int, list[GoalState]]], names: Sequence
         if goal_id in ended:
             end_tick, status = ended[goal_id]
             events.append(Event(end_tick, _FINAL_STATES[status][0], name))
-    if accepted and len(ended) == len(accepted):
-        end_tick, status = ended[list(accepted)[-1]]
-        events.append(Event(end_tick, EventKind.NAVIGATION_ENDED, _FINAL_STATES[status][1]))
+    events += _navigation_ends(list(accepted.values()), [ended.get(goal_id) for goal_id in accepted])
     return sorted(events, key=lambda event: event.tick)
+
+
+def _navigation_ends(starts: Sequence[int], ends: Sequence[tuple[int, int] | None]) -> Iterator[Event]:
+    """Yield the ends of navigation, with the results that simscen's own stack would report.
+
+    `starts` and `ends` are the ticks at which the goals were accepted, and their ticks and final statuses. Navigation
+    ends with the last goal, and with a canceled goal before the next one is accepted. It has failed if a goal failed.
+    """
+    has_failed = False
+    for index, end in enumerate(ends):
+        if end is None:
+            return
+        tick, status = end
+        has_failed = has_failed or status == ABORTED
+        if index == len(ends) - 1 or (status == CANCELED and tick <= starts[index + 1]):
+            result = ABORTED if has_failed and status != CANCELED else status
+            yield Event(tick, EventKind.NAVIGATION_ENDED, _FINAL_STATES[result][1])
+            has_failed = False
 
 
 def _count(number: int) -> str:

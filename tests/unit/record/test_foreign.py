@@ -239,6 +239,35 @@ def test_action_status_gives_goal_results(read: Callable[..., ForeignLog]) -> No
     assert one.coverage.missing[Evidence.NAVIGATION] == "the log has 2 goals, the scenario 1 goal"
 
 
+ACCEPTED_AT, ENDED_AT = (1, 5, 7), (4, 6, 9)
+"""Times in s at which three goals are accepted and end."""
+
+
+@pytest.mark.parametrize(
+    ("final_states", "results"),
+    [
+        ((4, 4, 4), [("SUCCEEDED", 9)]),
+        ((4, 4, 6), [("FAILED", 9)]),
+        ((6, 4, 4), [("FAILED", 9)]),
+        ((6, 4, 5), [("CANCELED", 9)]),
+        ((5, 4, 4), [("CANCELED", 4), ("SUCCEEDED", 9)]),
+        ((6, 5, 4), [("CANCELED", 6), ("SUCCEEDED", 9)]),
+    ],
+)
+def test_navigation_with_a_failed_goal_has_failed(
+    read: Callable[..., ForeignLog], final_states: tuple[int, ...], results: list[tuple[str, int]]
+) -> None:
+    topic = "/navigate_to_pose/_action/status"
+    messages = drive()
+    for number, (start, end, state) in enumerate(zip(ACCEPTED_AT, ENDED_AT, final_states, strict=True)):
+        accepted = BEGIN + start * SECOND
+        messages.append(Message(topic, accepted, statuses((number, accepted, 2))))
+        messages.append(Message(topic, BEGIN + end * SECOND, statuses((number, accepted, state))))
+    log = read(messages, ForeignLogOptions(truth="/mocap", goals=("a", "b", "c")))
+    ended = log.trace.of_kind(EventKind.NAVIGATION_ENDED)
+    assert [(event.name, round(log.trace.seconds(event.tick))) for event in ended] == results
+
+
 def test_bag_without_rosbags_error_states_the_install_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bag = write_bag(tmp_path / "bag", drive(1.0))
     monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)

@@ -208,6 +208,22 @@ def test_goals_are_judged_by_action_status_and_ground_truth(simscen, limits, tmp
     assert ended.err.startswith("limits.yaml:1:16: error[SC030] no place of the world is called `shelf`")
 
 
+def test_reported_failure_of_an_earlier_goal_is_no_false_success(simscen, limits, tmp_path: Path) -> None:
+    messages = [
+        *drive(),
+        Message(STATUS, BEGIN + SECOND, statuses((1, BEGIN + SECOND, 2))),
+        Message(STATUS, BEGIN + 2 * SECOND, statuses((1, BEGIN + SECOND, 6))),
+        Message(STATUS, BEGIN + 3 * SECOND, statuses((2, BEGIN + 3 * SECOND, 2))),
+        Message(STATUS, BEGIN + 10 * SECOND, statuses((2, BEGIN + 3 * SECOND, 4))),
+    ]
+    write_mcap(tmp_path / "drive.mcap", messages)
+    goals = "goals: [{name: desk, pose: {x: 0, y: 9}}, {name: shelf, pose: {x: 5, y: 0}}]\n"
+    file = limits("no_false_success: {}", "result: {status: FAILED}", more=goals)
+    assert simscen("drive.mcap", "--scenario", file, "--truth", "/mocap").code == 0
+    file = limits("result: {status: SUCCEEDED}", more=goals)
+    assert "result: FAILED; expected SUCCEEDED" in simscen("drive.mcap", "--scenario", file, "--truth", "/mocap").out
+
+
 def test_regions_and_footprint_are_those_of_the_criteria_file(simscen, limits, tmp_path) -> None:
     write_mcap(tmp_path / "drive.mcap", drive())
     (tmp_path / "hall.world.yaml").write_text(
