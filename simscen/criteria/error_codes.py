@@ -51,6 +51,11 @@ def error_code_name(event: Event) -> str:
     return ErrorCode.NONE.name if number is None else str(number)
 
 
+def has_error_code(event: Event) -> bool:
+    """Return whether an event has an error code. Events in logs of real robots have none."""
+    return not event.data.keys().isdisjoint(("error_name", "error_code"))
+
+
 class ExpectedError(Spec):
     """Error code with which a goal is expected to fail.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from simscen.core.messages.goals import FAILED, Goal
 from simscen.core.records.events import GOAL_END_KINDS, Event, EventKind
-from simscen.criteria.error_codes import error_code_name
+from simscen.criteria.error_codes import error_code_name, has_error_code
 from simscen.criteria.trace_signals.ground_truth import truth
 
 if TYPE_CHECKING:
@@ -52,6 +52,11 @@ class GoalOutcome:
         if self.end is None or self.end.kind != EventKind.GOAL_FAILED:
             return False
         return self.expected_failure in (FAILED, error_code_name(self.end))
+
+    @property
+    def failed_for_unknown_reason(self) -> bool:
+        """Whether the goal failed and no error code was recorded, as in logs of real robots."""
+        return self.end is not None and self.end.kind == EventKind.GOAL_FAILED and not has_error_code(self.end)
 
     @property
     def was_preempted(self) -> bool:

@@ -174,6 +174,8 @@ def _judge_expected_failure(trace: Trace, outcome: GoalOutcome) -> Finding:
     expected = FAILED if outcome.expected_failure == FAILED else f"failed with {outcome.expected_failure}"
     if outcome.end is None and not has_ended(trace):
         return _truncated_log_finding(trace, outcome, expected)
+    if outcome.failed_for_unknown_reason and outcome.expected_failure != FAILED:
+        return undecided(f"goal {outcome.goal.name}", "failed, but the log has no error code", expected)
     at = (trace, trace.end if outcome.end is None else outcome.end.tick)
     is_passed_via = outcome.goal.via and outcome.reached is not None  # the drive may fail after passing some poses
     make_finding = held if outcome.failed_as_expected or is_passed_via else missed

@@ -9,7 +9,7 @@ from simscen.core.messages.goals import matches_goal_name
 from simscen.core.records.events import GOAL_END_KINDS, Event, EventKind
 from simscen.core.records.verdict import POSITION, Evidence, Finding
 from simscen.criteria.base import Criterion
-from simscen.criteria.error_codes import ErrorCodeValue, error_code_name
+from simscen.criteria.error_codes import ErrorCodeValue, error_code_name, has_error_code
 from simscen.criteria.findings import at_most, held, missed, undecided
 from simscen.criteria.goal_outcomes import GoalOutcome, closest_approach, goal_outcomes, outcome_start
 from simscen.criteria.timeline import end_reason, has_ended
@@ -95,7 +95,8 @@ def _compare(trace: Trace, end: Event, what: str, reported: str, expected: str) 
     if reported == expected:
         return held(what, reported, expected, (trace, end.tick))
     message = end.data.get("message")
-    details = [f"it ended with {end.name}, {error_code_name(end)}"] + ([str(message)] if message else [])
+    code = f", {error_code_name(end)}" if has_error_code(end) else ""
+    details = [f"it ended with {end.name}{code}"] + ([str(message)] if message else [])
     return missed(what, reported, expected, (trace, end.tick), details)
 
 
