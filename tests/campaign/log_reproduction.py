@@ -1,9 +1,9 @@
 """Reproduction of failed runs: reconstruct scenarios from only their logs, run these, and compare the failures.
 
 `python tests/campaign/log_reproduction.py [RUNS] [-k TEXT]` prints a table. RUNS is an output folder of `simscen run`;
-without it, the broken scenarios of tests/scenarios/can_fail are run first. Each run of a reconstructed scenario is
-judged with the criteria of the recorded one and with its own: an object that the lidar saw is no person for criteria
-about people, for example. Exit code 1 if fewer than 80 % fail again in the same criterion.
+without it, the scenarios of tests/scenarios/can_fail, which are made to fail, are run first. Each run of a
+reconstructed scenario is judged with the criteria of the recorded one and with its own: an object that the lidar saw is
+no person for criteria about people, for example. Exit code 1 if fewer than 80 % fail again in the same criterion.
 """
 
 import argparse

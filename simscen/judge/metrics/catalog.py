@@ -78,8 +78,8 @@ METRICS: dict[str, Metric] = {
     ),
     "norm_curvature": Metric(
         "rad",
-        "Sum of k (s1 + s2) over the driven path resampled to steps s of at least 0.3 m, k = 1 / radius of the circle "
-        "through three consecutive points.",
+        "Sum of k (s1 + s2) over the points of the driven path, resampled to steps of at least 0.3 m; s1, s2 = steps "
+        "before and after the point, k = 1 / radius of the circle through it and its neighbors.",
         "bench-mr",
         evidence=_PATH,
     ),

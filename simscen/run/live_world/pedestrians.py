@@ -25,7 +25,7 @@ from simscen.worlds.routes.shortest_paths import ShortestPaths, shortest_paths_i
 OBSTACLE_HEIGHTS_M = (0.15, 0.5, 0.95)
 """Heights at which walls block the way of pedestrians. Walls at the last height also block their view.
 
-Solids whose outline differs from height to height block their way at all heights from the first one on.
+Solids that are no prisms, or are at none of these heights, block their way at all heights from the first one on.
 """
 HEIGHT_TOLERANCE_M = 0.001
 """Difference up to which heights of vertices count as equal."""
