@@ -48,8 +48,8 @@ class Speed(Spec, Criterion):
     in_: RegionName | None = Field(default=None, alias="in")
     """Check only while the robot's center is in the region with this name."""
     while_on: bool = False
-    """Check only while the limit in the region is enabled by the action `speed_zone`, but not in its first `grace`.
-    Default: check the whole run."""
+    """Check only while the limit in the region is enabled by the action `speed_zone`, beginning after the time
+    `grace`. Default: check the whole run."""
     mask: SpeedMask | None = None
     """Filter mask of speed limits: file, type, base and multiplier, as in `stack.speed_mask`.
 

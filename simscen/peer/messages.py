@@ -159,9 +159,10 @@ def _odometry(reader: Reader) -> Odometry:
 def _imu(reader: Reader) -> Imu:
     stamp, frame = _header(reader)
     reader.take("13d")
-    turn, turn_covariance = reader.take("3d"), reader.take("9d")
-    force, force_covariance = reader.take("3d"), reader.take("9d")
-    return Imu(stamp, frame, turn, force, turn_covariance, force_covariance)
+    angular_velocity, angular_velocity_covariance = reader.take("3d"), reader.take("9d")
+    acceleration, acceleration_covariance = reader.take("3d"), reader.take("9d")
+    covariances = angular_velocity_covariance, acceleration_covariance
+    return Imu(stamp, frame, angular_velocity, acceleration, *covariances)
 
 
 def _image(reader: Reader) -> Image:

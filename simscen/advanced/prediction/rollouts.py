@@ -104,8 +104,8 @@ class TrajectoryFan:
     def ends(self) -> tuple[Array, Array]:
         """Final x and y (n,) of the trajectories."""
         speed, turn, (x, y, _) = self.speed_profile, self.turn_profile, self.pose
-        along, aside = self.vx @ self.cosine.T, self.vx @ self.sine.T
-        return x + along[speed, turn] * STEP_S, y + aside[speed, turn] * STEP_S
+        dx, dy = self.vx @ self.cosine.T, self.vx @ self.sine.T
+        return x + dx[speed, turn] * STEP_S, y + dy[speed, turn] * STEP_S
 
     def rollouts(self, indices: npt.NDArray[np.intp], steps: int = len(TIMES)) -> Rollouts:
         """Return the trajectories with these indices (k,), for the first `steps` time steps."""
@@ -121,15 +121,15 @@ def _ramp(now: float, first: Array, duration: Array, then: Array, acceleration: 
 
     The rates of change are limited by `acceleration` and `deceleration`.
     """
-    up = np.where(np.abs(first) >= abs(now), acceleration, deceleration)
-    before = now + np.clip(first - now, -up * np.minimum(TIMES, duration), up * np.minimum(TIMES, duration))
+    change = np.where(np.abs(first) >= abs(now), acceleration, deceleration) * np.minimum(TIMES, duration)
+    before = now + np.clip(first - now, -change, change)
     change = np.where(np.abs(then) >= np.abs(before), acceleration, deceleration) * np.maximum(TIMES - duration, 0.0)
     ramped: Array = before + np.clip(then - before, -change, change)
     return ramped
 
 
 def arc_rollouts(pose: Pose2, command: Twist, fractions: tuple[float, ...]) -> Rollouts:
-    """Return the trajectories of a constant command at `fractions` of its velocity, for a robot without a path."""
+    """Return the trajectories of a robot that follows no path: a constant command at `fractions` of its velocity."""
     scale = np.array(fractions)[:, None]
     vx, vy, wz = (scale * velocity + 0.0 * TIMES for velocity in command)
     yaw = pose.yaw + wz * TIMES

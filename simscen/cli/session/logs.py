@@ -67,7 +67,7 @@ def is_bag(names: Sequence[str]) -> bool:
 
 
 def log_file(run: Path) -> Path:
-    """Return the log in the folder of a run, or `run` itself if it is a file. Raises InvalidInput without a log."""
+    """Return the log in the folder `run`, or `run` itself if it is not a folder. Raises InvalidInput without a log."""
     if not run.is_dir():
         return run
     found = [run / name for name in (COMPLETE_LOG, PARTIAL_LOG) if (run / name).is_file()]

@@ -52,7 +52,7 @@ class EvaluationContext:
         return usual_period(self.trace.truth.ticks)
 
     def sample_windows(self, window: Window) -> SampleWindows:
-        """Return the window of each sample. Raises InvalidTrace if windows are too short to contain a sample."""
+        """Return the window of each sample. Raises InvalidTrace if windows contain no later sample."""
         start, end = window.interval
         rate, last = self.trace.tick_rate, None
         if end is not None:
@@ -61,7 +61,7 @@ class EvaluationContext:
             if last_sample < max(first_sample, 1):
                 spacing = self.trace.seconds(self.period)
                 raise InvalidTrace(
-                    f"the window up to {end:g} s ahead contains no sample: samples are {spacing:g} s apart"
+                    f"the window up to {end:g} s ahead contains no later sample: samples are {spacing:g} s apart"
                 )
         return SampleWindows.of_samples(self.trace.truth.ticks, self.period, round(start * rate), last)
 
@@ -110,7 +110,7 @@ def _until(until: Release, context: EvaluationContext, begin: int) -> Robustness
 def _response(premise: Condition, response: Condition, context: EvaluationContext, begin: int) -> ResponseRobustness:
     """Return the robustness of "whenever `premise`, then `response`". For `begin`, see `robustness`.
 
-    The window is the rest of the run, unless the premise is that of a criterion, which has its own window. If the
+    The premise of a criterion (`Whenever`) has its own window. Otherwise, the window is the rest of the run. If the
     premise is required, but was never certainly true, `low` is -inf.
     """
     windows = context.sample_windows(premise if isinstance(premise, Whenever) else Window())
@@ -137,7 +137,7 @@ def _response(premise: Condition, response: Condition, context: EvaluationContex
 def _apply_windows(
     operator: WindowOperator, part: Robustness, windows: SampleWindows, context: EvaluationContext
 ) -> Robustness:
-    """Return the robustness of `always` or `eventually` with the robustness of its operand."""
+    """Return the robustness of `always` or `eventually`, computed from the robustness of its operand."""
     low, high = (operator(part.bound(bound), windows, continuation) for bound, continuation in _continuations(context))
     return WindowRobustness(low, high, [part], windows)
 
@@ -153,7 +153,7 @@ def _continuations(context: EvaluationContext) -> list[tuple[Bound, Continuation
 
 
 def _combine(parts: Sequence[Robustness], operator: Literal["all", "any"]) -> Robustness:
-    """Return the robustness of `all` or `any` with the robustness of its operands."""
+    """Return the robustness of `all` or `any`, computed from the robustness of its operands."""
     extremum = np.minimum if operator == "all" else np.maximum
     low, high = reduce(extremum, [part.low for part in parts]), reduce(extremum, [part.high for part in parts])
     return BooleanRobustness(low, high, parts)

@@ -19,7 +19,8 @@ from simscen.loading.yaml.tree import Key
 class SetValue:
     """Edit that sets the value at `keys`, and creates the missing mappings that contain it.
 
-    `order` is the preferred order of keys, which determines the position of a new key.
+    `order` is the order of the keys at the top of the file, and of the same keys in nested mappings, such as those of
+    one of several robots. It determines the position of a new key.
     """
 
     keys: tuple[Key, ...]
@@ -31,7 +32,7 @@ class SetValue:
 class AddItem:
     """Edit that inserts an item into the list at `keys` before the item `index`, or at the end for None.
 
-    A missing list is created. `order` is the preferred order of keys, as in SetValue.
+    A missing list is created. `order` is that of SetValue.
     """
 
     keys: tuple[Key, ...]
@@ -110,7 +111,7 @@ def _set_value(text: str, source: SourceNode, keys: tuple[Key, ...], value: Any,
         for key in reversed(missing[1:]):
             value = {key: value}
         if parent.kind == "mapping":
-            return insert_entry(text, parent, str(missing[0]), value, order if len(missing) == 1 or depth == 0 else ())
+            return insert_entry(text, parent, str(missing[0]), value, order)
         if parent.kind == "scalar" and text[parent.start : parent.end] in ("", "~", "null"):
             return _replacement(text, parent, {missing[0]: value})
         break

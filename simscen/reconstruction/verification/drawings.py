@@ -24,7 +24,7 @@ WALL_COLOR, UNKNOWN_COLOR, NEW_HIT_COLOR = (112, 117, 128, 255), (128, 133, 144,
 WALL_DISTANCE_M = 0.15
 """Maximum distance from a wall of a return that belongs to the wall."""
 TARGET_SCANS, TARGET_POINTS = 300, 600
-"""Minimum number of drawn scans, and of drawn points per line. At most twice as many are drawn."""
+"""Number of drawn scans, and of drawn points per line: at least this many (or all), and less than twice as many."""
 MAX_TIME_MARKS, MIN_MARK_DISTANCE = 12, 0.06
 """Maximum number of time marks on a path, and minimum distance of marks as a fraction of the larger side of the map."""
 MARGIN_M, MIN_ASPECT = 1.0, 0.45
@@ -96,16 +96,17 @@ def drive_map(
         at_x, at_y = incident.position
         tip = f"<title>{escape(f'{incident.kind} at {incident.time:.2f} s')}</title>"
         shapes.append(f'<circle class="incident" cx="{at_x:.3f}" cy="{-at_y:.3f}" r="{box.font:.3f}">{tip}</circle>')
-        row = 1 + number // 2
-        beside = (1.7 * row if number % 2 == 0 else -0.7 - 1.7 * row) * box.font
+        # Labels alternate above and below, so that labels of close incidents do not overlap.
+        level = 1 + number // 2
+        offset_y = (1.7 * level if number % 2 == 0 else -0.7 - 1.7 * level) * box.font
         label = f"{incident.kind}, {incident.time:.1f} s"
-        shapes.append(_label(at_x, at_y + beside, label, box, "incidentname"))
+        shapes.append(_label(at_x, at_y + offset_y, label, box, "incidentname"))
     view = f"{box.x:.3f} {-box.y - box.height:.3f} {box.width:.3f} {box.height:.3f}"
     return f'<svg role="img" aria-label="{escape(title)}" viewBox="{view}">{"".join(shapes)}</svg>'
 
 
 def _label(x: float, y: float, label: str, box: Box, kind: str = "") -> str:
-    """Return an SVG text with the CSS class `kind`, centered at (x, y) in m and moved into the box."""
+    """Return an SVG text with the CSS class `kind`, centered at (x, y) in m and moved horizontally into the box."""
     half = 0.27 * box.font * len(label)
     x = min(max(x, box.x + half), box.x + box.width - half)
     return f'<text class="{kind}" x="{x:.2f}" y="{-y:.2f}" font-size="{box.font:.3f}">{escape(label)}</text>'
@@ -158,7 +159,7 @@ def _picture(world: StaticWorld, drive: RecordedDrive) -> str:
     colors = np.zeros((*grid.shape, 4), dtype=np.uint8)
     colors[grid.cells == UNKNOWN] = UNKNOWN_COLOR
     colors[grid.cells == OCCUPIED] = WALL_COLOR
-    cells = grid.cell_of(_returns_off_the_map(world, drive))
+    cells = grid.cell_of(_returns_not_from_walls(world, drive))
     cells = cells[grid.inside(cells)]
     colors[cells[:, 0], cells[:, 1]] = NEW_HIT_COLOR
     out = io.BytesIO()
@@ -166,7 +167,7 @@ def _picture(world: StaticWorld, drive: RecordedDrive) -> str:
     return f"data:image/png;base64,{base64.b64encode(out.getvalue()).decode()}"
 
 
-def _returns_off_the_map(world: StaticWorld, drive: RecordedDrive) -> Array:
+def _returns_not_from_walls(world: StaticWorld, drive: RecordedDrive) -> Array:
     """Return the ends (n, 2) in the map frame of beams that did not end at walls."""
     if drive.scans is None or not len(drive.scans):
         return np.empty((0, 2))

@@ -109,7 +109,7 @@ def _parent(pid: int) -> int:
 
 
 def plugin_path(plugins: Iterable[RegisteredType]) -> str:
-    """Return the argument of `apply_plugin_path` in a fork server that finds the plug-ins as this process does."""
+    """Return the argument with which `apply_plugin_path` lets a fork server find the same plug-ins as this process."""
     used = sorted({(entry.distribution, entry.folder) for entry in plugins})
     user_site = site.getusersitepackages() if site.ENABLE_USER_SITE else ""
     return json.dumps(

@@ -54,7 +54,7 @@ class OdometryFilter:
         self._filter.P = np.diag([0.0, 0.0, 0.0, spec.gyro_bias**2])
         self._covariance = np.zeros((7, 7))  # of the pose and the state together
         self._pose_covariance, self._cross_covariance = self._covariance[:3, :3], self._covariance[:3, 3:]  # views
-        self._jacobian = np.eye(3, 7)  # of the pose after a step by the pose before it and the state
+        self._jacobian = np.eye(3, 7)  # of the pose after a step with respect to the pose before it and the state
         self._pose = Pose2(0.0, 0.0)
         self._last: Odometry | None = None  # reading of the last update
         self._last_tick: int | None = None  # of the last reading
@@ -177,7 +177,8 @@ class GyroscopeIntegral:
     def __init__(self, tick_rate: int) -> None:
         self._tick_rate, self._max_gap = tick_rate, MAX_GYRO_GAP_S * tick_rate
         self._tick: int | None = None  # of the newest reading
-        self._rate, self._angle, self._variance = 0.0, 0.0, 0.0
+        self._rate, self._angle = 0.0, 0.0
+        self._variance_per_s = 0.0  # growth of the variance of the angle, in rad²/s
         self._read: tuple[int, float] | None = None  # tick and angle at the end of the last increment
 
     def add(self, imu: Imu) -> None:
@@ -190,7 +191,7 @@ class GyroscopeIntegral:
         else:
             seconds = (tick - self._tick) / self._tick_rate
             self._angle += (self._rate + rate) / 2 * seconds
-            self._variance = imu.angular_velocity_variance * seconds
+            self._variance_per_s = imu.angular_velocity_variance * seconds
         self._tick, self._rate = tick, rate
 
     def turned_until(self, tick: int) -> tuple[float, float] | None:
@@ -202,4 +203,4 @@ class GyroscopeIntegral:
         self._read = tick, angle
         if last is None:
             return None
-        return angle - last[1], self._variance * (tick - last[0]) / self._tick_rate
+        return angle - last[1], self._variance_per_s * (tick - last[0]) / self._tick_rate

@@ -31,23 +31,24 @@ def _outline_cells(segments: Array) -> tuple[Integers, Integers]:
     """Return the rows (k,) and columns (k,) of the cells that segments (n, 2, 2) cross, possibly outside the grid."""
     # The segments are split at the grid lines, so that each piece lies in one cell.
     start, step = segments[:, 0], segments[:, 1] - segments[:, 0]
-    owner = [np.arange(len(segments)), np.arange(len(segments))]
+    indices = [np.arange(len(segments)), np.arange(len(segments))]
     along = [np.zeros(len(segments)), np.ones(len(segments))]
     for axis in (0, 1):
         low, high = np.sort(segments[:, :, axis], axis=1).T
         first, last = np.floor(low).astype(np.int64) + 1, np.ceil(high).astype(np.int64) - 1
         which, lines = expand_ranges(first, last + 1)
-        owner.append(which)
+        indices.append(which)
         along.append((lines - start[which, axis]) / step[which, axis])
-    owners, cuts = np.concatenate(owner), np.concatenate(along)
-    order = np.lexsort((cuts, owners))
-    owners, cuts = owners[order], cuts[order]
+    segments_of_cuts, cuts = np.concatenate(indices), np.concatenate(along)
+    order = np.lexsort((cuts, segments_of_cuts))
+    segments_of_cuts, cuts = segments_of_cuts[order], cuts[order]
     lengths = np.linalg.norm(step, axis=1)
     # A shorter piece is a rounding error at a grid line, not a wall in the next cell.
-    same = (owners[:-1] == owners[1:]) & (np.diff(cuts) * lengths[owners[:-1]] > INWARD_OFFSET_CELLS)
-    middles = ((cuts[:-1] + cuts[1:]) / 2)[same]
-    which = owners[:-1][same]
-    # Only for kept pieces: two different points can be equal in cells, and then have no direction.
+    before, after = segments_of_cuts[:-1], segments_of_cuts[1:]
+    is_kept = (before == after) & (np.diff(cuts) * lengths[before] > INWARD_OFFSET_CELLS)
+    middles = ((cuts[:-1] + cuts[1:]) / 2)[is_kept]
+    which = before[is_kept]
+    # A segment of length 0 has no direction; none of its pieces is kept.
     left = np.column_stack((-step[which, 1], step[which, 0])) / lengths[which, None]
     points = start[which] + middles[:, None] * step[which] + INWARD_OFFSET_CELLS * left
     cells = np.floor(points).astype(np.int64)

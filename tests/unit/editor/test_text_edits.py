@@ -95,6 +95,9 @@ def test_new_keys_take_the_indentation_and_the_order_of_the_language() -> None:
     assert edited(text, SetValue(("robot", "model"), "amr")) == text.replace("y: 2}\n", "y: 2}\n    model: amr\n")
     assert edited(text, SetValue(("robot", "pose", "yaw"), "5 deg")) == text.replace("y: 2}", "y: 2, yaw: 5 deg}")
     assert edited(text, SetValue(("stack", "planner", "type"), "navfn")).endswith("stack: {planner: {type: navfn}}\n")
+    robots = "robots:\n  a:\n    robot: amr\n    pass: []\n"
+    first_goal = SetValue(("robots", "a", "goals", "dock"), {"x": 1}, order)
+    assert edited(robots, first_goal) == robots.replace("amr\n", "amr\n    goals: {dock: {x: 1}}\n")
 
 
 @pytest.mark.parametrize(

@@ -103,9 +103,11 @@ def test_uneven_samples_are_judged_at_their_own_times(late):
     assert found.high.tolist() == [1.0] * 5
 
 
-def test_a_window_without_a_sample_is_refused():
+def test_a_window_without_a_later_sample_is_refused():
     scene = EvaluationContext(run([1.0] * 5, [0.0] * 5), CASE, run_ended=True)
-    with pytest.raises(InvalidTrace, match=r"the window up to 1.9 s ahead contains no sample: samples are 1 s apart"):
+    with pytest.raises(
+        InvalidTrace, match=r"the window up to 1.9 s ahead contains no later sample: samples are 1 s apart"
+    ):
         scene.sample_windows(Window(between=[1.1, 1.9]))
     window = scene.sample_windows(Window(between=[1.1, 2.0]))
     assert (window.first[0], window.last[0]) == (2, 2)
