@@ -152,6 +152,7 @@ class AdvancedPlanManager(PlanManager):
     def _adopt(self, tick: int, now: float, result: PlanResult, reason: str) -> Event:
         event = super()._adopt(tick, now, result, reason)
         self._avoids_moving, self._moving_replanned_at = result.avoids_moving, now
-        self._checked_revision = self._costmap.revision
+        # With a latency, the costmap may have changed since planning, so the plan is checked at the next step.
+        self._checked_revision = -1 if self._latency else self._costmap.revision
         self._max_obstacle_cells = self._costmap.obstacle_cell_count
         return event

@@ -76,7 +76,10 @@ def _recent_faults(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
     for start in trace.of_kind(EventKind.FAULT_STARTED):
         ends = [event.tick for event in trace.of_kind(EventKind.FAULT_ENDED) if _is_same_entry(event, start)]
         end = next((end for end in ends if end > start.tick), None)
-        if start.tick > tick or not any(_is_same_entry(start, event) and event.tick >= start.tick for event in effects):
+        if not any(
+            _is_same_entry(start, event) and start.tick <= event.tick and (end is None or event.tick <= end)
+            for event in effects
+        ):
             continue
         if end is None or end > tick:
             since = f"since t = {trace.seconds(start.tick):.2f} s" if start.tick else "since the start"

@@ -23,7 +23,8 @@ _USE_CIRCLE: Values = {"consider_footprint": False}
 NAV2: Values = {
     "controller_frequency": 20.0,
     "failure_tolerance": 0.3,
-    "min_x_velocity_threshold": 0.001, "min_y_velocity_threshold": 0.5, "min_theta_velocity_threshold": 0.001,
+    "min_x_velocity_threshold": 0.001, "min_theta_velocity_threshold": 0.001,
+    "min_y_velocity_threshold": 0.001,  # nav2_bringup: 0.5, for robots that cannot move sideways
     "localizer": {"amcl": {"laser_model_type": "likelihood_field"}},
     "costmap": {**_COSTMAP, "update_frequency": 1.0, "track_unknown_space": True},
     "local_costmap": {**_COSTMAP, "update_frequency": 5.0, "width": 3.0, "height": 3.0, "track_unknown_space": False},

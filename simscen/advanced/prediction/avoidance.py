@@ -24,7 +24,6 @@ from simscen.advanced.prediction.rollouts import (
 )
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.model.guards import Prediction
 from simscen.stack.footprint import CoveringDiscs
 from simscen.stack.moving_obstacles import MAX_INFLATION_M, MovingObstacles, Reals
 from simscen.stack.protocols import CostmapView, RobotModel
@@ -58,9 +57,9 @@ MAX_ROUND_DIFFERENCE_M = 0.15
 class Avoidance:
     """Replaces commands that lead too close to moving obstacles."""
 
-    def __init__(self, spec: Prediction, robot: RobotModel, full_speed: float) -> None:
-        """Take the parameters, the robot, and the full speed of the controller in m/s."""
-        self._spec, self._robot = spec, robot
+    def __init__(self, robot: RobotModel, full_speed: float) -> None:
+        """Take the robot, and the full speed of the controller in m/s."""
+        self._robot = robot
         self._speed = min(max(full_speed, MIN_FULL_SPEED_M_S), robot.max_linear)
         is_round = robot.circumscribed_radius - robot.inscribed_radius < MAX_ROUND_DIFFERENCE_M
         self._discs = CoveringDiscs(replace(robot, radius=robot.circumscribed_radius) if is_round else robot)

@@ -33,7 +33,7 @@ class MotionPrediction:
         """Take the parameters, the robot, the names of its lidars, the tick rate in Hz, and the full speed in m/s."""
         self._spec, self._rate = spec, tick_rate
         self._trackers = {name: Tracker(spec, tick_rate) for name in lidars} if spec.enabled else {}
-        self._avoidance = Avoidance(spec, robot, full_speed)
+        self._avoidance = Avoidance(robot, full_speed)
         self._stand_position = StandPosition(robot, full_speed)
         self._warm_up_ticks, self._must_stay = WARM_UP_S * tick_rate, False
         self._odometry = GyroOdometry(tick_rate)

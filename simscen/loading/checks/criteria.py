@@ -107,7 +107,8 @@ def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[CheckProblem]:
         return
     for index, goal in enumerate(spec.goals):
         if expected_failure_name(goal.expect) and (spec.navigation.loops > 1 or index + 1 < len(spec.goals)):
-            following = spec.goal_names[(index + 1) % len(spec.goals)]
+            names = spec.goal_names
+            following = names[index + 1] if index + 1 < len(names) else f"{names[0]}#2"
             message = f"the robot never gets goal `{following}`: it stops after this goal, which is expected to fail"
             yield CheckProblem(("goals", index, "expect"), message, "set `on_goal_failure: continue`")
             return

@@ -62,11 +62,11 @@ class ObjectTrack:
         """Return the distance in m of a cluster from the prediction of the track; inf above MAX_CENTER_DISTANCE_M."""
         last = self.clusters[-1]
         predicted = last.points + self.velocity * (cluster.time - last.time)
-        if float(np.hypot(*(predicted.mean(axis=0) - cluster.points.mean(axis=0)))) > MAX_CENTER_DISTANCE_M:
+        centers = float(np.hypot(*(last.center + self.velocity * (cluster.time - last.time) - cluster.center)))
+        if centers > MAX_CENTER_DISTANCE_M:
             return float("inf")
         between = np.hypot(*(predicted[:, None, :] - cluster.points[None, :, :]).transpose(2, 0, 1))
         surfaces = float(min(between.min(axis=0).mean(), between.min(axis=1).mean()))
-        centers = float(np.hypot(*(last.center + self.velocity * (cluster.time - last.time) - cluster.center)))
         return surfaces + CENTER_WEIGHT * centers
 
 

@@ -142,7 +142,8 @@ class Canvas:
         for outline in corners:
             fill.polygon([(u - left, v - top) for u, v in outline], fill=255)
         step = HATCH_SPACING_PX * SUPERSAMPLING
-        first = -height_px - ((left + (top if rising else -top)) % step)  # aligned between all polygons of the canvas
+        # Multiples of `step`, so that the lines of all polygons of the canvas are aligned.
+        first = -step * math.ceil(height_px / step) - ((left + (top if rising else -top)) % step)
         for offset in np.arange(first, width_px + height_px, step).tolist():
             top_end, bottom_end = (offset, 0), (offset - height_px if rising else offset + height_px, height_px)
             pen.line([top_end, bottom_end], fill=color[3] if len(color) > 3 else 255, width=_line_width(1.2))

@@ -85,16 +85,20 @@ def _end_record(job: Job, report: int, execute: ExecuteJob) -> dict[str, Any]:
         return _OUT_OF_MEMORY
     except SystemExit as error:
         return {"error": "crashed", "message": f"called sys.exit({error.code}) ({exception_place(error)})"}
-    except OSError as error:
-        if error.errno == errno.ENOMEM:
-            return _OUT_OF_MEMORY
-        if error.errno not in _DISK_FULL_ERRNOS:
-            traceback.print_exc()
-        return {"error": "output", "message": f"{error.strerror or error} writing {error.filename or job.folder}"}
     except Exception as error:
         # The boundary of the process: any exception becomes the error of this run.
+        if isinstance(error, OSError) and error.errno == errno.ENOMEM:
+            return _OUT_OF_MEMORY
+        if isinstance(error, OSError) and _is_about_output(error, job.folder):
+            return {"error": "output", "message": f"{error.strerror} writing {error.filename or job.folder}"}
         traceback.print_exc()
         return {"error": "crashed", "message": f"{type(error).__name__}: {error} ({exception_place(error)})"}
+
+
+def _is_about_output(error: OSError, folder: Path) -> bool:
+    """Return whether an error is about a file in the output folder of the run, or about a full disk."""
+    is_in_folder = isinstance(error.filename, str) and Path(error.filename).is_relative_to(folder)
+    return is_in_folder or error.errno in _DISK_FULL_ERRNOS
 
 
 class ProgressReporter:

@@ -76,8 +76,9 @@ def in_view(cells: Cells, frame: GridFrame, scan: Scan, base: Pose2) -> npt.NDAr
     lidar = base.compose(scan.mount)
     offset = frame.centers(cells) - np.array([lidar.x, lidar.y])
     bearing = np.arctan2(offset[:, 1], offset[:, 0])
-    turned = np.remainder(bearing - lidar.yaw - scan.angle_min, math.copysign(2 * math.pi, scan.angle_increment))
-    return np.asarray(np.abs(turned) <= abs(scan.angle_increment) * len(scan.ranges))
+    step = scan.angle_increment  # the outer beams see half a step beyond their directions
+    turned = np.remainder(bearing - lidar.yaw - scan.angle_min + step / 2, math.copysign(2 * math.pi, step))
+    return np.asarray(np.abs(turned) <= abs(step) * len(scan.ranges))
 
 
 def crossed_cells(

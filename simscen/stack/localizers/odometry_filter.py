@@ -178,7 +178,8 @@ class GyroscopeIntegral:
         self._tick_rate, self._max_gap = tick_rate, MAX_GYRO_GAP_S * tick_rate
         self._tick: int | None = None  # of the newest reading
         self._rate, self._angle = 0.0, 0.0
-        self._variance_per_s = 0.0  # growth of the variance of the angle, in rad²/s
+        # Growth of the variance of the angle in rad²/s; unknown before the second reading, which shows the sample period.
+        self._variance_per_s: float | None = None
         self._read: tuple[int, float] | None = None  # tick and angle at the end of the last increment
 
     def add(self, imu: Imu) -> None:
@@ -201,6 +202,6 @@ class GyroscopeIntegral:
             return None
         angle = self._angle + self._rate * (tick - self._tick) / self._tick_rate
         self._read = tick, angle
-        if last is None:
+        if last is None or self._variance_per_s is None:
             return None
         return angle - last[1], self._variance_per_s * (tick - last[0]) / self._tick_rate

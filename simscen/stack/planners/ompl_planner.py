@@ -118,7 +118,7 @@ class PosePlanner:
         rows, columns = reachable.shape
 
         def contains(x: float, y: float) -> bool:
-            row, column = int((y - y0) / size), int((x - x0) / size)
+            row, column = math.floor((y - y0) / size), math.floor((x - x0) / size)
             return 0 <= row < rows and 0 <= column < columns and bool(reachable[row, column])
 
         preferred = self._spec.hull_clearance

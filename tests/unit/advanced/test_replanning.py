@@ -49,23 +49,28 @@ class Scripted:
 
 
 class Bench:
-    """Plan manager with its costmap."""
+    """Plan manager with its costmap. `latency` is the planning time in ticks."""
 
-    def __init__(self, **options: object) -> None:
+    def __init__(self, latency: int = 0, **options: object) -> None:
         self.script = Scripted()
         grid = WORLD.grid((-0.5, -0.5, 8.5, 6.5))
         self.costmap = LayeredCostmap(CostmapSpec(), Surroundings(round_robot(), grid, TICK_RATE_HZ))
         self.journal: list[Event] = []
         self.now = 0.0
         self.manager = AdvancedPlanManager(
-            PlannerSpec(**{"cautious": True, **options}), self.script, self.costmap, lambda k: 100 + k, 0.22
+            PlannerSpec(**{"cautious": True, **options}),
+            self.script,
+            self.costmap,
+            lambda k: 100 + k,
+            0.22,
+            latency=latency,
         )
 
     def steps(self, count: int, goal: Goal = GOAL) -> list[object]:
         """Return the reasons of the plans made in `count` steps of the navigator."""
         before = len(self.journal)
         for _ in range(count):
-            self.journal += self.manager.step(0, self.now, goal, START)
+            self.journal += self.manager.step(round(self.now * TICK_RATE_HZ), self.now, goal, START)
             self.now += 0.05
         return [event.data["reason"] for event in self.journal[before:]]
 
@@ -94,6 +99,14 @@ def test_blocked_plan_is_replaced_or_fails() -> None:
         bench.steps(4)
     bench.script.broken, bench.script.bulge = False, 1.0
     assert bench.steps(4) == ["blocked"]
+
+
+def test_plan_that_was_blocked_while_it_was_made_is_replaced() -> None:
+    bench = Bench(latency=round(0.2 * TICK_RATE_HZ))
+    bench.steps(2)
+    bench.see((2.5, 3.0, 0.2))  # the planner does not know this obstacle
+    bench.script.bulge = 1.0
+    assert bench.steps(20) == ["goal", "blocked"]
 
 
 def test_obstacle_next_to_the_plan_does_not_cause_replanning() -> None:

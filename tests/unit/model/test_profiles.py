@@ -11,7 +11,7 @@ NAV2_PARAMS = {
     "localizer.laser_model_type": "likelihood_field", "localizer.max_beams": 60, "localizer.max_particles": 2000,
     "localizer.alpha1": 0.2, "localizer.z_hit": 0.5, "localizer.sigma_hit": 0.2, "localizer.update_min_a": 0.2,
     "controller_frequency": 20.0, "failure_tolerance": 0.3,
-    "min_x_velocity_threshold": 0.001, "min_y_velocity_threshold": 0.5, "min_theta_velocity_threshold": 0.001,
+    "min_x_velocity_threshold": 0.001, "min_theta_velocity_threshold": 0.001,
     "progress_checker.required_movement_radius": 0.5, "progress_checker.movement_time_allowance": 10.0,
     "goal_checker.xy_goal_tolerance": 0.25, "goal_checker.yaw_goal_tolerance": 0.25, "goal_checker.stateful": True,
     "controller.type": "mppi", "controller.time_steps": 56, "controller.model_dt": 0.05, "controller.batch_size": 2000,

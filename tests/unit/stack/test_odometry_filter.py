@@ -25,7 +25,7 @@ from simscen.sensors.imu import ImuSensor
 from simscen.sensors.odometry import WheelOdometrySensor, integrate_arc
 from simscen.sensors.sensor import SensorSetting
 from simscen.stack.build import build_stack
-from simscen.stack.localizers.odometry_filter import OdometryFilter
+from simscen.stack.localizers.odometry_filter import GyroscopeIntegral, OdometryFilter
 from simscen.stack.protocols import Surroundings
 from simscen.testing.flatland import round_robot
 
@@ -377,3 +377,15 @@ def test_a_second_odometry_sensor_and_a_second_gyroscope_do_not_move_the_robot(l
     assert [decision.command for decision in one] == [decision.command for decision in two]
     poses = [[each.belief.pose for each in made if each.belief is not None] for made in (one, two)]
     assert poses[0] == poses[1]
+
+
+def test_gyroscope_is_used_from_its_second_reading_on() -> None:
+    """Its variance depends on the time between two readings."""
+    gyroscope = GyroscopeIntegral(tick_rate=100)
+    gyroscope.add(imu(0, 0.5))
+    assert [gyroscope.turned_until(tick) for tick in (0, 2, 4)] == [None, None, None]
+    gyroscope.add(imu(5, 0.5))
+    turned = gyroscope.turned_until(6)
+    assert turned is not None
+    assert turned[0] == pytest.approx(0.5 * 0.02)
+    assert turned[1] > 0.0

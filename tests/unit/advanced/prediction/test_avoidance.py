@@ -138,7 +138,7 @@ def test_pruned_search_finds_the_cheapest_candidate(robot: RobotModel, monkeypat
     samples = [(rng.normal(0, 2, (3, 2)), rng.normal(0, 1, (3, 2)), rng.uniform(0, 1, 3)) for _ in range(24)]
     for batch_size in (avoidance.BATCH_SIZE, 10**6):
         monkeypatch.setattr(avoidance, "BATCH_SIZE", batch_size)
-        subject, commands = Avoidance(Prediction(), robot, 1.0), list[Twist]()
+        subject, commands = Avoidance(robot, 1.0), list[Twist]()
         for centers, velocities, (x, vx, wz) in samples:
             states = zip(centers, velocities, strict=True)
             moving = MovingObstacles(
@@ -182,7 +182,7 @@ def test_a_command_is_as_risky_sideways_as_forward(heading: float) -> None:
     commands = {"forward": Twist(0.5, 0.0, 0.0), "sideways": Twist(0.0, 0.5, 0.0), "rest": STOP}
     yaw = {"forward": 0.0, "sideways": -math.pi / 2, "rest": 0.0}
     kept = {
-        name: Avoidance(Prediction(enabled=True), robot, 0.6).steer(
+        name: Avoidance(robot, 0.6).steer(
             command, Pose2(0.0, 0.0, math.radians(heading) + yaw[name]), command, moving, costmap, None
         )
         is command
@@ -201,7 +201,7 @@ def test_robot_returns_to_its_position_within_its_reverse_speed(max_reverse: flo
 def test_slow_robot_avoids_obstacles_within_its_speed() -> None:
     moving = MovingObstacles([MovingObstacle(-0.9 + 0.0j, 0.5 + 0.0j, 0.3, 1e-4, 0.0, 1e-3)], 1.0)
     costmap = CostmapView(np.zeros((200, 200), np.uint8), np.full((200, 200), 2.0, np.float32), 0.05, (-5.0, -5.0))
-    avoidance_of_slow_robot = Avoidance(Prediction(), replace(box_robot(), max_linear=0.2), 0.2)
+    avoidance_of_slow_robot = Avoidance(replace(box_robot(), max_linear=0.2), 0.2)
     command = avoidance_of_slow_robot.steer(STOP, Pose2(0.0, 0.0), STOP, moving, costmap, None)
     assert 0.0 < command.vx <= 0.2
 
@@ -210,6 +210,6 @@ def test_slow_robot_avoids_obstacles_within_its_speed() -> None:
 def test_avoidance_keeps_the_limit_of_a_speed_zone(limit: float, is_reached: bool) -> None:
     moving = MovingObstacles([MovingObstacle(-0.9 + 0.0j, 0.5 + 0.0j, 0.3, 1e-4, 0.0, 1e-3)], 1.0)
     costmap = CostmapView(np.zeros((200, 200), np.uint8), np.full((200, 200), 2.0, np.float32), 0.05, (-5.0, -5.0))
-    avoidance_of_robot = Avoidance(Prediction(), box_robot(), 1.0)
+    avoidance_of_robot = Avoidance(box_robot(), 1.0)
     command = avoidance_of_robot.steer(STOP, Pose2(0.0, 0.0), STOP, moving, costmap, None, max_speed=limit)
     assert (abs(command.vx) > 0.15) is is_reached

@@ -20,6 +20,18 @@ from diagnosis_cases import slip, why, with_event
             ["lidar.off had ended 2.00 s before, after 3.00 s"],
         ),
         (
+            [*slip(5, 5, 8, "lidar.off", "off"), [8.5, "fault.started", "lidar.off", {"entry": 0}]],
+            ["lidar.off had ended 2.00 s before, after 3.00 s"],
+        ),
+        (
+            [
+                [4, "fault.started", "lidar.off", {"entry": 0}],
+                [7.5, "fault.ended", "lidar.off", {"entry": 0}],
+                *slip(8, 8, 9, "lidar.off", "off"),
+            ],
+            ["lidar.off had ended 1.00 s before, after 1.00 s"],
+        ),
+        (
             [[2, "fault.started", "imu.off", {"entry": 1}], *slip(2, 2, name="lidar.off", kind="off")],
             ["lidar.off was active since t = 2.00 s, for 8.00 s"],
         ),

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 from simscen.run.process.fork_server import ForkServer
 
@@ -55,6 +56,8 @@ def perform(job, tell):  # noqa: PLR0915 - a list of faults
             sys.exit(0)
         case "exception":
             raise ZeroDivisionError("the controller divided by zero")
+        case "missing-file":
+            Path("/nowhere/parameters.txt").read_text()
         case "hang":
             time.sleep(60)
         case "deaf":

@@ -193,6 +193,14 @@ def test_an_output_folder_that_cannot_be_created_is_an_error_with_the_reason(ses
     )
 
 
+def test_a_file_that_a_component_cannot_read_is_not_an_error_of_the_output(session):
+    answers, _ = session("missing-file")
+    error = answers["missing-file"].result.error
+    assert error.kind == "crashed"
+    assert "No such file or directory: '/nowhere/parameters.txt' (" in error.message
+    assert "writing" not in error.message
+
+
 def test_each_crashed_run_is_an_error(session):
     answers, _ = session("segfault", "kill", "exit-0", "exception", "sys-exit", workers=2)
     assert [answer.outcome for answer in answers.values()] == [Outcome.ERROR] * 5
