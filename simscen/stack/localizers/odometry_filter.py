@@ -178,7 +178,7 @@ class GyroscopeIntegral:
         self._tick_rate, self._max_gap = tick_rate, MAX_GYRO_GAP_S * tick_rate
         self._tick: int | None = None  # of the newest reading
         self._rate, self._angle = 0.0, 0.0
-        # Growth of the variance of the angle in rad²/s; unknown before the second reading, which shows the sample period.
+        # Growth of the variance of the angle in rad²/s; unknown before the second reading, which shows the period.
         self._variance_per_s: float | None = None
         self._read: tuple[int, float] | None = None  # tick and angle at the end of the last increment
 
