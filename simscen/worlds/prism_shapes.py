@@ -69,14 +69,14 @@ def prism_shapes(solid: Solid, height: float, changes: list[str]) -> list[PrismS
     """
     exact = _exact_shape(solid)
     shapes = [exact] if exact else list(_cross_section_prisms(solid, height, changes))
-    above = [
+    above_ground = [
         shape if shape.bottom >= 0 else replace(shape, bottom=0.0, height=shape.height + shape.bottom)
         for shape in shapes
         if shape.bottom + shape.height > 10**-DECIMALS
     ]
-    if shapes and not above:
+    if shapes and not above_ground:
         changes.append(f"{solid.name}: it is below the ground; it is left out")
-    return [shape for shape in above if _is_valid(shape, solid.name, changes)]
+    return [shape for shape in above_ground if _is_valid(shape, solid.name, changes)]
 
 
 def _is_valid(shape: PrismShape, name: str, changes: list[str]) -> bool:

@@ -170,7 +170,7 @@ def object_at_problem(problem: Problem, objects: Sequence[MapObject], source: So
     index = line_start + max(problem.col - 1, 0)
     line_end = line_start + len(lines[problem.line - 1].rstrip("\r\n\x85\u2028\u2029"))
     nodes = [(node, one) for one in objects if one.keys and (node := source_at(source, one.keys)) is not None]
-    around = [(node.end - node.start, one) for node, one in nodes if node.start <= index <= node.end]
-    behind = [(node.end - node.start, one) for node, one in nodes if index < node.start <= line_end]
-    found = around or behind
+    enclosing = [(node.end - node.start, one) for node, one in nodes if node.start <= index <= node.end]
+    following = [(node.end - node.start, one) for node, one in nodes if index < node.start <= line_end]
+    found = enclosing or following
     return "/".join(map(str, min(found, key=lambda each: each[0])[1].keys)) if found else ""

@@ -91,10 +91,10 @@ def contradicting_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
         else:
             continue
         keys: Keys = ("pass", index, entry.kind)
-        before = next((other for key, other in required_results.items() if key != status), None)
-        if before:
-            first = loaded.key_position_of(*before[1])
-            message = f"{entry.kind} contradicts {before[0]} at {first.line}:{first.col}: no run can pass both"
+        contradicted = next((other for key, other in required_results.items() if key != status), None)
+        if contradicted:
+            first = loaded.key_position_of(*contradicted[1])
+            message = f"{entry.kind} contradicts {contradicted[0]} at {first.line}:{first.col}: no run can pass both"
             yield CheckProblem(keys, message, at_key=True)
         required_results.setdefault(status, (entry.kind, keys))
 

@@ -76,9 +76,9 @@ def unsuitable_faults(scope: NameScope) -> Iterator[CheckProblem]:
             message = f"fault `{entry.kind}` cannot affect {what} (`{entry.sensor}`)"
             yield CheckProblem(keys, message, hint, at_key=True)
         elif unsuitable := entry.fault.unsuitable_key(target):
-            below = (unsuitable[0],) if unsuitable[0] else ()
+            inner_keys = (unsuitable[0],) if unsuitable[0] else ()
             message = f"fault `{entry.kind}` does not fit `{entry.sensor}`: {unsuitable[1]}"
-            yield CheckProblem((*keys, *below), message, at_key=True)
+            yield CheckProblem((*keys, *inner_keys), message, at_key=True)
 
 
 @NAMES.check("SC032")

@@ -69,8 +69,8 @@ def _mask_test(mask: OccupancyGrid) -> ZoneTest:
 
     def forbids(pose: Pose2, within: float) -> bool:
         steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, MIN_DEPTH_M))) + 1)
-        around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-        return bool(in_keepout_mask(mask, around + np.array((pose.x, pose.y))).all())
+        offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+        return bool(in_keepout_mask(mask, offsets + np.array((pose.x, pose.y))).all())
 
     return forbids
 

@@ -64,8 +64,8 @@ def hint_for_misplaced_key(model: type[BaseModel], tree: Node, loc: Sequence[Key
     item = next((index + 1 for index, part in enumerate(loc) if isinstance(part, int)), 0)
     for length in range(len(loc) - 1, item - 1, -1):
         if key in keys_of(models_at(model, loc[:length])):
-            above = dotted_path(existing_keys(tree, loc[:length]))
-            return f"move it one level up, to `{above}`" if above else "move it to the top level of the file"
+            parent = dotted_path(existing_keys(tree, loc[:length]))
+            return f"move it one level up, to `{parent}`" if parent else "move it to the top level of the file"
     starts = ((loc, models_at(model, loc)), ((), [model]))
     for start, models in starts[:1] if item else starts:
         for below, valid_keys in _mappings_below(tuple(models)):

@@ -98,8 +98,8 @@ def _lag(commanded: Array, driven: Array) -> float:
     commanded, driven = commanded[:, varies], driven[:, varies]
     scale = np.std(commanded, axis=0)
     for shift in range(0, min(round(MAX_LAG_S / SAMPLE_PERIOD_S), len(commanded) // 4)):
-        ahead = commanded[: len(commanded) - shift] / scale
-        error = -float(np.mean((ahead - driven[shift:] / scale) ** 2))
+        earlier = commanded[: len(commanded) - shift] / scale
+        error = -float(np.mean((earlier - driven[shift:] / scale) ** 2))
         error_without_lag = error if shift == 0 else error_without_lag
         if error > best + 1e-9:
             best, lag = error, shift

@@ -28,7 +28,7 @@ MIN_FALSE_FRACTION = 0.015
 """Minimum fraction of isolated beams in a scan that shows dust."""
 JUMP_M = 0.3
 """Minimum difference between the ranges of neighbor beams that end at different objects."""
-BESIDE_BEAMS, SAME_OBJECT_M = 3, 0.3
+NEIGHBOR_BEAMS, SAME_OBJECT_M = 3, 0.3
 """Distance in beams from a ghost at which the ghost must not be visible, and maximum range difference between beams on
 one object."""
 MIN_GHOST_FRACTION = 0.3
@@ -115,8 +115,8 @@ def _is_wider(ranges: Array, first: int, last: int, distance: float) -> bool:
     with np.errstate(invalid="ignore"):
         same = np.abs(ranges - distance) < SAME_OBJECT_M
     rows = same[:, (first + last) // 2]
-    beside = [beam for beam in (first - BESIDE_BEAMS, last + BESIDE_BEAMS) if 0 <= beam < ranges.shape[1]]
-    return any(float(same[rows, beam].mean()) > 0.5 for beam in beside) if rows.any() else False
+    neighbors = [beam for beam in (first - NEIGHBOR_BEAMS, last + NEIGHBOR_BEAMS) if 0 <= beam < ranges.shape[1]]
+    return any(float(same[rows, beam].mean()) > 0.5 for beam in neighbors) if rows.any() else False
 
 
 MIN_PASSING_FRACTION, MIN_PASSING_BEAMS = 0.3, 30

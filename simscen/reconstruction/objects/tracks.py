@@ -112,9 +112,9 @@ def _link_tracks(tracks: list[ObjectTrack]) -> list[ObjectTrack]:
     """Merge the tracks of an object before and after it was hidden."""
     linked: list[ObjectTrack] = []
     for track in tracks:
-        before = [(gap, earlier) for earlier in linked if (gap := _link_distance(earlier, track)) is not None]
-        if before:
-            nearest = min(before, key=lambda pair: pair[0])[1]
+        predecessors = [(gap, earlier) for earlier in linked if (gap := _link_distance(earlier, track)) is not None]
+        if predecessors:
+            nearest = min(predecessors, key=lambda pair: pair[0])[1]
             nearest.clusters += track.clusters
             nearest.velocity = track.velocity
         else:

@@ -190,21 +190,21 @@ def chart(label: str, series: Sequence[Series], unit: str) -> str:
     series = [line for line in series if len(line.times)]
     end = max((float(line.times[-1]) for line in series), default=1.0) or 1.0
     top = max(0.1, *(float(np.max(line.values)) for line in series)) if series else 1.0
-    across, up = CHART_WIDTH - LEFT_MARGIN - 10.0, CHART_HEIGHT - BOTTOM_MARGIN - 8.0
+    width, height = CHART_WIDTH - LEFT_MARGIN - 10.0, CHART_HEIGHT - BOTTOM_MARGIN - 8.0
     parts = []
     for value in _ticks(top, 5):
-        y = CHART_HEIGHT - BOTTOM_MARGIN - up * value / top
+        y = CHART_HEIGHT - BOTTOM_MARGIN - height * value / top
         parts.append(f'<line class="axis" x1="{LEFT_MARGIN:g}" y1="{y:.1f}" x2="{CHART_WIDTH - 10:g}" y2="{y:.1f}"/>')
         parts.append(
             f'<text class="tick" x="{LEFT_MARGIN - 4:g}" y="{y + 4:.1f}" font-size="11">{value:g} {escape(unit)}</text>'
         )
     for value in _ticks(end, 7):
-        x = LEFT_MARGIN + across * value / end
+        x = LEFT_MARGIN + width * value / end
         parts.append(f'<text x="{x:.1f}" y="{CHART_HEIGHT - 4:g}" font-size="11">{value:g} s</text>')
     for line in series:
         step = max(1, len(line.times) // TARGET_POINTS)
         points = " ".join(
-            f"{LEFT_MARGIN + across * time / end:.1f},{CHART_HEIGHT - BOTTOM_MARGIN - up * value / top:.1f}"
+            f"{LEFT_MARGIN + width * time / end:.1f},{CHART_HEIGHT - BOTTOM_MARGIN - height * value / top:.1f}"
             for time, value in zip(line.times[::step].tolist(), line.values[::step].tolist(), strict=True)
         )
         parts.append(f'<polyline class="path line {line.name}" points="{points}"/>')

@@ -117,8 +117,8 @@ def _map_layer(grid: OccupancyGrid, view: Viewport) -> "Image.Image":
     # Pillow needs the transform from pixels to cells: canvas -> world -> frame of the grid -> cells.
     ends = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) / view.scale * (1, -1) + (view.left, view.top)
     zero, right, down = grid.origin.inverse().apply(ends) / grid.resolution
-    across, along = right - zero, down - zero
-    matrix = (across[0], along[0], zero[0], across[1], along[1], zero[1])
+    x_step, y_step = right - zero, down - zero
+    matrix = (x_step[0], y_step[0], zero[0], x_step[1], y_step[1], zero[1])
     return cells.transform(
         view.size, Image.Transform.AFFINE, matrix, Image.Resampling.NEAREST, fillcolor=BACKGROUND_COLOR
     )
