@@ -122,18 +122,25 @@ class TransformTree:
         return pose
 
     def _chain(self, outer: str, inner: str) -> list[_Link]:
-        """Return the transforms from `inner` up to `outer`. Raises UnknownTransform if they are not connected."""
-        chain: list[_Link] = []
-        frame = inner
-        while frame != outer:
+        """Return the transforms from `inner` up to `outer`. Raises UnknownTransform if `inner` is not below `outer`."""
+        chain = self._links_up(inner, outer)
+        if chain is not None:
+            return chain
+        if self._links_up(outer, inner) is not None:
+            raise UnknownTransform(f"in tf, {outer} is below {inner}; write {inner}:{outer}")
+        listed = ", ".join(sorted({*self._links, *(link.parent for link in self._links.values())})) or "none"
+        raise UnknownTransform(f"tf does not connect {outer} with {inner}; frames: {listed}")
+
+    def _links_up(self, frame: str, ancestor: str) -> list[_Link] | None:
+        """Return the transforms from a frame up to another one; None if the other one is not above it."""
+        links: list[_Link] = []
+        while frame != ancestor:
             link = self._links.get(frame)
-            if link is None or link in chain:
-                frames = sorted({*self._links, *(link.parent for link in self._links.values())})
-                listed = ", ".join(frames) or "none"
-                raise UnknownTransform(f"tf does not connect {outer} with {inner}; frames: {listed}")
-            chain.append(link)
+            if link is None or link in links:
+                return None
+            links.append(link)
             frame = link.parent
-        return chain
+        return links
 
 
 def _latest_poses(link: _Link, times: Ticks, use_log_time: bool) -> Array:

@@ -96,6 +96,8 @@ def test_transform_between_two_frames_can_be_the_ground_truth(read: Callable[...
     np.testing.assert_allclose(yaw, np.pi / 2, atol=1e-6)
     lost = read(messages, ForeignLogOptions(truth="map:wheel")).coverage.missing[Evidence.TRUTH]
     assert lost == "tf does not connect map with wheel; frames: base_link, map, marker, odom"
+    reversed_frames = read(messages, ForeignLogOptions(truth="marker:map")).coverage.missing[Evidence.TRUTH]
+    assert reversed_frames == "in tf, marker is below map; write map:marker"
 
 
 def test_a_transform_that_is_static_until_a_localizer_starts_is_dynamic(read: Callable[..., ForeignLog]) -> None:
