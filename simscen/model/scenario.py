@@ -322,12 +322,31 @@ def expected_failure(spec: ScenarioSpec) -> DeclaredFailure | None:
     return None if spec.expected is None else DeclaredFailure(spec.expected.fail, tuple(spec.expected.criteria))
 
 
+class CriteriaRobotEntry(RobotEntry):
+    """Robot of a criteria file. Its start pose is optional, because it is not used to judge a log."""
+
+    pose: PlaceOrPose | None = None  # type: ignore[assignment]
+    """True start pose."""
+
+
+class CriteriaMultiRobotEntry(MultiRobotEntry):
+    """One of several robots of a criteria file. Its start pose is optional."""
+
+    pose: PlaceOrPose | None = None  # type: ignore[assignment]
+    """True start pose."""
+
+
+_CriteriaRobots = Annotated[dict[RobotName, CriteriaMultiRobotEntry], Field(min_length=2, max_length=MAX_ROBOTS)]
+
+
 class CriteriaSpec(ScenarioSpec):
-    """Criteria file for judging existing logs: a scenario in which `world` and `robot` are optional."""
+    """Criteria file for judging existing logs: a scenario in which `world`, `robot`, and start poses are optional."""
 
     simscen: LanguageVersion = 1
     """Version of the scenario language."""
     world: WorldOrFile | None = None  # type: ignore[assignment]
     """World with the places and regions of the criteria; needed only for logs that simscen did not record."""
-    robot: RobotEntry | None = None
+    robot: CriteriaRobotEntry | None = None
     """Robot with the footprint for the criteria; needed only for logs that simscen did not record."""
+    robots: _CriteriaRobots | None = None  # type: ignore[assignment]
+    """Criteria of several robots, by name."""
