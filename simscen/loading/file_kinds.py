@@ -19,7 +19,7 @@ _STACK_FILE_KEYS = frozenset({"simscen", "name", "description", "stack"})
 _ROBOT_KEYS = frozenset({"drive", "sensors", "limits", "body", "urdf"})
 _WORLD_KEYS = frozenset({"walls", "obstacles", "objects", "doors", "places", "regions", "map_height", "sdf"})
 _SCENARIO_KEYS = frozenset({"world", "robot", "robots", "goals", "pass", "events", "faults", "stack"})
-"""Top-level keys that only files of this kind have."""
+"""Top-level keys by which files of these kinds are recognized."""
 
 
 def kind_of_content(tree: Node | None, text: str, display_name: str) -> str:

@@ -157,9 +157,12 @@ class NodeBarrier:
             self._leave_out([node for node in absent if not clients[node].service_is_ready()], "has exited")
         request = find_type(PARAMETER_SERVICE).Request()  # type: ignore[union-attr]
         futures = {node: client.call_async(request) for node, client in clients.items()}
-        if not self.step_time.wait_for(lambda: [full_name(n) for n, f in futures.items() if not f.done()], self._limit):
-            late = [node for node in sorted(futures) if not futures[node].done()]
-            self._leave_out(late, f"has not answered for {self._limit:g} s: it hangs, or was killed")
+
+        def late_nodes() -> List[Node]:
+            return [node for node in sorted(futures) if not futures[node].done()]
+
+        if not self.step_time.wait_for(awaited=lambda: map(full_name, late_nodes()), limit_s=self._limit):
+            self._leave_out(late_nodes(), f"has not answered for {self._limit:g} s: it hangs, or was killed")
         self._graph.receive_all()
 
     def _leave_out(self, nodes: List[Node], reason: str) -> None:

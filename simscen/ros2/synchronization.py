@@ -75,7 +75,7 @@ class LockstepSynchronization:
             commanded = overdue is None or _last_command(self._graph.inbox[start:]) is not None
             return [] if commanded or overdue is None else [overdue.node]
 
-        if not self._barrier.step_time.wait_for(late_server, self._actions.wait_s(self._limit)):
+        if not self._barrier.step_time.wait_for(awaited=late_server, limit_s=self._actions.wait_s(self._limit)):
             overdue = self._actions.record_missing(now)
             if overdue is not None:
                 raise AdapterError(

@@ -75,7 +75,7 @@ class Simulation:
         actors.add_all((terrain.raise_to_ground(body) for body in sorted(bodies, key=lambda body: body.name)), 0)
         self._stepper = Stepper(scene, self.robots.values(), firmware_period)
         self._stepper.settle()
-        with self._stepper.change():
+        with self._stepper.change():  # settling has moved the robots
             for name, robot in self.robots.items():
                 robot.set_pose(robots[name].pose)
 
@@ -124,9 +124,10 @@ class Simulation:
             self._scene.actors.place(name, Pose3.planar(pose, before.z - old_ground + new_ground), self.tick)
 
     def push_object(self, name: str, impulse: tuple[float, float], seconds: float = 0.0) -> None:
-        """Apply an impulse (N s, world frame) to a body, spread over `seconds` from the next tick on.
+        """Apply an impulse (N s, world frame) to a body, spread over `seconds`.
 
-        Has no effect on a body that does not exist or cannot be pushed.
+        The push begins one tick later, because the body may sleep. Has no effect on a body that does not exist or
+        cannot be pushed.
         """
         actors = self._scene.actors
         actors.wake(name)
@@ -140,7 +141,7 @@ class Simulation:
     def push_robot(self, name: str, impulse: tuple[float, float], seconds: float = 0.0) -> None:
         """Apply an impulse (N s, world frame) at a robot's center of mass, spread over `seconds` from now on.
 
-        Without `seconds`, the next tick has the whole impulse.
+        Without `seconds`, the step that begins now has the whole impulse.
         """
         push = self.robots[name].push
         if seconds:

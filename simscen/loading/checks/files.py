@@ -54,7 +54,8 @@ def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = (
     if isinstance(path := library.sandbox.resolve_argument(file), Problem):
         return [path]
     if kind in STACK_KINDS:
-        return found if isinstance(found := read_stack_file(path, library), list) else found[1]
+        stack = read_stack_file(path, library)
+        return stack if isinstance(stack, list) else stack[1]
     if kind == "base":
         return _base_file_problems(path, library)
     assets = Assets(library)

@@ -12,7 +12,7 @@ from simscen.core.records.case import CLEARANCE_RANGE_M
 from simscen.sim.body.outline import hull_points, radius_and_height
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.bullet import pybullet
-from simscen.sim.contact.static_distance import StaticDistance, max_displacement
+from simscen.sim.contact.static_distance import CONTACT_DISTANCE, StaticDistance, max_displacement
 from simscen.sim.objects.actor import SHAPE_MARGIN_M, SPEED_HORIZON_S
 from simscen.sim.objects.actors import NEVER
 from simscen.sim.robots.drive_factory import Base
@@ -21,6 +21,10 @@ from simscen.sim.scene.scene import Scene
 
 CONTACT_TOLERANCE_M = 0.002
 """Clearance up to which contact is possible, because corners of shapes are rounded by up to 0.4 mm."""
+SPEED_GAIN_RATIO = 1.25
+"""Factor by which the speed of a robot may exceed its present speed and its limits within SPEED_HORIZON_S."""
+CLOSING_SPEED_MARGIN_M_S = 0.1
+"""Safety margin of the upper bound of closing speeds."""
 
 
 class _StaticMeasurement(NamedTuple):
@@ -90,11 +94,11 @@ class Clearance:
     def invalidate(self) -> None:
         """Discard all results, because an object or robot was added, removed, or placed."""
         self._distance = 0.0
-        self._measured_tick, self.no_contact_before = -1, 0
+        self._measured_tick = self.no_contact_before = -1
         self._static_nearest: _StaticMeasurement | None = None
         self._deferrable_until = -1
-        """Tick until which `can_defer` is true."""
-        self._actors.set_no_contact_before(self._base.id, -1)
+        """Latest tick at which a deferred period may end."""
+        self._actors.set_no_contact_before(self._base.id, self.no_contact_before)
         self.enclosed_by: str | None = None
         """Name of the object that encloses the whole robot, or None."""
         self.may_be_enclosed = True
@@ -170,11 +174,15 @@ class Clearance:
         # The top of a tilted robot extends beyond its radius.
         ground_radius = SHAPE_MARGIN_M + self._radius + 2 * self._height * math.hypot(pose.qx, pose.qy)
         for other in self._actors.prepare_nearby(
-            self._base.id, point, nearest + self.bounding_radius, nearest + ground_radius, tick
+            self._base.id,
+            point,
+            distance=nearest + self.bounding_radius,
+            ground_distance=nearest + ground_radius,
+            tick=tick,
         ):
             for link in self._base.hull_links:
-                points = pybullet.getClosestPoints(self._base.id, other, nearest, link, physicsClientId=self._client)
-                nearest = min((point[8] for point in points), default=nearest)
+                contacts = pybullet.getClosestPoints(self._base.id, other, nearest, link, physicsClientId=self._client)
+                nearest = min((contact[CONTACT_DISTANCE] for contact in contacts), default=nearest)
         for robot in self.others:
             nearest = min(nearest, self._distance_to_robot(robot, point, nearest))
         return nearest
@@ -188,7 +196,7 @@ class Clearance:
             pybullet.getClosestPoints(self._base.id, robot._base.id, max_distance, *links, physicsClientId=self._client)
             for links in link_pairs
         )
-        return min((point[8] for points in found for point in points), default=math.inf)
+        return min((contact[CONTACT_DISTANCE] for contacts in found for contact in contacts), default=math.inf)
 
     def _center_point(self) -> Vector:
         """Return a point inside the hull in the world frame."""
@@ -201,14 +209,14 @@ class Clearance:
         if self.others:
             # A body that is hit by another robot leaves with up to twice its speed.
             speed = 2 * max(speed, *[robot.speed_bound() for robot in self.others])
-        return self.speed_bound() + speed + 0.1
+        return self.speed_bound() + speed + CLOSING_SPEED_MARGIN_M_S
 
     def speed_bound(self) -> float:
         """Return an upper bound in m/s of the speed of any point of the robot within SPEED_HORIZON_S."""
         _, linear, (x, y, z) = self._state()
         forward = max(self._max_speed, math.hypot(*linear))
         turning = max(self._limits.angular, math.hypot(x, y, z)) * self._radius
-        return 1.25 * (forward + turning + math.hypot(x, y) * self._height)
+        return SPEED_GAIN_RATIO * (forward + turning + math.hypot(x, y) * self._height)
 
     def static_solid_at(self, point: Vector) -> str:
         """Return the name of the static solid that the robot touches at a point. The result is cached."""

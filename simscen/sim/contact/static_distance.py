@@ -34,6 +34,8 @@ NEAREST_SLACK_M = 0.005
 """Additional search distance for the part that was nearest at the last measurement."""
 SOLID_TOLERANCE_M = 0.05
 """Largest distance from a contact point to the bounding box of the touched part."""
+CONTACT_DISTANCE = 8
+"""Index of the distance in a contact point of PyBullet."""
 ORIGIN, IDENTITY = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 
 PartBound = tuple[float, int, tuple[float, float, float, float]]
@@ -123,7 +125,7 @@ class StaticDistance:
             for point in pybullet.getClosestPoints(
                 -1, -1, max_distance, -1, -1, hull, shape, position, ORIGIN, quaternion, IDENTITY, client
             ):
-                nearest = min(nearest, point[8] + BULLET_MARGIN_M)
+                nearest = min(nearest, point[CONTACT_DISTANCE] + BULLET_MARGIN_M)
         return nearest if nearest <= max_distance else math.inf
 
     def _list_parts(self, pose: Pose3) -> None:

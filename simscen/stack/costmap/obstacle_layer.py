@@ -94,15 +94,17 @@ def crossed_cells(
     relative *= cmath.rect(1.0, -first)
     distance, bearing = np.abs(relative), np.arctan2(relative.imag, relative.real)
     nearest = distance.min().item()
-    beam, free = _nearest_beams(bearing, scan, _free_lengths(scan, spec.raytrace_max_range, spec.inf_is_valid))
-    in_front = (distance * math.cos(step / 2) + half <= free).nonzero()[0]  # most are behind the hits of their beams
+    beam, free_length = _nearest_beams(bearing, scan, _free_lengths(scan, spec.raytrace_max_range, spec.inf_is_valid))
+    # Most cells are behind the hits of their beams.
+    in_front = (distance * math.cos(step / 2) + half <= free_length).nonzero()[0]
     if not len(in_front):
         return in_front, nearest
-    distance, length = distance.take(in_front), free.take(in_front)
-    dense_distance = half / abs(math.sin(step / 2))  # up to here, some beam crosses each cell
+    distance, free_length = distance.take(in_front), free_length.take(in_front)
+    # Up to this distance, neighboring beams are so close that one of them crosses each cell.
+    dense_distance = half / abs(math.sin(step / 2))
     if (
         spec.raytrace_min_range == 0.0
-        and (distance <= np.minimum(length - (half + RANGE_TOLERANCE_M), dense_distance)).all()
+        and (distance <= np.minimum(free_length - (half + RANGE_TOLERANCE_M), dense_distance)).all()
     ):
         return in_front, nearest
     beam_offset = np.remainder(bearing[in_front] - beam[in_front] * step + math.pi, 2 * math.pi) - math.pi
@@ -112,7 +114,7 @@ def crossed_cells(
     along = distance * np.cos(beam_offset)
     passed = (
         (np.abs(distance * np.sin(beam_offset)) <= reach)
-        & (along <= length - half)
+        & (along <= free_length - half)
         & (along >= spec.raytrace_min_range)
     )
     return in_front[passed], nearest
@@ -135,7 +137,7 @@ def _nearest_beams(bearing: Array, scan: Scan, values: Array) -> tuple[CellIndic
     return beam, np.where((beam >= 0) & (beam < count), values.take(beam, mode="clip"), np.nan)
 
 
-MAX_WALL_SQUARED_CELLS = 2
+WALL_DISTANCE_SQUARED_CELLS = 2
 """Squared distance from a mapped wall up to which a hit counts as a hit on the wall and is not marked."""
 NO_CELLS: CellIndices = np.zeros(0, dtype=np.int64)
 EMPTY_MASK: Mask = np.zeros((0, 0), dtype=bool)
@@ -157,16 +159,20 @@ class ObstacleLayer:
         """Remove all marks, and use this grid from now on."""
         self._frame = frame
         self._scanned: Mask = np.zeros(frame.shape, dtype=bool)
+        """Cells that lidars have marked."""
+        self._scanned_cells: CellIndices = NO_CELLS
+        """Flat indices of these cells. A cell may occur twice."""
         self._heights: Heights | None = None
+        """Heights of the obstacles that depth cameras have marked, nan elsewhere; None before the first image."""
         self._ground: Mask = EMPTY_MASK
-        self._marked: CellIndices = NO_CELLS
+        """Cells in which a depth camera has seen the ground."""
 
     def clear_around(self, base: Pose2, meters: float) -> None:
         """Remove the marks within `meters` of the robot along x and y."""
         center = self._frame.cell(base.x, base.y)
         window = self._frame.window(center, center, math.ceil(meters / self._frame.resolution))
         self._scanned[window] = False
-        self._marked = np.flatnonzero(self._scanned)
+        self._scanned_cells = np.flatnonzero(self._scanned)
         if self._heights is not None:
             self._heights[window] = np.nan
 
@@ -185,13 +191,13 @@ class ObstacleLayer:
     def mark(self, cells: Cells) -> None:
         """Mark cells (n, 2) as obstacles seen by a lidar."""
         _set_values(self._scanned, cells, True)
-        self._marked = np.flatnonzero(self._scanned)
+        self._scanned_cells = np.flatnonzero(self._scanned)
 
     def roll(self, frame: GridFrame) -> None:
         """Use another window of the same size, and keep the marks that are in both."""
         before, self._frame = self._frame, frame
         self._scanned = shift_layer(self._scanned, before, frame, False)
-        self._marked = np.flatnonzero(self._scanned)
+        self._scanned_cells = np.flatnonzero(self._scanned)
         if self._heights is not None:
             self._heights = shift_layer(self._heights, before, frame, np.nan)
             self._ground = shift_layer(self._ground, before, frame, False)
@@ -206,12 +212,12 @@ class ObstacleLayer:
     @property
     def cells(self) -> CellIndices:
         """Flat indices of the cells with a live obstacle. A cell may occur twice."""
-        return self._marked if self._heights is None else np.flatnonzero(self.marked())
+        return self._scanned_cells if self._heights is None else np.flatnonzero(self.marked())
 
     @property
     def count(self) -> int:
         """Number of cells with a live obstacle."""
-        return len(set(self._marked.tolist())) if self._heights is None else int(np.count_nonzero(self.marked()))
+        return len(set(self._scanned_cells.tolist())) if self._heights is None else int(np.count_nonzero(self.marked()))
 
     def on_scan(self, base: Pose2, scan: Scan, walls: Squared | None) -> CellIndices:
         """Clear marks that beams cross or that are under the robot, then mark the hits. Return the changed cells.
@@ -221,7 +227,7 @@ class ObstacleLayer:
         spec, frame, scanned = self._spec, self._frame, self._scanned.reshape(-1)
         points, lidar = hit_points(scan, base, spec.obstacle_min_range, spec.obstacle_max_range)
         hits = frame.indices_of(points, lidar, spec.obstacle_max_range)
-        if not len(self._marked):
+        if not len(self._scanned_cells):
             new, cleared = self._without_walls(walls, hits), NO_CELLS
         else:
             was_marked = scanned.take(hits)
@@ -229,7 +235,7 @@ class ObstacleLayer:
         if not len(new):
             return cleared
         scanned[new] = True
-        self._marked = np.concatenate((self._marked, new))
+        self._scanned_cells = np.concatenate((self._scanned_cells, new))
         return np.concatenate((cleared, new)) if len(cleared) else new
 
     def _without_walls(self, walls: Squared | None, cells: CellIndices) -> CellIndices:
@@ -237,13 +243,13 @@ class ObstacleLayer:
         if walls is None:
             return cells
         if walls is not self._walls:
-            self._walls, self._is_off_walls = walls, walls > MAX_WALL_SQUARED_CELLS
+            self._walls, self._is_off_walls = walls, walls > WALL_DISTANCE_SQUARED_CELLS
         remaining: CellIndices = cells[self._is_off_walls.take(cells)]
         return remaining
 
     def _clear(self, base: Pose2, scan: Scan, hits: CellIndices) -> CellIndices:
         """Clear the marked cells that beams cross, except for `hits`, and those under the robot. Return them."""
-        marks, frame, scanned = self._marked, self._frame, self._scanned.reshape(-1)
+        marks, frame, scanned = self._scanned_cells, self._frame, self._scanned.reshape(-1)
         points = frame.points(marks)
         crossed, nearest = crossed_cells(points, frame.resolution, scan, base, self._spec)
         may_be_under_robot = nearest < self._inscribed + math.hypot(scan.mount.x, scan.mount.y)
@@ -257,7 +263,7 @@ class ObstacleLayer:
         remains = scanned.take(marks)
         if remains.all():
             return NO_CELLS
-        self._marked = marks[remains]
+        self._scanned_cells = marks[remains]
         cleared: CellIndices = marks[~remains]
         return cleared
 
@@ -274,7 +280,7 @@ class ObstacleLayer:
         _set_values(self._heights, marked[is_cleared], np.nan)
         cells, heights, ground = project_depth_image(image, base, self._frame, self._spec, self._ground)
         _set_values(self._ground, ground, True)
-        is_off_walls = walls[cells[:, 0], cells[:, 1]] > MAX_WALL_SQUARED_CELLS
+        is_off_walls = walls[cells[:, 0], cells[:, 1]] > WALL_DISTANCE_SQUARED_CELLS
         new = is_off_walls & ~self._under_robot(self._frame.centers(cells), base)
         cells = cells[new]
         self._heights[cells[:, 0], cells[:, 1]] = heights[new]

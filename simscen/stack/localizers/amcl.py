@@ -64,7 +64,7 @@ class AmclLocalizer:
         self._odometry, self._has_odometry = OdometryHistory(self._tick_rate), False
         self._filter.reset(estimate)
         self._initial_estimate = estimate
-        self.__dict__.pop("_correction", None)
+        self.__dict__.pop("_correction", None)  # it is then computed from the initial estimate when it is needed
         self._last_update: Pose2 | None = None  # odometry at the last filter update
         self._update_due: dict[str, bool] = {}  # by lidar
         self._waiting: dict[str, Scan] = {}  # by lidar: scans without odometry at their tick
@@ -98,6 +98,7 @@ class AmclLocalizer:
         if self._odometry.reaches(scan.tick):
             self._process(scan)
         else:
+            # Later changes of the ranges must not affect the belief (a promise of LocalizerContract).
             self._waiting[scan.sensor] = replace(scan, ranges=scan.ranges.copy())
 
     def on_imu(self, imu: Imu) -> None:

@@ -64,7 +64,7 @@ class TriggerContract(Contract):
 
     @promise
     def the_same_situation_gives_the_same_answer(self) -> None:
-        """Given the same situation then the same answer, independent of earlier calls."""
+        """Given the same situation then the answer is the same, independent of earlier calls."""
         ascending, descending, mixed = (
             self.answers([0, 1, 2, 3]),
             self.answers([3, 2, 1, 0]),

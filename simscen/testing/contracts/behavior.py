@@ -86,9 +86,9 @@ class BehaviorContract(ComponentContract):
 
     @promise
     def the_same_calls_give_the_same_commands_bit_for_bit(self) -> None:
-        """Given the same calls with the same generator then bit-identical commands."""
+        """Given the same calls and seed then the commands are bit-identical."""
         one, other = (self.simulate(self.build(), self.view(0.6)) for _ in range(2))
-        require(one == other, "two runs with the same generator differ")
+        require(one == other, "two runs with the same seed differ")
 
     @promise
     def a_costmap_is_not_changed(self) -> None:

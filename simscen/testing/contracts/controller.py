@@ -137,10 +137,10 @@ class ControllerContract(ComponentContract):
 
     @promise
     def the_same_calls_give_the_same_commands_bit_for_bit(self) -> None:
-        """Given the same calls with the same generator then bit-identical commands."""
+        """Given the same calls and seed then the commands are bit-identical."""
         view = self.view((4.0, 3.4, 0.15))
         one, other = (self.drive(self.controller_on_path(), view, Pose2(1, 3.15, 0.3), 2.0) for _ in range(2))
-        require(one == other, "two drives with the same generator differ")
+        require(one == other, "two drives with the same seed differ")
 
     @promise
     def an_empty_path_is_an_invalid_path(self) -> None:

@@ -77,7 +77,7 @@ class CriterionContract(Contract):
 
     @promise
     def the_same_trace_gives_the_same_findings(self) -> None:
-        """Given the same trace and case then the same findings, independent of clocks and earlier calls."""
+        """Given the same trace and case then the findings are the same, independent of clocks and earlier calls."""
         first = self.findings(synthetic_trace(DRIVE_TRACE), synthetic_case(CASE), "a drive")
         self.findings(synthetic_trace(STATIONARY_TRACE), synthetic_case(CASE), "the trace of a stationary robot")
         require(
@@ -128,7 +128,7 @@ class MetricContract(Contract):
 
     @promise
     def the_same_trace_gives_the_same_number(self) -> None:
-        """Given the same trace and case then the same number, independent of clocks and earlier calls."""
+        """Given the same trace and case then the number is the same, independent of clocks and earlier calls."""
         first = self.measure(DRIVE_TRACE, "a drive")
         self.measure(STATIONARY_TRACE, "the trace of a stationary robot")
         require(self.measure(DRIVE_TRACE, "a drive") == first, "returns different numbers for the same drive")

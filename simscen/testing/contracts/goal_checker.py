@@ -73,7 +73,7 @@ class GoalCheckerContract(ComponentContract):
 
     @promise
     def the_same_calls_give_the_same_answers(self) -> None:
-        """Given the same calls then the same answers, independent of clocks and global random generators."""
+        """Given the same calls then the answers are the same, independent of clocks and global random generators."""
         near = Pose2(GOAL.pose.x + 0.15, GOAL.pose.y, GOAL.pose.yaw + 0.15)
         answers = [[self.answers_at(self.build(), near, twist) for twist in VELOCITIES] for _ in range(2)]
         require(answers[0] == answers[1], "two checkers answer the same calls differently")

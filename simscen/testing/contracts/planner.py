@@ -114,7 +114,7 @@ class PlannerContract(ComponentContract):
 
     @promise
     def the_same_seed_gives_the_same_path_bit_for_bit_whatever_was_planned_before(self) -> None:
-        """Given the same costmap, start, goal, and seed then bit-identical paths, independent of earlier calls."""
+        """Given the same arguments and seed then the paths are bit-identical, independent of earlier calls."""
         first = self.plan(self.build(), self.view(), 7)
         other = self.build()
         self.plan(other, self.view(), 3, (GOAL, START))

@@ -108,7 +108,7 @@ class FaultContract(Contract):
 
     @promise
     def the_same_generator_gives_the_same_answers_bit_for_bit(self) -> None:
-        """Given the same inputs and random generator then bit-identical outputs."""
+        """Given the same inputs and random generator then the outputs are bit-identical."""
         for kind in sorted(self.spec.affects):
             one, other = (self.outputs(kind) for _ in range(2))
             same = len(one) == len(other) and all(map(are_identical, one, other))
@@ -202,7 +202,7 @@ class SensorContract(Contract):
 
     @promise
     def the_same_world_and_generator_give_the_same_readings_bit_for_bit(self) -> None:
-        """Given the same world and random generator then bit-identical readings."""
+        """Given the same world and random generator then the readings are bit-identical."""
         one, other = (self.measure(*self.build()) for _ in range(2))
         require(all(map(are_identical, one, other)), "returns different readings for the same world and generator")
 

@@ -156,7 +156,7 @@ class StackContract(Contract):
 
     @promise
     def the_same_seed_gives_the_same_drive_bit_for_bit(self) -> None:
-        """Given the same readings and seed then bit-identical commands and events."""
+        """Given the same readings and seed then the commands and events are bit-identical."""
         one, other = (self.new_drive(FAR_GOAL, discs=((3.2, 1.9, 0.25),)).run(6) for _ in range(2))
         require(one.commands == other.commands, "two drives from the same seed differ in their commands")
         require(one.log == other.log, "two drives from the same seed differ in their events")

@@ -51,7 +51,7 @@ class RaisesRuntimeError(Wrapper):
             raise RuntimeError("no free space") from failure
 
 
-@breaks(BACKUP, "the same calls", "two runs with the same generator differ")
+@breaks(BACKUP, "the same calls", "two runs with the same seed differ")
 class UsesGlobalRandom(CommandWrapper):
     def changed(self, command, seconds):
         return command and command._replace(vx=command.vx * (0.9 + 0.1 * random.random()))

@@ -80,7 +80,7 @@ class HidesFailure(Wrapper):
             return Twist(0.2, 0.0, 0.0)
 
 
-@breaks(CONTROLLER, "the same calls", "two drives with the same generator differ")
+@breaks(CONTROLLER, "the same calls", "two drives with the same seed differ")
 class UsesGlobalRandom(CommandWrapper):
     def changed(self, command):
         return command._replace(wz=command.wz * (1.0 + 1e-9 * random.random()))
