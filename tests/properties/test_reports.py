@@ -184,7 +184,7 @@ def write_session(folder, runs, finished):
 
 
 @given(sessions(), st.randoms(use_true_random=False))
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None)
 def test_merged_shards_give_the_reports_of_one_session(tmp_path_factory, runs, random):
     parts = [[run for k, run in enumerate(runs) if k % 2 == number] for number in range(2)]
     shards = []
@@ -204,7 +204,7 @@ def test_merged_shards_give_the_reports_of_one_session(tmp_path_factory, runs, r
 
 
 @given(sessions(), st.data())
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None)
 def test_resumed_session_runs_each_planned_run_that_has_no_result(tmp_path_factory, runs, data):
     """The journal is cut at any byte, as if the machine had crashed. Errors and changed scenarios run again."""
     folder = tmp_path_factory.mktemp("session")

@@ -38,7 +38,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @given(data=st.dictionaries(KEYS, TREES, max_size=4))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=3 * settings.default.max_examples, deadline=None)
 def test_written_yaml_is_read_back_equal_with_types(file: Path, data: dict[str, Any]) -> None:
     """Also when it is written to a file, where the reader refuses control characters."""
     file.write_text(to_yaml(data), encoding="utf-8", newline="")

@@ -173,7 +173,7 @@ def _at(value: Any, keys: tuple[Key, ...]) -> Any:
     return value
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
 def test_any_edit_of_a_shipped_file_changes_only_its_span(data: st.DataObject) -> None:
     text = data.draw(st.sampled_from(SHIPPED)).read_text(encoding="utf-8")
@@ -195,7 +195,7 @@ def test_any_edit_of_a_shipped_file_changes_only_its_span(data: st.DataObject) -
     assert all(_at(plain(after), leaf) == _at(plain(text), leaf) for leaf in others)
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
 def test_removing_an_added_part_restores_a_shipped_file(data: st.DataObject) -> None:
     text = data.draw(st.sampled_from(SHIPPED)).read_text(encoding="utf-8")

@@ -156,7 +156,7 @@ class TestPolylines:
 
     coordinates = st.tuples(st.integers(-8, 8), st.integers(-8, 8))
 
-    @settings(max_examples=60, deadline=None)
+    @settings(deadline=None)
     @given(st.lists(st.lists(coordinates, min_size=3, max_size=6, unique=True), min_size=1, max_size=3))
     @example([[(-1, 6), (6, -5), (1, 4), (-2, -6)]])
     @example([[(0, 0), (-5, -1), (6, -4)], [(2, -6), (0, 1), (8, 8), (0, 0)], [(0, 0), (0, 1), (3, -4)]])
