@@ -15,7 +15,7 @@ from simscen.testing.flatland import box_robot, round_robot
 CAR = RobotModel(box_robot(0.6, 0.4).footprint, None, 1.0, 1.0, 0.0, 1.5, 2.0, 2.0, 3.0, turning_radius=0.6)
 SPECS = {
     **{
-        kind: (Spec(type=kind, max_iterations=5000), round_robot())
+        kind: (Spec(type=kind, max_iterations=5000, improving_iterations=200), round_robot())
         for kind in get_args(Spec.model_fields["type"].annotation)
     },
     "navfn": (Navfn(type="navfn"), round_robot()),

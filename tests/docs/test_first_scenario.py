@@ -3,8 +3,6 @@
 import json
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -68,10 +66,7 @@ def test_python_example_runs(page: str, clone: Path) -> None:
     shutil.copytree(ROOT / "scenarios", "scenarios", dirs_exist_ok=True)
     text = (ROOT / f"docs/guides/{page}.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
-    done = subprocess.run(
-        [sys.executable, "-c", f"import simscen\n{code}"], capture_output=True, text=True, check=False, cwd=clone
-    )
-    assert done.returncode == 0, done.stderr
+    exec(f"import simscen\n{code}", {"__name__": "__main__"})
 
 
 def words(text: str) -> list[list[str]]:

@@ -5,6 +5,7 @@ import json
 import shutil
 import subprocess
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,7 @@ def read_in_viewer() -> Callable[[Path], dict[str, Any]]:
             stamp.write_text(" ".join(PACKAGES))
         shutil.copy(HERE / "read.mjs", FOLDER / "read.mjs")  # Node.js looks for packages in the folder of the script
 
+    @cache
     def read(log: Path) -> dict[str, Any]:
         done = subprocess.run([node, str(FOLDER / "read.mjs"), str(log)], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr

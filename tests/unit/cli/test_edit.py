@@ -63,6 +63,7 @@ def test_editor_serves_the_page_until_ctrl_c_and_leaves_no_files(tmp_path: Path)
         urllib.request.urlopen(url, timeout=5)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
 def test_signal_ends_the_editor_and_deletes_the_files_of_its_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals, code: int

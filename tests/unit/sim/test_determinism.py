@@ -37,17 +37,22 @@ print(simulation.robot.collisions())
 """
 
 
-def run_in_new_process(robot, reverse=False):
-    code = RUN.format(folders=FOLDERS, robot=robot, reverse=reverse)
+def run_in_new_process(robot):
+    code = RUN.format(folders=FOLDERS, robot=robot, reverse=False)
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
 
 
-def test_runs_in_the_same_and_in_a_new_process_are_equal(capsys):
-    code = RUN.format(folders=FOLDERS, robot="turtlebot", reverse=False)
-    outputs = []
-    for _ in range(2):
-        exec(code, {})
-        outputs.append(capsys.readouterr().out)
+@pytest.fixture
+def run_here(capsys):
+    def run(robot, reverse=False):
+        exec(RUN.format(folders=FOLDERS, robot=robot, reverse=reverse), {})
+        return capsys.readouterr().out
+
+    return run
+
+
+def test_runs_in_the_same_and_in_a_new_process_are_equal(run_here):
+    outputs = [run_here("turtlebot") for _ in range(2)]
     assert "collision.started" in outputs[0]
     assert outputs[0] == outputs[1] == run_in_new_process("turtlebot")
 
@@ -58,5 +63,5 @@ def test_runs_in_two_new_processes_are_equal(robot):
     assert run_in_new_process(robot) == run_in_new_process(robot)
 
 
-def test_order_of_bodies_does_not_change_the_run():
-    assert run_in_new_process("amr") == run_in_new_process("amr", reverse=True)
+def test_order_of_bodies_does_not_change_the_run(run_here):
+    assert run_here("amr") == run_here("amr", reverse=True)

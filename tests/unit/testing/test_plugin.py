@@ -89,13 +89,6 @@ def test_mistake_is_readable_with_xdist_workers(run) -> None:
     assert output.strip().splitlines()[-1].startswith("ERROR: --simscen-contract headless: no installed package")
 
 
-@pytest.mark.parametrize("limit", ["0", "-1", "nan", "soon"])
-def test_limit_must_be_positive(run, limit: str) -> None:
-    code, output = run("-p", "no:xdist", "--simscen-contract-limit", limit)
-    assert code == pytest.ExitCode.USAGE_ERROR
-    assert f"argument --simscen-contract-limit: {limit!r} is not a positive number of seconds" in output
-
-
 INVALID_TARGETS = {
     "own:Checker": "part: Field required",
     "own:Checker={part: 1}": "is not valid JSON",
@@ -106,26 +99,29 @@ INVALID_TARGETS = {
     "builtins:dict": "its first argument is not annotated with a specification",
     ":Nothing": "Empty module name",
 }
-RUN_EACH_TARGET = """
+INVALID_LIMITS = ("0", "-1", "nan", "soon")
+RUN_EACH_ARGUMENT = """
 import contextlib, io, json, sys
 import pytest
 sys.path.insert(0, ".")
 plugin = ("-p", "no:simscen", "-p", "simscen.testing.plugin", "-p", "no:cacheprovider", "-p", "no:xdist")
 outputs = {}
-for target in sys.argv[1:]:
+for argument in sys.argv[1:]:
     with io.StringIO() as text, contextlib.redirect_stdout(text), contextlib.redirect_stderr(text):
-        code = pytest.main([*plugin, "--simscen-contract", target])
-        outputs[target] = (int(code), text.getvalue())
+        code = pytest.main([*plugin, argument])
+        outputs[argument] = (int(code), text.getvalue())
 print(json.dumps(outputs))
 """
 
 
 @pytest.fixture(scope="module")
-def target_results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, str]]:
-    """Return exit code and output for each target, from one process that runs pytest for all of them."""
-    folder = tmp_path_factory.mktemp("target_results")
+def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, str]]:
+    """Return exit code and output for each invalid argument, from one process that runs pytest for all of them."""
+    folder = tmp_path_factory.mktemp("results")
     (folder / "own.py").write_text(OWN)
-    command = [sys.executable, "-c", RUN_EACH_TARGET, *INVALID_TARGETS]
+    arguments = [f"--simscen-contract={target}" for target in INVALID_TARGETS]
+    arguments += [f"--simscen-contract-limit={limit}" for limit in INVALID_LIMITS]
+    command = [sys.executable, "-c", RUN_EACH_ARGUMENT, *arguments]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     outputs: dict[str, tuple[int, str]] = json.loads(done.stdout)
     return outputs
@@ -133,11 +129,18 @@ def target_results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("target", INVALID_TARGETS)
-def test_untestable_target_is_a_readable_error(target_results, target: str) -> None:
-    code, output = target_results[target]
+def test_untestable_target_is_a_readable_error(results, target: str) -> None:
+    code, output = results[f"--simscen-contract={target}"]
     assert code == 4
     assert INVALID_TARGETS[target] in output
     assert "Traceback" not in output
+
+
+@pytest.mark.parametrize("limit", INVALID_LIMITS)
+def test_limit_must_be_positive(results, limit: str) -> None:
+    code, output = results[f"--simscen-contract-limit={limit}"]
+    assert code == pytest.ExitCode.USAGE_ERROR
+    assert f"argument --simscen-contract-limit: {limit!r} is not a positive number of seconds" in output
 
 
 def test_pytest_without_a_contract_imports_only_the_plug_in_of_simscen(run) -> None:
