@@ -110,19 +110,17 @@ class SuccessRate:
 class ParameterSetResults:
     """Results of one parameter set on all logs. The names of the fields are keys of the JSON output.
 
-    parameters:      name of the parameter set
-    shares:          success rate by circumstance
-    median:          median of `Trial.median` over the logs with circumstance "tracked"
-    median_interval: interval of the mean of `Trial.median` over the same logs
-    consistency:     consistency by circumstance
-    ms:              mean CPU time per scan in ms, including odometry
-    slowest_ms:      CPU time of the slowest message in ms
+    parameters:   name of the parameter set
+    shares:       success rate by circumstance
+    median:       median of `Trial.median` over the logs with circumstance "tracked"
+    consistency:  consistency by circumstance
+    ms:           mean CPU time per scan in ms, including odometry
+    slowest_ms:   CPU time of the slowest message in ms
     """
 
     parameters: str
     shares: Mapping[str, SuccessRate]
     median: float
-    median_interval: Interval
     consistency: Mapping[str, Consistency]
     ms: float
     slowest_ms: float
@@ -198,7 +196,6 @@ def summarize(name: str, trials: Sequence[Trial]) -> ParameterSetResults:
         parameters=name,
         shares={group: _success_rate(members) for group, members in groups.items()},
         median=float(np.median([trial.median for trial in tracked])),
-        median_interval=_interval(_means_by_building(tracked, [trial.median for trial in tracked])),
         consistency={group: _consistency(groups[group]) for group in CONSISTENCY_CIRCUMSTANCES if groups[group]},
         ms=float(np.mean([trial.ms for trial in trials])),
         slowest_ms=max(trial.slowest_ms for trial in trials),
@@ -219,7 +216,8 @@ def _consistency(trials: Sequence[Trial]) -> Consistency:
 def _success_rate(trials: Sequence[Trial]) -> SuccessRate:
     successes = [trial.succeeded for trial in trials]
     means = _means_by_building(trials, [float(success) for success in successes])
-    return SuccessRate(sum(successes), len(trials), _interval(means))
+    interval = bootstrap_mean_interval(means, Streams(1).generator("bootstrap"))
+    return SuccessRate(sum(successes), len(trials), interval)
 
 
 def _means_by_building(trials: Sequence[Trial], values: Sequence[float]) -> list[float]:
@@ -229,8 +227,3 @@ def _means_by_building(trials: Sequence[Trial], values: Sequence[float]) -> list
         float(np.mean([value for trial, value in zip(trials, values, strict=True) if trial.building == number]))
         for number in numbers
     ]
-
-
-def _interval(values: Sequence[float]) -> Interval:
-    """Return the bootstrap interval of the mean of the values."""
-    return bootstrap_mean_interval(values, Streams(1).generator("bootstrap"))

@@ -19,7 +19,7 @@ from simscen.report.display_text import detect_style
 
 if TYPE_CHECKING:
     from simscen.bench.localization.campaign import ParameterSetResults, SuccessRate, Trial
-    from simscen.bench.localization.consistency import Consistency, Interval
+    from simscen.bench.localization.consistency import Consistency
     from simscen.bench.localization.sparse_logs import SparseTrial
 
 
@@ -128,18 +128,15 @@ def _cells(row: "ParameterSetResults") -> tuple[str, ...]:
     return (
         row.parameters,
         *(_success_text(row.shares[name]) for name in COLUMN_NAMES),
-        f"{row.median:.3f} m{_interval_text(row.median_interval)}",
+        f"{row.median:.3f} m",
         f"{row.ms:.1f}",
         f"{row.slowest_ms:.0f}",
     )
 
 
 def _success_text(rate: "SuccessRate") -> str:
-    return f"{rate.count} of {rate.of}{_interval_text(rate.interval, '.2f')}"
-
-
-def _interval_text(interval: "Interval", number_format: str = ".3f") -> str:
-    return "" if interval is None else f" ({interval[0]:{number_format}} … {interval[1]:{number_format}})"
+    interval = "" if rate.interval is None else f" ({rate.interval[0]:.2f} … {rate.interval[1]:.2f})"
+    return f"{rate.count} of {rate.of}{interval}"
 
 
 def _consistency_lines(row: "ParameterSetResults") -> list[str]:
