@@ -103,7 +103,7 @@ class AllowedFolders:
             first = first or path
         if first is not None:
             return first
-        raise NoSuchFile(_NOT_FOUND, self._hint(uri, tried))
+        raise NoSuchFile(_NOT_FOUND, self._hint(uri, real_base, tried))
 
     @staticmethod
     def resolve_parent(path: Path) -> Path:
@@ -182,15 +182,28 @@ class AllowedFolders:
         if not self._contains(path):
             raise UnusableFile("outside the scenario root and the world paths")
 
-    def _hint(self, uri: str, tried: list[tuple[Path, Path]]) -> str:
-        """Return a hint for a URI that was not found in the `tried` pairs (allowed folder, path in it)."""
+    def _hint(self, uri: str, base: Path, tried: list[tuple[Path, Path]]) -> str:
+        """Return a hint for a URI that was not found in the `tried` pairs (allowed folder, path in it).
+
+        `base` is the folder of the file that contains the URI.
+        """
         similar = next((found for folder, path in tried if (found := find_similar_name(folder, path))), None)
         if similar:
             return f"did you mean `{similar}`?"
         if parse_fuel_uri(uri) and not self.search_folders:
             return "allow Fuel's cache with --world-path ~/.gz/fuel, or a folder that holds the downloaded model"
+        if not tried and (package := self._package_of(uri, base)) is not None:
+            return f"the folder of its package is {self.display_path(package) or '.'}"
         searched = ", ".join(dict.fromkeys(self.display_path(folder) or "." for folder, _ in tried))
         return f"{f'looked in {searched}; ' if searched else ''}allow its folder with --world-path"
+
+    def _package_of(self, uri: str, base: Path) -> Path | None:
+        """Return the folder of the package of a URI such as "package://cart/base.stl"; None for another URI."""
+        name, _, file = uri.partition("://")[2].partition("/")
+        try:
+            return self.package_folder(name, base) if uri.startswith(PACKAGE_SCHEMES) and file else None
+        except UnusableFile:
+            return None
 
 
 def _to_unusable_file(error: OSError) -> UnusableFile:

@@ -152,6 +152,13 @@ def test_hint_without_allowed_folders_lists_none(tmp_path: Path) -> None:
     assert caught.value.hint == "allow its folder with --world-path"
 
 
+def test_hint_for_a_file_that_its_package_lacks_names_the_package(tmp_path: Path) -> None:
+    put(tmp_path / "vendor" / "cart" / "package.xml")
+    with pytest.raises(NoSuchFile) as caught:
+        AllowedFolders.of([tmp_path]).find("package://cart/meshes/base.stl", tmp_path)
+    assert caught.value.hint == "the folder of its package is vendor/cart"
+
+
 def test_a_package_name_that_is_too_long_for_a_folder_is_refused(folders: AllowedFolders) -> None:
     with pytest.raises(UnusableFile, match="is not the name of a package"):
         folders.package_folder("a" * 300, folders.roots[0])
