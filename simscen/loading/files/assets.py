@@ -58,11 +58,7 @@ class Assets:
         """Load the world in a `*.world.yaml`, the YAML file of a ROS map, or an SDF file, which is parsed later."""
         if path.name.endswith(SDF_SUFFIXES):
             return LoadedWorld(path.name.split(".")[0], path, sdf=path)
-        name = self.library.sandbox.display_name(path)
-        text = read_text(path, name)
-        if isinstance(text, str) and is_xml(text):
-            hint = "if it is SDF, rename it to .sdf or .world"
-            self.problems.append(Problem(name, 1, 1, "SC004", "this is an XML file, expected a world in YAML", hint))
+        if self._is_xml_file(path, "world", "if it is SDF, rename it to .sdf or .world"):
             return None
         tree = self._read_tree(path)
         if is_ros_map(tree):
@@ -94,6 +90,8 @@ class Assets:
 
     def map_file(self, path: Path) -> LoadedMap | None:
         """Load the ROS map in a YAML file."""
+        if self._is_xml_file(path, "ROS map", "use a world in SDF as `world`; `simscen world export` writes its map"):
+            return None
         return self._ros_map(self._read_tree(path), path)
 
     def robot(self, written: str, position: Position) -> LoadedRobot | None:
@@ -118,6 +116,8 @@ class Assets:
                 self.problems.append(text)
                 return None
             return LoadedRobot(name, path, urdf=path)
+        if self._is_xml_file(path, "robot", "if it is a URDF, rename it to .urdf; robots in SDF are not supported"):
+            return None
         tree = self._read_tree(path)
         spec = self._validated(RobotSpec, tree)
         if spec is None or tree is None:
@@ -132,6 +132,15 @@ class Assets:
             return None
         mapping = tree if isinstance(tree, MappingNode) else None
         return LoadedRobot(name, path, spec, urdf, mapping, packages)
+
+    def _is_xml_file(self, path: Path, kind: str, hint: str) -> bool:
+        """Return whether a file is XML instead of YAML, and report it as a problem if so."""
+        name = self.library.sandbox.display_name(path)
+        text = read_text(path, name)
+        if isinstance(text, Problem) or not is_xml(text):
+            return False
+        self.problems.append(Problem(name, 1, 1, "SC004", f"this is an XML file, expected a {kind} in YAML", hint))
+        return True
 
     def _load_cached(self, load: Callable[[Path], Loaded | None], path: Path) -> Loaded | None:
         """Return `load(path)`; from the cache if the file has been loaded without problems before."""

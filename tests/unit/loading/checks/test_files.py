@@ -97,3 +97,19 @@ def test_file_of_another_kind_is_no_scenario_and_gets_a_hint(
 def test_merge_key_of_yaml_is_no_xml(write: Write, tmp_path: Path) -> None:
     problems = check_file("scenario", write("a.yaml", "<<: {simscen: 1}"), tmp_path)
     assert "SC025" not in [problem.code for problem in problems]
+
+
+@pytest.mark.parametrize(
+    ("kind", "message", "hint"),
+    [
+        ("world", "expected a world in YAML", "if it is SDF, rename it to .sdf or .world"),
+        ("robot", "expected a robot in YAML", "if it is a URDF, rename it to .urdf; robots in SDF are not supported"),
+        ("map", "expected a ROS map in YAML", "`simscen world export` writes its map"),
+    ],
+)
+def test_xml_file_with_the_suffix_of_yaml_gets_a_hint(
+    write: Write, tmp_path: Path, kind: str, message: str, hint: str
+) -> None:
+    (problem,) = check_file(kind, write("mine.yaml", "<?xml version='1.0'?>\n<sdf/>"), tmp_path)
+    assert problem.message == f"this is an XML file, {message}"
+    assert hint in problem.hint
