@@ -4,7 +4,7 @@ UNSUPPORTED_BY_STACK = "SC062"
 """Code of problems of the selected stack. With another stack, the scenario may be valid."""
 
 CODES = {
-    "SC001": "The file cannot be read: it is missing, not a regular file, too large, or not permitted.",
+    "SC001": "The file cannot be read: it is missing, not a regular file, an image, too large, or not permitted.",
     "SC002": "The file is not clean text: it must be UTF-8 without control characters.",
     "SC003": "The file is not YAML.",
     "SC004": "The file does not contain exactly one mapping.",

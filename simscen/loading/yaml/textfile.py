@@ -12,6 +12,8 @@ from simscen.core.errors import Problem
 
 MAX_FILE_BYTES = 1 << 20
 """Largest size of a text file: 1 MiB."""
+_IMAGE_START = re.compile(rb"P[25]\s+[#\d]|\x89PNG|BM.{4}\0{4}|\xff\xd8\xff", re.DOTALL)
+"""First bytes of images in the formats PGM, PNG, BMP, and JPEG."""
 
 # C0 and C1 controls, noncharacters, bidirectional overrides (CVE-2021-42574), and the line breaks of YAML 1.1 that
 # editors do not treat as line breaks.
@@ -58,6 +60,8 @@ def _read_bytes(path: Path) -> bytes | str:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             return "not a regular file"
         raw = file.read(MAX_FILE_BYTES + 1)
+    if _IMAGE_START.match(raw):
+        return "an image, not a text; if it is the image of a map, name the YAML file of the map"
     return raw if len(raw) <= MAX_FILE_BYTES else "larger than 1 MiB"
 
 

@@ -53,6 +53,14 @@ def _waits(*_) -> None:
     raise AssertionError("it waits for somebody who writes")
 
 
+@pytest.mark.parametrize(
+    "start", [b"P5\n# made by map_saver\n", b"\x89PNG\r\n", b"BM\x36\x10\0\0\0\0\0\0", b"\xff\xd8\xff\xe0"]
+)
+def test_image_is_recognized_and_refused(tmp_path: Path, start: bytes) -> None:
+    hint = "an image, not a text; if it is the image of a map, name the YAML file of the map"
+    assert _problem(_written(tmp_path / "map.pgm", start + bytes(2 << 20))).message == hint
+
+
 def test_refuses_a_huge_file_without_reading_it_all(tmp_path: Path) -> None:
     path = tmp_path / "big.yaml"
     with path.open("wb") as file:
