@@ -21,7 +21,8 @@ class PlannerSpec(Typed):
     advanced stack also replans if a clearly better path appears, or if moving obstacles will be in the way."""
     replanning_rate: Frequency | None = None
     """Rate of new plans (`rate`), or of checks whether the plan is still valid (`on_invalid`). Default, as in Nav2: 1
-    Hz, or 0.333 Hz with navigate_through_poses."""
+    Hz, or 0.333 Hz with navigate_through_poses. With `on_invalid`, the advanced stack checks after each change of the
+    costmap instead."""
     proximity_threshold: NonNegativeLength = 4.0
     """With `replanning: rate`: remaining length of the plan below which the plan is only replaced if it is blocked
     (IsGoalNearby in Nav2's behavior trees)."""
@@ -65,8 +66,8 @@ class OmplPlanner(OmplParameters):
     """Minimum clearance on both sides of the robot's inscribed circle in gaps; 0 = no minimum. Narrower gaps are used
     only if there is no other path. The start and the goal may be closer to obstacles."""
     improving_iterations: Iterations = 500
-    """Number of iterations after which planners that improve their path stop, or later with their first path. No effect
-    on `bit_star` (see `max_batches`)."""
+    """Number of iterations after which planners that improve their path stop. Without a path by then, they stop at
+    their first path. No effect on `bit_star` (see `max_batches`)."""
     samples_per_batch: Annotated[int, Field(ge=1, le=100_000)] = 200
     """Number of samples per batch; `bit_star` only (OMPL: 100)."""
     max_batches: Annotated[int, Field(ge=1, le=1000)] = 2

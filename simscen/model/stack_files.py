@@ -50,8 +50,8 @@ AnyStack = Annotated[
 class StackFileSpec(Spec):
     """Stack file for `--stack NAME=FILE`, which replaces the `stack` section of scenarios.
 
-    Keepout regions, speed zones, filter masks, and goal tolerances are taken from the scenario if the file does not set
-    them. Other parameters that the file does not set have their default values.
+    It cannot contain zones and masks: those of the scenario apply, and also the goal tolerances that the scenario sets.
+    All other parameters that the file does not set have their default values.
     """
 
     simscen: LanguageVersion

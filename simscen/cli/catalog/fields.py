@@ -1,6 +1,7 @@
 """Keys of YAML mappings, with descriptions of their values, for `simscen explain` and the language reference."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -139,11 +140,24 @@ def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
     bounds = {name: bound for name, bound in found.items() if bound is not None}
     if {"gt", "ge"} <= bounds.keys():  # the stricter one applies
         del bounds["ge" if bounds["gt"] >= bounds["ge"] else "gt"]
+    units = {} if quantity is None else UNITS[quantity.dimension]
+    numbers = {name: _bound_text(bound, units) for name, bound in bounds.items()}
     if bounds.keys() == {"ge", "le"}:
-        texts = [f"{bounds['ge']:g} … {bounds['le']:g}"]
+        texts = [f"{numbers['ge']} … {numbers['le']}"]
     else:
-        texts = [f"{_BOUNDS[name]} {bound:g}" for name, bound in bounds.items()]
+        texts = [f"{_BOUNDS[name]} {number}" for name, number in numbers.items()]
     return ", ".join([text.replace("ratio in %", "ratio"), *texts])
+
+
+def _bound_text(bound: float, units: Mapping[str, float]) -> str:
+    """Return a bound without rounding, in another unit if the number is long in the SI unit, such as "500 mm/h"."""
+    if isinstance(bound, int):
+        return str(bound)
+    for unit, factor in [("", 1.0), *sorted(units.items(), key=lambda item: item[1])]:
+        number = f"{bound / factor:g}"
+        if float(number) * factor == bound:
+            return f"{number} {unit}".strip()
+    return str(bound)
 
 
 def _default(model: type[BaseModel], name: str, field: FieldInfo) -> str:

@@ -23,7 +23,7 @@ _GROUPS = {
         "Scenario files",
         "`*.scenario.yaml`. With `extends: FILE`, missing keys are taken from another file.",
     ),
-    "stack": ("The stack", "Value of `stack`; all keys are optional."),
+    "stack": ("The stack", "Value of `stack`; keys are optional unless they are marked as required."),
     "stack file": (
         "Stack files and user configuration",
         "`*.stack.yaml`, used with `--stack NAME=FILE`; and the user configuration, which defines the commands of "

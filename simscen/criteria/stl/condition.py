@@ -129,11 +129,13 @@ class Window(Spec):
     """Interval of time after the evaluation of its condition. Without any key, it is the rest of the run."""
 
     within: PositiveDuration | None = None
-    """Length of the window. It begins at the start of the run; in a nested condition, at the time of its evaluation."""
+    """Length of the window. It begins at the start of the run; in a nested condition, at its evaluation."""
     after: PositiveDuration | None = None
-    """Time from the evaluation of its condition to the start of the window, which lasts until the end of the run."""
+    """Time from the start of the run (in a nested condition: from its evaluation) to the start of the window, which
+    lasts until the end of the run."""
     between: Annotated[list[Duration], Field(min_length=2, max_length=2)] | None = None
-    """Times from the evaluation of its condition to the start and to the end of the window."""
+    """Times from the start of the run (in a nested condition: from its evaluation) to the start and to the end of the
+    window."""
 
     @model_validator(mode="after")
     def _check_interval(self) -> Window:

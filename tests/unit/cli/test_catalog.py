@@ -9,12 +9,14 @@ from simscen.actions.base import AnyAction
 from simscen.cli.catalog.fields import fields_of, kind_of
 from simscen.cli.catalog.topics import Topic, topics
 from simscen.criteria.registry import AnyCriterion
+from simscen.faults.lidar_environment import Rain
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.model.controllers import GoalCheckerSpec
 from simscen.model.costmaps import Costmap
 from simscen.model.disturbances import FaultEntry
 from simscen.model.localizers import Amcl, LocalizerSpec
 from simscen.model.planners import PlannerSpec
+from simscen.model.scenario import ScenarioSpec
 from simscen.model.stack import StackSpec
 from simscen.model.stack_base import ControllerSpec, GoalTolerances, Latency
 from simscen.spec import registry
@@ -84,6 +86,11 @@ def test_type_is_described_with_unit_and_range() -> None:
     assert kind_of(Angle) == "angle in rad, -100 … 100"
     assert kind_of(Probability) == "ratio, 0 … 1"
     assert kind_of(list[Angle] | None) == "list of angles in rad, each -100 … 100"
+
+
+def test_bounds_are_not_rounded() -> None:
+    assert kind_of(ScenarioSpec.model_fields["seed"]) == "integer, 1 … 4294967295"
+    assert kind_of(Rain.model_fields["rate"]) == "speed in m/s, > 0, ≤ 500 mm/h"
 
 
 def test_defaults_are_listed_and_required_keys_have_none() -> None:
