@@ -87,7 +87,7 @@ def serve(requests: socket.socket) -> None:
                 pid, messages = key.data
                 selector.unregister(key.fileobj)
                 os.close(key.fd)
-                with messages, suppress(BrokenPipeError):  # nobody waits for it
+                with messages, suppress(BrokenPipeError):  # the session has ended
                     messages.send(str(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])).encode())
                 continue
             folder, descriptors, _, _ = socket.recv_fds(requests, MESSAGE_BYTES, 4)

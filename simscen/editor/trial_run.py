@@ -80,16 +80,17 @@ class TrialRuns:
         self._backend_factory = backend_factory
         self._folder: Path | None = None
         self._trials: list[TrialRun] = []
-        self._lock = threading.Lock()
+        self._start_lock, self._run_lock = threading.Lock(), threading.Lock()  # of `start`, and of the run in progress
 
     def start(self, loaded: LoadedScenario) -> TrialRun:
         """Cancel all earlier runs, start a run in a thread, and return it."""
-        for trial in self._trials:
-            trial.is_canceled = True
-        self._folder = self._folder or Path(tempfile.mkdtemp(prefix="simscen-edit-"))
-        number = len(self._trials) + 1
-        trial = TrialRun(number, self._folder / str(number), loaded.spec.time_limit)
-        self._trials.append(trial)
+        with self._start_lock:
+            for trial in self._trials:
+                trial.is_canceled = True
+            self._folder = self._folder or Path(tempfile.mkdtemp(prefix="simscen-edit-"))
+            number = len(self._trials) + 1
+            trial = TrialRun(number, self._folder / str(number), loaded.spec.time_limit)
+            self._trials.append(trial)
         threading.Thread(target=self._run, args=(loaded, trial), daemon=True).start()
         return trial
 
@@ -101,11 +102,11 @@ class TrialRuns:
         """Cancel all runs and delete their files."""
         for trial in self._trials:
             trial.is_canceled = True
-        has_ended = self._lock.acquire(timeout=STOP_TIMEOUT_S)
+        has_ended = self._run_lock.acquire(timeout=STOP_TIMEOUT_S)
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
         if has_ended:
-            self._lock.release()
+            self._run_lock.release()
 
     def _run(self, loaded: LoadedScenario, trial: TrialRun) -> None:
         """Wait for earlier runs, simulate a scenario, and write its progress and result to `trial`."""
@@ -118,7 +119,7 @@ class TrialRuns:
 
         job = Job(0, loaded, loaded.key(loaded.spec.seed), trial.folder, WALL_LIMIT_S, WrittenFor.ALL)
         try:
-            with self._lock, self._backend_factory() as backend:
+            with self._run_lock, self._backend_factory() as backend:
                 answers, _ = run_session([job], SessionOptions(), backend, listen)
             self._finish(trial, answers[0].result)
         except _Canceled:

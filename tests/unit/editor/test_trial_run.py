@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -91,4 +92,20 @@ def test_an_unexpected_error_ends_the_run(loaded: LoadedScenario, capsys: pytest
     until(lambda: trial.state == "error" and trial.message != "")
     assert trial.message == "internal error: RuntimeError; this is a bug in simscen"
     assert "RuntimeError: broken" in capsys.readouterr().err
+    runs.close()
+
+
+def test_runs_that_start_at_the_same_time_have_different_numbers(
+    loaded: LoadedScenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def make_folder(prefix: str) -> str:
+        time.sleep(0.2)  # the other thread starts its run in this time
+        return str(tmp_path / prefix)
+
+    monkeypatch.setattr("simscen.editor.trial_run.tempfile.mkdtemp", make_folder)
+    runs = TrialRuns(EndlessBackend)
+    with ThreadPoolExecutor(2) as threads:
+        trials = list(threads.map(runs.start, [loaded, loaded]))
+    assert sorted(trial.number for trial in trials) == [1, 2]
+    assert [runs.trial(trial.number) for trial in trials] == trials
     runs.close()
