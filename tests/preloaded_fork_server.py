@@ -1,10 +1,12 @@
 """A process that imports the modules of the fork server once, and forks a fork server for each session of the tests.
 
-The imports take longer than most runs of the tests. Tests that start `simscen` in a process of its own start the fork
-server as users do.
+The imports take longer than most runs of the tests. This does not affect tests that start `simscen` in a process of its
+own, and fork servers that start with `python -c`.
 """
 
+import json
 import os
+import runpy
 import selectors
 import socket
 import subprocess
@@ -15,7 +17,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from simscen.cli.session.fork_server_start import FORK_SERVER
 from simscen.run.process.isolation import clean_environment
 
 MESSAGE_BYTES = 4096
@@ -30,9 +31,10 @@ class PreloadedForkServer:
         self._requests, self._received_requests = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 
     def popen(self, arguments: Sequence[str], env: dict[str, str], **options: Any) -> "subprocess.Popen | Forked":
-        """Start a program as `subprocess.Popen` would: the fork server in the usual environment, or a new process."""
-        is_fork_server = tuple(arguments[1:-1]) == ("-I", *FORK_SERVER)
-        if not is_fork_server or env != self._environment or os.getpid() != self._owner:
+        """Start a fork server as `subprocess.Popen` would. Other environments than usual get a process of their own."""
+        _, isolated, *entry, replies = arguments
+        is_python_file = isolated == "-I" and (entry[0] == "-m" or entry[0].endswith(".py"))
+        if not is_python_file or env != self._environment or os.getpid() != self._owner:
             return subprocess.Popen(arguments, env=env, **options)
         if not self._is_started:
             descriptor = self._received_requests.fileno()
@@ -40,7 +42,8 @@ class PreloadedForkServer:
             subprocess.run(command, env=env, pass_fds=[descriptor], stdin=null, stdout=null, check=True)
             self._received_requests.close()
             self._is_started = True
-        return Forked(self._requests, options["stdin"], options["stdout"].fileno(), options["pass_fds"][0])
+        request = json.dumps([str(Path.cwd()), entry])
+        return Forked(self._requests, request, options["stdin"], options["stdout"].fileno(), int(replies))
 
     def close(self) -> None:
         """Let the process exit."""
@@ -51,11 +54,11 @@ class PreloadedForkServer:
 class Forked:
     """A fork server that another process has forked, with the methods of `subprocess.Popen` that simscen uses."""
 
-    def __init__(self, requests: socket.socket, jobs: int, output: int, replies: int) -> None:
+    def __init__(self, requests: socket.socket, request: str, jobs: int, output: int, replies: int) -> None:
         self.returncode: int | None = None
         self._messages, sent = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with sent:
-            socket.send_fds(requests, [str(Path.cwd()).encode()], [jobs, output, replies, sent.fileno()])
+            socket.send_fds(requests, [request.encode()], [jobs, output, replies, sent.fileno()])
         self.pid = int(self._messages.recv(MESSAGE_BYTES))
 
     def wait(self, timeout: float | None = None) -> int:
@@ -77,7 +80,7 @@ class Forked:
 
 def serve(requests: socket.socket) -> None:
     """Fork a fork server for each request, and send its process id and its exit code, until no requests can come."""
-    from simscen.cli.session import fork_server_main
+    import simscen.cli.session.fork_server_main  # noqa: F401 - for the forks
 
     selector = selectors.DefaultSelector()
     selector.register(requests, selectors.EVENT_READ)
@@ -90,8 +93,8 @@ def serve(requests: socket.socket) -> None:
                 with messages, suppress(BrokenPipeError):  # the session has ended
                     messages.send(str(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])).encode())
                 continue
-            folder, descriptors, _, _ = socket.recv_fds(requests, MESSAGE_BYTES, 4)
-            if not folder:
+            request, descriptors, _, _ = socket.recv_fds(requests, MESSAGE_BYTES, 4)
+            if not request:
                 return
             *given, sent = descriptors
             messages = socket.socket(fileno=sent)
@@ -99,8 +102,7 @@ def serve(requests: socket.socket) -> None:
                 try:
                     selector.close()
                     requests.close()
-                    become_fork_server(folder.decode(), *given, messages)
-                    fork_server_main.main()
+                    run_fork_server(*json.loads(request), *given, messages)
                 except BaseException:
                     traceback.print_exc()
                 os._exit(1)
@@ -109,8 +111,10 @@ def serve(requests: socket.socket) -> None:
             selector.register(os.pidfd_open(pid), selectors.EVENT_READ, (pid, messages))
 
 
-def become_fork_server(folder: str, jobs: int, output: int, replies: int, messages: socket.socket) -> None:
-    """Use the folder and file descriptors of a request in this process, as a new process would."""
+def run_fork_server(
+    folder: str, entry: list[str], jobs: int, output: int, replies: int, messages: socket.socket
+) -> None:
+    """Run a fork server in this process: in a folder, from a module or script, with the given file descriptors."""
     os.setsid()
     for descriptor, target in ((jobs, 0), (output, 1), (output, 2)):
         os.dup2(descriptor, target)
@@ -120,6 +124,11 @@ def become_fork_server(folder: str, jobs: int, output: int, replies: int, messag
     sys.argv = ["fork server", str(replies)]
     messages.send(str(os.getpid()).encode())
     messages.close()
+    if entry[0] == "-m":
+        del sys.modules[entry[1]]  # it is only executed as `__main__`
+        runpy.run_module(entry[1], run_name="__main__", alter_sys=True)
+    else:
+        runpy.run_path(entry[0], run_name="__main__")
 
 
 if __name__ == "__main__":

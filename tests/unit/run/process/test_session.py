@@ -21,7 +21,10 @@ from simscen.run.process.supervisor import Interrupted, Supervisor
 from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_session
 from simscen.spec.registry import RegisteredType
 
-ENTRY = (str(Path(__file__).with_name("faulty_fork_server.py")),)
+SCRIPT = str(Path(__file__).with_name("faulty_fork_server.py"))
+ENTRY = (SCRIPT,)
+CHILD_ENTRY = ("-c", f"import runpy; runpy.run_path({SCRIPT!r}, run_name='__main__')")
+"""Entry of a fork server that is a child of this process (see tests/preloaded_fork_server.py)."""
 SCENARIO = """
 simscen: 1
 tags: [{fault}]
@@ -239,7 +242,7 @@ def test_a_supervisor_keeps_its_processes_between_two_sessions_until_it_is_close
     file.write_text(SCENARIO.format(fault="fine"))
     options = SessionOptions(wall_limit=20.0)
     servers = []
-    with Supervisor(1, ENTRY) as backend:
+    with Supervisor(1, CHILD_ENTRY) as backend:
         for number in range(2):
             jobs = plan_jobs([load_scenario(file, tmp_path)], options, tmp_path / str(number))
             answers, _ = run_session(jobs, options, backend, lambda event: None)
@@ -255,10 +258,10 @@ def test_a_supervisor_uses_a_fork_server_that_was_started_before(tmp_path):
     file.write_text(SCENARIO.format(fault="fine"))
     options = SessionOptions(wall_limit=20.0)
     jobs = plan_jobs([load_scenario(file, tmp_path)], options, tmp_path / "out")
-    started = ForkServerProcess(ENTRY)
+    started = ForkServerProcess(CHILD_ENTRY)
     (server,) = _children()
     plugin = RegisteredType("criterion", "dwell", "yardwork.dwell:Dwell", "yardwork", "1.2", folder=str(tmp_path))
-    with Supervisor(1, ENTRY, started) as backend:
+    with Supervisor(1, CHILD_ENTRY, started) as backend:
         ends = [update.end for update in backend.run(jobs, [plugin]) if isinstance(update, Ended)]
         assert [end.code for end in ends] == [0]
         assert _children() == [server]
@@ -270,7 +273,7 @@ def test_a_fork_server_that_dies_between_two_sessions_is_started_again(tmp_path)
     file = tmp_path / "fine.scenario.yaml"
     file.write_text(SCENARIO.format(fault="fine"))
     options = SessionOptions(wall_limit=20.0)
-    with Supervisor(1, ENTRY) as backend:
+    with Supervisor(1, CHILD_ENTRY) as backend:
         for number in range(2):
             jobs = plan_jobs([load_scenario(file, tmp_path)], options, tmp_path / str(number))
             answers, _ = run_session(jobs, options, backend, lambda event: None)
