@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -185,6 +185,26 @@ def si_number(value: Any) -> Any:
         return value
     scales = [units[match[2]] for units in UNITS.values() if match[2] in units]
     return float(match[1]) * scales[0] if scales else value
+
+
+def exact_text(number: float, units: Mapping[str, float]) -> str:
+    """Return a number without rounding, in the first of `units` in which it is short, such as "500 mm/h".
+
+    `units` are factors to SI units, by unit. The unit "" is not shown. Without such a unit, return all digits.
+    """
+    for unit, factor in units.items():
+        shown = f"{number / factor:.12g}"
+        if float(shown) * factor == number:
+            return f"{shown} {unit}".strip()
+    return str(number)
+
+
+def possible_units(text: str) -> dict[str, float]:
+    """Return the unit of a quantity such as "20 km", and the SI unit, with factors to SI units; {} for other texts."""
+    match = NUMBER_AND_UNIT_PATTERN.fullmatch(text)
+    units = next((units for units in UNITS.values() if match and match[2] in units), {})
+    si_units = {unit: factor for unit, factor in units.items() if factor == 1.0}
+    return {match[2]: units[match[2]], **si_units} if match and units else {}
 
 
 def _parse_amount(value: Any) -> Amount:

@@ -1,7 +1,6 @@
 """Keys of YAML mappings, with descriptions of their values, for `simscen explain` and the language reference."""
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -19,7 +18,7 @@ from simscen.spec.base import Typed, field_docs
 from simscen.spec.choice import Choice
 from simscen.spec.extensible_union import ExtensibleUnion, TypeName
 from simscen.spec.places import PlaceAllowed, PlaceShorthand
-from simscen.spec.quantities import UNITS, Amount, Quantity
+from simscen.spec.quantities import UNITS, Amount, Quantity, exact_text
 from simscen.spec.registry import all_types
 
 OPTIONAL = "–"
@@ -141,23 +140,13 @@ def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
     if {"gt", "ge"} <= bounds.keys():  # the stricter one applies
         del bounds["ge" if bounds["gt"] >= bounds["ge"] else "gt"]
     units = {} if quantity is None else UNITS[quantity.dimension]
-    numbers = {name: _bound_text(bound, units) for name, bound in bounds.items()}
+    smallest_first = {"": 1.0, **dict(sorted(units.items(), key=lambda unit: unit[1]))}
+    numbers = {name: exact_text(bound, smallest_first) for name, bound in bounds.items()}
     if bounds.keys() == {"ge", "le"}:
         texts = [f"{numbers['ge']} … {numbers['le']}"]
     else:
         texts = [f"{_BOUNDS[name]} {number}" for name, number in numbers.items()]
     return ", ".join([text.replace("ratio in %", "ratio"), *texts])
-
-
-def _bound_text(bound: float, units: Mapping[str, float]) -> str:
-    """Return a bound without rounding, in another unit if the number is long in the SI unit, such as "500 mm/h"."""
-    if isinstance(bound, int):
-        return str(bound)
-    for unit, factor in [("", 1.0), *sorted(units.items(), key=lambda item: item[1])]:
-        number = f"{bound / factor:g}"
-        if float(number) * factor == bound:
-            return f"{number} {unit}".strip()
-    return str(bound)
 
 
 def _default(model: type[BaseModel], name: str, field: FieldInfo) -> str:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from simscen.loading.yaml.lookalikes import lookalike_hint
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
 from simscen.spec.places import ROS_NAMESPACE_PATTERN
+from simscen.spec.quantities import exact_text, possible_units
 
 _EXPECTED_TYPES = {
     "model_type": "a mapping",
@@ -97,7 +98,8 @@ def translate_error(error_type: str, context: Mapping[str, Any], node: Node, tex
         return Message("SC011", text, _type_hint(error_type, node))
     if error_type in _BOUNDS:
         words, key = _BOUNDS[error_type]
-        bound = f"{context[key]:g}" if isinstance(context[key], float) else str(context[key])
+        known_units = possible_units(str(node.value)) if isinstance(node, ScalarNode) else {}
+        bound = exact_text(context[key], known_units or {"": 1.0})
         return Message("SC013", f"must be {words} {bound}, got {short_value(node)}")
     if error_type in _TEMPLATES:
         code, template = _TEMPLATES[error_type]

@@ -54,6 +54,19 @@ def test_a_valid_scenario_becomes_its_model() -> None:
     assert spec.faults[0].for_ == 3.0
 
 
+@pytest.mark.parametrize(
+    ("value", "bound"), [("600 mm/h", "500 mm/h"), ("1 m/h", "0.5 m/h"), ("0.1", "0.0001388888888888889")]
+)
+def test_a_bound_has_the_unit_of_the_value_and_is_not_rounded(value: str, bound: str) -> None:
+    told = _told(ScenarioSpec, SCENARIO + f"faults: [{{sensor: lidar, rain: {{rate: {value}}}}}]\n")
+    assert told == [(5, 39, f"must be at most {bound}, got `{value}`")]
+
+
+def test_a_bound_of_a_ratio_in_percent_is_in_percent() -> None:
+    told = _told(ScenarioSpec, SCENARIO + "faults: [{sensor: lidar, rain: {rate: 1 mm/h, reflectivity: 150 %}}]\n")
+    assert told == [(5, 61, "must be at most 100 %, got `150 %`")]
+
+
 def test_names_of_fields_in_python_are_no_keys() -> None:
     told = _told(ScenarioSpec, SCENARIO + "faults: [{sensor: lidar, off: {}, for_: 3 s}]\n")
     assert told == [(5, 35, "unknown key `for_` in `faults[0]`")]
