@@ -17,7 +17,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 from editor_page import TEXT, Edit, settle
-from rig import Opened, Opener
+from rig import Opened, Opener, Pages
 
 from simscen.cli.session.backends import backend_of
 from simscen.editor.document import EditedFile
@@ -64,13 +64,19 @@ def browser(chromium: str) -> Iterator[Any]:
         running.close()
 
 
+@pytest.fixture(scope="session")
+def pages(browser: Any) -> Pages:
+    """Return the blank pages of the browser."""
+    return Pages(browser)
+
+
 @pytest.fixture
-def open_page(browser: Any) -> Iterator[Opener]:
+def open_page(pages: Pages) -> Iterator[Opener]:
     """Return a function that opens files; at the end, check for logged errors and requests of other files."""
     opened: list[Opened] = []
 
     def open_(file: Path | str, *, size: tuple[int, int] = (1280, 800), dark: bool = False, where: str = "") -> Opened:
-        opened.append(Opened(browser, file, size, dark, where))
+        opened.append(Opened(pages, file, size, dark, where))
         return opened[-1]
 
     yield open_

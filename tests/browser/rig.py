@@ -1,4 +1,4 @@
-"""A page that is open in a browser, and its errors and requests."""
+"""Pages that are open in a browser, and their errors and requests."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -10,23 +10,49 @@ TIMEOUT_MS = 30_000
 GRAVE = ("serious", "critical")
 
 
-class Opened:
-    """A page from a file or local server in a new browser context; `page` is the page object of Playwright."""
+class Pages:
+    """Blank pages in browser contexts of their own. A page of a file is used again, because new ones are expensive."""
 
-    def __init__(self, browser: Any, file: Path | str, size: tuple[int, int], dark: bool, where: str) -> None:
-        scheme = "dark" if dark else "light"
-        width, height = size
-        self._context = browser.new_context(
-            viewport={"width": width, "height": height}, color_scheme=scheme, bypass_csp=False, offline=False
-        )
-        self._context.set_default_timeout(TIMEOUT_MS)
-        self.page = self._context.new_page()
+    def __init__(self, browser: Any) -> None:
+        self._browser = browser
+        self._blank: list[Any] = []
+
+    def take(self, size: tuple[int, int], scheme: str) -> Any:
+        """Return a blank page."""
+        viewport = {"width": size[0], "height": size[1]}
+        if not self._blank:
+            context = self._browser.new_context(viewport=viewport, color_scheme=scheme, bypass_csp=False, offline=False)
+            context.set_default_timeout(TIMEOUT_MS)
+            return context.new_page()
+        page = self._blank.pop()
+        page.set_viewport_size(viewport)
+        page.emulate_media(color_scheme=scheme)
+        return page
+
+    def give_back(self, page: Any) -> None:
+        """Keep the page of a file, which stores nothing. Close the page of a server, which may have unsaved edits."""
+        if not page.url.startswith("file:"):
+            page.context.close()
+            return
+        page.goto("about:blank")
+        self._blank.append(page)
+
+
+class Opened:
+    """A page from a file or local server; `page` is the page object of Playwright."""
+
+    def __init__(self, pages: Pages, file: Path | str, size: tuple[int, int], dark: bool, where: str) -> None:
+        self._pages, self.page = pages, pages.take(size, "dark" if dark else "light")
         self._complaints: list[str] = []
         self._uri = file if isinstance(file, str) else file.resolve().as_uri()
-        self.page.on("console", self._on_console)
-        self.page.on("pageerror", lambda error: self._complaints.append(f"error: {error}"))
-        self.page.on("request", self._on_request)
-        self.page.on("dialog", lambda dialog: (self._complaints.append(f"dialog: {dialog.message}"), dialog.dismiss()))
+        self._listeners = {
+            "console": self._on_console,
+            "pageerror": lambda error: self._complaints.append(f"error: {error}"),
+            "request": self._on_request,
+            "dialog": lambda dialog: (self._complaints.append(f"dialog: {dialog.message}"), dialog.dismiss()),
+        }
+        for event, listener in self._listeners.items():
+            self.page.on(event, listener)
         self.page.goto(self._uri + where)
 
     def until(self, condition: str) -> None:
@@ -61,7 +87,9 @@ class Opened:
 
     def close(self) -> list[str]:
         """Close the page, and return its errors, warnings, dialogs, and requests of other files."""
-        self._context.close()
+        self._pages.give_back(self.page)
+        for event, listener in self._listeners.items():
+            self.page.remove_listener(event, listener)
         return self._complaints
 
     def _on_console(self, message: Any) -> None:
