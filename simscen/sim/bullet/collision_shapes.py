@@ -87,7 +87,9 @@ def create_compound_shape(client: int, solids: Sequence[Solid]) -> int:
 def create_hull_of_solids(client: int, solids: Iterable[Solid]) -> int:
     """Create the shape of the common convex hull of solids; large meshes are reduced to a part of their vertices."""
     points = [
-        solid.pose.apply(reduce_hull_vertices(shape) if isinstance(shape := solid.shape, Mesh) else hull_points(shape))
+        solid.pose.apply(
+            reduce_hull_vertices(solid.shape) if isinstance(solid.shape, Mesh) else hull_points(solid.shape)
+        )
         for solid in solids
     ]
     return create_convex_shape(client, np.concatenate(points))
