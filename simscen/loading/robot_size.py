@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from simscen.core.environment.world_model import World
 from simscen.core.geometry import Polygon
-from simscen.core.geometry.polygons import distance_to_segment
+from simscen.core.geometry.polygons import inscribed_radius
 from simscen.core.geometry.shapes import Solid
 from simscen.loading.builders import load_robot
 from simscen.loading.loaded import LoadedScenario
@@ -32,15 +32,7 @@ class RobotSize:
     @property
     def inscribed(self) -> float:
         """Radius of the largest circle inside the footprint, around the origin of the base frame."""
-        return inscribed_radius(self.radius, self.footprint)
-
-
-def inscribed_radius(radius: float | None, footprint: Polygon) -> float:
-    """Return the radius in m of the largest circle around the origin in a footprint: `radius` if it is round."""
-    if radius is not None:
-        return radius
-    ends = (*footprint[1:], footprint[0])
-    return min(distance_to_segment(0.0, 0.0, a, b) for a, b in zip(footprint, ends, strict=True))
+        return self.radius if self.radius is not None else inscribed_radius(self.footprint)
 
 
 def robot_size(loaded: LoadedScenario) -> RobotSize:

@@ -6,7 +6,6 @@ from simscen.core.records.case import Case
 from simscen.loading.builders import load_criterion_masks, robot_from_file, world_from_file
 from simscen.loading.files.criteria_file import LoadedCriteria
 from simscen.loading.goals import expected_failures, scenario_goals
-from simscen.loading.robot_size import inscribed_radius
 from simscen.model.world import WorldSpec
 from simscen.worlds.world_file import world_from_spec
 
@@ -27,7 +26,7 @@ def case_from_criteria(criteria: LoadedCriteria) -> Case:
         expected=expected_failures(criteria.spec, goals),
         regions=world.regions,
         footprint=() if body is None else body.footprint,
-        inscribed_radius=0.0 if body is None else inscribed_radius(body.radius, body.footprint),
+        inscribed_radius=0.0 if body is None else body.inscribed_radius,
         time_limit=criteria.spec.time_limit,
         masks=load_criterion_masks(criteria.masks, criteria.tree, criteria.library.texts),
     )

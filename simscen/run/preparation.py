@@ -19,7 +19,7 @@ from simscen.loading.goals import event_goals, expected_failures, scenario_goals
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.open_ground import with_stops_in_bounds
 from simscen.loading.plugins import plugins_of
-from simscen.loading.robot_size import blocking_solids, inscribed_radius
+from simscen.loading.robot_size import blocking_solids
 from simscen.model.localizers import OdometryOnly
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, initial_estimate
@@ -136,7 +136,7 @@ def _prepare_robot(
         sent=tuple(event_goals(loaded).values()),
         regions=world.regions,
         footprint=body.footprint,
-        inscribed_radius=inscribed_radius(body.radius, body.footprint),
+        inscribed_radius=body.inscribed_radius,
         time_limit=spec.time_limit,
         clearance_range=_clearance_range(spec),
         disturbances=tuple(disturbances_of(loaded)),

@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field, GetCoreSchemaHandler, PrivateAttr, S
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from simscen.core.geometry import Pose2
-from simscen.core.geometry.polygons import polygon_defect
+from simscen.core.geometry.polygons import polygon_defect, without_repeated_corners
 from simscen.spec.base import Spec, text_or_mapping
 from simscen.spec.quantities import Angle, Length
 
@@ -47,10 +47,12 @@ Point = Annotated[list[Length], Field(min_length=2, max_length=2)]
 
 
 def _check_polygon(ring: list[Point]) -> list[Point]:
-    defect = polygon_defect([(x, y) for x, y in ring])
+    """Return the polygon without repeated corners. Raises ValueError if it is invalid."""
+    corners = [(x, y) for x, y in ring]
+    defect = polygon_defect(corners)
     if defect:
         raise ValueError(f"the polygon {defect}")
-    return ring
+    return [[x, y] for x, y in without_repeated_corners(corners)]
 
 
 Ring = Annotated[list[Point], Field(min_length=3, max_length=200), AfterValidator(_check_polygon)]

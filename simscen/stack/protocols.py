@@ -20,6 +20,7 @@ from simscen.core.environment.costmap_filters import FilterMasks, Zones
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Polygon, Pose2
 from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.polygons import inscribed_radius
 from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import Belief, ErrorCode, Estimate, Path
 from simscen.core.messages.sensor_data import Imu, Odometry, Readings, Scan
@@ -60,11 +61,7 @@ class RobotModel:
     @property
     def inscribed_radius(self) -> float:
         """Radius in m of the largest circle around the origin of the base inside the footprint."""
-        corners = np.array(self.footprint)
-        ends = np.roll(corners, -1, axis=0)
-        normal = np.column_stack((ends[:, 1] - corners[:, 1], corners[:, 0] - ends[:, 0]))
-        distance = np.abs(np.sum(normal * corners, axis=1)) / np.hypot(*normal.T)
-        return self.radius if self.radius is not None else float(distance.min())
+        return self.radius if self.radius is not None else inscribed_radius(self.footprint)
 
     @property
     def circumscribed_radius(self) -> float:

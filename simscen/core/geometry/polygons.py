@@ -73,6 +73,11 @@ def distance_to_segment(x: float, y: float, a: Corner, b: Corner) -> float:
     return math.hypot(x - a[0] - along * dx, y - a[1] - along * dy)
 
 
+def inscribed_radius(polygon: Sequence[Corner]) -> float:
+    """Return the radius in m of the largest circle around the origin inside a polygon that contains the origin."""
+    return min(distance_to_segment(0.0, 0.0, a, b) for a, b in polygon_edges(polygon))
+
+
 def signed_double_area(a: Corner, b: Corner, c: Corner) -> float:
     """Return twice the signed area of the triangle; positive if a, b, c are counterclockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -8,7 +8,7 @@ import numpy as np
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Polygon, Pose3, Vector
-from simscen.core.geometry.polygons import polygon_contains
+from simscen.core.geometry.polygons import inscribed_radius, polygon_contains
 from simscen.core.geometry.shapes import Solid, Sphere
 from simscen.model.robot import Drive, Limits, Omnidirectional, RobotSpec
 from simscen.sim.body.inertia import MassProperties, combine
@@ -60,6 +60,11 @@ class RobotBody:
     def tires(self) -> tuple[Solid, ...]:
         """One sphere for each wheel, with the radius and center of the wheel."""
         return tuple(Solid(Sphere(wheel.radius), Pose3(wheel.x, wheel.y, wheel.radius)) for wheel in self.wheels)
+
+    @property
+    def inscribed_radius(self) -> float:
+        """Radius in m of the largest circle around the base frame's origin inside the footprint."""
+        return self.radius if self.radius is not None else inscribed_radius(self.footprint)
 
     @property
     def circumscribed_radius(self) -> float:

@@ -18,7 +18,7 @@ from simscen.model.localizers import Amcl
 from simscen.model.robot import SkidSteer
 from simscen.model.scenario import Physics, ScenarioSpec
 from simscen.model.sensors import InertialUnit
-from simscen.spec.places import PlaceAllowed, PoseSpec
+from simscen.spec.places import PlaceAllowed, PoseSpec, Ring
 from simscen.spec.quantities import AnyQuantity, Quantity
 
 PLAIN = {
@@ -147,3 +147,12 @@ def test_names_of_places_are_valid_for_all_poses_and_points_of_the_world() -> No
     without = {str(value) for value in found if not any(isinstance(mark, PlaceAllowed) for mark in value.marks)}
     assert without == set(NO_PLACES)
     assert len(found) > len(without)
+
+
+@pytest.mark.parametrize("repeated", [0, 2, 3])
+def test_repeated_corners_of_a_polygon_are_dropped(repeated: int) -> None:
+    """Some tools close a polygon with its first corner. An edge without length has no direction."""
+    square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+    written = [*square, square[0]] if repeated == 0 else [*square[:repeated], *square[repeated - 1 :]]
+    corners = TypeAdapter(Ring).validate_python(written)
+    assert sorted(corners) == sorted(square)

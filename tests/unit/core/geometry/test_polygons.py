@@ -8,10 +8,12 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.polygons import (
     depth_inside_polygon,
     distance_to_polygon,
+    inscribed_radius,
     points_in_polygon,
     polygon_contains,
     polygon_defect,
 )
+from simscen.stack.protocols import RobotModel
 
 L = ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))
 
@@ -58,3 +60,16 @@ def test_containment_and_distances_equal_those_of_shapely(ring, x, y):
     assert points_in_polygon(ring, np.array([[x, y]])).tolist() == [is_inside]
     assert distance_to_polygon(pose, ring) == pytest.approx(0.0 if is_inside else to_border)
     assert depth_inside_polygon(pose, ring) == pytest.approx(to_border if is_inside else -1.0)
+
+
+T_SHAPE = ((-0.35, -0.25), (0.2, -0.25), (0.2, -0.1), (0.5, -0.1), (0.5, 0.1), (0.2, 0.1), (0.2, 0.25), (-0.35, 0.25))
+L_SHAPE = ((-0.2, -0.2), (0.6, -0.2), (0.6, 0.0), (0.2, 0.0), (0.2, 0.3), (-0.2, 0.3))
+
+
+@pytest.mark.parametrize("corners", [T_SHAPE, L_SHAPE, T_SHAPE[::-1]])
+def test_inscribed_radius_is_the_distance_to_the_outline(corners: tuple[tuple[float, float], ...]) -> None:
+    """The lines through the edges of a concave outline can be nearer than the edges."""
+    expected = shapely.Polygon(corners).exterior.distance(shapely.Point(0.0, 0.0))
+    assert inscribed_radius(corners) == pytest.approx(expected)
+    robot = RobotModel(corners, None, 0.5, 0.5, 0.0, 1.0, 1.0, 1.0, 1.0)
+    assert robot.inscribed_radius == pytest.approx(expected)
