@@ -87,7 +87,8 @@ def test_robot_without_progress_fails() -> None:
 
 def test_sporadic_planning_failures_cause_no_recovery() -> None:
     """Nav2's RecoveryNode counts its retries from the last success on."""
-    d = start(rooms(), spec=StackSpec(localizer=TRUTH, planner=OmplPlanner(replanning="rate", replanning_rate=1.0)))
+    spec = OmplPlanner(type="rrt_connect", replanning="rate", replanning_rate=1.0)
+    d = start(rooms(), spec=StackSpec(localizer=TRUTH, planner=spec))
     planner, calls = d.stack.inner._navigator.plans.planner, []
     plan = planner.plan
 

@@ -84,14 +84,13 @@ def test_a_task_that_has_ended_can_be_given_a_new_goal() -> None:
 
 
 def test_replanning_at_a_rate_replans_at_that_rate() -> None:
-    d = start(
-        rooms(), spec=StackSpec(localizer=TRUTH, planner=OmplPlanner(replanning="rate", replanning_rate=0.5))
-    ).run(10)
+    planner = OmplPlanner(type="rrt_connect", replanning="rate", replanning_rate=0.5)
+    d = start(rooms(), spec=StackSpec(localizer=TRUTH, planner=planner)).run(10)
     assert reasons(d).count("rate") == pytest.approx(d.tick / 480, abs=1)
 
 
 def test_nav2_replans_through_poses_at_a_third_of_its_usual_rate() -> None:
-    spec = StackSpec(localizer=TRUTH, planner=OmplPlanner(replanning="rate"))
+    spec = StackSpec(localizer=TRUTH, planner=OmplPlanner(type="rrt_connect", replanning="rate"))
     through = [Goal("by", Pose2(3.0, 5.0), via=True, xy_tolerance=0.7), FAR]
     assert reasons(start(rooms(), spec=spec).run(6.5)).count("rate") == 6
     assert reasons(start(rooms(), *through, spec=spec).run(6.5)).count("rate") == 2

@@ -76,6 +76,7 @@ def visibility_graph(polygons, a, b, radius):
     return dijkstra(graph, directed=False, indices=0)[1]
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("seed", range(8))
 def test_shortest_path_among_random_boxes_is_that_of_a_visibility_graph_within_one_percent(seed):
     rng = np.random.default_rng(seed)
