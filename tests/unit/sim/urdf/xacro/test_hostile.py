@@ -3,6 +3,8 @@
 
 import pytest
 
+from simscen.sim.urdf.xacro import limits
+
 PYTHON_ACCESS = [
     "(lambda: 1)()",
     "().__class__.__base__.__subclasses__()",
@@ -133,9 +135,10 @@ def test_hostile_yaml_file_is_refused(refusal, content, message):
     assert message in problem.message
 
 
-def test_long_yaml_file_is_refused(refusal):
-    problem = refusal("<a v=\"${xacro.load_yaml('x.yaml')}\"/>", x__yaml="- 1\n" * 70_000)
-    assert problem.message == "${xacro.load_yaml('x.yaml')}: the value is longer than 65536"
+def test_long_yaml_file_is_refused(refusal, monkeypatch):
+    monkeypatch.setattr(limits, "MAX_LENGTH", 1000)
+    problem = refusal("<a v=\"${xacro.load_yaml('x.yaml')}\"/>", x__yaml="- 1\n" * 1001)
+    assert problem.message == "${xacro.load_yaml('x.yaml')}: the value is longer than 1000"
 
 
 BOMBS = {
