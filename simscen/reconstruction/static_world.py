@@ -11,7 +11,15 @@ from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, Occ
 from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Array, Pose2
-from simscen.reconstruction.drive.recorded_drive import Indices, Mask, RecordedDrive, Scans
+from simscen.reconstruction.drive.recorded_drive import (
+    MAX_STEP_M,
+    STEP_S,
+    Indices,
+    Mask,
+    RecordedDrive,
+    Scans,
+    TimedValues,
+)
 from simscen.worlds.extent import placed_solids
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.maps.occupancy_map import draw_map, walls_from_map
@@ -20,7 +28,7 @@ from simscen.worlds.raycasting.ray_scene import RayScene
 MAP_WALL_HEIGHT_M = 1.0
 """Height of the walls that are made from the occupied cells of a map."""
 UNMAPPED_DISTANCE_M = 1e3
-"""Result of `StaticWorld.distance_to_walls` for points outside of the map."""
+"""Result of `StaticWorld.distance_to_walls` for points outside of the map, and for a map without occupied cells."""
 
 
 class StaticWorld:
@@ -34,8 +42,10 @@ class StaticWorld:
         self._scene = RayScene(mesh)
         self.grid: OccupancyGrid = draw_map(replace(world, solids=solids), mesh, height)
         self.built = BuiltWorld(world, mesh, self.grid)
-        distances = distance_transform_edt(self.grid.cells != OCCUPIED)
-        self._distances: Array = np.asarray(distances) * self.grid.resolution
+        is_occupied = self.grid.cells == OCCUPIED
+        self._distances: Array = np.full(is_occupied.shape, UNMAPPED_DISTANCE_M)
+        if is_occupied.any():
+            self._distances = np.asarray(distance_transform_edt(~is_occupied)) * self.grid.resolution
 
     def ranges_from(self, poses: Array, angles: Array, max_range: float) -> Array:
         """Return the ranges (n, beams) in m from lidar `poses` (n, 3) in the map frame; inf beyond `max_range` m.
@@ -128,9 +138,24 @@ def map_from_scans(drive: RecordedDrive) -> OccupancyGrid:
     for row in range(len(scans)):
         if hits[row].any():
             _add_scan(odds, poses[row, :2] - low, ends[row][hits[row]] - low)
-    odds[_driven_cells(odds.shape, path - low)] = -MAX_LOG_ODDS
+    odds[_driven_cells(odds.shape, _driven_path(drive.poses) - low)] = -MAX_LOG_ODDS
     cells = np.where(odds > MIN_OCCUPIED_LOG_ODDS, OCCUPIED, np.where(odds < MAX_FREE_LOG_ODDS, FREE, UNKNOWN))
     return OccupancyGrid(cells.astype(np.int8), RESOLUTION_M, Pose2(float(low[0]), float(low[1]), 0.0))
+
+
+def _driven_path(poses: TimedValues) -> Array:
+    """Return points (n, 2) at most RESOLUTION_M apart on the path through the poses.
+
+    Jumps, which are longer than MAX_STEP_M or faster than MAX_STEP_M in STEP_S, get no points between their ends.
+    """
+    steps, seconds = np.diff(poses.values[:, :2], axis=0), np.diff(poses.times)
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    is_jump = lengths > MAX_STEP_M * np.minimum(seconds / STEP_S, 1.0)
+    parts = np.where(is_jump, 1, np.ceil(lengths / RESOLUTION_M)).astype(int)
+    starts = np.repeat(np.arange(len(parts)), parts)
+    shares = (np.arange(len(starts)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[starts]
+    points = poses.values[starts, :2] + shares[:, None] * steps[starts]
+    return np.concatenate((points, poses.values[-1:, :2]))
 
 
 def _driven_cells(shape: tuple[int, ...], path: Array) -> Mask:

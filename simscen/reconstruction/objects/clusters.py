@@ -81,14 +81,13 @@ def _clusters(compared: ComparedScans, row: int, beams: Indices) -> Iterator[Sca
     step = abs(float(compared.scans.angles[1] - compared.scans.angles[0])) if len(compared.scans.angles) > 1 else 0.0
     ranges, points = compared.scans.ranges[row], compared.ends[row]
     total = len(ranges)
-    gaps = np.hypot(*(points[beams[1:]] - points[beams[:-1]]).T)
-    limit = np.maximum(MAX_GAP_M, MAX_GAP_BEAMS * step * np.minimum(ranges[beams[1:]], ranges[beams[:-1]]))
-    apart = (np.diff(beams) > MAX_SKIPPED_BEAMS + 1) | (gaps > limit)
-    groups = np.split(beams, np.flatnonzero(apart) + 1)
+    following = np.roll(beams, -1)
+    gaps = np.hypot(*(points[following] - points[beams]).T)
+    limit = np.maximum(MAX_GAP_M, MAX_GAP_BEAMS * step * np.minimum(ranges[following], ranges[beams]))
+    apart = ((following - beams) % total > MAX_SKIPPED_BEAMS + 1) | (gaps > limit)
+    groups = np.split(beams, np.flatnonzero(apart[:-1]) + 1)
     full = abs(total * step - 2 * np.pi) < 1.5 * step
-    seam = points[beams[0]] - points[beams[-1]]
-    is_near = beams[0] + total - beams[-1] <= MAX_SKIPPED_BEAMS + 1 and np.hypot(*seam) <= MAX_GAP_M
-    if full and is_near and len(groups) > 1:
+    if full and not apart[-1] and len(groups) > 1:
         groups = [np.concatenate((groups[-1], groups[0])), *groups[1:-1]]
     for group in groups:
         if len(group) < MIN_HITS:
