@@ -1,6 +1,7 @@
 """Test of `simscen run --watch` on the command line."""
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -71,3 +72,25 @@ def test_watch_reruns_affected_scenarios_and_reacts_to_keys(watch: Watch, tmp_pa
     assert "1 passed, 1 failed" in watch.until("q = quit")
     watch.press("q")
     assert watch.process.wait(timeout=60) == 1
+
+
+def begin_long_run(watch: Watch, tmp_path: Path) -> None:
+    """Wait for the first session, and begin a session that takes minutes."""
+    watch.until("q = quit")
+    long_run = SCENARIO.replace("time_limit: 0.5 s", "time_limit: 8000 s\nlinger: 3600 s")
+    (tmp_path / "a.scenario.yaml").write_text(long_run)
+    watch.until("1 scenario ·")
+
+
+def test_sigterm_ends_the_running_session_with_its_reports(watch: Watch, tmp_path: Path) -> None:
+    begin_long_run(watch, tmp_path)
+    watch.process.send_signal(signal.SIGTERM)
+    output, _ = watch.process.communicate(timeout=30)
+    assert "interrupted: 0 passed" in output.decode()
+    assert watch.process.returncode == 143
+
+
+def test_running_session_ends_if_watch_mode_is_killed(watch: Watch, tmp_path: Path) -> None:
+    begin_long_run(watch, tmp_path)
+    watch.process.kill()
+    watch.process.communicate(timeout=30)  # returns when the last process that can write the output has ended

@@ -24,6 +24,7 @@ from simscen.loading.files.discovery import default_root, discover
 from simscen.loading.loaded import LoadedScenario
 from simscen.report.display_text import number_with_noun
 from simscen.report.journal_reader import JOURNAL_FILE
+from simscen.run.process.isolation import die_with_parent
 from simscen.run.reproducibility import scenario_files
 
 FileStamps = dict[Path, tuple[int, int, int] | None]
@@ -194,8 +195,10 @@ def _run_in_child(request: SessionRequest, state: WatchState) -> tuple[int, File
     reading, writing = os.pipe()
     sys.stdout.flush()
     sys.stderr.flush()
+    watching_process = os.getpid()
     pid = os.fork()
     if pid == 0:
+        die_with_parent(watching_process)
         os.close(reading)
         with os.fdopen(writing, "w", encoding="utf-8") as pipe:
             report = WatchReporter(pipe)
@@ -205,7 +208,9 @@ def _run_in_child(request: SessionRequest, state: WatchState) -> tuple[int, File
                 report.invalid_files(error.problems)
                 raise
     os.close(writing)
-    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)  # the child process handles Ctrl-C
+    # A terminal sends SIGINT and SIGHUP also to the child process, which handles them.
+    handlers = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGHUP)}
+    handlers[signal.SIGTERM] = signal.signal(signal.SIGTERM, lambda number, _: os.kill(pid, number))
     try:
         with os.fdopen(reading, encoding="utf-8") as lines:
             state.begin(request.paths)
@@ -213,7 +218,8 @@ def _run_in_child(request: SessionRequest, state: WatchState) -> tuple[int, File
                 state.update(line)
             code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
     finally:
-        signal.signal(signal.SIGINT, handler)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
     state.end(code)
     now = file_stamps(state.files)
     return code, {**now, **{file: stamp for file, stamp in stamps_before.items() if file in now}}
