@@ -52,8 +52,9 @@ def session_comparison_lines(comparison: Comparison, links: Links, is_worse: boo
     yield from _outcome_table(comparison, "", None, changed_only=True)
     yield (StyledText(""),)
     newly_fails = any(flip.failed == against.stack for flip in against.flips)
+    is_doubtful = newly_fails or against.error_pairs or not against.pairs
     yield (
-        StyledText(session_conclusion(against, is_worse), "bad" if is_worse else "warning" if newly_fails else "good"),
+        StyledText(session_conclusion(against, is_worse), "bad" if is_worse else "warning" if is_doubtful else "good"),
     )
 
 
@@ -67,6 +68,8 @@ def with_changed_metrics(against: BaselineComparison) -> BaselineComparison:
 
 def session_conclusion(against: BaselineComparison, is_worse: bool) -> str:
     """Return whether a session is significantly worse than the baseline, and otherwise how many runs newly fail."""
+    if not against.pairs:
+        return f"nothing was compared: {', '.join(_exclusions(against)) or 'there are no runs'}"
     newly_failed = sum(flip.failed == against.stack for flip in against.flips)
     if is_worse:
         return f"{against.stack} is significantly worse"
@@ -87,12 +90,17 @@ def exclusion_notes(against: BaselineComparison) -> list[str]:
     if against.pairs_with_different_arrivals:
         pairs = number_with_noun(against.pairs_with_different_arrivals, "pair")
         notes.append(f"the arrivals differ in {pairs}, so only their collisions are compared")
+    excluded = _exclusions(against)
+    return [*notes, f"left out: {', '.join(excluded)}"] if excluded else notes
+
+
+def _exclusions(against: BaselineComparison) -> list[str]:
     excluded = []
     if against.error_pairs:
         excluded.append(f"{number_with_noun(against.error_pairs, 'pair')} with an error")
     if against.unpaired_runs:
         excluded.append(f"{number_with_noun(against.unpaired_runs, 'run')} without a partner")
-    return [*notes, f"left out: {', '.join(excluded)}"] if excluded else notes
+    return excluded
 
 
 def comparison_headline(baseline: str, against: BaselineComparison) -> str:

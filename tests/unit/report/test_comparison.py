@@ -8,7 +8,8 @@ import pytest
 
 from simscen.core.records.comparison import BaselineComparison, Comparison, Flip, MetricDifference, OutcomeCounts
 from simscen.core.records.session_events import SessionFinished, SessionStarted
-from simscen.report.comparison import comparison_lines, difference_cells, shorten
+from simscen.report.comparison import comparison_lines, difference_cells, session_comparison_lines, shorten
+from simscen.report.comparison_markup import session_comparison_markdown
 from simscen.report.console_reporter import text_reporter
 from simscen.report.display_text import plain_text
 from simscen.report.github import summary_markdown
@@ -115,6 +116,23 @@ def test_comparison_in_results_json(comparison, passed) -> None:
         json.loads("".join(json_parts([passed], "", comparison)))["comparison"]["against"][0]["flips"][0]["seed"] == 3
     )
     assert "comparison" not in json.loads("".join(json_parts([passed])))
+
+
+@pytest.mark.parametrize(
+    ("against", "conclusion"),
+    [
+        (BaselineComparison("candidate", 0, 5, 0, 0, (), 1.0, ()), "nothing was compared: 5 pairs with an error"),
+        (BaselineComparison("candidate", 4, 1, 0, 0, (), 1.0, ()), "candidate is not significantly worse in 4 pairs"),
+    ],
+)
+def test_comparison_with_crashed_runs_is_not_good(against, conclusion) -> None:
+    outcomes = {"baseline": OutcomeCounts(5), "candidate": OutcomeCounts(against.pairs, 0, against.error_pairs)}
+    sessions = Comparison({"baseline": "a", "candidate": "b"}, {"goal": outcomes}, (against,))
+    *_, last = session_comparison_lines(sessions, {}, is_worse=False)
+    assert plain_text(last) == conclusion
+    assert last[0].role == "warning"
+    markdown = session_comparison_markdown(sessions, {}, is_worse=False)
+    assert markdown[0] == f"### simscen: {conclusion}"
 
 
 def test_small_numbers_have_one_more_digit() -> None:
