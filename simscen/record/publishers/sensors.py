@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping
+from itertools import chain, count
 from typing import Any, NamedTuple
 
 from simscen.core.clock import Clock, Stamp
@@ -28,7 +29,8 @@ class SensorPublisher:
     """Publishes readings when the stack receives them. Stamps are the times of measurement.
 
     The first sensor of a type has the default topic, e.g. /scan. Further sensors of this type, and all cameras, have
-    their name in front, e.g. /rear/scan.
+    their name in front, e.g. /rear/scan. Characters that ROS names cannot have become `_`, and equal results get
+    numbers.
 
     Args:
         mounts: Poses of sensors on the base, by sensor name.
@@ -62,6 +64,7 @@ class SensorPublisher:
             Image: self._write_image,
         }
         self._used_defaults: set[str] = set()
+        self._namespaces: dict[str, str] = {}
         self._frames = frames
         self._pack_odometry = message_templates.odometry_with_covariance(self._frames.odom, self._frames.base).packer()
         self._mounts = dict(mounts)
@@ -89,7 +92,7 @@ class SensorPublisher:
 
     def _topics_of(self, sensor: str, kind: str) -> list[Topic]:
         if kind == "Image":
-            return [image for image, _ in _image_topics(sensor)]
+            return [image for image, _ in self._image_topics(sensor)]
         return [self._topic(sensor, kind)] if kind in _DEFAULT_TOPICS else []
 
     def _write_odometry(self, now: int, odometry: Odometry) -> None:
@@ -144,7 +147,7 @@ class SensorPublisher:
 
     def _write_image(self, now: int, image: Image) -> None:
         frame, stamp = self._frames.sensor_frame(image.sensor), self._time.stamp(image.tick)
-        for topic, is_depth in _image_topics(image.sensor):
+        for topic, is_depth in self._image_topics(image.sensor):
             pixels = image.depth if is_depth else image.rgb
             if pixels.size:
                 self._out.publish(topic, now, encode.image(frame, stamp, pixels))
@@ -160,10 +163,25 @@ class SensorPublisher:
         topic = self._topics.get((sensor, kind))
         if topic is None:
             default, message_type = _DEFAULT_TOPICS[kind]
-            name = f"/{_ros_name(sensor)}/{default}" if default in self._used_defaults else f"/{default}"
+            name = f"/{self._namespace(sensor)}/{default}" if default in self._used_defaults else f"/{default}"
             self._used_defaults.add(default)
             topic = self._topics[sensor, kind] = Topic(name, message_type)
         return topic
+
+    def _image_topics(self, sensor: str) -> list[tuple[Topic, bool]]:
+        """Return the topics of a camera, each with whether it contains depths instead of colors."""
+        root = f"/{self._namespace(sensor)}"
+        names = ("image_raw", False), ("depth/image_raw", True)
+        return [(Topic(f"{root}/{name}", topics.IMAGE_TYPE), is_depth) for name, is_depth in names]
+
+    def _namespace(self, sensor: str) -> str:
+        """Return the namespace of a sensor's topics, with a number if another sensor has the same ROS name."""
+        if sensor not in self._namespaces:
+            name = _ros_name(sensor)
+            numbered = (f"{name}_{number}" for number in count(2))
+            used = set(self._namespaces.values())
+            self._namespaces[sensor] = next(one for one in chain([name], numbered) if one not in used)
+        return self._namespaces[sensor]
 
 
 class _OdometryWriters(NamedTuple):
@@ -171,13 +189,6 @@ class _OdometryWriters(NamedTuple):
 
     without_map: BatchWriter
     with_map: BatchWriter
-
-
-def _image_topics(sensor: str) -> list[tuple[Topic, bool]]:
-    """Return the topics of a camera, each with whether it contains depths instead of colors."""
-    root = f"/{_ros_name(sensor)}"
-    names = ("image_raw", False), ("depth/image_raw", True)
-    return [(Topic(f"{root}/{name}", topics.IMAGE_TYPE), is_depth) for name, is_depth in names]
 
 
 def _ros_name(text: str) -> str:

@@ -24,6 +24,8 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.records.trace import Decision, Moment
+from simscen.record.frame_names import RobotFrames
+from simscen.record.publishers.sensors import SensorPublisher
 from simscen.record.recorder import Recorder
 
 HERE = Path(__file__).parent
@@ -65,6 +67,20 @@ def read(path: Path) -> dict[str, list[tuple[int, Any]]]:
 
 def test_rosbags_decodes_every_topic(read: dict[str, list[tuple[int, Any]]]) -> None:
     assert set(read) == TOPICS
+
+
+def test_sensors_with_equal_ros_names_have_different_topics() -> None:
+    sensors = {"front": "Bump", "left bumper": "Bump", "left_bumper": "Bump", "a b": "Image", "a.b": "Image"}
+    publisher = SensorPublisher(None, CLOCK, None, {}, sensors, RobotFrames())  # type: ignore[arg-type]
+    assert [(sensor, topic.name) for sensor, topic in publisher.sensor_topics] == [
+        ("front", "/bumper"),
+        ("left bumper", "/left_bumper/bumper"),
+        ("left_bumper", "/left_bumper_2/bumper"),
+        ("a b", "/a_b/image_raw"),
+        ("a b", "/a_b/depth/image_raw"),
+        ("a.b", "/a_b_2/image_raw"),
+        ("a.b", "/a_b_2/depth/image_raw"),
+    ]
 
 
 def test_mcap_ros2_decodes_every_message(path: Path) -> None:
