@@ -76,12 +76,14 @@ class ForkServerDeath:
         was_preparing: Whether the fork server was preparing this job.
         timed_out: Whether the fork server was killed because it did not respond while it prepared this job.
         output: Last part of the fork server's output.
+        has_started: Whether the fork server had sent a message.
     """
 
     description: str
     was_preparing: bool
     timed_out: bool
     output: str
+    has_started: bool = True
 
 
 def pack_message(message: Job | str) -> bytes:

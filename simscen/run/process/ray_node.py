@@ -16,7 +16,7 @@ from simscen.core.version import __version__
 from simscen.loading.plugins import requirement_of
 from simscen.run.platform_fingerprint import source_digest
 from simscen.run.process.job_transfer import PackedJob, Unpacker
-from simscen.run.process.jobs import Ended, Job, JobUpdate
+from simscen.run.process.jobs import Ended, ForkServerDeath, Job, JobUpdate
 from simscen.run.process.supervisor import Supervisor
 from simscen.spec.registry import RegisteredType, find_type
 
@@ -84,11 +84,14 @@ class NodeRunner:
     def run(self, queue: Any, runner: str, plugins: Sequence[RegisteredType]) -> Iterator[NodeUpdate]:
         """Run jobs from the queue until it is empty, and yield their updates and files.
 
-        `runner` is the name of this runner. Raises UsageError if a plug-in is missing or has another version here.
+        `runner` is the name of this runner. Raises UsageError if the fork server cannot start, so that it does not
+        take the jobs of other nodes, or if a plug-in is missing or has another version here.
         """
         jobs = _JobsOfQueue(lambda: self._take_job(queue, runner))
         for update in self._supervisor.run(jobs, [_installed_plugin(entry) for entry in plugins]):
             if isinstance(update, Ended):
+                if isinstance(update.end, ForkServerDeath) and not update.end.has_started:
+                    raise UsageError(f"the fork server cannot start: it {update.end.description}\n{update.end.output}")
                 folder = self._output_folder(update.number)
                 yield from _file_chunks(update.number, folder)
                 shutil.rmtree(folder, ignore_errors=True)

@@ -7,6 +7,7 @@ import json
 import signal
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import chain
 from typing import Any
 
 from simscen.run.process.fork_server_process import ForkServerProcess, ProcessDeath, Unresponsive
@@ -72,12 +73,17 @@ class Supervisor:
         plugins: Sequence[RegisteredType] = (),
         should_continue: Callable[[], bool] = lambda: True,
     ) -> Iterator[JobUpdate]:
-        """Run jobs and yield their updates (see `Backend.run`). Takes a job from `jobs` only when it can start."""
+        """Run jobs and yield their updates (see `Backend.run`).
+
+        Takes a job from `jobs` only when it can start, or to fail it because the fork server cannot start.
+        """
         if not self._plugins.issuperset(plugins):
             self.close()
             self._plugins |= frozenset(plugins)
         self._jobs, self._should_continue = iter(jobs), should_continue
         self._reported, self._suspect_numbers = set(), set()
+        self._retries.clear()
+        self._suspects.clear()
         try:
             while (job := self._next_job()) is not None:
                 if self._server is None:
@@ -164,14 +170,13 @@ class Supervisor:
         # A SIGKILL comes from outside, perhaps from another job; other exits are caused by the fork server itself.
         culprit = in_preparation if was_unresponsive or death.code != -signal.SIGKILL or len(running) == 1 else None
         description = f"did not respond and {death.description}" if was_unresponsive else death.description
-        if not self._responded:  # it could not start
-            running += [*self._suspects, *self._retries, *self._jobs]
-            self._suspects.clear()
-            self._retries.clear()
-        for job in running:
+        # If the fork server cannot start, all other jobs fail as well.
+        others = () if self._responded else iter(self._next_job, None)
+        for job in chain(running, others):
             if job is culprit or job.number in self._suspect_numbers or not self._responded:
                 timed_out = was_unresponsive and job is culprit
-                yield Ended(job.number, ForkServerDeath(description, job is in_preparation, timed_out, death.output))
+                end = ForkServerDeath(description, job is in_preparation, timed_out, death.output, self._responded)
+                yield Ended(job.number, end)
             elif culprit is not None:
                 self._retries.appendleft(job)
             else:

@@ -1,12 +1,15 @@
 """Jobs that were packed on one machine and run on another: paths, files, and equal results."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from simscen.core.errors import UsageError
 from simscen.core.version import PACKAGE
 from simscen.loading.scenario import load_scenario
 from simscen.run.preparation import prepare
@@ -98,6 +101,19 @@ def test_a_queue_gives_each_job_to_one_runner_and_records_which() -> None:
     assert queue.taken_by("b") == [1]
     queue.clear()
     assert queue.taken_by("a") == []
+
+
+def test_a_node_whose_fork_server_cannot_start_leaves_the_jobs_to_other_nodes(job: Job) -> None:
+    queue = JobQueue()
+    for number in range(5):
+        queue.add(pack(replace(job, number=number), send))
+    remote_queue = SimpleNamespace(take=SimpleNamespace(remote=queue.take))
+    runner = NodeRunner(2, ("-c", "import no_such_module"), receive)
+    with pytest.raises(UsageError, match=r"(?s)cannot start: it exited 1.*No module named 'no_such_module'"):
+        list(runner.run(remote_queue, "a", ()))
+    runner.close()
+    assert queue.taken_by("a") == [0, 1]
+    assert queue.take("b").number == 2
 
 
 def test_large_files_are_sent_in_pieces(job: Job, tmp_path: Path, monkeypatch) -> None:

@@ -168,6 +168,38 @@ def test_a_fork_server_that_cannot_start_is_an_error_of_every_run_with_its_reaso
     assert all("No module named 'no_such_module'" in answer.result.error.tail for answer in answers.values())
 
 
+def test_jobs_are_not_taken_after_the_session_stops_because_the_fork_server_cannot_start(tmp_path):
+    taken, ended = [], []
+
+    def jobs():
+        for job in planned_jobs(tmp_path, *["fine"] * 5):
+            taken.append(job.number)
+            yield job
+
+    with Supervisor(2, ("-c", "import no_such_module")) as backend:
+        ended += [update.number for update in backend.run(jobs(), should_continue=lambda: len(taken) < 3)]
+    assert taken == ended == [0, 1, 2]
+
+
+def test_a_job_that_was_to_be_repeated_when_a_session_stopped_is_not_run_in_the_next_session(tmp_path):
+    stopped = []
+    with Supervisor(2, ENTRY) as backend:
+        for update in backend.run(planned_jobs(tmp_path, "hang", "prepare-segfault"), (), lambda: not stopped):
+            if isinstance(update, Ended):
+                stopped.append(update.number)
+        assert stopped == [1]
+        assert list(backend.run([])) == []
+
+
+def planned_jobs(tmp_path, *faults):
+    scenarios = []
+    for number, fault in enumerate(faults):
+        file = tmp_path / f"{number}-{fault}.scenario.yaml"
+        file.write_text(SCENARIO.format(fault=fault))
+        scenarios.append(load_scenario(file, tmp_path))
+    return plan_jobs(scenarios, SessionOptions(wall_limit=5.0), tmp_path / "out")
+
+
 def test_stray_bytes_on_the_pipes_are_ignored(session):
     answers, _ = session("stray-bytes", "fine", workers=2)
     assert answers["stray-bytes"].outcome is Outcome.PASSED
