@@ -9,7 +9,7 @@ from typing import NamedTuple
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.loading.files.paths import PathSandbox
 from simscen.loading.yaml.library import Library
-from simscen.loading.yaml.textfile import read_text
+from simscen.loading.yaml.textfile import decode, read_bytes
 from simscen.run.sessions.output_folder import write_atomically
 
 
@@ -73,10 +73,12 @@ class Document:
 
     def read(self) -> Content:
         """Return the content of the file. Raises InvalidInput if the file is not text or mixes kinds of line breaks."""
-        text = read_text(self.path, self.display_name)
+        raw = read_bytes(self.path, self.display_name)
+        if isinstance(raw, Problem):
+            raise InvalidInput([raw])
+        text = decode(raw, self.display_name)
         if isinstance(text, Problem):
             raise InvalidInput([text])
-        raw = self.path.read_bytes()
         breaks = {"\r\n": raw.count(b"\r\n"), "\n": raw.count(b"\n") - raw.count(b"\r\n")}
         if (breaks["\r\n"] and breaks["\n"]) or raw.count(b"\r") > breaks["\r\n"]:
             hint = "convert the file to one kind, for example with dos2unix"
@@ -89,11 +91,16 @@ class Document:
         """Replace the content of the file atomically and return its new version.
 
         `version` is the version that was edited. Raises ChangedMeanwhile if the file now has another version and
-        `overwrite` is False. Raises UsageError if the file cannot be written.
+        `overwrite` is False. Raises UsageError if the file cannot be written, or the text is not valid Unicode.
         """
         if not overwrite:
             self._require_version(version)
-        data = self._mark + text.replace("\n", self._line_break).encode()
+        try:
+            data = self._mark + text.replace("\n", self._line_break).encode()
+        except UnicodeEncodeError as error:
+            character = f"U+{ord(error.object[error.start]):04X}"
+            message = f"{self.display_name}: cannot be written: {character} is not a valid character; remove it"
+            raise UsageError(message) from error
         try:
             mode = stat.S_IMODE(self.path.stat().st_mode) if self.path.exists() else None
             write_atomically(self.path, data)
@@ -105,12 +112,15 @@ class Document:
 
     def _require_version(self, version: str) -> None:
         try:
-            now = _version(self.path.read_bytes())
-        except OSError:
-            now = NEW
+            raw = self.path.read_bytes()
+            now = _version(raw)
+        except (FileNotFoundError, NotADirectoryError):
+            raw, now = b"", NEW
+        except OSError as error:
+            raise UsageError(f"{self.display_name}: cannot be read: {error.strerror or error}") from error
         if now == version:
             return
-        text = read_text(self.path, self.display_name) if now != NEW else ""
+        text = decode(raw, self.display_name)
         what = "was created" if version == NEW else "was deleted" if now == NEW else "was changed by another program"
         hint = "reload it, or overwrite it with your text"
         message = f"{self.display_name} {what} since it was opened here; {hint}"

@@ -22,13 +22,34 @@ _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\u202a-\u
 
 def read_text(path: Path, display_name: str) -> str | Problem:
     """Return the text of a regular UTF-8 file of at most 1 MiB without control characters, or a problem."""
+    raw = read_bytes(path, display_name)
+    return raw if isinstance(raw, Problem) else decode(raw, display_name)
+
+
+def read_bytes(path: Path, display_name: str) -> bytes | Problem:
+    """Return the content of a regular file of at most 1 MiB that is not an image, or a problem."""
     try:
         raw = _read_bytes(path)
     except OSError as error:
         return Problem(display_name, 0, 0, "SC001", os_error_reason(error))
-    if isinstance(raw, str):
-        return Problem(display_name, 0, 0, "SC001", raw)
-    return _decode(raw, display_name)
+    return Problem(display_name, 0, 0, "SC001", raw) if isinstance(raw, str) else raw
+
+
+def decode(raw: bytes, display_name: str) -> str | Problem:
+    """Return the text of the bytes in a file, or the problem of a wrong encoding or a control character."""
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = _normalize_line_breaks(raw[: error.start].decode("utf-8-sig", errors="replace"))
+        line, column = _position(before, len(before))
+        hint = "save the file as UTF-8" + (" (it looks like UTF-16)" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "")
+        return Problem(display_name, line, column, "SC002", f"not valid UTF-8 at byte {error.start}", hint)
+    text = _normalize_line_breaks(text)
+    if control := _CONTROL.search(text):
+        line, column = _position(text, control.start())
+        message = f"control character U+{ord(control[0]):04X}"
+        return Problem(display_name, line, column, "SC002", message, "remove it, or write an escape such as \\n")
+    return text
 
 
 def with_source_line(problem: Problem, texts: Mapping[str, str]) -> Problem:
@@ -63,23 +84,6 @@ def _read_bytes(path: Path) -> bytes | str:
     if _IMAGE_START.match(raw):
         return "an image, not a text; if it is the image of a map, name the YAML file of the map"
     return raw if len(raw) <= MAX_FILE_BYTES else "larger than 1 MiB"
-
-
-def _decode(raw: bytes, display_name: str) -> str | Problem:
-    """Return the text of the bytes in a file, or the problem of a wrong encoding or a control character."""
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        before = _normalize_line_breaks(raw[: error.start].decode("utf-8-sig", errors="replace"))
-        line, column = _position(before, len(before))
-        hint = "save the file as UTF-8" + (" (it looks like UTF-16)" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "")
-        return Problem(display_name, line, column, "SC002", f"not valid UTF-8 at byte {error.start}", hint)
-    text = _normalize_line_breaks(text)
-    if control := _CONTROL.search(text):
-        line, column = _position(text, control.start())
-        message = f"control character U+{ord(control[0]):04X}"
-        return Problem(display_name, line, column, "SC002", message, "remove it, or write an escape such as \\n")
-    return text
 
 
 def _normalize_line_breaks(text: str) -> str:

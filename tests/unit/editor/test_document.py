@@ -7,6 +7,7 @@ import pytest
 
 from simscen.core.errors import InvalidInput, UsageError
 from simscen.editor.document import NEW, ChangedMeanwhile, Document
+from simscen.loading.yaml.textfile import decode
 
 
 @pytest.mark.parametrize("raw", [b"a: 1\nb: 2\n", b"a: 1\r\nb: 2\r\n", b"\xef\xbb\xbfa: 1\nb: 2", "a: ü\n".encode()])
@@ -71,3 +72,53 @@ def test_missing_folder_is_an_error_with_a_reason(tmp_path: Path) -> None:
     blocked.write_text("")
     with pytest.raises(UsageError, match="cannot be written"):
         Document(blocked / "a.yaml", "a.yaml").save("a: 1\n", NEW)
+
+
+def test_file_that_changes_while_it_is_read_is_not_overwritten(tmp_path: Path, monkeypatch) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text("mine\n")
+    document = Document(file, "a.yaml")
+
+    def decode_slowly(raw: bytes, display_name: str) -> object:
+        file.write_text("theirs\n")
+        return decode(raw, display_name)
+
+    monkeypatch.setattr("simscen.editor.document.decode", decode_slowly)
+    text, version = document.read()
+    assert text == "mine\n"
+    with pytest.raises(ChangedMeanwhile) as refused:
+        document.save("mine, edited\n", version)
+    assert refused.value.content.text == "theirs\n"
+    assert file.read_text() == "theirs\n"
+
+
+def test_file_that_is_deleted_while_it_is_read_has_the_content_that_was_read(tmp_path: Path, monkeypatch) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text("a: 1\n")
+
+    def decode_after_deletion(raw: bytes, display_name: str) -> object:
+        file.unlink()
+        return decode(raw, display_name)
+
+    monkeypatch.setattr("simscen.editor.document.decode", decode_after_deletion)
+    assert Document(file, "a.yaml").read().text == "a: 1\n"
+
+
+def test_unreadable_file_is_not_replaced_by_a_new_one(tmp_path: Path, monkeypatch) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text("theirs\n")
+
+    def refuse(path: Path) -> bytes:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_bytes", refuse)
+    with pytest.raises(UsageError, match=r"a\.yaml: cannot be read: Permission denied"):
+        Document(file, "a.yaml").save("mine\n", NEW)
+    assert file.read_text() == "theirs\n"
+
+
+def test_text_with_a_lone_surrogate_is_not_saved(tmp_path: Path) -> None:
+    file = tmp_path / "a.yaml"
+    with pytest.raises(UsageError, match=r"U\+D800 is not a valid character"):
+        Document(file, "a.yaml").save("x: \ud800\n", NEW)
+    assert not file.exists()
