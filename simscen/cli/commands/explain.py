@@ -14,6 +14,7 @@ from simscen.cli.diagnostics import print_text
 from simscen.core.errors import UsageError
 from simscen.loading.codes import CODES
 from simscen.loading.schema.messages import quoted, suggestion
+from simscen.spec.registry import GROUPS, BrokenPlugin, plugin_types
 
 _ITEM_STARTS = ("- ", *HEADINGS)
 """Beginnings of lines with which a list item or a paragraph with a heading begins."""
@@ -66,11 +67,21 @@ def _topics_named(name: str) -> list[Topic]:
     ]
     found = found or key_topics(name, known)
     if not found:
+        _require_usable_type(name)
         keys = known_names(keys=True) if "." in name else [field.key for topic in known for field in topic.fields]
         hint = suggestion(name, [*known_names(), *keys])
         advice = hint if hint.startswith("did") else "run `simscen explain` for a list"
         raise UsageError(f"unknown name {quoted(name)}; {advice}")
     return found
+
+
+def _require_usable_type(name: str) -> None:
+    """Raise UsageError if an installed package adds a type with this name that cannot be used."""
+    for entry in (entry for group in GROUPS for entry in plugin_types(group) if entry.name == name):
+        try:
+            entry.load()
+        except BrokenPlugin as error:
+            raise UsageError(f"{error}; {error.hint}") from None
 
 
 def _overview(width: int) -> str:

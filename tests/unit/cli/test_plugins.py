@@ -78,6 +78,9 @@ def test_broken_package_affects_only_files_that_use_it(simscen, packages, tmp_pa
     assert simscen("validate", "good.scenario.yaml").code == 0
     assert simscen("schema").code == 0
     assert simscen("explain", "speed").code == 0
+    explained = simscen("explain", "hello")
+    assert explained.code == 2
+    assert "criterion `hello` of hello 1.0 cannot be used: " in explained.err
     done = simscen("validate", ".")
     assert done.code == 2
     assert "uses.scenario.yaml:10:16: error[SC019]" in done.out + done.err
