@@ -16,6 +16,7 @@ from simscen.loading.variations.conditions import (
     Condition,
     ConditionError,
     all_hold,
+    condition_keys,
     parse_condition,
     written_value,
 )
@@ -23,7 +24,7 @@ from simscen.loading.variations.covering_arrays import Row, covering_array
 from simscen.loading.variations.naming import NAME_HINT, name_error, number_of
 from simscen.loading.variations.options import Axis, Change, Option, SampledOptions, typical_options
 from simscen.loading.variations.paths import PathError, Target, resolve_path
-from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, child, entries_of, items_of, node_at
+from simscen.loading.yaml.tree import Entry, Keys, MappingNode, Node, Position, child, entries_of, items_of, node_at
 
 if TYPE_CHECKING:  # most scenarios have no variations
     from simscen.model.variations import Sampled, VariationBlock
@@ -50,7 +51,9 @@ class AxisBuilder:
             return axes, conditions
         for condition, item in zip(conditions, items, strict=True):
             for path in condition.paths:
-                if path not in self.targets and written_value(self.tree, path) is None:
+                keys = condition_keys(self.tree, path)
+                is_varied = any(_overlap(keys, target.keys) for target in self.targets.values())
+                if not is_varied and written_value(self.tree, path) is None:
                     message = f"`{path}` is neither varied nor written in the scenario"
                     self.add_problem(item.position, "SC030", message, "write its value, or vary it")
         return axes, conditions
@@ -69,14 +72,16 @@ class AxisBuilder:
         """Return the axes of a block: one for each path under `grid`, and one for each other kind, such as `pairs`."""
         grid = self._changes_by_path(child(node, "grid"), True)
         found: list[Axis] = [[Option((change,)) for change in changes] for changes in grid]
-        if block.pairwise is not None:
-            found.append(self._pairwise_options(child(node, "pairwise"), conditions))
+        pairwise = self._changes_by_path(child(node, "pairwise"), True)
+        pairwise_index = len(found)
         if block.pairs is not None:
             found.append(self._pairs_options(child(node, "pairs")))
         if block.list_ is not None:
             found.append(self._list_options(child(node, "list")))
         if block.sampled is not None:
             found.append(self._sampled_options(block.sampled, node_at(node, ("sampled", "values"))))
+        if block.pairwise is not None:
+            found.insert(pairwise_index, self._pairwise_options(pairwise, found, conditions))
         self._report_overlaps(found)
         return found
 
@@ -92,17 +97,25 @@ class AxisBuilder:
                 found.append([Change(target, value, number) for number, value in enumerate(values, start=1)])
         return found
 
-    def _pairwise_options(self, node: Node | None, conditions: Sequence[Condition]) -> list[Option]:
-        """Return options in which each pair of values of two paths occurs, unless the conditions exclude it."""
-        columns = self._changes_by_path(node, True)
+    def _pairwise_options(
+        self, columns: Sequence[Sequence[Change]], other_axes: Sequence[Axis], conditions: Sequence[Condition]
+    ) -> list[Option]:
+        """Return options in which each pair of changes of two columns occurs, unless the conditions exclude it.
+
+        A column contains the changes of one path. Conditions on values of `other_axes` of the block exclude nothing.
+        """
         if self.problems or not columns:
             return []
 
         def option(row: Row) -> Option:
             return Option(tuple(column[value] for column, value in zip(columns, row, strict=True)))
 
-        paths = {column[0].target.path for column in columns}
-        decidable = [one for one in conditions if paths.issuperset(set(one.paths) & set(self.targets))]
+        others = [target.keys for axis in other_axes for target in _targets_by_path(axis).values()]
+        decidable = [
+            condition
+            for condition in conditions
+            if not any(_overlap(condition_keys(self.tree, path), keys) for path in condition.paths for keys in others)
+        ]
 
         def is_allowed(row: Row) -> bool:
             return all_hold(decidable, self.tree, option(row).changes)
@@ -182,14 +195,10 @@ class AxisBuilder:
 
     def _report_overlaps(self, axes: Sequence[Axis]) -> None:
         """Report paths of different axes that lead to the same value, or to a value and to a part of it."""
-        targets = [
-            {change.target.path: change.target for option in typical_options(axis) for change in option.changes}
-            for axis in axes
-        ]
+        targets = [_targets_by_path(axis) for axis in axes]
         for first, second in combinations(targets, 2):
             for one, other in product(first.values(), second.values()):
-                shorter = min(len(one.keys), len(other.keys))
-                if one.keys[:shorter] == other.keys[:shorter]:
+                if _overlap(one.keys, other.keys):
                     same = len(one.keys) == len(other.keys)
                     what = "change the same value" if same else "overlap: one is part of the other"
                     self.add_problem(other.position, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
@@ -199,3 +208,13 @@ class AxisBuilder:
         problem = Problem(*position, code=code, message=message, hint=hint)
         if problem not in self.problems:
             self.problems.append(problem)
+
+
+def _targets_by_path(axis: Axis) -> dict[str, Target]:
+    return {change.target.path: change.target for option in typical_options(axis) for change in option.changes}
+
+
+def _overlap(one: Keys, other: Keys) -> bool:
+    """Return whether one of two values is the other one or a part of it. () are the keys of no value."""
+    shorter = min(len(one), len(other))
+    return shorter > 0 and one[:shorter] == other[:shorter]

@@ -14,7 +14,7 @@ from typing import Any
 from simscen.core.geometry import wrap
 from simscen.loading.variations.options import Change
 from simscen.loading.variations.paths import PathError, resolve_path
-from simscen.loading.yaml.tree import MappingNode, existing_keys, node_at
+from simscen.loading.yaml.tree import Keys, MappingNode, existing_keys, node_at
 from simscen.spec.quantities import si_number
 
 # What conditions can contain, besides `and`, `or`, and `not`.
@@ -156,16 +156,27 @@ def _evaluate_number(node: ast.expr, values: Mapping[str, Any]) -> float:
 
 def all_hold(conditions: Sequence[Condition], tree: MappingNode, changes: Iterable[Change]) -> bool:
     """Return whether all conditions hold for the scenario `tree` with these changes. Raises ConditionError."""
-    changed = {change.target.path: change.value.plain for change in changes}
     paths = {path for condition in conditions for path in condition.paths}
-    values = {path: changed[path] if path in changed else written_value(tree, path) for path in sorted(paths)}
+    changed = tree
+    for change in changes if paths else ():
+        changed = changed.with_value(change.target.keys, change.value, change.target.position)
+    values = {path: _value(changed, condition_keys(tree, path)) for path in sorted(paths)}
     return all(condition.holds(values) for condition in conditions)
+
+
+def condition_keys(tree: MappingNode, path: str) -> Keys:
+    """Return the keys of a path in a condition on the scenario `tree`; () if the path leads to no value."""
+    try:
+        return resolve_path(path, tree.position, tree).keys
+    except PathError:
+        return ()
 
 
 def written_value(tree: MappingNode, path: str) -> Any:
     """Return the YAML data at a path of the scenario; None if there is no value."""
-    try:
-        keys = resolve_path(path, tree.position, tree).keys
-    except PathError:
-        return None
-    return node_at(tree, keys).plain if existing_keys(tree, keys) == keys else None
+    return _value(tree, condition_keys(tree, path))
+
+
+def _value(tree: MappingNode, keys: Keys) -> Any:
+    """Return the YAML data at these keys; None if there is no value."""
+    return node_at(tree, keys).plain if keys and existing_keys(tree, keys) == keys else None

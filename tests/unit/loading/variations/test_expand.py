@@ -185,3 +185,27 @@ def test_a_number_without_a_variation_is_not_a_file_without_variations(write: Wr
     path = write("a.scenario.yaml", f"{scenario}variations: {{grid: {{time_limit: [50, 60]}}}}\n")
     with pytest.raises(UsageError, match=r"has no variation `variation-9`$"):
         load_scenario(path, path.parent, variation="variation-9")
+
+
+@pytest.mark.parametrize(
+    ("varied", "condition"),
+    [
+        ("goals[0].pose: [{x: 1}, {x: 5}]", "goals[0].pose.x > 2"),
+        ("goals.dock.pose.x: [1, 10]", "goals[0].pose.x > 5"),
+        ("faults.lidar.for: [3 s, 10 s]", "value('faults[0].for') > 5"),
+        ("robot.limits: [{linear: 0.4}, {linear: 0.8}]", "robot.limits.linear > 0.5"),
+        ("robot.pose.x: [1, 2]", "robot.pose.x == 2"),
+    ],
+)
+def test_a_condition_uses_the_new_value_however_its_path_is_written(varied: str, condition: str) -> None:
+    base = "robot: {}\ngoals: [{name: dock, pose: {x: 1}}]\nfaults: [{sensor: lidar, for: 3 s}]\n"
+    (only,) = expanded(f'  grid:\n    {varied}\n  require: ["{condition}"]', base)
+    assert only.changes[0].number == 2
+
+
+def test_conditions_on_other_axes_leave_out_no_pairs() -> None:
+    block = "  pairwise: {robot.pose.x: [1, 2], robot.pose.y: [3, 4]}\n  pairs: {robot.pose.yaw: [1, 5]}\n"
+    base = BASE.replace("y: 1", "y: 1, yaw: 0")
+    assert len(expanded(f"{block}  require: [robot.pose.yaw > robot.pose.y]", base)) == 4
+    with_other_path = block.replace("robot.pose.yaw:", "'robot[\"pose\"].yaw':")
+    assert len(expanded(f"{with_other_path}  require: [robot.pose.yaw > robot.pose.y]", base)) == 4
