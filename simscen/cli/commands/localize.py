@@ -50,7 +50,7 @@ def command(
     scan: Annotated[str, typer.Option(help="Topic of the scans.")] = "/scan",
     start: Annotated[
         str | None,
-        typer.Option(help="X,Y,YAW in m and rad, or `unknown`; default: first reference pose, else /initialpose."),
+        typer.Option(help="X,Y,YAW in m and rad, or `unknown`; default: from the reference, else /initialpose."),
     ] = None,
     lost: Annotated[float, typer.Option(min=0.01, help="Error in meters above which the robot counts as lost.")] = 1.0,
     seed: Annotated[int, typer.Option(min=1, max=MAX_SEED, help="Seed of the localizer.")] = 1,
@@ -126,8 +126,6 @@ def _estimate(start: str | None, log_data: LocalizationLog) -> Estimate:
     if start == "unknown":
         return Estimate(None)
     if start is None:
-        if len(log_data.truth):
-            return Estimate(Pose2(*log_data.truth[0].tolist()))
         if log_data.initial_pose is None:
             raise UsageError("the log has no initial pose; use --start X,Y,YAW or --start unknown")
         return Estimate(log_data.initial_pose)

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Pose2, wrap
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.records.trace import Ticks
 from simscen.record.foreign.raw_messages import UnusableLog, unusable_log_as_invalid_input
 from simscen.record.localization_logs.rosbag import read_rosbag_rows
-from simscen.record.localization_logs.rows import TICK_RATE_HZ, LocalizationRows
+from simscen.record.localization_logs.rows import TICK_RATE_HZ, LocalizationRows, PoseRow
 from simscen.record.localization_logs.text_formats import read_carmen_rows, read_csv_rows
 from simscen.record.log_reader import invalid_log
 
@@ -30,7 +30,8 @@ class LocalizationLog:
         ticks: Ticks (n,) of the reference poses.
         truth: Reference poses x, y, yaw (n, 3) in the map frame.
         notes: Remarks for the user.
-        initial_pose: Pose at the start of the odometry, from the first initial pose in the log; None if it has none.
+        initial_pose: Pose at the start of the odometry, from the reference poses or, without them, from the first
+            initial pose in the log; None if it has neither.
     """
 
     readings: Sequence[Odometry | Scan]
@@ -77,7 +78,30 @@ def _to_log(rows: LocalizationRows) -> LocalizationLog:
     ticks = np.array(sorted(truth), dtype=np.int64)
     poses = np.array([truth[tick] for tick in sorted(truth)], dtype=np.float64).reshape(-1, 3)
     readings = [reading for *_, reading in ordered]
-    return LocalizationLog(readings, ticks, poses, [*rows.notes, *_check_readings(readings)], _initial_pose(rows))
+    initial_pose = _first_reference_pose(rows) or _initial_pose(rows)
+    return LocalizationLog(readings, ticks, poses, [*rows.notes, *_check_readings(readings)], initial_pose)
+
+
+def _first_reference_pose(rows: LocalizationRows) -> Pose2 | None:
+    """Return the reference pose at the start of the odometry; None without reference poses.
+
+    If the reference starts later, it is moved back by the motion that odometry measured until then.
+    """
+    if not rows.truth:
+        return None
+    begin, first = rows.odometry[0], min(rows.truth, key=lambda row: row.time)
+    if first.time <= begin.time:
+        return _pose_at(rows.truth, begin.time)
+    return first.pose.compose(_pose_at(rows.odometry, first.time).between(begin.pose))
+
+
+def _pose_at(rows: Sequence[PoseRow], time: float) -> Pose2:
+    """Return the pose at a time in s, interpolated; before the first row and after the last one, their poses."""
+    ordered = sorted(rows, key=lambda row: row.time)
+    times = [row.time for row in ordered]
+    yaw = np.interp(time, times, np.unwrap([row.pose.yaw for row in ordered]))
+    x, y = (np.interp(time, times, values) for values in zip(*((r.pose.x, r.pose.y) for r in ordered), strict=True))
+    return Pose2(float(x), float(y), wrap(float(yaw)))
 
 
 def _initial_pose(rows: LocalizationRows) -> Pose2 | None:

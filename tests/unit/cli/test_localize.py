@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from simscen.core.geometry import Pose2
+from simscen.record.localization_logs.read import read_localization_log
+
 sys.path.insert(0, str(Path(__file__).parent))
 from recorded_drives import drive, ranges_at, write_carmen, write_csv, write_map
 
@@ -45,6 +48,21 @@ def test_drift_of_odometry_is_reported(simscen, tmp_path: Path) -> None:
     assert [row[1] for row in found["error_over_time"]] == pytest.approx(errors, abs=1e-9)
     assert found["error"]["rmse"] == pytest.approx(np.sqrt(np.mean(errors**2)))
     assert found["lost"][0]["since"] == pytest.approx(times[errors > 0.2][0])
+
+
+@pytest.mark.parametrize(("first_odometry", "first_reference"), [(0.0, 10.0), (4.0, 0.0), (4.0, 10.0), (4.1, 0.0)])
+def test_default_start_is_the_pose_at_the_start_of_the_odometry(
+    tmp_path: Path, first_odometry: float, first_reference: float
+) -> None:
+    lines = []
+    for t, (x, y, yaw), _ in drive():
+        odometry = Pose2(3.0, -1.0, 2.5).compose(Pose2(x, y, yaw))
+        lines += [f"odom,{t},{odometry.x},{odometry.y},{odometry.yaw}"] if t >= first_odometry else []
+        lines += [f"truth,{t},{x},{y},{yaw}"] if t >= first_reference and round(10 * t) % 2 == 0 else []
+    (tmp_path / "drive.csv").write_text("\n".join([*lines, "scan,12,-1,0.1,0.05,15,1.0,1.0"]))
+    start = read_localization_log(tmp_path / "drive.csv", "/odom", "/scan", None).initial_pose
+    expected_pose = next(pose for t, pose, _ in drive() if t >= first_odometry)
+    assert start == pytest.approx(expected_pose, abs=1e-9)
 
 
 def test_log_without_reference_needs_a_start(simscen, tmp_path: Path) -> None:
