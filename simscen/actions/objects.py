@@ -72,7 +72,7 @@ class Spawn(ShapedObject, Action):
 
 
 def pose_on_plan(plan: Path, robot: Pose2, distance: float) -> Pose2:
-    """Return the pose that is `distance` m ahead along `plan`, counted from the plan's point nearest to the robot.
+    """Return the pose that is `distance` m ahead along `plan`, counted from the point of its line nearest to the robot.
 
     The heading is the direction of the plan. If the plan is shorter, the pose is at its end.
     """
@@ -83,12 +83,14 @@ def pose_on_plan(plan: Path, robot: Pose2, distance: float) -> Pose2:
     if not len(steps):
         return Pose2(*plan.points[0].tolist())
     lengths = np.concatenate(([0.0], np.cumsum(steps)))
-    nearest = int(np.argmin(np.hypot(points[:, 0] - robot.x, points[:, 1] - robot.y)))
-    target = min(lengths[nearest] + distance, lengths[-1])
+    directions = np.diff(points, axis=0) / steps[:, None]
+    offsets = np.array([robot.x, robot.y]) - points[:-1]
+    along = np.clip((offsets * directions).sum(axis=1), 0.0, steps)
+    nearest = int(np.argmin(np.hypot(*(offsets - along[:, None] * directions).T)))
+    target = min(lengths[nearest] + along[nearest] + distance, lengths[-1])
     segment = min(int(np.searchsorted(lengths, target, side="right")) - 1, len(steps) - 1)
-    direction = points[segment + 1] - points[segment]
-    x, y = points[segment] + (target - lengths[segment]) / steps[segment] * direction
-    return Pose2(float(x), float(y), float(np.arctan2(direction[1], direction[0])))
+    x, y = points[segment] + (target - lengths[segment]) * directions[segment]
+    return Pose2(float(x), float(y), float(np.arctan2(directions[segment, 1], directions[segment, 0])))
 
 
 class Remove(Spec, WorldAction):
@@ -121,12 +123,12 @@ class Move(Motion, WorldAction):
     """The object to move."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Start the motion. Has no effect if the object does not exist or is already at its only waypoint."""
+        """Start the motion. Has no effect if the object does not exist or is already at all its waypoints."""
         pose = stage.object(self.name)
         if pose is None:
             return Effect(False, f"there is nothing called {self.name}")
         path = self.path(pose)
-        if len(path.poses) == 1 and self.keyframes is None:
+        if all(is_same_pose(pose, each) for each in path.poses):
             return Effect(False, f"{self.name} is already at its waypoint")
         stage.move(self.name, path)
         return Effect(True, f"moved {self.name}")
@@ -173,7 +175,7 @@ class Stop(Spec, WorldAction):
     """Duration of the stop; default: until another action moves the object."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Stop the object; has no effect if it does not exist or no script moves it."""
+        """Stop the object; has no effect if it does not exist, if no script moves it, or if it stands longer anyway."""
         pose, motion = stage.object(self.name), stage.motion(self.name)
         if pose is None:
             return Effect(False, f"there is nothing called {self.name}")
@@ -183,6 +185,7 @@ class Stop(Spec, WorldAction):
         if self.for_ is None:
             stage.place(self.name, pose)
             return Effect(True, f"stopped {self.name}")
-        delay = self.for_ + max(0.0, path.start - elapsed)
-        stage.move(self.name, replace(path, phase=path.elapsed(elapsed), start=delay))
+        if self.for_ <= path.start - elapsed:
+            return Effect(False, f"{self.name} was not moving")
+        stage.move(self.name, replace(path, phase=path.elapsed(elapsed), start=self.for_))
         return Effect(True, f"stopped {self.name} for {self.for_:g} s")

@@ -88,7 +88,7 @@ def _event_outcome(trace: Trace, case: Case, disturbance: Disturbance, entry: in
         )
     in_time = [event for event in ended if event.tick < trace.end]
     if not in_time:
-        return DisturbanceOutcome(disturbance, fired, False, _too_late(trace), fired[0])
+        return DisturbanceOutcome(disturbance, fired, False, _no_effect_text(trace, fired[0]), fired[0])
     starts = [_effects(event) for event in in_time]
     for action in range(len(starts[0])):
         if not any(effects[action][0] for effects in starts):
@@ -147,6 +147,13 @@ def _fault_outcome(trace: Trace, disturbance: Disturbance, entry: int) -> Distur
 def _never_began(trace: Trace) -> str:
     """Return the text for a disturbance if its trigger never fired."""
     return f"it never began; the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"
+
+
+def _no_effect_text(trace: Trace, fired: int) -> str:
+    """Return the text for an event that began at the tick `fired` and whose effect was not recorded in time."""
+    if fired < trace.end:
+        return f"its effect is not in the log, which ends at t = {trace.seconds(trace.end):.2f} s"
+    return _too_late(trace)
 
 
 def _too_late(trace: Trace) -> str:

@@ -193,14 +193,16 @@ class MovingObstacles:
 
     def after(self, seconds: float) -> "MovingObstacles":
         """Return the obstacles as predicted after `seconds`."""
+        speed_change = self.acceleration * seconds
+        drift = 0.5 * speed_change * seconds
         predicted = [
             MovingObstacle(
                 position + velocity * seconds,
                 velocity,
                 radius,
-                variance + seconds * (2.0 * covariance + seconds * velocity_variance),
-                covariance + seconds * velocity_variance,
-                velocity_variance,
+                variance + seconds * (2.0 * covariance + seconds * velocity_variance) + drift * drift,
+                covariance + seconds * velocity_variance + drift * speed_change,
+                velocity_variance + speed_change * speed_change,
             )
             for position, velocity, radius, variance, covariance, velocity_variance in self.obstacles
         ]

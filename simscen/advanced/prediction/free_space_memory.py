@@ -164,7 +164,7 @@ class BeamComparison:
     def has_appeared(self) -> Mask:
         """Return which points were free in the earlier scan for each of SLIP_RATIOS, and without slip.
 
-        Points beyond NO_HIT_RANGE_M do not count as free.
+        Points beyond the maximum range of the lidar do not count as free.
         """
         earlier = self.earlier
         has_appeared = earlier.passed_beyond(self.beam, self.distance)
@@ -202,7 +202,8 @@ class FreeSpaceMemory:
         if (geometry.count, geometry.start, geometry.increment) != (count, scan.angle_min, scan.angle_increment):
             self._geometry = geometry = ScanGeometry(count, scan.angle_min, scan.angle_increment)
         padded = geometry.padded_ranges(scan)
-        self._scans.append(EarlierScan(scan.tick, lidar, geometry, padded, geometry.free_distances(padded)))
+        free = geometry.free_distances(np.minimum(padded, scan.range_max))  # nothing is known beyond the maximum range
+        self._scans.append(EarlierScan(scan.tick, lidar, geometry, padded, free))
 
     def scan_before(self, tick: int) -> EarlierScan | None:
         """Return the scan that is about PREFERRED_AGE_S older than a tick; None if none is MIN_AGE_S older."""

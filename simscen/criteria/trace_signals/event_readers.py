@@ -43,19 +43,25 @@ def require_object(case: Case, name: str) -> None:
 def goal_active(query: SignalQuery) -> Array:
     """Return whether the goal of the query, or any goal, is active: accepted, and not yet ended.
 
-    Raises MissingEvidence if the scenario has no such goal.
+    Raises MissingEvidence if the scenario has no such goal, or if the stack accepted none of the scenario's goals.
     """
     name = query.arguments.get("goal")
     accepted = query.trace.of_kind(EventKind.GOAL_ACCEPTED)
     names = [*(goal.name for goal in query.case.every_goal), *(event.name for event in accepted)]
     if name is not None and goal_without_loop(str(name)) not in map(goal_without_loop, names):
         raise MissingEvidence(f"the scenario has no goal `{name}`")
+    if query.case.goals and not accepted:
+        raise MissingEvidence("the stack did not report that it accepted a goal")
     ends = (*GOAL_END_KINDS, EventKind.NAVIGATION_ENDED, EventKind.GOAL_ACCEPTED)
     return _active_between_events(query.trace, EventKind.GOAL_ACCEPTED, ends, name)
 
 
 def recovery_active(query: SignalQuery) -> Array:
-    """Return whether the recovery behavior of the query, or any recovery behavior, is active."""
+    """Return whether the recovery behavior of the query, or any recovery behavior, is active.
+
+    Raises MissingEvidence as `recoveries` does.
+    """
+    recoveries(query.trace, query.case)
     start, end = EventKind.RECOVERY_STARTED, EventKind.RECOVERY_ENDED
     return _active_between_events(query.trace, start, (end,), query.arguments.get("recovery"))
 
@@ -92,11 +98,11 @@ def replans(trace: Trace) -> list[Event]:
     reached goal without any plan.
     """
     plans = trace.of_kind(EventKind.PLAN_MADE)
-    if trace.plans and not plans:
+    if (trace.plans and not plans) or any("reason" not in plan.data for plan in plans):
         raise MissingEvidence("the stack did not report why it made its plans")
     if not plans and trace.of_kind(EventKind.GOAL_REACHED, EventKind.GOAL_PASSED):
         raise MissingEvidence("the stack reported no plan, although it reached a goal")
-    return [plan for plan in plans if plan.data.get("reason", "goal") != "goal"]
+    return [plan for plan in plans if plan.data["reason"] != "goal"]
 
 
 def recovery_count(query: SignalQuery) -> Array:

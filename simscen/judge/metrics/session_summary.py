@@ -13,37 +13,39 @@ class SessionSummary:
 
     Attributes:
         runs: Number of runs that were neither skipped nor left unfinished because the session ended.
-        success_rate: Share of the `runs` in which all robots succeeded.
+        judged_runs: Number of these runs with a known success. A run with an error did not succeed.
+        success_rate: Share of the `judged_runs` in which all robots succeeded.
         success_interval: 95 % Wilson interval of the success rate.
         spl: Mean of the metric `spl` over all robots.
         soft_spl: Mean of the metric `soft_spl` over all robots.
         spl_runs: Number of values of `spl`.
-        collisions: Number of collisions of all robots.
-        kilometers: Distance driven by all robots.
-        hours: Simulated time of all robots.
-        measured_runs: Number of runs that have metrics.
+        collisions: Number of collisions of all robots whose collisions are known.
+        kilometers: Distance driven by these robots.
+        hours: Simulated time of these robots.
+        measured_runs: Number of runs with such robots.
     """
 
     runs: int
+    judged_runs: int
     success_rate: float | None
     success_interval: tuple[float, float] | None
     spl: float | None
     soft_spl: float | None
     spl_runs: int
-    collisions: int
+    collisions: int | None
     kilometers: float
     hours: float
     measured_runs: int
 
     @property
     def collisions_per_km(self) -> float | None:
-        """Collisions per kilometer; None if no robot drove."""
-        return self.collisions / self.kilometers if self.kilometers > 0 else None
+        """Collisions per kilometer; None if they are unknown or no robot drove."""
+        return None if self.collisions is None or not self.kilometers else self.collisions / self.kilometers
 
     @property
     def collisions_per_hour(self) -> float | None:
-        """Collisions per hour; None without simulated time."""
-        return self.collisions / self.hours if self.hours > 0 else None
+        """Collisions per hour; None if they are unknown, or without simulated time."""
+        return None if self.collisions is None or not self.hours else self.collisions / self.hours
 
 
 class SessionSummaryBuilder:
@@ -59,46 +61,49 @@ class SessionSummaryBuilder:
             return
         self._runs += 1
         if result.metrics:
-            robots = max(1, sum(_is_metric(metric, "path_length") for metric in result.metrics))
+            collisions = _by_robot(result, "collisions")
+            path_lengths = _by_robot(result, "path_length")
             numbers = _RunNumbers(
-                result.metrics.get("success") == 1.0,
-                _known(result, "spl"),
-                _known(result, "soft_spl"),
-                _known(result, "collisions"),
-                _known(result, "path_length"),
-                result.simulated * robots,
+                result.metrics.get("success"),
+                tuple(_by_robot(result, "spl").values()),
+                tuple(_by_robot(result, "soft_spl").values()),
+                tuple(collisions.values()),
+                tuple(path_lengths.get(robot, 0.0) for robot in collisions),
+                result.simulated * len(collisions),
             )
             self._measured.append((result.key, numbers))
 
     def summary(self) -> SessionSummary:
         """Return the statistics of the added runs."""
         measured = [numbers for _, numbers in sorted(self._measured, key=lambda run: run[0])]
-        successes = sum(run.success for run in measured)
+        known = [run.success == 1.0 for run in measured if run.success is not None]
+        successes, judged_runs = sum(known), len(known) + self._runs - len(measured)
         spl = [value for run in measured for value in run.spl]
         soft_spl = [value for run in measured for value in run.soft_spl]
-        runs = self._runs
+        with_collisions = [run for run in measured if run.collisions]
         return SessionSummary(
-            runs=runs,
-            success_rate=successes / runs if runs else None,
-            success_interval=wilson_interval(successes, runs) if runs else None,
+            runs=self._runs,
+            judged_runs=judged_runs,
+            success_rate=successes / judged_runs if judged_runs else None,
+            success_interval=wilson_interval(successes, judged_runs) if judged_runs else None,
             spl=_mean(spl),
             soft_spl=_mean(soft_spl),
             spl_runs=len(spl),
-            collisions=round(sum(value for run in measured for value in run.collisions)),
-            kilometers=sum(value for run in measured for value in run.path_lengths) / 1000.0,
-            hours=sum(run.robot_seconds for run in measured) / 3600.0,
-            measured_runs=len(measured),
+            collisions=round(sum(sum(run.collisions) for run in with_collisions)) if with_collisions else None,
+            kilometers=sum(value for run in with_collisions for value in run.path_lengths) / 1000.0,
+            hours=sum(run.robot_seconds for run in with_collisions) / 3600.0,
+            measured_runs=len(with_collisions),
         )
 
 
 class _RunNumbers(NamedTuple):
     """Numbers of one run that the statistics of a session need.
 
-    Tuples have one value for each robot that has the metric. `robot_seconds` is the simulated time of all robots
-    together.
+    Tuples have one value for each robot that has the metric; `path_lengths` and `robot_seconds`, the simulated time of
+    all robots together, are of the robots with known `collisions`. `success` is None if it is unknown.
     """
 
-    success: bool
+    success: float | None
     spl: tuple[float, ...]
     soft_spl: tuple[float, ...]
     collisions: tuple[float, ...]
@@ -111,6 +116,7 @@ def session_summary_data(summary: SessionSummary) -> dict[str, float | list[floa
     interval = summary.success_interval
     return {
         "runs": summary.runs,
+        "judged_runs": summary.judged_runs,
         "success_rate": summary.success_rate,
         "success_interval": None if interval is None else list(interval),
         "spl": summary.spl,
@@ -131,7 +137,7 @@ def session_summary_line(summary: SessionSummary) -> str:
     if summary.success_interval is not None:
         assert summary.success_rate is not None
         low, high = summary.success_interval
-        parts.append(f"success {summary.success_rate:.0%} of {_runs(summary.runs)} ({low:.0%} … {high:.0%})")
+        parts.append(f"success {summary.success_rate:.0%} of {_runs(summary.judged_runs)} ({low:.0%} … {high:.0%})")
     if summary.spl is not None:
         parts.append(f"SPL {summary.spl:.2f} of {_runs(summary.spl_runs)}")
     per_km, per_hour = summary.collisions_per_km, summary.collisions_per_hour
@@ -145,14 +151,11 @@ def _runs(number: int) -> str:
     return f"{number} run" if number == 1 else f"{number} runs"
 
 
-def _known(run: RunResult, name: str) -> tuple[float, ...]:
-    """Return the defined values of a metric for all robots."""
-    return tuple(value for metric, value in run.metrics.items() if _is_metric(metric, name) and value is not None)
-
-
-def _is_metric(metric: str, name: str) -> bool:
-    """Return whether `metric` is `name` or, with several robots, `robot/name`."""
-    return metric.rpartition("/")[2] == name
+def _by_robot(run: RunResult, name: str) -> dict[str, float]:
+    """Return the known values of a metric by robot: "" with one robot; otherwise the metric is called `robot/name`."""
+    parts = {metric: metric.rpartition("/") for metric in run.metrics}
+    values = {parts[metric][0]: value for metric, value in run.metrics.items() if parts[metric][2] == name}
+    return {robot: value for robot, value in values.items() if value is not None}
 
 
 def _mean(values: list[float]) -> float | None:

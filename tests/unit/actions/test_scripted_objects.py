@@ -84,8 +84,23 @@ def test_paused_object_continues_from_its_position():
 def test_pause_delays_a_scheduled_start():
     path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)), start=2.0)
     stage = FakeStage(motions={"cart": (path, 1.5)})
-    perform(stage, stop={"name": "cart", "for": 3.0})
-    assert pose_at(moved(stage), 4.5) == Pose2(1.0, 0.0, 0.0)
+    assert perform(stage, stop={"name": "cart", "for": 3.0}).happened
+    assert pose_at(moved(stage), 4.0) == Pose2(1.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("elapsed", [0.0, 7.0])
+def test_an_object_that_stands_longer_than_the_pause_is_not_stopped(elapsed):
+    path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)), start=10.0)
+    stage = FakeStage(motions={"cart": (path, elapsed)})
+    effect = perform(stage, stop={"name": "cart", "for": 3.0})
+    assert (effect.happened, effect.what, stage.calls) == (False, "cart was not moving", [])
+
+
+def test_keyframes_at_the_pose_of_the_object_have_no_effect():
+    stage = FakeStage(objects={"cart": Pose2(1.0, 2.0, 0.5)})
+    assert not perform(stage, move={"name": "cart", "keyframes": [[0, 1, 2, 0.5], [3, 1, 2, 0.5]]}).happened
+    assert perform(stage, move={"name": "cart", "keyframes": [[0, 1, 2, 0.5], [3, 1, 2, 0.6]]}).happened
+    assert perform(stage, move={"name": "cart", "keyframes": [[2, 1, 2.1, 0.5]]}).happened
 
 
 def test_stopped_object_stays_at_its_pose():
@@ -143,6 +158,12 @@ def test_mark_is_recorded():
     stage = FakeStage()
     perform(stage, mark={"name": "in the aisle", "note": "sees the rack"})
     assert stage.calls == [("record_world_event", Event(0, EventKind.MARK, "in the aisle", {"note": "sees the rack"}))]
+
+
+@pytest.mark.parametrize(("x", "expected"), [(0.0, 1.5), (4.0, 5.5), (6.0, 7.5), (9.0, 10.0), (-1.0, 1.5)])
+def test_distance_on_a_plan_with_few_points_is_counted_from_the_robot(x, expected):
+    plan = Path(np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]]))
+    assert pose_on_plan(plan, Pose2(x, 0.3), 1.5) == Pose2(expected, 0.0, 0.0)
 
 
 def test_a_repeated_point_at_the_end_of_a_plan_does_not_change_the_heading():

@@ -31,7 +31,8 @@ def test_arrays_are_unchanged_and_rotate_with_the_frame() -> None:
     assert seen.centers == pytest.approx(np.array([[0.0, -4.0]]))
     assert seen.velocities == pytest.approx(np.array([[0.0, -1.0]]))
     step = np.eye(4) + 2.0 * np.eye(4, k=2)
-    assert seen.covariances == pytest.approx(step @ spread @ step.T)
+    noise = np.array([0.5 * 2.0**2, 2.0])  # of position and velocity, by an acceleration of 1 m/s² during 2 s
+    assert seen.covariances == pytest.approx(step @ spread @ step.T + np.kron(np.outer(noise, noise), np.eye(2)))
     assert NO_MOVING_OBSTACLES.centers.shape == (0, 2)
     assert NO_MOVING_OBSTACLES.covariances.shape == (0, 4, 4)
 

@@ -38,10 +38,12 @@ class Watch:
         view: float = FRONT,
         beams: int = 720,
         covered: float | None = None,
+        max_range: float = 30.0,
     ) -> None:
         """Set up the tracker; `covered` is the range of the first 40 beams if something covers the lens."""
         self.discs, self.base, self.odometry = discs, base, odometry or base
         self.walls, self.view, self.beams, self.covered = walls or Flatland(), view, beams, covered
+        self.max_range = max_range
         self.tracker, self.rng, self.time = Tracker(Prediction(), TICK_RATE_HZ), np.random.default_rng(1), 0.0
 
     def run(self, seconds: float, each: Callable[["Watch"], None] = lambda _: None) -> "Watch":
@@ -52,10 +54,10 @@ class Watch:
             step = self.view / (self.beams if self.view == FULL else self.beams - 1)
             angles = -self.view / 2 + step * np.arange(self.beams)
             ranges = world.cast((here.x, here.y), angles + here.yaw) + self.rng.normal(0, 0.01, self.beams)
-            ranges = np.round(np.where(ranges > 30.0, np.inf, ranges), 3)
+            ranges = np.round(np.where(ranges > self.max_range, np.inf, ranges), 3)
             if self.covered is not None:
                 ranges[:40] = self.covered
-            scan = Scan("lidar", round(self.time * TICK_RATE_HZ), ranges, -self.view / 2, step, 0.1, 30.0)
+            scan = Scan("lidar", round(self.time * TICK_RATE_HZ), ranges, -self.view / 2, step, 0.1, self.max_range)
             self.scan = scan
             self.tracker.on_scan(scan, self.odometry(self.time))
             each(self)
@@ -196,6 +198,15 @@ def tour(t: float) -> Pose2:
 @pytest.mark.parametrize("view, beams", [(FRONT, 720), (FULL, 360)])
 def test_no_motion_is_reported_in_a_static_room(view: float, beams: int) -> None:
     assert scans_with_motion(Watch(lambda _: [], tour, walls=static_room(), view=view, beams=beams), 12.0) == 0
+
+
+@pytest.mark.parametrize("max_range", [3.5, 6.0, 12.0])
+@pytest.mark.parametrize("speed", [0.3, 0.5, 0.8, 1.0])
+def test_no_motion_is_reported_when_a_wall_comes_into_range(speed: float, max_range: float) -> None:
+    """A beam that hits nothing shows free space only up to the maximum range of the lidar."""
+    wall = Flatland([(max_range + 1.0, -0.6, max_range + 1.2, 0.6)])
+    watch = Watch(lambda _: [], lambda t: Pose2(speed * t, 0.0), walls=wall, max_range=max_range)
+    assert scans_with_motion(watch, 6.0) == 0
 
 
 @pytest.mark.parametrize("view, beams", [(FRONT, 720), (FULL, 360)])

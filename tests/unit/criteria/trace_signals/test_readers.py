@@ -41,7 +41,7 @@ def test_a_signal_has_one_finite_value_for_each_truth_sample_within_its_range(na
         "objects": {"cart": [[0, 3, 3]]},
         "events": [
             [0.5, "goal.accepted", "shelf"],
-            [1, "plan.made", ""],
+            [1, "plan.made", "", {"reason": "goal"}],
             [1, "fault.started", "off"],
             [1, "event.started", "off"],
             [0, "object.spawned", "cart", {"person": True, "size": [0.25, 1.7]}],

@@ -72,7 +72,8 @@ def test_soft_spl_needs_the_true_pose():
 
 def test_plans_for_new_goals_are_not_replans():
     plans = [[k, "plan.made", "", {"reason": reason}] for k, reason in enumerate(("goal", "timer", "blocked", "worse"))]
-    assert measures([*plans, [4, "plan.made", "", {}]]).values["replans"] == 3.0
+    assert measures(plans).values["replans"] == 3.0
+    assert measures([*plans, [4, "plan.made", "", {}]]).values["replans"] is None  # its reason is unknown
 
 
 def test_paths_of_half_a_meter_have_a_score():

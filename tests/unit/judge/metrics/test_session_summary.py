@@ -63,9 +63,35 @@ def test_summary_without_runs_has_no_rates():
     figures = summarize_session([])
     assert session_summary_line(figures) == ""
     data = session_summary_data(figures)
-    assert data["runs"] == data["measured_runs"] == data["collisions"] == 0
-    for name in ("success_rate", "success_interval", "spl", "soft_spl", "collisions_per_km", "collisions_per_hour"):
+    assert data["runs"] == data["judged_runs"] == data["measured_runs"] == 0
+    for name in (
+        "collisions",
+        "success_rate",
+        "success_interval",
+        "spl",
+        "soft_spl",
+        "collisions_per_km",
+        "collisions_per_hour",
+    ):
         assert data[name] is None
+
+
+def test_unknown_success_and_unknown_collisions_do_not_count():
+    """Logs of real robots have no contacts, and therefore neither collisions nor success."""
+    unknown = run(5, success=None, collisions=None, path_length=5000.0)
+    figures = summarize_session([unknown])
+    assert session_summary_data(figures)["runs"] == 1
+    assert (figures.success_rate, figures.collisions, figures.collisions_per_km) == (None, None, None)
+    assert session_summary_line(figures) == ""
+    more = summarize_session([*RUNS, unknown])
+    assert session_summary_line(more) == session_summary_line(summarize_session(RUNS))
+    assert (more.runs, more.judged_runs, more.measured_runs, more.collisions) == (5, 4, 3, 3)
+
+
+def test_rates_of_several_robots_are_over_those_with_known_collisions():
+    metrics = {"success": 0.0, "a/collisions": 2.0, "a/path_length": 1000.0, "b/path_length": 7000.0}
+    figures = summarize_session([run(1, **metrics, **{"b/collisions": None})])
+    assert (figures.collisions, figures.kilometers, figures.hours) == (2, 1.0, 0.5)
 
 
 def test_runs_with_errors_did_not_succeed():
