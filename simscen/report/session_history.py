@@ -43,10 +43,12 @@ class PastSession:
 def past_sessions(folder: Path) -> list[PastSession]:
     """Return the sessions in the parent folder of `folder` that are older than the session in `folder`, newest first.
 
-    At most MAX_SHOWN_SESSIONS are returned. Sessions without a readable results.json are omitted.
+    At most MAX_SHOWN_SESSIONS are returned. Sessions without a readable results.json are omitted. `folder` can be a
+    link, such as `latest`.
     """
-    folders = sessions_in(folder.absolute().parent)
-    index = next((k for k, each in enumerate(folders) if each.name == folder.absolute().name), -1)
+    folder = folder.resolve()
+    folders = sessions_in(folder.parent)
+    index = next((k for k, each in enumerate(folders) if each.name == folder.name), len(folders))
     sessions = (past for each in folders[index + 1 :] if (past := _read_session(each)) is not None)
     return list(islice(sessions, MAX_SHOWN_SESSIONS))
 

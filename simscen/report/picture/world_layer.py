@@ -145,11 +145,16 @@ def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     trace = scene.trace
     shapes = object_outlines(trace, scene.scenery.things)
     spawned = {event.name: event for event in trace.of_kind(EventKind.OBJECT_SPAWNED)}
-    removed = {event.name: event.tick for event in trace.of_kind(EventKind.OBJECT_REMOVED)}
+    removed: dict[str, int] = {}
+    for event in trace.of_kind(EventKind.OBJECT_SPAWNED, EventKind.OBJECT_REMOVED):
+        if event.kind == EventKind.OBJECT_REMOVED:
+            removed[event.name] = event.tick
+        else:  # an object that replaces another one is spawned at the tick of the removal
+            removed.pop(event.name, None)
     doors = {thing.name: thing for thing in scene.scenery.things if thing.closed and thing.opened}
     for name in sorted(set(shapes) - set(scene.robots)):
-        samples, event = trace.objects.get(name), spawned.get(name)
-        person = event is not None and event.data.get("person") is True
+        samples, spawn = trace.objects.get(name), spawned.get(name)
+        person = spawn is not None and spawn.data.get("person") is True
         kind = "person" if person else "door" if name in doors else "object"
         color = palette.PEDESTRIAN if person else palette.OBJECT
         if samples is not None:
@@ -158,11 +163,11 @@ def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
             _draw_door_positions(canvas, doors[name], shapes[name])
         if samples is not None and len(samples):
             last = _pose(samples, -1)
-        elif event is not None:
-            last = spawn_pose(event)
+        elif spawn is not None:
+            last = spawn_pose(spawn)
         else:
             continue
-        is_removed = removed.get(name, -1) >= (event.tick if event else 0)
+        is_removed = name in removed
         outlines = [last.apply(outline) for outline in shapes[name]]
         for outline in outlines:
             fill, width = (None, 1.0) if is_removed else ((*color, 150), 1.5)

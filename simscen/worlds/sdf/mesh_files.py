@@ -211,7 +211,8 @@ def _parts_of_nodes(nodes: list[object]) -> Iterator[MeshPart]:
                 _check_face_count(face_count)
                 yield part
         elif isinstance(node, Node):
-            name = node.xmlnode.get("name") or node_name
+            element = getattr(node, "node", node).xmlnode  # that of the node itself, also for <instance_node>
+            name = element.get("name") or node_name
             matrix = parent_matrix @ np.asarray(node.matrix, float)
             pending.extend((child, matrix, name) for child in reversed(node.children or []))
 

@@ -23,6 +23,7 @@ from simscen.report.picture.map_picture import (
 from simscen.report.picture.object_outlines import object_outlines, outlines_of_event
 from simscen.report.picture.path_layer import round_time_step
 from simscen.report.picture.scene import Scene
+from simscen.report.picture.world_layer import draw_objects
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 WIDE, TALL, RESOLUTION = 200, 120, 0.05
@@ -97,6 +98,19 @@ def test_spawned_object_is_drawn_at_the_pose_of_its_event():
     assert not near(pixel(draw_map_picture(scene()), 7.3, 4.6), palette.FREE)
     without = scene(events=[[1, "goal.accepted", "end"]])
     assert near(pixel(draw_map_picture(without), 6.8, 4.2), palette.FREE)
+
+
+def test_object_that_replaces_another_one_is_not_removed():
+    """Both events have the same tick. An object that is removed later is marked."""
+    shape = {"parts": [[[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]], "x": 7, "y": 4.5, "yaw": 0.0}
+    replaced = [[2, "object.spawned", "box", shape], [4, "object.removed", "box"], [4, "object.spawned", "box", shape]]
+
+    def texts(events):
+        canvas = Canvas((0.0, 0.0, 10.0, 6.0), 50.0, palette.FREE)
+        return [label.text for label in draw_objects(canvas, scene(events=events))]
+
+    assert texts(replaced) == ["box"]
+    assert texts([*replaced, [6, "object.removed", "box"]]) == ["box (removed at 6.0 s)"]
 
 
 def test_a_collision_has_a_red_star():

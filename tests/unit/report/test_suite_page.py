@@ -205,6 +205,7 @@ def sessions(tmp_path, passed, failed):
 def test_earlier_sessions_are_listed_with_changes(sessions, passed):
     past = past_sessions(sessions / "three")
     assert [session.name for session in past] == ["two", "one"]
+    assert past_sessions(sessions / "latest") == past
     html = to_html(SessionReport([called(passed, "a/flaky"), called(passed, "a/steady")], past))
     assert "1 newly passing" in html
     assert html.index("../two/report.html") < html.index("../one/report.html")

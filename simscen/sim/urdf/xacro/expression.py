@@ -59,6 +59,8 @@ class _Evaluation:
             self._budget.spend()
             try:
                 value = check_bounds(self._unchecked_value(node))
+            except RecursionError:
+                raise ExpansionError("the value is nested too deeply") from None
             except (ArithmeticError, TypeError, ValueError, LookupError) as error:
                 raise ExpansionError(str(error)[:200] or type(error).__name__) from None
             self._budget.spend(size(value) // 16)

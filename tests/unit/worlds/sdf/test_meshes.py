@@ -146,6 +146,12 @@ class TestCollada:
         nodes = node("a").replace('url="#g"/>', f'url="#g">{bound}</instance_geometry>')
         assert len(mesh(dae(nodes=nodes)).faces) == 1
 
+    def test_instantiated_node_keeps_its_name(self):
+        library = f"<library_nodes>{node('wheel')}</library_nodes><library_visual_scenes>"
+        instance = '<node name="root"><instance_node url="#gn"/></node>'
+        text = dae(nodes=instance).replace("<library_visual_scenes>", library)
+        assert [part.names[0] for part in read_parts(text.encode(), ".dae")] == ["wheel"]
+
     def test_exponentially_nested_nodes_are_refused(self):
         levels = "".join(
             f'<node id="l{k}"><instance_node url="#l{k + 1}"/><instance_node url="#l{k + 1}"/></node>'

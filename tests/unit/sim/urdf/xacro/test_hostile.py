@@ -166,6 +166,10 @@ BOMBS = {
         f'<xacro:macro name="m{n}" params="*b"><xacro:m{n + 1}><e><xacro:insert_block name="b"/>'
         f'<xacro:insert_block name="b"/></e></xacro:m{n + 1}></xacro:macro>' for n in range(40)
     ) + '<xacro:macro name="m40" params="*b"><xacro:insert_block name="b"/></xacro:macro><xacro:m0><a/></xacro:m0>',
+    "lists in lists": '<xacro:property name="p0" value="1"/>' + "".join(
+        f'<xacro:property name="p{n}" value="${{[p{n - 1}]}}"/><xacro:if value="${{len(p{n}) == 0}}"/>'
+        for n in range(1, 600)
+    ),
     "quotes in parameters": f'<xacro:macro name="m" params="p:={"a" * 50000}\'"/>',
 }  # fmt: skip
 
