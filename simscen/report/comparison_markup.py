@@ -87,8 +87,9 @@ def comparison_markdown(comparison: Comparison, links: Links = NO_LINKS, changed
         ]
         more = len(against.flips) - MAX_FLIPS
         lines += [f"- and {more} more, in the JSON results"] if more > 0 else []
-        heads = [cell(head.format(comparison.baseline, against.stack)) for head in _HEADINGS]
-        lines += ["", f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
+        if against.differences:
+            heads = [cell(head.format(comparison.baseline, against.stack)) for head in _HEADINGS]
+            lines += ["", f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
         lines += [f"| {' | '.join(_metric_cells(difference))} |" for difference in against.differences]
         lines += ["", "Significant changes:", ""] if against.changes else []
         lines += [

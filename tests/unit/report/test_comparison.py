@@ -135,6 +135,14 @@ def test_comparison_with_crashed_runs_is_not_good(against, conclusion) -> None:
     assert markdown[0] == f"### simscen: {conclusion}"
 
 
+def test_markdown_without_differences_has_no_empty_table() -> None:
+    against = BaselineComparison("candidate", 4, 0, 0, 0, (), 1.0, ())
+    outcomes = {"baseline": OutcomeCounts(4), "candidate": OutcomeCounts(4)}
+    sessions = Comparison({"baseline": "a", "candidate": "b"}, {"goal": outcomes}, (against,))
+    markdown = session_comparison_markdown(sessions, {}, is_worse=False)
+    assert not [line for line in markdown if "interval |" in line]
+
+
 def test_small_numbers_have_one_more_digit() -> None:
     near = MetricDifference("min_clearance", "m", 6, 0.0716, 0.0309, -0.0407, (-0.0512, -0.0298), 6, 0, 0, 0.03)
     assert difference_cells(near)[1:5] == ("0.072", "0.031", "-0.041", "-0.051 … -0.030")
