@@ -52,6 +52,7 @@ def test_time_until_a_condition_is_decided(condition, holds, does_not):
         ({"until": {"hold": NOW, "release": NOW, "after": 4.0}}, 4),
         ({"whenever": {**NOW, "within": 6.0}, "then": always(within=3.0)}, 9),
         ({"whenever": {**NOW, "within": 6.0, "required": False}, "then": always(within=3.0)}, 6),
+        ({"whenever": {**eventually(within=5.0), "within": 6.0, "required": False}, "then": always(within=9.0)}, 11),
         ({"localization_error": {"max": 1.0, "after": 8.0}}, 8),
         ({"localization_consistency": {"after": 7.0}}, 7),
         ({"collisions": {"max": 0}}, 0),
