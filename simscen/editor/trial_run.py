@@ -119,8 +119,11 @@ class TrialRuns:
 
         job = Job(0, loaded, loaded.key(loaded.spec.seed), trial.folder, WALL_LIMIT_S, WrittenFor.ALL)
         try:
-            with self._run_lock, self._backend_factory() as backend:
-                answers, _ = run_session([job], SessionOptions(), backend, listen)
+            with self._run_lock:
+                if trial.is_canceled:
+                    raise _Canceled
+                with self._backend_factory() as backend:
+                    answers, _ = run_session([job], SessionOptions(), backend, listen)
             self._finish(trial, answers[0].result)
         except _Canceled:
             trial.state, trial.message = "canceled", "the run was stopped"

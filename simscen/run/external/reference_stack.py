@@ -160,7 +160,8 @@ class ReferenceStackPeer(Peer):
             step.publish(topics.PLAN.name + EXACT_SUFFIX, _encode_table(decision.plan.points))
         elif self._had_plan and stack.plan is None:
             step.publish(topics.PLAN.name, messages.path(step.stamp, []))
-        self._had_plan = stack.plan is not None
+        # A plan can be made and dropped in the same step.
+        self._had_plan = decision.plan is not None or stack.plan is not None
         if decision.local_plan is not None:
             step.publish(topics.LOCAL_PLAN.name + EXACT_SUFFIX, _encode_table(decision.local_plan.points))
         for costmap in decision.costmaps:

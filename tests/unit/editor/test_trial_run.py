@@ -1,5 +1,6 @@
 """A run of the editor can be watched and stopped, and leaves nothing behind."""
 
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -79,6 +80,26 @@ def test_new_run_stops_the_previous_one_and_exit_deletes_their_files(loaded: Loa
     assert folder.is_dir() and folder.name.startswith("simscen-edit-")
     runs.close()
     assert not folder.exists()
+
+
+def test_a_run_that_is_stopped_before_its_turn_starts_no_process(loaded: LoadedScenario) -> None:
+    started, is_released = [], threading.Event()
+
+    class WaitingBackend(EndlessBackend):
+        def run(self, jobs: Iterable[Job], *rest: object) -> Iterator[JobUpdate]:
+            (job,) = jobs
+            started.append(job.folder.name)
+            is_released.wait(10)
+            yield Progressed(job.number, 1.0)
+
+    runs = TrialRuns(WaitingBackend)
+    runs.start(loaded)
+    second = runs.start(loaded)
+    second.is_canceled = True
+    is_released.set()
+    until(lambda: second.state == "canceled")
+    assert started == ["1"]
+    runs.close()
 
 
 class BrokenBackend(EndlessBackend):
