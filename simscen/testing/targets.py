@@ -96,7 +96,7 @@ def promises_of_target(target: str) -> list[Promise]:
     except ValueError as error:
         raise InvalidTarget(f"{target}: {values_json} is not valid JSON: {error}") from error
     specs = [_instance(spec_class, values, target) for spec_class in _specification_classes(component)]
-    return [each for spec in specs for each in promises_of(spec, component)]
+    return [each for spec in specs for each in promises_of(spec, target if values_json else component)]
 
 
 def _specification_classes(component: str) -> Sequence[Any]:

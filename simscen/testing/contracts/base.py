@@ -60,8 +60,11 @@ class Promise:
     def check(self, limit: float = DEFAULT_LIMIT_S) -> None:
         """Check the promise within `limit` seconds. Raises PromiseBroken."""
         reseed_global_generators()
-        with time_limit(limit):
-            self.verify()
+        try:
+            with time_limit(limit):
+                self.verify()
+        except NavigationFailure as failure:  # a promise that allows failures catches them itself
+            raise PromiseBroken(f"fails with {getattr(failure.code, 'name', failure.code)}: {failure}") from None
 
 
 def promise(method: Callable[[T], None]) -> Callable[[T], None]:

@@ -89,6 +89,15 @@ def test_mistake_is_readable_with_xdist_workers(run) -> None:
     assert output.strip().splitlines()[-1].startswith("ERROR: --simscen-contract headless: no installed package")
 
 
+def test_two_targets_with_other_values_have_different_test_ids(run) -> None:
+    targets = [f'own:Checker={{"part": {part}}}' for part in (0.8, 0.9)]
+    options = [option for target in targets for option in ("--simscen-contract", target)]
+    code, output = run("--collect-only", "-q", "-p", "no:xdist", *options)
+    assert code == 0, output
+    ids = [line for line in output.splitlines() if "::" in line]
+    assert len(ids) == len(set(ids)) == 12
+
+
 INVALID_TARGETS = {
     "own:Checker": "part: Field required",
     "own:Checker={part: 1}": "is not valid JSON",
