@@ -160,7 +160,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _body(self) -> bytes | None:
         """Return the body of a request; None if it is too large or has no length."""
         length = self.headers.get("Content-Length", "")
-        if not length.isdecimal() or int(length) > MAX_REQUEST_BYTES:
+        if not re.fullmatch("[0-9]{1,9}", length) or int(length) > MAX_REQUEST_BYTES:
             self.close_connection = True
             return None
         return self.rfile.read(int(length))
@@ -213,11 +213,12 @@ def _response(session: EditorSession, name: str, body: bytes) -> Response:
         return _error("no such request", HTTPStatus.NOT_FOUND)
     try:
         data = json.loads(body)
-        if not isinstance(data, dict):
-            return _error("a request must be a JSON object", HTTPStatus.BAD_REQUEST)
-        return _json(handler(data))
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError):
+    except (ValueError, RecursionError):  # ValueError also for numbers with too many digits
         return _error("the request is not JSON", HTTPStatus.BAD_REQUEST)
+    if not isinstance(data, dict):
+        return _error("a request must be a JSON object", HTTPStatus.BAD_REQUEST)
+    try:
+        return _json(handler(data))
     except RequestRefused as refused:
         return _json({**refused.data, "error": str(refused)}, refused.status)
     except SimscenError as error:  # such as a file that cannot be written

@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import threading
 import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -80,7 +81,8 @@ def command(
             print_text(f"editing {escaped(edited.display_name)} at {server.url}\npress Ctrl-C to end")
             sys.stdout.flush()
             if not no_browser:
-                webbrowser.open(server.url)
+                # A browser in the terminal waits for the page, which the server below sends.
+                threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
             server.serve_forever()
         except KeyboardInterrupt:
             print_text("")
@@ -129,7 +131,8 @@ def _new_file(
 
     target = file or Path(f"{map_.name.split('.')[0]}{SUFFIX}")
     if not target.name.endswith(SCENARIO_SUFFIXES):
-        target = target.with_name(f"{target.name}{SUFFIX}")
+        stem = target.stem if target.suffix in (".yaml", ".yml") else target.name
+        target = target.with_name(f"{stem}{SUFFIX}")
     if target.exists():
         raise UsageError(f"{target} already exists; edit it without --new, or choose another name")
     if not target.absolute().parent.is_dir():

@@ -1,11 +1,13 @@
 """`simscen edit` on the command line."""
 
 import json
+import os
 import re
 import shutil
 import signal
 import subprocess
 import sys
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -63,6 +65,28 @@ def test_editor_serves_the_page_until_ctrl_c_and_leaves_no_files(tmp_path: Path)
         urllib.request.urlopen(url, timeout=5)
 
 
+def test_a_browser_that_runs_in_the_terminal_gets_the_page(tmp_path: Path) -> None:
+    (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
+    browser = tmp_path / "browser.py"
+    browser.write_text(
+        "import sys, urllib.request\n"
+        "page = urllib.request.urlopen(sys.argv[1], timeout=5).read()\n"
+        "open('page.tmp', 'wb').write(page)\n"
+        "import os; os.rename('page.tmp', 'page.html')\n"
+    )
+    command = [sys.executable, "-m", "simscen", "edit", "a.scenario.yaml"]
+    environment = {**os.environ, "BROWSER": f"{sys.executable} {browser} %s"}
+    process = subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL)
+    try:
+        end = time.monotonic() + 30
+        while not (tmp_path / "page.html").exists() and time.monotonic() < end:
+            time.sleep(0.05)
+        assert "<canvas" in (tmp_path / "page.html").read_text()
+    finally:
+        process.kill()
+        process.wait()
+
+
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
 def test_signal_ends_the_editor_and_deletes_the_files_of_its_runs(
@@ -118,6 +142,7 @@ def test_a_new_scenario_on_a_map_is_valid_and_has_a_goal_that_can_be_reached(tmp
         (("w.sdf",), "is a Gazebo world"),
         (("--new", "--map", "none.yaml"), "none.yaml: error[SC001]"),
         (("--new", "--map", "w.sdf", "a.scenario.yaml"), "already exists"),
+        (("--new", "--map", "w.sdf", "a.yaml"), "a.scenario.yaml already exists"),
         (("--new", "--map", "w.sdf", "nowhere/a"), "nowhere is not a folder"),
         (("--root", "folder", "a.scenario.yaml"), "outside the scenario root"),
         (("a.scenario.yaml", "--stack", "unheard_of"), "cannot read --stack unheard_of"),

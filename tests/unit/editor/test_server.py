@@ -149,6 +149,38 @@ def test_a_request_that_is_too_large_is_refused(server: EditorServer) -> None:
     assert ask(server, "scene", text="a: " + "x" * (1 << 20)).status == 413
 
 
+@pytest.mark.parametrize("length", ["9" * 5000, "٣", "-1", ""])
+def test_a_request_with_an_invalid_length_is_refused(server: EditorServer, length: str) -> None:
+    connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=10)
+    connection.putrequest("POST", f"/{server.token}/api/open")
+    connection.putheader("Content-Length", length.encode())
+    connection.endheaders()
+    assert connection.getresponse().status == 413
+    connection.close()
+
+
+def test_a_number_with_too_many_digits_is_not_json(server: EditorServer) -> None:
+    answer = request(server, "POST", f"/{server.token}/api/open", b'{"a": ' + b"9" * 5000 + b"}")
+    assert (answer.status, answer.data["error"]) == (400, "the request is not JSON")
+
+
+def test_an_error_in_a_request_handler_is_not_blamed_on_the_request(server: EditorServer, capfd) -> None:
+    def recurse(request: Any) -> Any:
+        raise RecursionError
+
+    server.session.requests["open"] = recurse
+    answer = ask(server, "open")
+    assert answer.status == 500 and answer.data["error"].startswith("internal error")
+    assert "RecursionError" in capfd.readouterr().err
+
+
+def test_a_text_that_is_not_valid_unicode_is_not_saved(server: EditorServer) -> None:
+    version = ask(server, "open").data["version"]
+    answer = ask(server, "save", text="x: \ud800", version=version)
+    assert answer.status == 422 and "U+D800 is not a valid character" in answer.data["error"]
+    assert server.session.file.path.read_text() == TEXT
+
+
 def test_saving_requires_the_version_that_was_read(server: EditorServer) -> None:
     opened = ask(server, "open").data
     server.session.file.path.write_text("theirs: 1\n")
