@@ -105,7 +105,8 @@ def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path
     poses = [scene.start, *(goal.pose for _, goal in scene.expected_goals)]
     outlines = [place_polygon(scene.size.footprint, pose) for pose in poses]
     image = draw_world(build_world_and_map(scene.world, height), height, outlines, gaps)
-    file = folder / f"{scene.loaded.title}.png"
+    robot = scene.loaded.robot_name
+    file = folder / f"{scene.loaded.title}{f'_{robot}' if robot else ''}.png"
     try:
         require_regular_file(file)
         file.parent.mkdir(parents=True, exist_ok=True)

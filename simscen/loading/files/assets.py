@@ -16,7 +16,6 @@ from simscen.loading.schema.messages import did_you_mean, quoted, suggestion
 from simscen.loading.schema.validate import check
 from simscen.loading.spec_walk import references
 from simscen.loading.yaml.library import Library
-from simscen.loading.yaml.textfile import read_text
 from simscen.loading.yaml.tree import MappingNode, Node, Position, ScalarNode, entries_of, node_at, value_position
 from simscen.model.robot import RobotSpec
 from simscen.model.world import RosMapSpec, WorldSpec
@@ -111,7 +110,7 @@ class Assets:
         """Load the robot in a `*.robot.yaml`, or in a `.urdf` or `.xacro` file, which is parsed later."""
         name = path.name.split(".")[0]
         if path.suffix in URDF_SUFFIXES:
-            text = read_text(path, self.library.sandbox.display_name(path))
+            text = self.library.text(path)
             if isinstance(text, Problem) and text.message != "larger than 1 MiB":
                 self.problems.append(text)
                 return None
@@ -136,7 +135,7 @@ class Assets:
     def _is_xml_file(self, path: Path, kind: str, hint: str) -> bool:
         """Return whether a file is XML instead of YAML, and report it as a problem if so."""
         name = self.library.sandbox.display_name(path)
-        text = read_text(path, name)
+        text = self.library.text(path)
         if isinstance(text, Problem) or not is_xml(text):
             return False
         self.problems.append(Problem(name, 1, 1, "SC004", f"this is an XML file, expected a {kind} in YAML", hint))

@@ -44,6 +44,10 @@ class Library:
         tree, problems = self._read_with_base(path, ())
         return self.with_defaults(path, tree, problems) if defaults else (tree, problems)
 
+    def text(self, path: Path) -> str | Problem:
+        """Return the text of a file, or a problem."""
+        return self.unsaved[path] if path in self.unsaved else read_text(path, self.sandbox.display_name(path))
+
     def with_defaults(
         self, path: Path, tree: Node | None, problems: list[Problem]
     ) -> tuple[Node | None, list[Problem]]:
@@ -92,7 +96,7 @@ class Library:
         """Return the tree of a file alone, and all problems. Keep its text and path."""
         name = self.sandbox.display_name(path)
         self.files[name] = path
-        text = self.unsaved[path] if path in self.unsaved else read_text(path, name)
+        text = self.text(path)
         if isinstance(text, Problem):
             return None, [text]
         self.texts[name] = text

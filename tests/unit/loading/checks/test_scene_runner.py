@@ -123,3 +123,21 @@ def test_an_error_code_of_a_goal_applies_to_the_goal_in_every_loop(tmp_path: Pat
         False,
         False,
     ]
+
+
+def test_each_robot_has_its_own_picture(tmp_path: Path) -> None:
+    file = tmp_path / "a.scenario.yaml"
+    file.write_text("""
+simscen: 1
+world: {simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 6], [0, 6], [0, 0]]}]}
+robots:
+  east: {pose: {x: 1, y: 1}, goals: [{pose: {x: 20, y: 1}}]}
+  west: {pose: {x: 1, y: 4}, goals: [{pose: {x: 20, y: 4}}]}
+pass: [{collisions: {max: 0}}]
+""")
+    problems = check_in_world(load_scenario(file, tmp_path), pictures=tmp_path / "pictures")
+    for name in ("east", "west"):
+        picture = tmp_path / "pictures" / f"a_{name}.png"
+        assert picture.is_file()
+        hints = [problem.hint for problem in problems if str(picture) in problem.hint]
+        assert len(hints) == 1

@@ -5,7 +5,10 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import InvalidInput
+from simscen.loading.files.assets import Assets
+from simscen.loading.files.paths import PathSandbox
 from simscen.loading.files.single_files import load_robot_file, load_world_file
+from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.writing import world_text
 
 WORLDS = sorted((Path(__file__).parents[4] / "worlds").glob("*.world.yaml"))
@@ -38,6 +41,17 @@ def test_sdf_worlds_and_ros_maps_are_recognized_by_content(tmp_path: Path) -> No
     (tmp_path / "s.sdf.xacro").write_text("<sdf version='1.6'/>")
     assert load_world_file(tmp_path / "m.yaml", tmp_path).map is not None
     assert load_world_file(tmp_path / "s.sdf.xacro", tmp_path).sdf == tmp_path / "s.sdf.xacro"
+
+
+@pytest.mark.parametrize("is_xml", [False, True])
+def test_unsaved_text_decides_whether_a_world_is_xml(tmp_path: Path, is_xml: bool) -> None:
+    texts = ["simscen: 1\n", "<sdf version='1.6'/>"]
+    file = tmp_path / "a.world.yaml"
+    file.write_text(texts[not is_xml])
+    assets = Assets(Library(PathSandbox.around(tmp_path, ()), unsaved={file: texts[is_xml]}))
+    world = assets.world_file(file)
+    assert (world is None) == is_xml
+    assert ["this is an XML file" in problem.message for problem in assets.problems] == [True] * is_xml
 
 
 @pytest.mark.parametrize(
