@@ -43,7 +43,7 @@ class CheckedPlanner(CheckedPlugin):
         self._radius = setting.robot.circumscribed_radius
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return the planner's path. Raises RunError if it is invalid or leads through a lethal cell.
+        """Return the planner's path. Raises RunError if it is invalid or has a pose on a lethal cell.
 
         Lethal cells within the circumscribed radius of the start are allowed, since the robot already stands there.
         """
@@ -145,7 +145,7 @@ class CheckedBehavior(CheckedPlugin):
 
 
 class CheckedLocalizer(CheckedPlugin):
-    """Passes readings to the localizer and checks each new belief."""
+    """Passes readings to the localizer and checks its belief."""
 
     may_fail = False
 
@@ -176,6 +176,5 @@ class CheckedLocalizer(CheckedPlugin):
             belief = self.inner.belief
         except Exception as error:  # as in `call`, without its overhead in every control period
             self.raise_as_run_error(error)
-        if self._last is None or belief is not self._last:
-            self._last = self.checked_belief(belief, self._last)
+        self._last = self.checked_belief(belief, self._last)
         return self._last

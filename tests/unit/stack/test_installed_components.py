@@ -5,6 +5,7 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -262,3 +263,23 @@ def test_failure_without_a_nav2_code_is_a_contract_violation(odd) -> None:
     with pytest.raises(RunError, match="failed with 208, which is not an ErrorCode"):
         CheckedPlanner(Own(), setting(round_robot())).plan(None, Pose2(0, 0), Pose2(1, 1), 1)  # type: ignore[arg-type]
     assert ErrorCode.NO_VALID_PATH == 208
+
+
+def test_belief_that_a_localizer_changes_in_place_is_checked_again() -> None:
+    from simscen.model.localizers import GroundTruth
+    from simscen.stack.validation.components import CheckedLocalizer
+    from simscen.testing.flatland import setting
+
+    methods = dict.fromkeys(("reset", "on_odometry", "on_scan", "on_imu"), lambda reading: None)
+    own = SimpleNamespace(belief=Belief(Pose2(0, 0), np.eye(3)), **methods)
+
+    class OwnSpec(GroundTruth):
+        @classmethod
+        def implementation(cls):
+            return lambda spec, setting: own
+
+    localizer = CheckedLocalizer(OwnSpec(type="ground_truth"), setting(round_robot()))
+    assert localizer.belief is own.belief
+    own.belief.covariance[0, 0] = math.nan
+    with pytest.raises(RunError, match="covariance is not a finite array"):
+        localizer.belief  # noqa: B018
