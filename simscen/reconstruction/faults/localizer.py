@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2, wrap_array
-from simscen.reconstruction.drive.recorded_drive import RecordedDrive
+from simscen.core.geometry import Array, Pose2, wrap, wrap_array
+from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive
 from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
 MIN_JUMP_M, MIN_JUMP_RAD = 0.2, math.radians(10)
@@ -38,35 +38,45 @@ def _jump(drive: RecordedDrive) -> Iterator[FoundFault]:
     belief, truth = drive.belief.values[:, :3], drive.poses.poses_at(drive.belief.times)
     errors = belief - truth
     errors[:, 2] = wrap_array(errors[:, 2])
-    distance = np.hypot(*np.diff(errors[:, :2], axis=0).T)
-    turn = np.abs(wrap_array(np.diff(errors[:, 2])))
-    jumps = np.flatnonzero((distance > MIN_JUMP_M) | (turn > MIN_JUMP_RAD)) + 1
-    if len(jumps) == 1:
-        yield from _lasting_jump(drive, belief, truth, int(jumps[0]))
-    for out, back in zip(jumps[:-1].tolist(), jumps[1:].tolist(), strict=True):
+    sizes, jumps = _sizes(errors), _sizes(np.diff(errors, axis=0)) > 1.0
+    indices = np.flatnonzero(jumps.any(axis=1)) + 1
+    if len(indices) == 1:
+        yield from _lasting_jump(drive, belief, truth, sizes, int(indices[0]))
+    for out, back in zip(indices[:-1].tolist(), indices[1:].tolist(), strict=True):
         begin, end = float(drive.belief.times[out]), float(drive.belief.times[back])
-        away = np.hypot(*errors[out:back, :2].T)
-        before, after = np.hypot(*errors[out - 1, :2]), np.hypot(*errors[back, :2])
-        if (
-            end - begin > MAX_JUMP_S
-            or _is_kidnapped(drive, begin - 0.5, end + 0.5)
-            or max(before, after) > 0.5 * float(np.median(away))
-        ):
+        is_small = np.maximum(sizes[out - 1], sizes[back]) <= 0.5 * np.median(sizes[out:back], axis=0)
+        returns = jumps[out - 1] & is_small
+        if end - begin > MAX_JUMP_S or _is_kidnapped(drive, begin - 0.5, end + 0.5) or not returns.any():
             continue
         values = _jump_values(truth[out], belief[out])
-        text = f"the estimated pose jumps by {float(away[0]):.2f} m and back"
+        text = f"the estimated pose jumps by {_size_text(errors[out], returns)} and back"
         yield FoundFault("localizer", "jump", values, begin, end - begin, Reason(text, begin, end))
         return
 
 
-def _lasting_jump(drive: RecordedDrive, belief: Array, truth: Array, index: int) -> Iterator[FoundFault]:
-    """Yield the fault of a jump of the poses `belief` (n, 3) at `index` if they never return to `truth` (n, 3)."""
-    begin, errors = float(drive.belief.times[index]), np.hypot(*(belief - truth)[:, :2].T)
-    stays = float(errors[index:].min()) > MIN_JUMP_M and float(errors[:index].max()) < MIN_JUMP_M
-    if stays and not _is_kidnapped(drive, begin - 0.5, begin + 0.5):
-        text = f"the estimated pose jumps by {float(errors[index]):.2f} m and stays there"
+def _lasting_jump(drive: RecordedDrive, belief: Array, truth: Array, sizes: Array, index: int) -> Iterator[FoundFault]:
+    """Yield the fault of a jump of the poses `belief` (n, 3) at `index` if they never return to `truth` (n, 3).
+
+    `sizes` (n, 2) are the sizes of the errors.
+    """
+    begin = float(drive.belief.times[index])
+    stays = (sizes[index:].min(axis=0) > 1.0) & (sizes[:index].max(axis=0) < 1.0)
+    if stays.any() and not _is_kidnapped(drive, begin - 0.5, begin + 0.5):
+        text = f"the estimated pose jumps by {_size_text(belief[index] - truth[index], stays)} and stays there"
         reason = Reason(text, begin, float(drive.belief.times[-1]), "medium")
         yield FoundFault("localizer", "jump", _jump_values(truth[index], belief[index]), begin, None, reason)
+
+
+def _sizes(differences: Array) -> Array:
+    """Return the sizes (n, 2) of differences in position and heading (n, 3), in multiples of the minimum jump."""
+    distances = np.hypot(differences[:, 0], differences[:, 1])
+    return np.column_stack((distances / MIN_JUMP_M, np.abs(wrap_array(differences[:, 2])) / MIN_JUMP_RAD))
+
+
+def _size_text(error: Array, parts: Mask) -> str:
+    """Return the size of an error (3,) as text. `parts` (2,) selects position and heading."""
+    texts = f"{math.hypot(error[0], error[1]):.2f} m", f"{abs(math.degrees(wrap(error[2]))):.0f} deg"
+    return " / ".join(text for text, is_part in zip(texts, parts, strict=True) if is_part)
 
 
 def _jump_values(truth: Array, belief: Array) -> dict[str, object]:
@@ -76,30 +86,45 @@ def _jump_values(truth: Array, belief: Array) -> dict[str, object]:
 
 
 def _is_kidnapped(drive: RecordedDrive, begin: float, end: float) -> bool:
-    """Return whether the true pose jumps between two times in s."""
-    chosen = (drive.poses.times >= begin) & (drive.poses.times <= end)
-    steps = np.hypot(*np.diff(drive.poses.values[chosen, :2], axis=0).T)
-    return bool((steps > MIN_JUMP_M).any())
+    """Return whether the true pose jumps, compared with the odometry, between two times in s."""
+    first, last = np.searchsorted(drive.poses.times, (begin, end))
+    chosen = slice(max(0, first - 1), last + 1)
+    motion = _motion(drive.poses.values[chosen])
+    if len(drive.odometry) > 1:
+        motion -= _motion(drive.odometry.poses_at(drive.poses.times[chosen]))
+    return bool((_sizes(motion) > 1.0).any())
+
+
+def _motion(poses: Array) -> Array:
+    """Return the motion x, y, yaw (n - 1, 3) between poses (n, 3), each in the frame of the pose before it."""
+    dx, dy, turn = np.diff(poses[:, :3], axis=0).T
+    c, s = np.cos(poses[:-1, 2]), np.sin(poses[:-1, 2])
+    return np.column_stack((c * dx + s * dy, c * dy - s * dx, turn))
 
 
 def _outages(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield the outages while the robot drives: gaps between estimates or, without gaps, missing corrections."""
-    times = drive.belief.times
+    """Yield the outages while the robot drives: gaps between estimates or, without such gaps, missing corrections."""
+    if len(drive.odometry) < 2:
+        return
+    times = np.append(drive.belief.times, drive.odometry.times[-1])
     limit = max(MIN_OUTAGE_S, MIN_OUTAGE_PERIODS * drive.belief.period)
-    gaps = np.flatnonzero(np.diff(times) > limit)
-    for index in gaps.tolist():
-        begin, end = float(times[index]), float(times[index + 1])
-        if len(drive.odometry) > 1 and _distance(drive, begin, end) > MIN_DRIVEN_M:
-            text = f"no pose from the localizer for {end - begin:.1f} s"
-            yield FoundFault("localizer", "off", {}, begin, end - begin, Reason(text, begin, end))
-    if not len(gaps):
+    gaps = [
+        (index, float(times[index]), float(times[index + 1]))
+        for index in np.flatnonzero(np.diff(times) > limit).tolist()
+        if _distance(drive, float(times[index]), float(times[index + 1])) > MIN_DRIVEN_M
+    ]
+    for index, begin, end in gaps:
+        text = f"no pose from the localizer for {end - begin:.1f} s"
+        duration = end - begin if index + 2 < len(times) else None
+        yield FoundFault("localizer", "off", {}, begin, duration, Reason(text, begin, end))
+    if not gaps:
         yield from _without_corrections(drive)
 
 
 def _without_corrections(drive: RecordedDrive) -> Iterator[FoundFault]:
     """Yield the outages in which the transform from map to odom stays constant although the robot drives."""
     corrections = drive.corrections
-    if len(corrections) < 2 or len(drive.odometry) < 2:
+    if len(corrections) < 2:
         return
     still = np.abs(np.diff(corrections.values, axis=0)).max(axis=1) < MIN_CORRECTION_M_RAD
     usual = windows(still, corrections.times[1:])
@@ -108,11 +133,12 @@ def _without_corrections(drive: RecordedDrive) -> Iterator[FoundFault]:
     shortest = float(np.percentile([window.length for window in usual], 25)) if len(usual) >= 5 else 0.0
     limit = max(MIN_OUTAGE_S, MIN_OUTAGE_PERIODS * shortest)
     for window in usual:
-        if window.length > limit and _distance(drive, window.begin, window.end) > MIN_DRIVEN_M:
-            text = f"the localizer does not correct the odometry for {window.length:.1f} s"
-            reason = Reason(text, window.begin, window.end, "medium")
-            until_end = window.end >= float(corrections.times[-1]) - MIN_OUTAGE_S
-            yield FoundFault("localizer", "off", {}, window.begin, None if until_end else window.length, reason)
+        begin, end = float(corrections.times[window.first]), window.end
+        if window.length > limit and _distance(drive, begin, end) > MIN_DRIVEN_M:
+            text = f"the localizer does not correct the odometry for {end - begin:.1f} s"
+            until_end = end >= float(corrections.times[-1]) - MIN_OUTAGE_S
+            reason = Reason(text, begin, end, "medium")
+            yield FoundFault("localizer", "off", {}, begin, None if until_end else end - begin, reason)
 
 
 def _distance(drive: RecordedDrive, begin: float, end: float) -> float:

@@ -186,3 +186,58 @@ def test_a_localizer_without_messages_while_the_robot_drives_is_off():
     silent = drives.signal(plain.belief.times[kept], plain.belief.values[kept])
     (fault,) = localizer_faults(replace(plain, belief=silent))
     assert (fault.kind, fault.duration) == ("off", pytest.approx(5.1, abs=0.2))
+
+
+@pytest.mark.parametrize(("end", "duration"), [(6.0, pytest.approx(2.0)), (99.0, None)])
+def test_jump_of_the_heading_alone_is_a_localizer_fault(end, duration):
+    plain = drives.drive()
+    values = plain.belief.values.copy()
+    values[:, :2] += np.random.default_rng(1).normal(0.0, 0.02, (len(values), 2))
+    values[(plain.belief.times >= 4.0) & (plain.belief.times < end), 2] += np.pi / 2
+    (fault,) = localizer_faults(replace(plain, belief=drives.signal(plain.belief.times, values)))
+    assert (fault.kind, fault.begin, fault.duration) == ("jump", pytest.approx(4.0), duration)
+    assert number(fault, "yaw") == pytest.approx(90)
+    assert "jumps by 90 deg" in fault.reason.text
+
+
+@pytest.mark.parametrize("rate", [1, 2, 20])
+def test_a_slow_ground_truth_hides_no_jump_of_the_belief(rate):
+    plain = drives.drive()
+    times = np.arange(0.0, drives.DURATION_S, 1 / rate)
+    values = plain.belief.values.copy()
+    values[plain.belief.times >= 4.0, 0] += 1.0
+    belief = drives.signal(plain.belief.times, values)
+    (fault,) = localizer_faults(replace(plain, belief=belief, poses=drives.signal(times, drives.poses(times))))
+    assert (fault.kind, fault.begin) == ("jump", pytest.approx(4.0))
+
+
+@pytest.mark.parametrize("moved", [(1.0, 0.0, 0.0), (0.0, 0.0, 1.5)])
+def test_a_robot_that_is_moved_away_or_turned_is_no_jump_of_the_belief(moved):
+    plain = drives.drive()
+    poses = plain.poses.values + np.where(plain.poses.times >= 4.01, 1.0, 0.0)[:, None] * moved
+    assert list(localizer_faults(replace(plain, poses=drives.signal(plain.poses.times, poses)))) == []
+
+
+def test_a_localizer_that_stays_silent_is_off_until_the_end():
+    plain = drives.drive()
+    kept = plain.belief.times < 3.05
+    silent = drives.signal(plain.belief.times[kept], plain.belief.values[kept])
+    (fault,) = localizer_faults(replace(plain, belief=silent))
+    assert (fault.kind, fault.begin, fault.duration) == ("off", pytest.approx(3.0), None)
+
+
+@pytest.mark.parametrize("has_gap", [False, True])
+def test_missing_corrections_are_found_also_after_a_gap_at_rest(has_gap):
+    plain = drives.drive()
+    ticks = np.arange(0.0, 12.0, 0.5)
+    corrected = 0.01 * np.where(ticks < 9.75, np.minimum(ticks, 6.0), ticks)
+    times = plain.belief.times[(plain.belief.times < 0.5) | (plain.belief.times > (2.5 if has_gap else 0.5))]
+    drive = replace(
+        plain,
+        has_true_poses=False,
+        odometry=drives.signal(plain.odometry.times, drives.poses(np.maximum(plain.odometry.times - 3.0, 0.0))),
+        corrections=drives.signal(ticks, np.column_stack((corrected, corrected, corrected))),
+        belief=drives.signal(times, drives.poses(np.maximum(times - 3.0, 0.0))),
+    )
+    (fault,) = localizer_faults(drive)
+    assert (fault.kind, fault.begin, fault.duration) == ("off", pytest.approx(6.0), pytest.approx(3.5))
