@@ -79,10 +79,19 @@ def outcome_change(run: RunFinished, past: Sequence[PastSession]) -> str:
 
     Return "" if the outcome has not changed, or if no earlier session contains the run.
     """
-    known = [outcome for outcome in past_outcomes(run, past) if outcome is not None]
-    if not known or known[-1].outcome.is_good == run.outcome.is_good:
-        return ""
-    return f"{known[-1].outcome.value.replace('-', ' ')} before"
+    before = changed_outcome(run, past_outcomes(run, past))
+    return "" if before is None else f"{before.value.replace('-', ' ')} before"
+
+
+def changed_outcome(run: RunFinished, past: Sequence[PastOutcome | None]) -> Outcome | None:
+    """Return the latest of the `past` outcomes, oldest first, if it was good and is now bad, or vice versa; else None.
+
+    Sessions that skipped the run are ignored. A run that is now skipped has not changed.
+    """
+    outcomes = (one.outcome for one in reversed(past) if one is not None)
+    before = next((outcome for outcome in outcomes if outcome is not Outcome.SKIPPED), None)
+    has_changed = before is not None and run.outcome is not Outcome.SKIPPED and before.is_good != run.outcome.is_good
+    return before if has_changed else None
 
 
 MAX_SEARCHED_SESSIONS = 50
@@ -131,14 +140,14 @@ def last_failed(folder: Path) -> frozenset[RunKey] | None:
 def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:
     """Yield the key of each finished run and whether its outcome is good. Yield nothing for an invalid journal.
 
-    For a run that was not finished, `last_failed` uses the outcome in an earlier session.
+    For a run that was skipped or not finished, `last_failed` uses the outcome in an earlier session.
     """
     try:
         runs = read_journal(session).runs
     except InvalidInput:
         return
     for run in runs:
-        if not run.result.is_unfinished:
+        if not run.result.is_unfinished and run.outcome is not Outcome.SKIPPED:
             yield run.key, run.outcome.is_good
 
 

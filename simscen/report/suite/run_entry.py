@@ -17,7 +17,7 @@ from simscen.judge.finding_text import (
     time_and_place,
 )
 from simscen.report.display_text import escape_control, html_text, plain_text, shell_command_text
-from simscen.report.session_history import PastOutcome
+from simscen.report.session_history import PastOutcome, changed_outcome
 from simscen.report.session_lines import violation_lines
 from simscen.report.suite.elements import anchor, link, outcome_badge, outcome_symbols, sparkline
 from simscen.report.violations import (
@@ -64,7 +64,6 @@ def run_element(
 
 def _data_attributes(run: RunFinished, past: Sequence[PastOutcome | None]) -> str:
     """Return the HTML attributes (`data-…`) by which the script of the page filters and sorts runs."""
-    known = [one.outcome.is_good for one in past if one is not None]
     values = {
         "status": run.outcome.value,
         "tags": " ".join(run.tags),
@@ -74,7 +73,7 @@ def _data_attributes(run: RunFinished, past: Sequence[PastOutcome | None]) -> st
         "simulated": f"{run.result.simulated:.3f}",
         "wall": f"{run.wall:.3f}",
         "margin": "" if (margin := smallest_margin(run)) is None else f"{margin:.4f}",
-        "changed": "1" if known and known[-1] != run.outcome.is_good else "",
+        "changed": "1" if changed_outcome(run, past) else "",
     }
     return " ".join(f'data-{name}="{html_text(value)}"' for name, value in values.items() if value)
 

@@ -1,5 +1,7 @@
 """A session with one run of each kind, told with text that tries to break out."""
 
+from dataclasses import replace
+
 import pytest
 
 from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResult
@@ -81,6 +83,11 @@ def crashed():
         wall=1.25,
         again="simscen run evil",
     )
+
+
+@pytest.fixture
+def skipped(passed):
+    return replace(passed, result=replace(passed.result, outcome=Outcome.SKIPPED, verdicts=(), lines=()))
 
 
 @pytest.fixture

@@ -13,9 +13,9 @@ from simscen.report.session_history import last_failed, sessions_in
 
 
 @pytest.fixture
-def session(tmp_path, passed, failed, crashed):
+def session(tmp_path, passed, failed, crashed, skipped):
     """`session(n, a="failed", b="passed")` writes the n-th session of the folder; "…" names a kind of error."""
-    made = {"passed": passed, "failed": failed}
+    made = {"passed": passed, "failed": failed, "skipped": skipped}
 
     def write(number, **outcomes):
         folder = tmp_path / f"s{number}"
@@ -62,6 +62,12 @@ def test_newest_outcome_of_each_run_counts(session, tmp_path):
 def test_interrupted_run_keeps_its_earlier_outcome(session, tmp_path):
     session(1, a="failed", b="passed")
     session(2, a="interrupted", b="not-run", c="interrupted")
+    assert failed_in(tmp_path) == {"a"}
+
+
+def test_skipped_run_keeps_its_earlier_outcome(session, tmp_path):
+    session(1, a="failed", b="passed")
+    session(2, a="skipped", b="skipped")
     assert failed_in(tmp_path) == {"a"}
 
 

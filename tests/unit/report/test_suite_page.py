@@ -214,6 +214,21 @@ def test_earlier_sessions_are_listed_with_changes(sessions, passed):
     assert [run.get("data-changed") for run in runs_on(html)] == ["1", None]
 
 
+def test_skipped_runs_have_no_change_and_hide_no_earlier_outcome(sessions, passed, skipped):
+    skips = "".join(json_parts([called(skipped, "a/flaky"), called(passed, "a/steady")]))
+    results = sessions / "three/results.json"
+    results.write_text(skips)
+    (sessions / "four").mkdir()
+    (sessions / "four/events.jsonl").write_text("")
+    (sessions / "four/run.json").write_text(json.dumps({"written": "2026-01-04T00:00:00+00:00"}))
+    past = past_sessions(sessions / "four")
+    assert [session.name for session in past] == ["three", "two", "one"]
+    html = to_html(SessionReport([called(passed, "a/flaky"), called(passed, "a/steady")], past))
+    assert "a/flaky, seed 1</a>: passed, failed before" in html
+    assert [run.get("data-changed") for run in runs_on(html)] == ["1", None]
+    assert "no change since the last session" in to_html(SessionReport([called(skipped, "a/flaky")], past))
+
+
 def test_share_of_good_runs_includes_runs_that_are_not_listed(sessions, passed, failed, monkeypatch):
     monkeypatch.setattr(page, "MAX_LISTED_RUNS", 1)
     runs = [called(passed, f"a/{number}") for number in range(3)] + [called(failed, "a/flaky")]
