@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import stat
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +16,8 @@ from simscen.core.files import record_read_file
 
 MAX_PATH_LENGTH = 1000
 """Maximum number of characters of a path or URI."""
+INVALID_IN_PATHS = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+"""Control characters, line separators, bidirectional controls, surrogates, and noncharacters."""
 MESH_SUFFIXES = (".dae", ".stl", ".obj")
 """Suffixes of mesh files. References to meshes often have the wrong suffix."""
 _NOT_FOUND = "no such file or directory"
@@ -77,7 +80,7 @@ class AllowedFolders:
 
         Raises UnusableFile, or NoSuchFile if the file does not exist.
         """
-        if not uri or not uri.isprintable():
+        if not uri or INVALID_IN_PATHS.search(uri):
             raise UnusableFile("control character in the uri" if uri else "the uri is empty")
         if len(uri) > MAX_PATH_LENGTH:
             raise UnusableFile("not a usable path")

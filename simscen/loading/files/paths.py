@@ -2,11 +2,11 @@
 
 import errno
 import os
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+from simscen.assets.folders import INVALID_IN_PATHS
 from simscen.core.errors import Problem
 from simscen.loading.schema.messages import did_you_mean, quoted
 from simscen.loading.yaml.textfile import os_error_reason
@@ -14,9 +14,6 @@ from simscen.loading.yaml.tree import Position
 
 MODEL_SCHEME = "model://"
 """Scheme of URIs for models in Gazebo."""
-
-_INVALID_IN_IDS = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
-"""Characters that the id of a scenario cannot contain: control characters, bidirectional characters, and surrogates."""
 
 _SCENARIO_SUFFIXES = (".scenario.yaml", ".scenario.yml", ".yaml", ".yml")
 """Suffixes that are not part of the id of a scenario."""
@@ -110,8 +107,8 @@ def is_folder(path: Path) -> bool:
 
 
 def _form_problem(written: str, position: Position) -> Problem | None:
-    """Return a problem if a path is not relative or has control characters; else None."""
-    if any(not c.isprintable() for c in written):
+    """Return a problem if a path is not relative or has invalid characters; else None."""
+    if INVALID_IN_PATHS.search(written):
         return Problem(*position, "SC017", f"control character in the path {quoted(written)}")
     if written.startswith(("/", "~")) or (len(written) > 1 and written[1] == ":"):
         return Problem(*position, "SC021", f"{quoted(written)} is an absolute path", "write it relative to this file")
@@ -122,7 +119,7 @@ def _form_problem(written: str, position: Position) -> Problem | None:
 
 def _name_problem(path: Path, name: str) -> Problem | None:
     """Return a problem if `name`, the path of the file for messages, has invalid characters; else None."""
-    character = _INVALID_IN_IDS.search(name)
+    character = INVALID_IN_PATHS.search(name)
     if character is None:
         return None
     code = ord(character[0])

@@ -98,6 +98,11 @@ def test_relative_path_is_searched_next_to_the_file_first(folders: AllowedFolder
     assert folders.find(written, root) == near
 
 
+def test_file_with_a_no_break_space_in_its_name_is_found(folders: AllowedFolders, tmp_path: Path) -> None:
+    file = put(tmp_path / "root/a\u00a0b.stl")
+    assert folders.find(file.name, file.parent) == file
+
+
 @pytest.mark.parametrize(
     ("written", "why"),
     [

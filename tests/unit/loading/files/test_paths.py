@@ -29,6 +29,12 @@ def test_path_is_relative_to_the_file_that_contains_it(sandbox: PathSandbox) -> 
     assert sandbox.find("../b.yaml", sandbox.root / "sub", POSITION) == sandbox.root / "b.yaml"
 
 
+@pytest.mark.parametrize("name", ["bu\u0308ro\u00a01.yaml", "at 9.41\u202fAM.yaml", "b\u3000c.yaml"])
+def test_file_names_can_contain_all_kinds_of_spaces(sandbox: PathSandbox, name: str) -> None:
+    (sandbox.root / name).write_text("x: 1")
+    assert sandbox.find(name, sandbox.root, POSITION) == sandbox.root / name
+
+
 def test_models_and_bare_paths_are_found_in_the_world_path(sandbox: PathSandbox) -> None:
     expected = sandbox.world_path[0] / "model/m.yaml"
     assert sandbox.find("model://model/m.yaml", sandbox.root, POSITION) == expected
