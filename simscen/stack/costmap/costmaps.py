@@ -139,8 +139,12 @@ class _UpdateSchedule:
     """Update times of one costmap, and the readings for its next update."""
 
     def __init__(self, period: int, latency: int) -> None:
-        """Take the time between two updates and the duration of an update, in ticks."""
-        self._period, self._updated_at = max(period, latency), -period
+        """Take the time between two starts of updates and the duration of an update, in ticks.
+
+        If an update takes longer than `period`, the next update starts at its end.
+        """
+        self._period = max(period, latency)
+        self._updated_at = -self._period
         self._updates = LatencyQueue[_Update](latency)
         self.next: float = 0
         """The tick of the next start or end of an update."""

@@ -110,6 +110,18 @@ def test_delayed_costmap_marks_obstacles_where_they_were_seen() -> None:
             assert cells[:, 1] * view.resolution + view.origin[0] == pytest.approx([1.0] * shown, abs=0.051)
 
 
+def test_first_update_that_takes_longer_than_the_period_starts_with_the_first_reading() -> None:
+    maps = Costmaps(StackSpec(), Surroundings(round_robot(), None, TICK_RATE_HZ), 0.5, latency=500)
+    odometry, ranges, pose = OdometryHistory(TICK_RATE_HZ), np.full(360, np.inf), Pose2(0.0, 0.0)
+    ranges[180] = 1.0
+    odometry.add(0, pose)
+    maps.add_reading(Scan("lidar", 0, ranges, -math.pi, math.pi / 180, 0.05, 12.0))
+    for tick in range(0, 600, 10):
+        maps.update(tick, Frames(pose, pose), odometry)
+        for view in (maps.local_costmap.view, maps.global_costmap.view):
+            assert (view.costs == 254).any() == (tick >= 500)
+
+
 def test_delayed_localizer_receives_scans_with_their_original_tick() -> None:
     d = start(localizer=0.05)
     heard: list[tuple[int, int]] = []
