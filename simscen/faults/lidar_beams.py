@@ -124,7 +124,7 @@ class Ghost(Spec, Fault):
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         def ranges(scan: Scan) -> Array:
             offsets = np.remainder(scan.angles() - self.direction + math.pi, 2 * math.pi) - math.pi
-            is_hit = (np.abs(offsets) <= self.width / 2) & (rng.random(len(offsets)) < self.probability)
+            is_hit = (np.abs(offsets) <= self.width / 2 + 1e-9) & (rng.random(len(offsets)) < self.probability)
             return np.where(is_hit, np.fmin(scan.ranges, self.range), scan.ranges)
 
         return ChangedRanges(ranges)

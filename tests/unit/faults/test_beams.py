@@ -47,6 +47,13 @@ def test_ghost_fills_its_sector_behind_nearer_ranges():
     assert unsuitable_key({"ghost": {"range": 20}}, "Scan", spec=Lidar())[0] == "range"
 
 
+@pytest.mark.parametrize("width", [10, 20, 30, 40])
+def test_ghost_includes_the_beams_at_both_edges_of_its_window(width):
+    ghost = {"ghost": {"range": 1, "width": f"{width} deg"}}
+    measured = start(ghost, "Scan").reading(scan(np.full(360, 2.0))).ranges
+    assert np.flatnonzero(measured == 1.0).tolist() == list(range(180 - width // 2, 180 + width // 2 + 1))
+
+
 def test_dust_shortens_beams_by_a_poisson_process():
     """At range r a share 1 - exp(-r / L) is short; of those the mean is L - r / (exp(r / L) - 1)."""
     path, wall = 8.0, 5.0
