@@ -24,8 +24,9 @@ _TIME_COLOR_COUNT = 48
 _DEFAULT_FOOTPRINT = 0.15 * np.column_stack((np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)))
 """Circle with a radius of 0.15 m for a robot without a footprint."""
 _LIFTED_SYMBOL = [(-6, -2), (0, -9), (6, -2), (2, -2), (2, 6), (-2, 6), (-2, -2)]
-_SET_DOWN_SYMBOL = [(-6, 2), (0, 9), (6, 2), (2, 2), (2, -6), (-2, -6), (-2, 2)]
-"""Corners of the arrows at a kidnapping in pixels from the center, x right and y down."""
+"""Corners of the arrow where a robot was lifted, in pixels from the center, x right and y down."""
+_SET_DOWN_SYMBOL = [(x, -y) for x, y in _LIFTED_SYMBOL]
+"""Corners of the arrow where a robot was set down."""
 
 
 def split_at_jumps(samples: Samples, tick_rate: int, placement_ticks: tuple[int, ...] = ()) -> list[Samples]:
@@ -80,13 +81,15 @@ def draw_truth(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     step = round_time_step(trace.seconds(trace.end))
     for number in range(1, int(trace.seconds(trace.end) / step) + 1) if pieces else ():
         tick = round(number * step * trace.tick_rate)
+        if not trace.truth.ticks[0] <= tick <= trace.truth.ticks[-1]:
+            continue
         x, y = trace.place(tick)
         canvas.disc(x, y, 3.6, palette.PAGE, palette.time_color(tick / max(trace.end, 1)), 1.6)
     yield from ()
 
 
 def draw_kidnapping(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw an arrow up where the robot was lifted, and an arrow down where it was set down."""
+    """Draw an arrow up and an arrow down at the two ends of each jump of the true path."""
     for before, after in pairwise(driven_segments(scene)):
         when = f"{scene.trace.seconds(int(before.ticks[-1])):.1f} s"
         ends = (before.values[-1], _LIFTED_SYMBOL, "lifted"), (after.values[0], _SET_DOWN_SYMBOL, "set down")

@@ -34,7 +34,7 @@ def draw_ground(canvas: Canvas, scene: Scene) -> Iterator[Label]:
         canvas.add_part(f"ground {ground.name}", outline)
         _draw_chevrons(canvas, ground, outline)
         x, y = outline.mean(axis=0).tolist()
-        height = f"{ground.height:.2g} m" if ground.height >= 1 else f"{100 * ground.height:.2g} cm"
+        height = f"{ground.height:.2g} m" if ground.height >= 0.995 else f"{100 * ground.height:.2g} cm"
         text = printable(f"{ground.name}, {height} high" if ground.name else f"{height} high")
         yield Label(LABEL_RANK, x, y, text, palette.FAINT_INK, 11, _label_distance(canvas, outline), is_optional=True)
 

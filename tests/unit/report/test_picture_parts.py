@@ -18,9 +18,11 @@ from simscen.loading.scenario import load_scenario
 from simscen.record.log_header import scenery_from_header
 from simscen.record.log_reader import read_log
 from simscen.report.picture import map_picture, sidebar
-from simscen.report.picture.canvas import LABEL_CELL_PX
+from simscen.report.picture.canvas import LABEL_CELL_PX, Canvas
 from simscen.report.picture.map_picture import draw_map_picture
+from simscen.report.picture.path_layer import draw_truth
 from simscen.report.picture.scene import Scene, scene_with_robots
+from simscen.report.picture.world_layer import draw_ground
 from simscen.run.log_header import world_scenery as scenery_in
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
@@ -123,6 +125,23 @@ def test_kidnapping_is_a_gap_with_marks_on_both_sides():
     assert [np.round(way, 1).tolist() for way in ways] == [[[1, 1], [1, 3]], [[7, 1], [9, 1]]]
     assert np.round(of(scene, "lifted")[0], 1).tolist() == [[1, 3]]
     assert np.round(of(scene, "set down")[0], 1).tolist() == [[7, 1]]
+
+
+def test_height_just_below_one_meter_is_readable():
+    ramp = DrivableSurface("ramp", ((7, 4), (9, 4), (9, 5), (7, 5)), 0.996, (0.05, 0.0))
+    scene = replace(everything(), scenery=Scenery(ground=(ramp,)))
+    canvas = map_picture.draw_map_canvas(everything())
+    assert [label.text for label in draw_ground(canvas, scene)] == ["ramp, 1 m high"]
+
+
+def test_time_marks_are_drawn_only_while_the_true_pose_is_known(monkeypatch):
+    scene, marks = everything(truth=[[0, 1, 1], [10, 6, 1]]), []
+    monkeypatch.setattr(Canvas, "disc", lambda canvas, x, y, *rest, **options: marks.append(round(x, 6)))
+    canvas = map_picture.draw_map_canvas(scene)
+    known = (scene.trace.truth.ticks >= 720) & (scene.trace.truth.ticks <= 1680)
+    marks.clear()
+    list(draw_truth(canvas, replace(scene, trace=replace(scene.trace, truth=scene.trace.truth.select(known)))))
+    assert marks == [2.5, 3.0, 3.5, 4.0, 4.5]
 
 
 def test_short_teleport_is_a_gap():
