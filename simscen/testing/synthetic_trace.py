@@ -110,11 +110,11 @@ def _events(description: Mapping[str, Any], end: int) -> tuple[Event, ...]:
 
 
 def _path_points(points: Sequence[Sequence[float]]) -> Array:
-    """Return the poses (n, 3) of a path through points [x, y]. Yaw is the direction to the next point."""
+    """Return the poses (n, 3) of a path through points [x, y]. Yaw is the direction to the next point, if any."""
     xy = np.array(points, dtype=np.float64)[:, :2]
     steps = np.diff(xy, axis=0)
     yaw = np.arctan2(steps[:, 1], steps[:, 0])
-    return np.column_stack((xy, np.append(yaw, yaw[-1:])))
+    return np.column_stack((xy, np.append(yaw, yaw[-1:] if len(yaw) else 0.0)))
 
 
 def synthetic_case(description: Mapping[str, Any]) -> Case:

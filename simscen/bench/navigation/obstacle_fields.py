@@ -112,7 +112,10 @@ def _shortest_path_length(centers: Array, radius: float) -> float:
 
 
 NARROW_MARGINS_M = (0.30, 0.20, 0.10)
-"""Guaranteed width of a passage through a narrow field, minus ROBOT_WIDTH_M. The true width is at most 0.1 m larger."""
+"""Guaranteed width of a passage through a narrow field, minus ROBOT_WIDTH_M.
+
+The true width can be about 0.14 m larger, because `_is_crossable` tests `blocked_radius` on a grid.
+"""
 ROBOT_WIDTH_M = 0.42
 """Width of the Jackal across its wheels."""
 

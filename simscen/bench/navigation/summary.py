@@ -241,7 +241,7 @@ class ExperimentComparison:
 
 
 def compare_experiment(experiment: str, baseline: Sequence[Trial], other: Sequence[Trial]) -> ExperimentComparison:
-    """Compare the trials of two stacks. Raises ValueError if number, worlds, seeds, or order differ."""
+    """Compare the trials of two stacks. Raises ValueError if their numbers, or worlds or seeds of a pair, differ."""
     pairs = list(zip(baseline, other, strict=True))
     if any(first.world != second.world or first.run.key.seed != second.run.key.seed for first, second in pairs):
         raise ValueError(f"{experiment}: the runs are not of the same drives")

@@ -133,13 +133,15 @@ def time_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> RunT
     gc.freeze()  # as the fork server does, so that older objects are not searched for garbage
     previous = gc.get_threshold()
     gc.set_threshold(GC_THRESHOLD)  # as a run's own process does
-    with TemporaryDirectory() as folder:
-        cpu_start, wall_start = time.process_time(), time.perf_counter()
-        attach = partial(_watch_parts, watch) if watch else None
-        run = simulate(prepared, SEED, log=Path(folder, "run.mcap"), attach=attach)
-        cpu, wall = time.process_time() - cpu_start, time.perf_counter() - wall_start
-    gc.set_threshold(*previous)
-    gc.unfreeze()
+    try:
+        with TemporaryDirectory() as folder:
+            cpu_start, wall_start = time.process_time(), time.perf_counter()
+            attach = partial(_watch_parts, watch) if watch else None
+            run = simulate(prepared, SEED, log=Path(folder, "run.mcap"), attach=attach)
+            cpu, wall = time.process_time() - cpu_start, time.perf_counter() - wall_start
+    finally:
+        gc.set_threshold(*previous)
+        gc.unfreeze()
     return RunTimes(run.result.simulated, cpu, wall)
 
 
@@ -178,7 +180,10 @@ def time_baseline_patrol(prepared: PreparedScenario, simulated: float) -> float:
 
 
 def measure_obstacle_field(obstacles: int) -> ObstacleFieldTimes:
-    """Measure scans and physics steps among this number of cylinders, with 0.9 cylinders per square meter."""
+    """Measure scans and physics steps among this number of cylinders.
+
+    There are about 0.9 cylinders per square meter, but none within 1 m of the robot.
+    """
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
     solids = random_cylinders(obstacles)
     mesh, start, height = merge_solids(solids), Pose2(0.0, 0.0, 0.0), lidar_height(prepared.robot)

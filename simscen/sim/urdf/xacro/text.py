@@ -35,7 +35,8 @@ class TextEvaluator:
         while position < len(text):
             token = TOKEN.match(text, position)
             if token is None:
-                raise ExpansionError(f"{text[position : position + 60]!r}: a bracket is not closed")
+                rest = text[position : position + 60]
+                raise ExpansionError(f"{rest!r}: `$` does not begin a complete `${{…}}` or `$(…)`")
             parts.append(self._part(token[0], scope))
             position = token.end()
         if len(parts) == 1:
