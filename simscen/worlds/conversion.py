@@ -3,7 +3,7 @@
 import math
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import chain, count, pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -33,6 +33,25 @@ class Conversion:
     obstacles: list[Obstacle] = field(default_factory=list)
     objects: list[Movable] = field(default_factory=list)
     changes: list[str] = field(default_factory=list)
+    _names: set[str] = field(default_factory=set, init=False)
+
+    def add(self, kind: type[ObjectT], items: list[ObjectT], fields: dict[str, object]) -> None:
+        """Add an obstacle or object with these `fields` to `items`, or a sentence to `changes` if they are not valid.
+
+        If its name is taken, it gets a number: `shelf-2`.
+        """
+        name = self._unique_name(str(fields["name"])[:MAX_NAME_LENGTH] or "obstacle")
+        try:
+            items.append(kind.model_validate({**fields, "name": name}))
+        except ValidationError as error:
+            self.changes.append(f"{name}: {first_problem(error)}; it is left out")
+        else:
+            self._names.add(name)
+
+    def _unique_name(self, name: str) -> str:
+        suffixes = chain([""], (f"-{number}" for number in count(2)))
+        names = (f"{name[: MAX_NAME_LENGTH - len(suffix)]}{suffix}" for suffix in suffixes)
+        return next(one for one in names if one not in self._names)
 
     def merged_into(self, spec: WorldSpec) -> WorldSpec:
         """Return a copy of `spec` with these obstacles and objects in front of its own, and without `sdf`.
@@ -59,19 +78,10 @@ def convert_world(world: World, height: float) -> Conversion:
     for solid in world.solids:
         friction = {"friction": solid.friction} if solid.friction != 1.0 else {}
         for shape in prism_shapes(solid, height, conversion.changes):
-            _add(Obstacle, conversion.obstacles, {"name": solid.name, **shape.fields, **friction}, conversion.changes)
+            conversion.add(Obstacle, conversion.obstacles, {"name": solid.name, **shape.fields, **friction})
     for body in world.bodies:
         _add_body(body, height, conversion)
     return conversion
-
-
-def _add(kind: type[ObjectT], items: list[ObjectT], fields: dict[str, object], changes: list[str]) -> None:
-    """Add an obstacle or object with these `fields` to `items`, or a sentence to `changes` if they are not valid."""
-    name = str(fields["name"])[:MAX_NAME_LENGTH] or "obstacle"
-    try:
-        items.append(kind.model_validate({**fields, "name": name}))
-    except ValidationError as error:
-        changes.append(f"{name}: {first_problem(error)}; it is left out")
 
 
 def _add_body(body: Body, height: float, conversion: Conversion) -> None:
@@ -86,11 +96,11 @@ def _add_body(body: Body, height: float, conversion: Conversion) -> None:
             f"{body.name}: it {moves} and has {len(shapes)} shapes, but an object can have only one; it is made static"
         )
         for shape in shapes:
-            _add(Obstacle, conversion.obstacles, {"name": body.name, **shape.fields}, conversion.changes)
+            conversion.add(Obstacle, conversion.obstacles, {"name": body.name, **shape.fields})
         return
     travel = _travel(body.name, body.path, shapes[0], conversion.changes) if body.path else None
     fields = {"name": body.name, "mass": body.mass, "move": travel, **shapes[0].fields}
-    _add(Movable, conversion.objects, fields, conversion.changes)
+    conversion.add(Movable, conversion.objects, fields)
 
 
 def _travel(name: str, path: MotionPath, shape: PrismShape, changes: list[str]) -> Travel | None:

@@ -114,6 +114,14 @@ def test_open_mesh_is_left_out_with_a_note():
     assert changes == ["torn: a mesh whose cross section at 0.2 m is not closed; it is left out"]
 
 
+def test_parts_of_a_solid_get_names_of_their_own():
+    shelf = merge_solids([Solid(Box((0.2, 0.2, 1.0)), Pose3(x=x, z=0.5)) for x in (0.0, 2.0, 4.0)])
+    solids = [Solid(Mesh(shelf.vertices, shelf.faces), Pose3(y=y), "s" * 130) for y in (0.0, 3.0)]
+    conversion = convert_world(World("w", tuple(solids), ()), 0.2)
+    names = [obstacle.name for obstacle in conversion.obstacles]
+    assert names == ["s" * 120, *("s" * 118 + f"-{number}" for number in range(2, 7))]
+
+
 def test_bodies_keep_mass_and_motion():
     start = Pose2(1.0, 1.0, 0.0)
     path = path_through_waypoints(start, [[4.0, 1.0], [4.0, 3.0]], 0.8, "back_and_forth")
@@ -141,7 +149,7 @@ def test_unsupported_motions_and_shapes_are_reported():
         "table: it could be pushed and has 2 shapes, but an object can have only one; it is made static",
     ]
     assert world.bodies[0].path is None
-    assert [solid.name for solid in world.solids] == ["table", "table"]
+    assert [solid.name for solid in world.solids] == ["table", "table-2"]
 
 
 @pytest.mark.parametrize("mode", ["once", "back_and_forth"])
