@@ -6,6 +6,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.polygons import points_in_polygon
+from simscen.core.records.event_shapes import spawn_pose, spawned_outlines
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
 
@@ -59,24 +60,20 @@ def movable_objects(trace: Trace, tick: int) -> list[MovableObject]:
             case EventKind.OBJECT_REMOVED:
                 spawned.pop(event.name, None)
     return [
-        _movable_object(trace, tick, event, *last[name]) for name, event in spawned.items() if event.data.get("parts")
+        _movable_object(trace, tick, event, *last[name]) for name, event in spawned.items() if spawned_outlines(event)
     ]
 
 
 def _movable_object(trace: Trace, tick: int, spawned: Event, by: str, last: Event) -> MovableObject:
     """Return the state of an object at `tick`. `by` is the name of the event that caused its last change `last`."""
-    x, y, yaw = (spawned.data.get(key) for key in ("x", "y", "yaw"))
+    pose = spawn_pose(spawned)
     samples = trace.objects.get(spawned.name)
     if samples is not None:
         # The sample at its own tick precedes the spawning and may be that of an earlier object of the same name.
         now = (samples.ticks > spawned.tick) & (samples.ticks <= tick)
         if now.any():
-            x, y, yaw = samples.values[now][-1].tolist()
-    assert isinstance(x, int | float) and isinstance(y, int | float) and isinstance(yaw, int | float)
-    parts = spawned.data["parts"]
-    assert isinstance(parts, list)
-    pose = Pose2(float(x), float(y), float(yaw))
-    outlines = tuple(pose.apply(np.array(part, dtype=np.float64)) for part in parts)
+            pose = Pose2(*samples.values[now][-1].tolist())
+    outlines = tuple(pose.apply(np.array(outline)) for outline in spawned_outlines(spawned))
     return MovableObject(spawned.name, outlines, by, last.tick, last.kind != EventKind.OBJECT_SPAWNED)
 
 

@@ -9,7 +9,8 @@ from simscen.core.environment.costmap_filters import Filter
 from simscen.core.environment.scenery import FilterZone, Scenery
 from simscen.core.geometry import Pose3
 from simscen.core.records.case import Case
-from simscen.core.records.events import Event, EventKind, Value
+from simscen.core.records.event_shapes import spawned_outlines
+from simscen.core.records.events import Event, EventKind
 from simscen.record import frame_names, topics
 from simscen.record.frame_names import RobotFrames
 from simscen.record.messages.encode_markers import (
@@ -104,7 +105,7 @@ class ScenePublisher:
             elif name in self._doors:
                 group, color = "doors", DOOR_COLOR
             frame = frame_names.object_frame(name)
-            if outlines := _outlines(event):
+            if outlines := spawned_outlines(event):
                 edges = outline_edges(outlines, _MARKER_HEIGHT_M)
                 yield Marker(frame, group, LINE_LIST, color, LINE_SCALE, points=edges)
             yield Marker(frame, "names", TEXT, color, TEXT_SCALE, _TEXT_POSE, text=name)
@@ -123,23 +124,6 @@ class ScenePublisher:
             yield Marker(frame_names.MAP, "places", ARROW, PLACE_COLOR, (0.4, 0.06, 0.06), Pose3.planar(place))
             above = Pose3(place.x, place.y, 0.3)
             yield Marker(frame_names.MAP, "places", TEXT, PLACE_COLOR, TEXT_SCALE, above, text=name)
-
-
-def _outlines(event: Event) -> list[list[tuple[float, float]]]:
-    """Return the outlines in an object.spawned event. Values that are not polygons are skipped."""
-    parts = event.data.get("parts")
-    outlines = [_corners(part) for part in parts] if isinstance(parts, list) else []
-    return [corners for corners in outlines if len(corners) > 2]
-
-
-def _corners(part: Value) -> list[tuple[float, float]]:
-    """Return the corners of an outline in an event, without invalid ones."""
-    corners = []
-    for corner in part if isinstance(part, list) else []:
-        match corner:
-            case [int() | float() as x, int() | float() as y]:
-                corners.append((float(x), float(y)))
-    return corners
 
 
 def _zone_markers(zone: FilterZone) -> Iterator[Marker]:

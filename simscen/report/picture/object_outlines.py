@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from simscen.core.environment.scenery import MovableObject
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array
+from simscen.core.records.event_shapes import spawned_outlines
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Trace
 
@@ -28,12 +29,4 @@ def object_outlines(trace: Trace, world_objects: Sequence[MovableObject]) -> dic
 
 def outlines_of_event(event: Event) -> Outlines:
     """Return the outlines in an object.spawned event; a circle if there are none."""
-    parts = event.data.get("parts")
-    outlines = tuple(np.array(part, dtype=np.float64) for part in parts) if isinstance(parts, list) else ()
-    return outlines or _UNKNOWN_SHAPE
-
-
-def spawn_pose(event: Event) -> Pose2:
-    """Return the pose of the object in an object.spawned event. Missing values are 0."""
-    values = (event.data.get(key) for key in ("x", "y", "yaw"))
-    return Pose2(*(float(value) if isinstance(value, int | float) else 0.0 for value in values))
+    return tuple(map(np.array, spawned_outlines(event))) or _UNKNOWN_SHAPE

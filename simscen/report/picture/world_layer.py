@@ -11,12 +11,13 @@ import numpy as np
 from simscen.core.environment.costmap_filters import MaskBlocks
 from simscen.core.environment.scenery import DrivableSurface, FilterZone, MovableObject
 from simscen.core.geometry import Array, Pose2
+from simscen.core.records.event_shapes import polygon_from_data, spawn_pose
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Samples
 from simscen.report.picture import palette
 from simscen.report.picture.canvas import Canvas, printable
 from simscen.report.picture.labels import Label
-from simscen.report.picture.object_outlines import Outlines, object_outlines, spawn_pose
+from simscen.report.picture.object_outlines import Outlines, object_outlines
 from simscen.report.picture.path_layer import split_at_jumps
 from simscen.report.picture.scene import Scene
 
@@ -58,13 +59,13 @@ def draw_floors(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     for floor in scene.scenery.floors:
         yield from _draw_floor(canvas, floor.region, np.array(floor.outline), f"friction {floor.friction:g}")
     for event in scene.per_robot[0].trace.of_kind(EventKind.FLOOR_CHANGED):
-        outline, friction = event.data.get("outline"), event.data.get("friction")
-        if not isinstance(outline, list) or not isinstance(friction, int | float):
-            continue  # plug-ins can record any data
+        outline, friction = polygon_from_data(event.data.get("outline")), event.data.get("friction")
+        if not outline or not isinstance(friction, int | float):
+            continue
         text = f"friction {friction:g} from {scene.trace.seconds(event.tick):.1f} s"
         until = event.data.get("until")
         text += f" to {until:.1f} s" if isinstance(until, int | float) else ""
-        yield from _draw_floor(canvas, event.name, np.array(outline, dtype=np.float64), text)
+        yield from _draw_floor(canvas, event.name, np.array(outline), text)
 
 
 def _draw_floor(canvas: Canvas, name: str, outline: Array, text: str) -> Iterator[Label]:

@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any
 
 from simscen.core.environment.scenery import Scenery
+from simscen.core.records.event_shapes import spawn_pose, spawned_outlines
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.run_result import RunResult
 from simscen.core.version import PACKAGE
 from simscen.record.log_header import scenery_from_header
 from simscen.record.log_reader import Log
 from simscen.report.display_text import csp_hash, escape_control, one_line
-from simscen.report.picture.object_outlines import spawn_pose
 from simscen.report.picture.palette import css_variables
 from simscen.report.replay.packed_columns import PackedColumns
 from simscen.report.replay.robot_data import moving_objects, occupancy_grid_data, robot_data
@@ -191,12 +191,10 @@ def run_data(log: Log, result: RunResult, columns: PackedColumns) -> dict[str, A
 
 def _spawned(event: Event) -> dict[str, Any]:
     """Return the JSON data of a spawned object: tick, pose, and outlines in the frame of the object."""
-    parts: Any = event.data.get("parts")
-    outlines = parts if isinstance(parts, list) and parts else []
     return {
         "name": one_line(event.name),
         "tick": event.tick,
         "pose": [round(part, 4) for part in spawn_pose(event)],
-        "parts": [corners_data(outline) for outline in outlines],
+        "parts": [corners_data(outline) for outline in spawned_outlines(event)],
         "person": bool(event.data.get("person")),
     }

@@ -175,6 +175,22 @@ def test_outline_has_all_parts_and_unknown_shapes_are_discs():
     assert np.hypot(*found["ghost"][0].T) == pytest.approx(np.full(32, 0.2))
 
 
+INVALID_POLYGONS = [None, "many", [], [3, []], [[0, 0], [1]], ["a"], [[0, 0], [1, 0]], [[0, 0], [1, 0], [0, "b"]],
+                    [[0, 0], [1, 0], [0, float("nan")]], [[0, 0], [1, 0], [0, 10**400]]]  # fmt: skip
+
+
+@pytest.mark.parametrize("polygon", INVALID_POLYGONS)
+def test_invalid_polygons_in_events_are_not_drawn(polygon):
+    """Stacks of packages can report events with any data."""
+    events = [
+        [1, "floor.changed", "oil", {"outline": polygon, "friction": 0.1}],
+        [1, "object.spawned", "odd", {"parts": [polygon], "x": "left"}],
+    ]
+    drawn = dict(draw_map_canvas(scene(events=events)).parts)
+    assert not any(name.startswith("floor") for name in drawn)
+    assert np.hypot(*drawn["object odd"].T) == pytest.approx(np.full(32, 0.2))
+
+
 @pytest.mark.parametrize("data", [{}, {"parts": []}, {"parts": "many"}])
 def test_event_without_a_shape_is_drawn_as_a_default_shape(data):
     event = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0]], "events": [[0, "object.spawned", "x", data]]}).events[

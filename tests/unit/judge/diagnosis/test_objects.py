@@ -43,6 +43,12 @@ def test_distance_is_to_the_nearest_part():
     assert table.distance(np.array([[1.5, 0.0], [9.9, 9.5]])).tolist() == pytest.approx([1.0, 0.0])
 
 
+def test_objects_without_a_valid_outline_are_ignored():
+    """Stacks of packages can report events with any data."""
+    odd = [[1, "object.spawned", name, {"parts": parts}] for name, parts in (("a", [["a"]]), ("b", 3), ("c", [SQUARE]))]
+    assert [thing.name for thing in objects_at(odd, 2)] == ["c"]
+
+
 def test_object_exists_from_spawn_to_removal():
     events = [spawned(2, "crate", 3, 0), [5, "object.removed", "crate", {}], spawned(7, "crate", 4, 0)]
     assert [len(objects_at(events, at)) for at in (1.9, 2, 4.9, 5, 6.9, 7)] == [0, 1, 1, 0, 0, 1]
