@@ -9,12 +9,18 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from simscen.core.geometry import Array
-from simscen.core.records.verdict import POSITION, Evidence, Finding
+from simscen.core.records.verdict import POSITION, Evidence, Finding, Status
 from simscen.core.statistics import chi2_quantile, nees_mean_bounds
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, if_complete, missed, undecided
 from simscen.criteria.timeline import Span, end_reason, first_sustained, never_started, spans
-from simscen.criteria.trace_signals.estimation_errors import DIMENSIONS, NO_BELIEF, nees_samples, pose_error
+from simscen.criteria.trace_signals.estimation_errors import (
+    BELIEF_TIMEOUT_S,
+    DIMENSIONS,
+    NO_BELIEF,
+    nees_samples,
+    pose_error,
+)
 from simscen.spec.base import Spec
 from simscen.spec.places import DisturbanceName
 from simscen.spec.quantities import Duration, PositiveAngle, PositiveDuration, PositiveLength, Quantity
@@ -30,7 +36,8 @@ class LocalizationError(Spec, Criterion):
     What is measured: the distance between the estimated and the true position, and the heading error. Both are measured
         whenever the stack publishes an estimated pose (belief), and continuously while its newest belief is over 1 s
         old. The trajectories are not aligned, because an alignment would hide the error.
-    When it fails: the largest error, the root mean square, or the last error exceeds its bound.
+    When it fails: the largest error, the root mean square, or the last error exceeds its bound. If the first belief is
+        over 1 s later than `after`, only `final` can pass.
     Why this: a robot whose error is half a meter may reach goals in open space, but not near obstacles.
     Source: evo's APE (metrics.py) and Beluga's benchmarks.
 
@@ -42,7 +49,7 @@ class LocalizationError(Spec, Criterion):
     rmse: PositiveLength | None = None
     """Bound on the root mean square of the distance."""
     final: PositiveLength | None = None
-    """Bound on the distance at the end of the run."""
+    """Bound on the last measured distance, at most 1 s before the end of the run."""
     max_yaw: PositiveAngle | None = None
     """Bound on the largest heading error."""
     after: Duration = 0.0
@@ -66,6 +73,7 @@ class LocalizationError(Spec, Criterion):
         error = pose_error(trace)
         if not len(error):
             return [undecided("localization_error", NO_BELIEF)]
+        first = int(error.ticks[0])
         is_counted = error.ticks >= self.after * trace.tick_rate
         if not is_counted.any():
             last = trace.seconds(int(error.ticks[-1]))
@@ -75,18 +83,28 @@ class LocalizationError(Spec, Criterion):
         distances, angles = error.values.T
         findings = []
         if self.max is not None:
-            findings.append(_judge_largest(trace, error, distances, "localization_error", self.max, "m"))
+            largest = _judge_largest(trace, error, distances, "localization_error", self.max, "m")
+            findings.append(self._if_known_early(trace, first, largest))
         if self.rmse is not None:
             rmse = float(np.sqrt(np.mean(distances**2)))
             bound = at_most("localization_error rmse", rmse, self.rmse, "m", context="(not aligned)")
-            findings.append(if_complete(trace, bound))
+            findings.append(self._if_known_early(trace, first, if_complete(trace, bound)))
         if self.final is not None:
             at = (trace, int(error.ticks[-1]))
             bound = at_most("localization_error final", float(distances[-1]), self.final, "m", at=at)
             findings.append(if_complete(trace, bound))
         if self.max_yaw is not None:
-            findings.append(_judge_largest(trace, error, angles, "localization_error yaw", self.max_yaw, "rad"))
+            largest = _judge_largest(trace, error, angles, "localization_error yaw", self.max_yaw, "rad")
+            findings.append(self._if_known_early(trace, first, largest))
         return findings
+
+    def _if_known_early(self, trace: Trace, first: int, finding: Finding) -> Finding:
+        """Return the finding, or an inconclusive one if it passes, but the `first` belief is long after `after`."""
+        if finding.status is not Status.PASS or first <= (self.after + BELIEF_TIMEOUT_S) * trace.tick_rate:
+            return finding
+        known = f"the first belief is from t = {trace.seconds(first):.2f} s"
+        because = f"{known}, but the evaluation begins at {self.after:.2f} s"
+        return undecided(finding.what, because, finding.limit)
 
 
 def _judge_largest(trace: Trace, error: Samples, values: Array, what: str, limit: float, unit: str) -> Finding:
@@ -98,7 +116,8 @@ def _judge_largest(trace: Trace, error: Samples, values: Array, what: str, limit
 class RelocalizedWithin(Spec, Criterion):
     """The robot relocalized in time.
 
-    A robot is lost if its belief (the estimated pose) is not within the tolerances of the true pose.
+    A robot is lost if its belief (the estimated pose) is not within the tolerances of the true pose, or if it has had
+    no belief by the end of `time`.
 
     What is measured: the time from each start of `after`, or from the start of the run, until the belief of a lost
         robot is within the tolerances again and stays there for `hold`.
@@ -153,7 +172,8 @@ class RelocalizedWithin(Spec, Criterion):
         later = error.ticks >= start
         ticks, errors = error.ticks[later], error.values[later]
         is_localized = (errors[:, 0] <= self.tolerance) & (errors[:, 1] <= self.yaw_tolerance)
-        if is_localized[ticks <= start + self.time * trace.tick_rate].all():
+        limit = start + self.time * trace.tick_rate
+        if error.ticks[0] <= limit and is_localized[ticks <= limit].all():
             return undecided("relocalized_within", f"the robot was never lost {self._context_text}", self._limit_text)
         # Only samples after the loss count as relocalization.
         lost = int(np.argmin(is_localized))
@@ -212,6 +232,8 @@ class LocalizationConsistency(Spec, Criterion):
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return the finding for the upper bound of the average, and with `both_sides` also for the lower bound."""
+        if not len(pose_error(trace)):
+            return [undecided("localization_consistency", NO_BELIEF)]
         samples = self._sampled(trace)
         if samples is None:
             return [undecided("localization_consistency", "the belief has no covariance")]
@@ -236,14 +258,16 @@ class LocalizationConsistency(Spec, Criterion):
         return None, chi2_quantile(self.probability, DIMENSIONS * count) / count
 
     def _sampled(self, trace: Trace) -> Samples | None:
-        """Return the NEES (n, 1) at regular times from `after` to the last belief; None without covariances.
+        """Return the NEES (n, 1) at regular times from the first belief after `after`; None without covariances.
 
         Each belief is used at most once.
         """
         all_samples = nees_samples(trace)
         if not len(all_samples):
             return None
-        first, last = max(self.after * trace.tick_rate, int(all_samples.ticks[0])), int(all_samples.ticks[-1])
-        times = np.arange(first, last + 1, self.every * trace.tick_rate).astype(np.int64)
-        chosen = np.searchsorted(all_samples.ticks, times, side="right") - 1
-        return all_samples.select(np.unique(chosen))
+        samples = all_samples.select(all_samples.ticks >= self.after * trace.tick_rate)
+        if not len(samples):
+            return samples
+        times = np.arange(samples.ticks[0], samples.ticks[-1] + 1, self.every * trace.tick_rate).astype(np.int64)
+        chosen = np.searchsorted(samples.ticks, times, side="right") - 1
+        return samples.select(np.unique(chosen))

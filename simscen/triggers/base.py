@@ -122,6 +122,6 @@ class Trigger(AnyCondition):
     delay: Duration = 0.0
     """Delay between the edge and the start."""
     times: Annotated[int, Field(ge=1, le=10_000)] = 1
-    """Maximum number of starts."""
+    """Maximum number of starts. An edge while the fault is active counts, but does not start it again."""
     probability: Probability = 1.0
     """Probability that an edge starts the event or fault. The random draw depends on the seed."""

@@ -27,7 +27,8 @@ TESTS_OF_MODULE = {
         ["golden", "localization_error"],
         ["golden", "relocalized_within"],
         ["golden", "localization_consistency"],
-        ["tests/unit/criteria/test_smoothness_and_consistency.py", *EVERY_CRITERION],
+        [f"tests/unit/criteria/test_{of}.py" for of in ("smoothness_and_consistency", "sparse_beliefs")],
+        EVERY_CRITERION,
     ],
     "criteria/stopping": [
         ["golden", "stopped_within"],

@@ -1,0 +1,75 @@
+"""Tests of the localization criteria with few beliefs, as of AMCL, which publishes only while the robot moves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simscen.core.records.trace import Samples
+from simscen.core.records.verdict import Status
+from simscen.criteria.localization import LocalizationConsistency, LocalizationError, RelocalizedWithin
+from simscen.testing.synthetic_trace import TICK_RATE_HZ, synthetic_case, synthetic_trace
+
+CASE = synthetic_case({})
+NO_BELIEF = "the robot never reported an estimated pose"
+
+
+def trace_of(beliefs, seconds=60, columns=9, events=()):
+    """Return the trace of a robot that stands at the origin, with beliefs (t, x) of a standard deviation of 0.1."""
+    trace = synthetic_trace({"seconds": seconds, "truth": [[0, 0, 0]], "events": events})
+    ticks = np.array([round(t * TICK_RATE_HZ) for t, _ in beliefs], dtype=np.int64)
+    values = np.array([[x, 0, 0, 0.01, 0, 0, 0.01, 0, 0.01] for _, x in beliefs]).reshape(-1, 9)
+    return replace(trace, belief=Samples(ticks, values[:, :columns]))
+
+
+@pytest.mark.parametrize(("first", "status"), [(6.0, Status.PASS), (6.1, Status.INCONCLUSIVE)])
+@pytest.mark.parametrize("bound", ["max", "rmse", "max_yaw"])
+def test_unknown_error_at_the_start_of_the_evaluation_does_not_pass(first, status, bound):
+    criterion = LocalizationError(**{bound: 0.3}, after=5.0)
+    (found,) = criterion.judge(trace_of([(first, 0.0)]), CASE)
+    assert found.status is status
+    if status is Status.INCONCLUSIVE:
+        assert found.measured == "the first belief is from t = 6.10 s, but the evaluation begins at 5.00 s"
+        assert found.limit.startswith("≤ 0.30")
+
+
+def test_late_first_belief_can_fail_and_decides_the_final_error():
+    criterion = LocalizationError(max=0.3, rmse=0.3, final=0.3)
+    findings = criterion.judge(trace_of([(30, 2.0), (60, 0.0)]), CASE)
+    assert [found.status for found in findings] == [Status.FAIL, Status.FAIL, Status.PASS]
+
+
+@pytest.mark.parametrize(
+    ("beliefs", "status", "value"),
+    [
+        ([(30, 3.0)], Status.FAIL, 60.0),
+        ([(30, 0.0)], Status.FAIL, 30.0),
+        ([(20, 0.0)], Status.INCONCLUSIVE, None),
+    ],
+)
+def test_robot_without_a_belief_is_lost(beliefs, status, value):
+    (found,) = RelocalizedWithin(time=20.0).judge(trace_of(beliefs), CASE)
+    assert (found.status, found.value) == (status, value)
+
+
+def test_robot_is_not_lost_while_its_correct_belief_is_recent():
+    trace = trace_of([(t, 0.0) for t in np.arange(0.0, 61.0)], events=[[10.2, "event.started", "kidnapped"]])
+    (found,) = RelocalizedWithin(time=0.5, after="kidnapped").judge(trace, CASE)
+    assert found.measured == "the robot was never lost after kidnapped"
+
+
+def test_beliefs_before_the_evaluation_do_not_count_for_consistency():
+    """Beliefs before `after` are wrong and overconfident, all later ones are one standard deviation from the truth."""
+    trace = trace_of([(2, 100.0), (30, 0.1), (40, 0.1)])
+    (found,) = LocalizationConsistency(after=10.0).judge(trace, CASE)
+    assert (found.status, found.value) == (Status.PASS, pytest.approx(1.0))
+    assert "(mean of 2 NEES" in found.limit
+    (found,) = LocalizationConsistency(after=50.0).judge(trace, CASE)
+    assert (found.status, found.measured) == (Status.INCONCLUSIVE, "there is no belief after t = 50.00 s")
+
+
+@pytest.mark.parametrize(("columns", "beliefs", "reason"), [(9, [], NO_BELIEF), (3, [(1, 0.0)], "no covariance")])
+def test_consistency_is_undefined_without_beliefs_or_covariances(columns, beliefs, reason):
+    (found,) = LocalizationConsistency().judge(trace_of(beliefs, columns=columns), CASE)
+    assert found.status is Status.INCONCLUSIVE
+    assert reason in found.measured
