@@ -143,7 +143,7 @@ class BringUp:
                     raise BringUpAborted(self._reasons(missing), self._report.aborted_bring_up)
             if missing or nodes != self._graph.nodes():
                 changed_at, nodes = time.monotonic(), self._graph.nodes()
-            return time.monotonic() - changed_at >= self._options.settle
+            return not missing and time.monotonic() - changed_at >= self._options.settle
 
         try:
             if not self._graph.spin_until(_throttled(complete), max(0.5, min(remaining_s, step_limit_s))):

@@ -80,6 +80,8 @@ class MotionActions:
 
     def _process_status(self, action: str, message: Any) -> None:
         self._executing[action] = any(goal.status == EXECUTING for goal in message.status_list)
+        if not any(self._executing.values()):
+            self._missing_since = None
 
     def record_command(self, now: int) -> None:
         """Record that a command arrived."""
@@ -141,6 +143,8 @@ class RecoveryReporter:
     def begin_goal(self) -> None:
         """Begin a new navigation action, whose feedback counts recoveries from zero."""
         self._last_number = 0
+        # Behaviors that the feedback of the last action did not count must not replace clearings of this one.
+        self._feedback_count = max(self._feedback_count, self._behavior_count)
 
     def report_clearing(self, now: int) -> None:
         """Report recoveries in the count that are not behaviors as costmap clearings. `now` is simulated time in ns."""

@@ -72,6 +72,19 @@ def test_server_may_miss_commands_for_one_simulated_second() -> None:
 
 
 @pytest.mark.usefixtures("types")
+def test_missing_command_of_an_ended_action_does_not_count_for_the_next_one() -> None:
+    graph = FakeGraph({"follow_path": "/controller_server"}, {"/controller_server": 20.0})
+    actions = MotionActions(graph, graph)  # type: ignore[arg-type]
+    actions.subscribe()
+    graph.report("follow_path", 2)
+    assert actions.record_missing(5000 * MS) is None
+    graph.report("follow_path", 6)
+    graph.report("follow_path", 6, 2)
+    assert actions.wait_s(5.0) == 5.0
+    assert actions.record_missing(20_000 * MS) is None
+
+
+@pytest.mark.usefixtures("types")
 def test_servers_without_rate_or_status_need_not_send_commands() -> None:
     graph = FakeGraph({"spin": "/behavior_server", "follow_path": "/silent"}, {"/behavior_server": 0.0})
     actions = MotionActions(graph, graph)  # type: ignore[arg-type]

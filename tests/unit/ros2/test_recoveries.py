@@ -94,3 +94,23 @@ def test_recovery_count_restarts_with_each_goal(graph, events, followed) -> None
         followed.report_clearing(now)
         followed.report_clearing(now + S)
     assert [event[0] for event in events].count("recovery.started") == 4
+
+
+def test_behavior_that_the_last_goal_did_not_count_does_not_hide_a_clearing(graph, events, followed) -> None:
+    followed.begin_goal()
+    graph.report("spin", (1, 2))
+    graph.report("spin", (1, 5))
+    followed.begin_goal()  # before the feedback that counts the spin
+    followed.update_count(1)
+    for now in (10 * S, 11 * S):
+        followed.report_clearing(now)
+    assert events[2:] == [("recovery.started", "clear_costmap"), ("recovery.ended", "clear_costmap", "succeeded")]
+
+
+def test_clearing_shortly_before_the_next_goal_is_reported(graph, events, followed) -> None:
+    followed.begin_goal()
+    followed.update_count(1)
+    followed.report_clearing(0)
+    followed.begin_goal()
+    followed.report_clearing(1 * S)
+    assert events == [("recovery.started", "clear_costmap"), ("recovery.ended", "clear_costmap", "succeeded")]
