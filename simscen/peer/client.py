@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import messages, wire
@@ -36,7 +37,7 @@ class Step:
 
     Attributes:
         messages: Messages since the last step.
-        canceled: True if simscen has canceled a goal since the last step.
+        canceled: True if simscen has sent CANCEL since the last step, also without a current goal.
     """
 
     def __init__(self, peer: Peer, header: wire.StepHeader, received: list[Message], canceled: bool) -> None:
@@ -136,10 +137,13 @@ class Peer:
         if kind != wire.HELLO:
             raise wire.Malformed(f"a frame of kind {kind} instead of HELLO")
         self.hello = wire.from_json(body)
-        if wire.PROTOCOL not in self.hello["protocols"]:
-            self.give_up(f"{name} requires version {wire.PROTOCOL} of the stack protocol")
-        self._topics: dict[int, tuple[str, str]] = {t["number"]: (t["topic"], t["type"]) for t in self.hello["says"]}
-        self.accepted_topics: dict[str, int] = {topic["topic"]: topic["number"] for topic in self.hello["hears"]}
+        with _valid_content(kind):
+            if wire.PROTOCOL not in self.hello["protocols"]:
+                self.give_up(f"{name} requires version {wire.PROTOCOL} of the stack protocol")
+            self._topics: dict[int, tuple[str, str]] = {
+                t["number"]: (t["topic"], t["type"]) for t in self.hello["says"]
+            }
+            self.accepted_topics: dict[str, int] = {topic["topic"]: topic["number"] for topic in self.hello["hears"]}
         self._connection.send_json(
             wire.WELCOME,
             {
@@ -172,7 +176,8 @@ class Peer:
             if kind == wire.STEP:
                 header, received = wire.from_step(body)
                 self.goals.now = header.sec + header.nanosec * 1e-9
-                named = [Message(*self._topics[number], data) for number, data in received]
+                with _valid_content(kind):
+                    named = [Message(*self._topics[number], data) for number, data in received]
                 step = Step(self, header, named, self._canceled)
                 self._canceled = False
                 yield step
@@ -182,7 +187,9 @@ class Peer:
                 self._connection.close()
                 return
             else:
-                self._process_frame(kind, wire.from_json(body))
+                content = wire.from_json(body)
+                with _valid_content(kind):
+                    self._process_frame(kind, content)
 
     def add(self, **about: Any) -> None:
         """Add facts about the stack, as JSON values, to the run's log. They are sent at the end of the run."""
@@ -206,3 +213,12 @@ class Peer:
             self.goals.cancel(content["all"])
         else:
             raise wire.Malformed(f"a stack cannot receive a frame of kind {kind}")
+
+
+@contextmanager
+def _valid_content(kind: int) -> Iterator[None]:
+    """Convert errors about missing or invalid fields of a frame of this kind to wire.Malformed."""
+    try:
+        yield
+    except (KeyError, TypeError) as error:
+        raise wire.Malformed(f"invalid content of {wire.KIND_NAMES[kind]}: {type(error).__name__}: {error}") from error
