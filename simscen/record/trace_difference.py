@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from simscen.core.records.events import Event
 from simscen.core.records.trace import Samples, Trace
 
 _POSE = ("x", "y", "yaw")
@@ -59,18 +60,30 @@ def _differences(first: Trace, second: Trace) -> Iterator[Difference]:
     yield from _length_difference("plan", [p.tick for p in first.plans], [p.tick for p in second.plans])
     for event, other_event in zip(first.events, second.events, strict=False):
         if repr(event) != repr(other_event):
-            yield (
-                min(event.tick, other_event.tick),
-                f"event: {event.kind} {event.name} against {other_event.kind} {other_event.name}",
-            )
+            yield min(event.tick, other_event.tick), _describe_events(event, other_event)
     yield from _length_difference("event", [e.tick for e in first.events], [e.tick for e in second.events])
     if first.end != second.end:
         yield min(first.end, second.end), f"end of the run: tick {first.end} against {second.end}"
 
 
+def _describe_events(first: Event, second: Event) -> str:
+    """Return a description of two different events, with their ticks and data if kind and name are equal."""
+    if (first.kind, first.name) != (second.kind, second.name):
+        return f"event: {first.kind} {first.name} against {second.kind} {second.name}"
+    values = f"tick {first.tick} {dict(first.data)} against tick {second.tick} {dict(second.data)}"
+    return f"event: {first.kind} {first.name}: {values}"
+
+
 def _sample_differences(name: str, first: Samples, second: Samples) -> Iterator[Difference]:
     """Yield the first row that differs in at least one bit (nan equals nan, but 0.0 differs from -0.0)."""
     n = min(len(first), len(second))
+    if not n:
+        yield from _length_difference(name, first.ticks.tolist(), second.ticks.tolist())
+        return
+    if first.values.shape[1] != second.values.shape[1]:
+        counts = f"{first.values.shape[1]} against {second.values.shape[1]} columns"
+        yield int(min(first.ticks[0], second.ticks[0])), f"{name}: {counts}"
+        return
     a, b = (np.ascontiguousarray(samples.values[:n]) for samples in (first, second))
     differs = a.view(np.int64) != b.view(np.int64)
     rows = np.flatnonzero(differs.any(axis=1) | (first.ticks[:n] != second.ticks[:n]))
@@ -102,7 +115,7 @@ POSE_TOLERANCE_M_RAD = 1e-5
 def first_pose_difference(first: Trace, second: Trace) -> str | None:
     """Return a description of the first difference of true poses above POSE_TOLERANCE_M_RAD; None without a difference.
 
-    Without one, different ends of the runs are described. Used for runs on different processors.
+    Without one, different ends of the runs or numbers of poses are described. Used for runs on different processors.
     """
     if first.tick_rate != second.tick_rate:
         return f"tick rate: {first.tick_rate} against {second.tick_rate} Hz"
@@ -119,4 +132,6 @@ def first_pose_difference(first: Trace, second: Trace) -> str | None:
         return f"{when}: the true pose differs by {x:.2g} m, {y:.2g} m, {yaw:.2g} rad"
     if first.end != second.end:
         return f"the runs end at ticks {first.end} and {second.end}"
+    if len(first.truth) != len(second.truth):
+        return f"the traces have {len(first.truth)} and {len(second.truth)} true poses"
     return None

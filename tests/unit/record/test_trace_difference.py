@@ -7,7 +7,7 @@ import pytest
 from moments import CLOCK, moments
 
 from simscen.core.messages.navigation import Path
-from simscen.core.records.events import Event
+from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Samples, Trace
 from simscen.record.trace_builder import TraceBuilder
 from simscen.record.trace_difference import first_difference
@@ -76,6 +76,12 @@ def test_difference_of_plans_states_what_differs(trace: Trace, tick: int, points
         ("scans", np.array([0, 24, 72]), "tick 48 (t = 0.200 s): scan: at tick 48 against 72"),
         ("events", (), "tick 0 (t = 0.000 s): event: 2 against 0"),
         ("events", (Event(0, "a", "b"),) * 2, "tick 0 (t = 0.000 s): event: goal.accepted shelf against a b"),
+        (
+            "events",
+            (Event(0, EventKind.GOAL_ACCEPTED, "shelf", {"index": 9}),) * 2,
+            "tick 0 (t = 0.000 s): event: goal.accepted shelf: tick 0 {'index': 0, 'list': [1, 2.5, None, True]} "
+            "against tick 0 {'index': 9}",
+        ),
         ("plans", (), "tick 0 (t = 0.000 s): plan: 2 against 0"),
         ("objects", {}, "tick 0 (t = 0.000 s): object a box: 2 against 0"),
         ("end", 200, "tick 200 (t = 0.833 s): end of the run: tick 240 against 200"),
@@ -84,3 +90,18 @@ def test_difference_of_plans_states_what_differs(trace: Trace, tick: int, points
 )
 def test_missing_values_are_reported_as_differences(trace: Trace, name: str, value: object, expected: str) -> None:
     assert first_difference(trace, dataclasses.replace(trace, **{name: value})) == expected
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "expected"),
+    [
+        (2, 2, "tick 0 (t = 0.000 s): belief: 9 against 3 columns"),
+        (2, 0, "tick 0 (t = 0.000 s): belief: 2 against 0"),
+        (0, 0, None),
+    ],
+)
+def test_beliefs_with_and_without_covariance_differ(trace: Trace, first: int, second: int, expected: str) -> None:
+    with_covariance = Samples(np.arange(first), np.zeros((first, 9)))
+    without = Samples(np.arange(second), np.zeros((second, 3)))
+    traces = (dataclasses.replace(trace, belief=belief) for belief in (with_covariance, without))
+    assert first_difference(*traces) == expected

@@ -40,3 +40,9 @@ def test_different_path_is_reported_with_its_tick(trace: Trace, column: int, by:
 def test_different_end_is_reported(trace: Trace) -> None:
     assert first_pose_difference(trace, dataclasses.replace(trace, end=241)) == "the runs end at ticks 240 and 241"
     assert "tick rate" in str(first_pose_difference(trace, dataclasses.replace(trace, tick_rate=100)))
+
+
+def test_missing_poses_are_reported(trace: Trace) -> None:
+    count = len(trace.truth)
+    empty = dataclasses.replace(trace, truth=Samples(trace.truth.ticks[:0], trace.truth.values[:0]))
+    assert first_pose_difference(trace, empty) == f"the traces have {count} and 0 true poses"
