@@ -64,8 +64,8 @@ class InvalidTarget(Exception):
 def contracts_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | None = None) -> list[Contract]:
     """Return the contracts of the component that `spec` specifies; for some kinds one per robot.
 
-    `subject` is the name of the component in reports. `robots` are robots by name, by default ROBOTS. Raises
-    InvalidTarget if `spec` is not a specification.
+    `subject` is the name of the component in reports. `robots` are robots by name, by default ROBOTS, for the
+    kinds with one contract per robot. Raises InvalidTarget if `spec` is not a specification.
     """
     for kind, contract in _CONTRACTS_PER_ROBOT.items():
         if isinstance(spec, kind):
@@ -157,3 +157,5 @@ def _instance(model: Any, values: Any, target: str) -> Any:
         example = "1.0" if issubclass(model, RootModel) else '{"key": 1}'
         hint = "" if values else f", e.g. {target}={example}"
         raise InvalidTarget(f"{target}: {model.__name__} has invalid values ({problems}){hint}") from error
+    except Exception as error:  # a validator of a plug-in can raise anything
+        raise InvalidTarget(f"{target}: {model.__name__}: {type(error).__name__}: {error}") from error

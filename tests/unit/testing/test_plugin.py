@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pydantic import model_validator
+
 from simscen.model.controllers import GoalCheckerSpec
 
 if TYPE_CHECKING:
@@ -35,6 +37,12 @@ class Checker:
 
         near = goal.pose.distance(pose) <= self.part * goal.xy_tolerance
         return near and abs(wrap(goal.pose.yaw - pose.yaw)) <= goal.yaw_tolerance
+
+
+class Raising(Spec):
+    @model_validator(mode="after")
+    def check(self):
+        raise KeyError("k")
 
 
 class Unannotated:
@@ -101,6 +109,7 @@ def test_two_targets_with_other_values_have_different_test_ids(run) -> None:
 INVALID_TARGETS = {
     "own:Checker": "part: Field required",
     "own:Checker={part: 1}": "is not valid JSON",
+    'own:Raising={"part": 1}': "Raising: KeyError: 'k'",
     "own:Unannotated": "its first argument is not annotated with a specification",
     "own:Nothing": "has no attribute 'Nothing'",
     "nowhere:Nothing": "No module named 'nowhere'",
