@@ -86,8 +86,12 @@ Places = Mapping[str, tuple[float, float, float]]
 def number(value: Any) -> float | None:
     """Return a finite number, or a quantity such as "2 cm" in SI units; None for other values."""
     found = si_number(value)
-    usable = isinstance(found, int | float) and not isinstance(found, bool) and math.isfinite(found)
-    return float(found) if usable else None
+    if not isinstance(found, int | float) or isinstance(found, bool):
+        return None
+    try:
+        return float(found) if math.isfinite(found) else None
+    except OverflowError:  # an integer that is larger than any float
+        return None
 
 
 def items(value: Any) -> list[Any]:

@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from simscen.editor.map_view.map_edits import read_edits
+from simscen.editor.map_view.map_objects import number
 from simscen.editor.text_editing.splices import EditRefused
 from simscen.editor.text_editing.text_edits import AddItem, Edit, RemovePart, SetValue, apply_edits
 from simscen.editor.text_editing.value_text import is_same_value
@@ -217,6 +218,11 @@ def test_setting_each_value_to_itself_does_not_change_a_shipped_file(file: Path)
     numbers = [keys for keys in _leaves(data) if isinstance(_at(data, keys), int | float)]
     kept = [SetValue(keys, _at(data, keys)) for keys in numbers]
     assert edited(text, *kept) == text
+
+
+@pytest.mark.parametrize("value", [10**400, math.inf, True, "1 lightyear"])
+def test_values_that_are_not_finite_numbers_are_not_shown_on_the_map(value: Any) -> None:
+    assert number(value) is None
 
 
 def test_keyframe_that_is_not_in_the_text_is_refused() -> None:
