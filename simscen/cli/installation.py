@@ -1,6 +1,6 @@
 """Checks of the machine and the installation for `simscen doctor`.
 
-Each check returns its result as text, or raises CheckFailed.
+Each check returns its result as text, or raises CheckFailed or an error of the operating system.
 """
 
 import os
@@ -131,7 +131,7 @@ def _soft_limit(limit: int) -> int:
 
 
 def _cgroup_memory() -> int:
-    """Return the memory limit of the control group (version 2 or 1) in bytes; sys.maxsize without a limit."""
+    """Return the memory limit of the root control group (of the container) in bytes; sys.maxsize without a limit."""
     for name in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
         try:
             text = Path(name).read_text(encoding="ascii").strip()

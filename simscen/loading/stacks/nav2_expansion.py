@@ -1,4 +1,4 @@
-"""Expansion of `stack: {nav2_params: FILE}`: the translated parameters of the Nav2 file replace its path."""
+"""Expansion of `stack: {nav2_params: FILE}`: the translated parameters of the Nav2 file are added to the section."""
 
 import math
 from collections.abc import Iterator, Mapping
