@@ -34,7 +34,7 @@ class SimscenError(Exception):
 
 
 class InvalidInput(SimscenError):
-    """An input file is invalid. No run was started."""
+    """An input file is invalid."""
 
     exit = Exit.USAGE
 

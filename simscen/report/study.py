@@ -80,7 +80,8 @@ def claim_text(claim: ClaimResult) -> str:
             return f"{statement}: refuted, {runs}"
         case ClaimStatus.UNDECIDED:
             is_complete = claim.runs >= claim.max_runs
-            hint = "more `runs` may decide it" if is_complete else f"{claim.max_runs} are needed"
+            needed = f"{claim.max_runs} are" if claim.method == "fixed" else f"up to {claim.max_runs} may be"
+            hint = "more `runs` may decide it" if is_complete else f"{needed} needed"
             return f"{statement}: undecided, {runs}; {hint}"
         case ClaimStatus.BLOCKED:
             return f"{statement}: open, because {number_with_noun(claim.errors, 'run')} could not be completed; {runs}"

@@ -34,7 +34,8 @@ TIME_LIMIT = "time limit"
 class EndCondition:
     """Condition under which one robot is done: `linger` seconds after its task has ended, or at the time limit.
 
-    The robot continues if it accepts a new goal during these `linger` seconds. The run ends when all robots are done.
+    The robot continues if it accepts a new goal during these `linger` seconds, or later while another robot is not
+    done. The run ends when all robots are done.
     """
 
     def __init__(self, clock: Clock, time_limit: float, linger: float, is_idle: bool = False) -> None:

@@ -65,7 +65,9 @@ class TurningBelow(Value[PositiveAngularSpeed], Condition):
 
 
 class Travelled(Value[NonNegativeLength], Condition):
-    """True once the robot has truly driven the given distance since the start; kidnapping does not count.
+    """True once the robot has truly driven the given distance since the start, or in `then` since the previous step.
+
+    Kidnapping does not count.
 
     Example: `when: {travelled: 2.5 m}`
     """

@@ -12,9 +12,10 @@ from simscen.core.geometry import Array, Pose2
 FAST_SLIP_GATE = 15.1
 """Ratio of a squared innovation to its variance above which the wheels slip: the chi-square quantile of 99.99 %."""
 SLOW_SLIP_WINDOW_S, SLOW_SLIP_GATE = 0.5, 24.0
-"""The same ratio for the sum of the innovations in a time window, which detects slow slip (quantile of 99.9999 %)."""
+"""Slow slip starts when the squared sum of the innovations in the window, divided by its variance, is above the gate:
+the chi-square quantile of 99.9999 %."""
 SLIP_END_WINDOW_S, SLIP_END_GATE = 0.15, 4.0
-"""The same for the end of slow slip: slow slip ends when the ratio is below the gate (quantile of 95 %)."""
+"""Slow slip ends when the ratio of this window is below the gate: the chi-square quantile of 95 %."""
 
 
 class SlipDetector:
@@ -118,7 +119,10 @@ def predict_state(state: Array, step: WheelStep) -> Array:
 
 
 def pose_model(spec: SlipEkf, state: Array, step: WheelStep) -> tuple[Array, Array]:
-    """Return the Jacobian (7, 7) of `predict_state` for a step from `state` (7,), and the process noise (7, 7)."""
+    """Return the Jacobian (7, 7) of `predict_state` for a step from `state` (7,), and the process noise (7, 7).
+
+    The columns of slip are for a step of `undetected_slip` seconds, so that the uncertainty includes earlier slip.
+    """
     dx, dy = _translation(state, step)
     c, s = _direction(state, step)
     f, q = np.eye(7), np.zeros((7, 7))

@@ -78,14 +78,14 @@ def command(
 ) -> None:
     """Search the ranges of a scenario for values with which it fails.
 
-    With `tpe`, the search prefers values for which the criteria have small margins. It writes each new kind of failure
-    beside the file as a scenario NAME.failure-N.scenario.yaml. Two failures are of different kinds if they differ in
-    the failed criteria, in the triggered events and faults, or in the place of the failure. The result does not depend
-    on the number of parallel runs.
+    With `tpe`, the search prefers values for which the criteria have small margins. The command writes each new kind
+    of failure beside the file as a scenario NAME.failure-N.scenario.yaml. Two failures are of different kinds if they
+    differ in the failed criteria, in the triggered events and faults, or in the place of the failure. The result does
+    not depend on the number of parallel runs.
 
-    Exit code 0: no failure was found; 1: a failure was found; 2: an invalid scenario; 3: a run could not be completed;
-    5: the scenario is skipped; 6: no failure was found, but --runs are too few for --probability; 129, 130, and 143:
-    interrupted.
+    Exit code 0: no failure was found; 1: a failure was found; 2: an invalid scenario; 3: a run could not be completed,
+    also if a failure was found; 5: the scenario is skipped; 6: no failure was found, but --runs are too few for
+    --probability; 129, 130, and 143: interrupted.
     """
     if probability is not None and method is not SearchMethod.RANDOM:
         raise UsageError("--probability needs --method random: only random values show a rate")

@@ -73,6 +73,7 @@ class ParameterEffect:
 
     Attributes:
         path: YAML path of the parameter.
+        criterion: ID of the verdict.
         effect: Spearman's rank correlation (-1 to 1) for numbers. Epsilon squared of the Kruskal-Wallis test (0 to 1)
             for other values.
         p: P-value with Holm's adjustment for multiple tests.

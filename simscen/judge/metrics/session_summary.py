@@ -132,14 +132,14 @@ def session_summary_data(summary: SessionSummary) -> dict[str, float | list[floa
 
 
 def session_summary_line(summary: SessionSummary) -> str:
-    """Return one line, e.g. "success 93% of 14 runs (69% … 99%) · SPL 0.81 of 12 runs · 0.8 collisions/km, 1.9/h"."""
+    """Return one line, e.g. "success 93% of 9 runs (69% … 99%) · SPL 0.81 of 12 values · 0.8 collisions/km, 1.9/h"."""
     parts = []
     if summary.success_interval is not None:
         assert summary.success_rate is not None
         low, high = summary.success_interval
         parts.append(f"success {summary.success_rate:.0%} of {_runs(summary.judged_runs)} ({low:.0%} … {high:.0%})")
     if summary.spl is not None:
-        parts.append(f"SPL {summary.spl:.2f} of {_runs(summary.spl_runs)}")
+        parts.append(f"SPL {summary.spl:.2f} of {summary.spl_runs} value{'s' * (summary.spl_runs != 1)}")
     per_km, per_hour = summary.collisions_per_km, summary.collisions_per_hour
     if per_km is not None and per_hour is not None:
         total = f"{summary.kilometers:.2f} km, {summary.hours:.2f} h of {_runs(summary.measured_runs)}"

@@ -42,7 +42,7 @@ class Assets:
     problems: list[Problem] = field(default_factory=list)
 
     def world_of(self, world: WorldSpec | str | None, tree: MappingNode, file: Path) -> LoadedWorld | None:
-        """Load the world of the scenario `file`: the inline world, or the file that the key `world` names."""
+        """Load the world of the scenario `file`: inline, or in the file that `world` names (see `world_file`)."""
         node = node_at(tree, ("world",))
         if isinstance(world, WorldSpec):
             return self.complete_world(world, node, file)

@@ -95,7 +95,10 @@ def transform_tree(decoded: DecodedMessages) -> TransformTree:
 
 
 def velocity_from_poses(ticks: Ticks, poses: Array, rate: int) -> Array:
-    """Return vx, vy, wz (n, 3) in the body frame for poses x, y, yaw (n, 3), averaged over DIFFERENCE_WINDOW_S."""
+    """Return vx, vy, wz (n, 3) in the body frame for poses x, y, yaw (n, 3).
+
+    They are averaged over at least DIFFERENCE_WINDOW_S, and over longer times where samples are sparse.
+    """
     if len(ticks) < 2:
         return np.zeros((len(ticks), 3))
     half = max(1, round(DIFFERENCE_WINDOW_S / 2 * rate))

@@ -50,7 +50,7 @@ def test_reports_are_reproduced_byte_for_byte(simscen, out: Path, name: str) -> 
     assert (out / name).read_bytes() == before
     assert "2 failed" in ended.out
     assert ended.out.splitlines()[-1].startswith(
-        "success 0% of 2 runs (0% … 66%) · SPL 0.00 of 2 runs · 0.0 collisions/km"
+        "success 0% of 2 runs (0% … 66%) · SPL 0.00 of 2 values · 0.0 collisions/km"
     )
 
 

@@ -63,6 +63,12 @@ def test_entry_with_effect_happened(ordered, events, effect):
         (EVENT, event(3, entry=1), "it never began; the run ended at t = 10.00 s (navigation ended)", None),
         (FAULT, [], "it never began; the run ended at t = 10.00 s (navigation ended)", None),
         (FAULT, fault(3, None, 3.05), "it changed no message of lidar from t = 3.00 s to t = 3.05 s", 720),
+        (
+            FAULT,
+            [*fault(3, None, 3.05), *fault(5, None, 5.05)],
+            "it changed no message of lidar from t = 3.00 s to t = 3.05 s and in 1 later activation",
+            720,
+        ),
         (FAULT, fault(3), "it changed no message of lidar from t = 3.00 s on", 720),
         (FAULT, fault(10, 10), "it began only when the run ended at t = 10.00 s (navigation ended)", 2400),
         (FAULT, fault(3, 3, entry=1), "it never began; the run ended at t = 10.00 s (navigation ended)", None),

@@ -53,7 +53,8 @@ def test_order_of_runs_does_not_change_the_summary():
 
 def test_summary_line_has_the_numbers_of_runs():
     line = (
-        "success 50% of 4 runs (15% … 85%) · SPL 0.45 of 2 runs · 1.5 collisions/km, 2.0/h in 2.00 km, 1.50 h of 3 runs"
+        "success 50% of 4 runs (15% … 85%) · SPL 0.45 of 2 values · "
+        "1.5 collisions/km, 2.0/h in 2.00 km, 1.50 h of 3 runs"
     )
     assert session_summary_line(summarize_session(RUNS)) == line
     assert session_summary_line(summarize_session(RUNS[2:3])) == "success 100% of 1 run (21% … 100%)"
