@@ -170,7 +170,10 @@ class Peer:
         return name
 
     def __iter__(self) -> Iterator[Step]:
-        """Yield steps until the run ends. The answer to a step is sent when the next step is requested."""
+        """Yield steps until the run ends. The answer to a step is sent when the next step is requested.
+
+        Therefore, do not leave the loop before the run ends: simscen would wait for the last answer.
+        """
         while True:
             kind, body = self._connection.receive()
             if kind == wire.STEP:

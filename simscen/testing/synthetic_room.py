@@ -74,7 +74,7 @@ class RoomDrive:
 
     truth:  true poses (k, 3) at 40 Hz
     steps:  motions (k, 3) from the previous pose to each pose, in the base frame of the previous pose; 0 for the first
-    ranges: exact ranges (k / 4, 360) of the scans at 10 Hz
+    ranges: exact ranges (ceil(k / 4), 360) of the scans at 10 Hz
     """
 
     truth: Array
