@@ -17,10 +17,9 @@ def test_results_contain_each_run_once(passed, failed, crashed):
 
 
 def test_results_contain_the_figures_of_the_session(passed, failed, crashed):
-    figures = as_document([passed, failed, crashed])["suite"]
-    assert figures["runs"] == 3
-    assert figures["measured_runs"] == sum(bool(run.result.metrics) for run in (passed, failed, crashed))
-    assert "collisions_per_km" in figures
+    measured = replace(passed, result=replace(passed.result, metrics={"collisions": 2.0, "path_length": 500.0}))
+    figures = as_document([measured, failed, crashed])["suite"]
+    assert (figures["runs"], figures["measured_runs"], figures["collisions_per_km"]) == (3, 1, 4.0)
 
 
 def test_artifact_paths_are_relative_to_the_session_folder(failed):
