@@ -4,6 +4,7 @@ The functions return a Splice, the replacement of a part of the text. In YAML's 
 line. In flow style, entries are in braces or brackets.
 """
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,6 +15,8 @@ from simscen.loading.yaml.tree import Key
 
 INDENT = 2
 """Number of spaces by which nested lines are indented."""
+_DASHES = re.compile(r" *(?:- +)*-(?!\S)")
+"""Pattern of the start of a line with a list item: the dashes of the item and of lists that begin in the same line."""
 
 
 def insert_entry(text: str, mapping: SourceNode, key: str, value: Any, order: Sequence[str] = ()) -> Splice:
@@ -68,7 +71,16 @@ def insert_item(text: str, sequence: SourceNode, value: Any, index: int | None =
 
 
 def _dash_before(text: str, start: int) -> int:
-    return text.rfind("-", 0, start)
+    """Return the index of the dash of the list item whose value begins at `start`.
+
+    Anchors, tags, and comments can be between the dash and the value.
+    """
+    end = start
+    while (found := _DASHES.match(text, line_start(text, end), end)) is None:
+        end = line_start(text, end) - 1
+        if end < 0:
+            raise EditRefused("a list item has no dash at the start of a line; edit the text")
+    return found.end() - 1
 
 
 def _block_entry(key: str, value: Any, indent: int) -> str:
@@ -123,22 +135,26 @@ def remove_part(text: str, source: SourceNode, keys: tuple[Key, ...]) -> Splice:
         parts = [(entry.start, max(entry.end, entry.value.end)) for entry in parent.entries.values()]
         number = list(parent.entries).index(str(keys[-1]))
     if parent.is_flow:
-        return _remove_from_flow(parent, parts, number)
+        return _remove_from_flow(text, parent, parts, number)
     if len(parts) == 1:
-        begin = len(text[: parent.start].rstrip())
         empty = "[]" if parent.kind == "sequence" else "{}"
-        is_behind_key = text[begin - 1 : begin] == ":"
-        return Splice(begin if is_behind_key else parent.start, parent.end, f" {empty}" if is_behind_key else empty)
+        owner = source_at(source, keys[:-2])
+        key_end = owner.entries[str(keys[-2])].end if len(keys) > 1 and owner and owner.kind == "mapping" else 0
+        if key_end and text[key_end : parent.start].strip() == ":":
+            return Splice(key_end, parent.end, f": {empty}")
+        return Splice(parent.start, parent.end, empty)
     return _remove_from_block(text, parts, number)
 
 
-def _remove_from_flow(parent: SourceNode, parts: list[tuple[int, int]], number: int) -> Splice:
+def _remove_from_flow(text: str, parent: SourceNode, parts: list[tuple[int, int]], number: int) -> Splice:
     """Return the splice that removes the part `number` of a flow list or mapping, including a comma.
 
     `parts` are the start and end of all parts.
     """
     start, end = parts[number]
     if len(parts) == 1:
+        if text[parent.start] not in "[{":  # [key: value]
+            return Splice(parent.start, parent.end, "{}")
         return Splice(parent.start + 1, parent.end - 1, "")
     if number == 0:
         return Splice(start, parts[1][0], "")

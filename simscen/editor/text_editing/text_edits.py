@@ -136,7 +136,7 @@ def _require_content(old: str, new: str, edits: Sequence[Edit]) -> None:
     """Raise EditRefused if the new text differs from the old text by more than the edits."""
     before, after = parse_yaml(old, "")[0], parse_yaml(new, "")[0]
     if before is None or after is None:
-        raise EditRefused("this cannot be changed on the map without changing other text; edit the text")
+        raise EditRefused("this cannot be changed on the map; edit the text")
     wanted = before.plain
     for edit in edits:
         wanted = _edited_data(wanted, edit)

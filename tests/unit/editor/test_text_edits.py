@@ -126,12 +126,18 @@ def test_a_key_that_the_language_puts_first_goes_before_its_successors(before: s
         ("g:\n    - 1\n\n    - 2\n", "g:\n    - 1\n\n    - 2\n\n    - 3\n"),
         ("g: [\n  1,\n  2,\n]\n", "g: [\n  1,\n  2,\n  3,\n]\n"),
         ("g:\n  - 1", "g:\n  - 1\n  - 3"),
+        ("g:\n  - &b-c\n    # - d\n    1\n", "g:\n  - &b-c\n    # - d\n    1\n  - 3\n"),
         ("h: 1\n", "h: 1\ng: [3]\n"),
         ("{h: 1}", "{h: 1, g: [3]}"),
     ],
 )
 def test_a_new_item_looks_like_its_siblings(before: str, after: str) -> None:
     assert edited(before, AddItem(("g",), 3)) == after
+
+
+def test_an_item_is_inserted_before_an_item_with_an_anchor() -> None:
+    text = "g:\n  - 1\n  - &b-c 2\n"
+    assert edited(text, AddItem(("g",), 3, 1)) == "g:\n  - 1\n  - 3\n  - &b-c 2\n"
 
 
 def test_a_new_block_item_is_written_like_the_one_before() -> None:
@@ -154,6 +160,15 @@ def test_a_new_block_item_is_written_like_the_one_before() -> None:
         ("a:\n  - x: 1\n    y: 2\n", ("a", 0, "x"), "a:\n  - y: 2\n"),
         ("a:\n  - x: 1\n    y: 2\n", ("a", 0, "y"), "a:\n  - x: 1\n"),
         ("a:\n  - 1\nb: 2\n", ("a", 0), "a: []\nb: 2\n"),
+        ("a:\n- &go-home {x: a}\n- {x: b}\n", ("a", 0), "a:\n- {x: b}\n"),
+        ("a:\n- # go-home\n  x: a\n- {x: b}\n", ("a", 0), "a:\n- {x: b}\n"),
+        ("a:\n- !!map &b-c\n  # - d\n\n  x: a\n- {x: b}\n", ("a", 0), "a:\n- {x: b}\n"),
+        ("a:\n  - - &b-c 1\n    - 2\n  - 3\n", ("a", 0, 0), "a:\n  - - 2\n  - 3\n"),
+        ("a: [b: {c: 0}]\n", ("a", 0, "b"), "a: [{}]\n"),
+        ("a: [1, b: 0, 2]\n", ("a", 1, "b"), "a: [1, {}, 2]\n"),
+        ("a: # b:\n  b: x\n", ("a", "b"), "a: # b:\n  {}\n"),
+        ("# b:\na: x\n", ("a",), "# b:\n{}\n"),
+        ("'a' :\n  b: x\n", ("a", "b"), "'a': {}\n"),
     ],
 )
 def test_removed_part_leaves_the_expected_text(before: str, keys: tuple[Key, ...], after: str) -> None:
