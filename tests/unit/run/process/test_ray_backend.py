@@ -167,6 +167,14 @@ def test_an_interrupt_ends_the_processes_on_all_nodes(cluster, tmp_path: Path) -
     assert not set(servers) & set(processes("fork_server_main"))
 
 
+def test_a_node_whose_fork_server_cannot_start_is_named(cluster, jobs) -> None:
+    with (
+        RayBackend(cluster.address, 3, ("-c", "import no_such_module")) as backend,
+        pytest.raises(UsageError, match=r"(?s)node [\d.]+: the fork server cannot start: it exited 1.*no_such_module"),
+    ):
+        list(backend.run(jobs("fine", "fine")))
+
+
 def test_missing_cluster_is_an_error() -> None:
     with pytest.raises(UsageError, match=r"cannot connect to a Ray cluster at 127\.0\.0\.1:1: .*refused"):
         connect("127.0.0.1:1")
