@@ -39,7 +39,7 @@ CASES = [
     Case(52, "SIGSEGV", "segfault.at.0", "crashed", r"^crashed: SIGSEGV, in string_at \(__init__.py:\d+\)"),
     Case(53, "SIGKILL", "sigkill.at.0", "crashed", r"killed \(SIGKILL; possibly out of memory; peak memory \d+ MiB"),
     Case(54, "exit 0", "exit-0.at.0", "crashed", "^exited 0 without a result"),
-    Case(55, "sys.exit(0)", "sys-exit.at.0", "crashed", r"^exited 0 by itself \(\w+.py:\d+\)"),
+    Case(55, "sys.exit(0)", "sys-exit.at.0", "crashed", r"^called sys.exit\(0\) \(\w+.py:\d+\)"),
     Case(58, "memory in Python", "memory.at.0", "out-of-memory", "exceeded its memory limit"),
     Case(58, "memory in C", "swell.at.0", "crashed", r"^crashed: SIGABRT, in leak .*peak memory \d+ MiB of 4096 MiB"),
     Case(59, "a grandchild", "grandchild.at.0", "crashed", "left a process behind"),

@@ -75,7 +75,7 @@ def test_json_contains_every_number() -> None:
 def test_localization_table_fits_a_narrow_terminal() -> None:
     shares = {name: SuccessRate(9, 10, (0.7, 1.0)) for name in COLUMN_NAMES}
     sure = dict.fromkeys(CONSISTENCY_CIRCUMSTANCES, Consistency(1.0, (2.1, 4.2), 0.951, (1.0,) * 5, (0.9, 6.34)))
-    row = ParameterSetResults("amcl, likelihood_field", shares, 0.029, (0.021, 0.042), sure, 1.5, 189.0)
+    row = ParameterSetResults("amcl, likelihood_field", shares, 0.029, sure, 1.5, 189.0)
     lines = localization([row], columns=80).splitlines()
     assert max(map(len, lines)) <= 80
     assert lines[:2] == [row.parameters, "  tracked 9 of 10 (0.70 … 1.00)  start unknown 9 of 10 (0.70 … 1.00)"]
