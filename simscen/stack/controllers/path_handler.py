@@ -5,6 +5,7 @@ from bisect import bisect_left, bisect_right
 from cmath import phase
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -22,6 +23,8 @@ CARROT_SEARCH_MARGIN_M = 0.5
 """Length of path, in addition to twice the lookahead distance, that is searched for the carrot."""
 LENGTH_TOLERANCE_M = 1e-9
 """Rounding error allowed for sums of lengths."""
+
+Extension = Literal["none", "path", "heading"]
 
 
 class PathTracker:
@@ -139,20 +142,23 @@ class PathTracker:
         end = self._complex_points[self._segment_ends[0]]
         return end.real, end.imag
 
-    def carrot(self, pose: Pose2, distance: float, beyond: bool = False) -> tuple[float, float]:
+    def carrot(self, pose: Pose2, distance: float, extension: Extension = "none") -> tuple[float, float]:
         """Return the carrot (x, y): where the segment leaves the circle of radius `distance` m around the robot.
 
-        If the segment ends inside the circle, return its end. With `beyond`, return instead the point where a straight
-        extension of the segment leaves the circle (RPP's interpolate_curvature_after_goal).
+        If the segment, or the part of it that is searched, ends inside the circle, return its end. With an `extension`,
+        return instead the point where a straight line from this end leaves the circle: in the direction of the last two
+        points (`path`, as RPP's interpolate_curvature_after_goal), or in the driving direction of the last pose
+        (`heading`).
         """
         search_end = self._along[self.index] + 2 * distance + CARROT_SEARCH_MARGIN_M
         outside = self._first_outside(pose, distance, search_end)
         if outside is None:
-            x, y, yaw = self.points[min(bisect_right(self._along, search_end), self._segment_ends[0])].tolist()
-            if not beyond:
+            end = min(bisect_right(self._along, search_end), self._segment_ends[0])
+            x, y = self.points[end, :2].tolist()
+            if extension == "none":
                 return x, y
-            extension = distance if self.is_forward else -distance
-            extended_x, extended_y = x + 2 * extension * math.cos(yaw), y + 2 * extension * math.sin(yaw)
+            dx, dy = self._heading(end) if extension == "heading" else self._path_direction(end)
+            extended_x, extended_y = x + 2 * distance * dx, y + 2 * distance * dy
             return _on_circle(x - pose.x, y - pose.y, extended_x - pose.x, extended_y - pose.y, distance, pose)
         point = self._complex_points[outside]
         if outside == self.index:
@@ -161,6 +167,22 @@ class PathTracker:
         return _on_circle(
             inside.real - pose.x, inside.imag - pose.y, point.real - pose.x, point.imag - pose.y, distance, pose
         )
+
+    def _heading(self, index: int) -> tuple[float, float]:
+        """Return the driving direction of the pose `index` as a unit vector."""
+        yaw, sign = float(self.points[index, 2]), 1.0 if self.is_forward else -1.0
+        return sign * math.cos(yaw), sign * math.sin(yaw)
+
+    def _path_direction(self, index: int) -> tuple[float, float]:
+        """Return the direction to the point `index` from the one before it as a unit vector.
+
+        Points at the same position are skipped. Without another point in the segment, return the heading.
+        """
+        before = bisect_left(self._along, self._along[index] - LENGTH_TOLERANCE_M) - 1
+        if before < self._segment_start:
+            return self._heading(index)
+        step = self._complex_points[index] - self._complex_points[before]
+        return step.real / abs(step), step.imag / abs(step)
 
     def _first_outside(self, pose: Pose2, distance: float, search_end: float) -> int | None:
         """Return the index of the first point ahead that is at least `distance` m from the robot, or None.

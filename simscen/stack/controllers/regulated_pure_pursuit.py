@@ -11,7 +11,7 @@ from simscen.model.controllers import RegulatedPurePursuit as RppSpec
 from simscen.stack.controllers.collision_checker import CollisionChecker, RotationClearance
 from simscen.stack.controllers.goal_rotation import BRAKING_FACTOR, GoalRotation
 from simscen.stack.controllers.path_follower import PathFollower
-from simscen.stack.controllers.path_handler import CUSP_REACHED_M, PathTracker
+from simscen.stack.controllers.path_handler import CUSP_REACHED_M, Extension, PathTracker
 from simscen.stack.controllers.speed_regulation import SpeedRegulation
 from simscen.stack.footprint import distance_at
 from simscen.stack.kinematics import LOCAL_PLAN_TIMES_S, arc_poses
@@ -100,15 +100,15 @@ class RegulatedPurePursuit(PathFollower):
         can_rotate = spec.use_rotate_to_heading and not self._is_car
         fixed_carrot: Carrot | None = None
         if spec.use_fixed_curvature_lookahead:
-            beyond = spec.interpolate_curvature_after_goal
-            fixed_carrot = _carrot(tracker, pose, spec.curvature_lookahead_dist, beyond)
+            extension: Extension = "path" if spec.interpolate_curvature_after_goal else "none"
+            fixed_carrot = _carrot(tracker, pose, spec.curvature_lookahead_dist, extension)
         arcs: list[CheckedArc] = []
         rotation: float | None = None
         escape_rotation: float | None = None
         for ratio in LOOKAHEAD_RATIOS:
             if ratio < 1.0 and ratio * lookahead_distance < spec.min_lookahead_dist:
                 break
-            carrot = _carrot(tracker, pose, ratio * lookahead_distance, self._is_car)
+            carrot = _carrot(tracker, pose, ratio * lookahead_distance, "heading" if self._is_car else "none")
             curvature_carrot = carrot if fixed_carrot is None else fixed_carrot
             backward = not tracker.is_forward or (spec.allow_reversing and carrot.x < 0.0)
             bearing = curvature_carrot.bearing(backward)
@@ -221,9 +221,9 @@ class RegulatedPurePursuit(PathFollower):
         return self._collision_checker.slow_down_for_moving(command, costmap, pose, horizon)
 
 
-def _carrot(tracker: PathTracker, pose: Pose2, distance: float, beyond: bool) -> Carrot:
-    """Return the carrot at `distance` m in the base frame; with `beyond`, also beyond the end of the segment."""
-    return _to_robot_frame(pose, *tracker.carrot(pose, distance, beyond=beyond))
+def _carrot(tracker: PathTracker, pose: Pose2, distance: float, extension: Extension) -> Carrot:
+    """Return the carrot at `distance` m in the base frame. `extension` is that of `PathTracker.carrot`."""
+    return _to_robot_frame(pose, *tracker.carrot(pose, distance, extension))
 
 
 def _to_robot_frame(pose: Pose2, x: float, y: float) -> Carrot:

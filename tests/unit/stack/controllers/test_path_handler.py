@@ -34,7 +34,29 @@ def test_carrot_at_the_end_is_the_end_or_interpolated_beyond_it() -> None:
     track.locate(Pose2(2.8, 0.0))
     track.locate(pose)
     assert track.carrot(pose, 0.5) == pytest.approx((4.0, 0.0))
-    assert track.carrot(pose, 0.5, beyond=True) == pytest.approx((4.3, 0.0))
+    assert track.carrot(pose, 0.5, "path") == pytest.approx((4.3, 0.0))
+    assert track.carrot(pose, 0.5, "heading") == pytest.approx((4.3, 0.0))
+
+
+@pytest.mark.parametrize("end_yaw", [0.0, math.pi / 2, math.pi])
+@pytest.mark.parametrize("copies", [0, 1])
+def test_extension_of_the_path_is_independent_of_the_heading_at_the_goal(end_yaw: float, copies: int) -> None:
+    points = straight(5.0).points.copy()
+    points = np.vstack((points, *[points[-1:]] * copies))
+    points[-1, 2] = end_yaw
+    track = PathTracker(Path(points), search_distance=9.0)
+    pose = Pose2(4.5, 0.0, 0.0)
+    track.locate(pose)
+    assert track.carrot(pose, 1.0, "path") == pytest.approx((5.5, 0.0))
+
+
+def test_carrot_of_a_path_in_reverse_is_extended_backward() -> None:
+    track = PathTracker(there_and_back())
+    for x in (1.0, 0.7, 0.5):
+        pose = Pose2(x, 0.0)
+        track.locate(pose)
+    assert track.carrot(pose, 0.5, "path") == pytest.approx((0.0, 0.0))
+    assert track.carrot(pose, 0.5, "heading") == pytest.approx((0.0, 0.0))
 
 
 def test_position_on_the_path_never_moves_back() -> None:
