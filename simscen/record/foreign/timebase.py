@@ -106,7 +106,7 @@ def check_recorder_clock(topic: str, logged: Sequence[int], stamps: Sequence[int
         return
     index = int(backward[0]) + 1
     step = int(times[index - 1] - times[index])
-    overlaps = times[index] > times[0] and times[-1] > times[index - 1]
+    overlaps = times[-1] > times[0]
     if step > MIN_CLOCK_STEP_NS and overlaps and (stamps[index] < stamps[index - 1] or not any(stamps)):
         text = (
             f"the clock of the recorder was set back by {step / NS_PER_SECOND:.1f} s at message {index + 1} of {topic}"

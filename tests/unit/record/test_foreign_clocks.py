@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -21,8 +22,9 @@ from foreign_logs import (
 
 from simscen.core.records.verdict import Evidence
 from simscen.record.foreign.options import Clock, ForeignLogOptions
+from simscen.record.foreign.raw_messages import UnusableLog
 from simscen.record.foreign.read import ForeignLog
-from simscen.record.foreign.timebase import find_clock_step
+from simscen.record.foreign.timebase import check_recorder_clock, find_clock_step
 
 
 def test_times_are_taken_from_message_headers(read: Callable[..., ForeignLog]) -> None:
@@ -137,6 +139,24 @@ def test_log_is_judged_from_the_first_recorded_scan(read: Callable[..., ForeignL
 def test_clock_of_the_recorder_that_is_set_back_is_refused(refused: Callable[..., str]) -> None:
     text = "SC804 the clock of the recorder was set back by 0.5 s at message 102 of /mocap ("
     assert refused(with_clock_step(-0.55, also_recorder=True)).startswith(text)
+
+
+@pytest.mark.parametrize(
+    ("parts", "is_refused"),
+    [
+        ([(0, 100), (90, 105)], True),
+        ([(0, 100), (90, 95)], True),
+        ([(50, 100), (40, 95)], True),
+        ([(50, 100), (0, 50)], False),
+        ([(60, 100), (30, 60), (0, 30)], False),
+    ],
+)
+def test_recorder_clock_was_set_back_if_parts_of_the_log_overlap(
+    parts: list[tuple[int, int]], is_refused: bool
+) -> None:
+    times = [second * SECOND for begin, end in parts for second in range(begin, end)]
+    with pytest.raises(UnusableLog, match="was set back") if is_refused else nullcontext():
+        check_recorder_clock("/odom", times, times)
 
 
 def delayed(messages: list[Message], start: float, end: float, seconds: float) -> list[Message]:
