@@ -71,7 +71,8 @@ class Building:
     """An office floor. All lengths are in m.
 
     size:      length along x and depth along y
-    middle:    x of the wall between the left and the right half. Only the corridor connects both halves
+    middle:    x of the wall between the left and the right half. The corridor connects both halves. In few buildings, a
+               gap behind the back wall of a room connects them, too
     walls:     boxes (n, 4), as in box_array
     glass:     boxes (n, 4) of the glass walls
     furniture: boxes (n, 4)
