@@ -101,9 +101,3 @@ def test_last_belief_is_sampled():
     (found,) = LocalizationConsistency(every=1.0, after=10.0).judge(trace, CASE)
     assert found.status is Status.PASS
     assert "(mean of 1 NEES" in found.limit
-
-
-def test_no_sample_after_the_last_belief():
-    trace = believing(10, np.tile([0.01, 0, 0, 0.01, 0, 0.01], (101, 1)))
-    (found,) = LocalizationConsistency(every=1.0, after=1 / 240).judge(trace, CASE)
-    assert "(mean of 10 NEES" in found.limit

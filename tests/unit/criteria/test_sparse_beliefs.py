@@ -68,6 +68,12 @@ def test_beliefs_before_the_evaluation_do_not_count_for_consistency():
     assert (found.status, found.measured) == (Status.INCONCLUSIVE, "there is no belief after t = 50.00 s")
 
 
+def test_no_sample_after_the_last_belief():
+    """The second sample would be one tick after the last belief."""
+    (found,) = LocalizationConsistency(every=1.0).judge(trace_of([(0, 0.1), (1 - 1 / TICK_RATE_HZ, 0.1)]), CASE)
+    assert "(mean of 1 NEES" in found.limit
+
+
 @pytest.mark.parametrize(("columns", "beliefs", "reason"), [(9, [], NO_BELIEF), (3, [(1, 0.0)], "no covariance")])
 def test_consistency_is_undefined_without_beliefs_or_covariances(columns, beliefs, reason):
     (found,) = LocalizationConsistency().judge(trace_of(beliefs, columns=columns), CASE)
