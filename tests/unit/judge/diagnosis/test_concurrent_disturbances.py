@@ -14,6 +14,7 @@ from diagnosis_cases import slip, why, with_event
         ([[2, "fault.started", "lidar.off", {"entry": 0}]], []),
         (slip(2, 2, 7, "lidar.off", "off"), ["lidar.off had ended 3.00 s before, after 5.00 s"]),
         (slip(5, 5, 10, "lidar.off", "off"), ["lidar.off had ended 0.00 s before, after 5.00 s"]),
+        (slip(5, 10, 10, "lidar.off", "off"), ["lidar.off had ended 0.00 s before, after 5.00 s"]),
         (slip(10, 10, None, "lidar.off", "off"), ["lidar.off was active since t = 10.00 s, for 0.00 s"]),
         (
             [*slip(2, 2, 5, "lidar.off", "off"), *slip(5, 5, 8, "lidar.off", "off")],

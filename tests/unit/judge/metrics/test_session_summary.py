@@ -1,6 +1,7 @@
 """Tests of the summary of a session."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import pytest
 
@@ -48,7 +49,9 @@ def test_runs_that_the_end_of_the_session_prevented_are_not_failures(kind):
 
 
 def test_order_of_runs_does_not_change_the_summary():
-    assert summarize_session(RUNS) == summarize_session(reversed(RUNS))
+    runs = [run(seed, success=1.0, spl=0.1 * seed, path_length=0.1 * seed, collisions=0.0) for seed in (1, 2, 3)]
+    assert 0.1 + 0.2 + 0.3 != 0.3 + 0.2 + 0.1  # sums of rounded numbers depend on the order
+    assert summarize_session(runs) == summarize_session(reversed(runs))
 
 
 def test_summary_line_has_the_numbers_of_runs():
@@ -84,9 +87,16 @@ def test_unknown_success_and_unknown_collisions_do_not_count():
     assert session_summary_data(figures)["runs"] == 1
     assert (figures.success_rate, figures.collisions, figures.collisions_per_km) == (None, None, None)
     assert session_summary_line(figures) == ""
+    drove = replace(figures, kilometers=1.0, hours=1.0)
+    assert (drove.collisions_per_km, drove.collisions_per_hour) == (None, None)
     more = summarize_session([*RUNS, unknown])
     assert session_summary_line(more) == session_summary_line(summarize_session(RUNS))
     assert (more.runs, more.judged_runs, more.measured_runs, more.collisions) == (5, 4, 3, 3)
+
+
+def test_a_robot_with_an_unknown_distance_adds_none():
+    figures = summarize_session([*RUNS, run(5, success=1.0, collisions=1.0, path_length=None)])
+    assert (figures.collisions, figures.kilometers) == (4, 2.0)
 
 
 def test_rates_of_several_robots_are_over_those_with_known_collisions():
