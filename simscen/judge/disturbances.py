@@ -140,7 +140,7 @@ def _fault_outcome(trace: Trace, disturbance: Disturbance, entry: int) -> Distur
     if fired[0] >= trace.end:
         return DisturbanceOutcome(disturbance, fired, False, _too_late(trace), fired[0])
     until = f"to t = {trace.seconds(ended[0].tick):.2f} s" if ended else "on"
-    later = f" and in {len(fired) - 1} later activation{'s' * (len(fired) > 2)}" if len(fired) > 1 else ""
+    later = f", the first of {len(fired)} times" if len(fired) > 1 else ""
     why = f"it changed no message of {sensor} from t = {trace.seconds(fired[0]):.2f} s {until}{later}"
     return DisturbanceOutcome(disturbance, fired, False, why, fired[0])
 

@@ -66,7 +66,7 @@ def test_entry_with_effect_happened(ordered, events, effect):
         (
             FAULT,
             [*fault(3, None, 3.05), *fault(5, None, 5.05)],
-            "it changed no message of lidar from t = 3.00 s to t = 3.05 s and in 1 later activation",
+            "it changed no message of lidar from t = 3.00 s to t = 3.05 s, the first of 2 times",
             720,
         ),
         (FAULT, fault(3), "it changed no message of lidar from t = 3.00 s on", 720),
