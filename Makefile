@@ -40,11 +40,11 @@ $(STAMP): pyproject.toml
 run: setup  ## Run the shipped scenarios
 	@$(BIN)/simscen run scenarios/
 
-test: setup  ## Run what CI runs: checks, and tests with type checks in parallel
-	@$(BIN)/python tests/ros/rig.py $(ROS) & $(MAKE) --no-print-directory lint layers schemas; failed=$$?; wait; exit $$failed
-	@$(MAKE) --no-print-directory types > $(VENV)/types.log 2>&1 & types=$$!; \
+test: setup  ## Run what CI runs: tests, and all checks in parallel
+	@$(MAKE) --no-print-directory lint layers schemas types > $(VENV)/check.log 2>&1 & check=$$!; \
+	$(BIN)/python tests/ros/rig.py $(ROS); \
 	$(BIN)/python -m pytest -m "not slow"; failed=$$?; \
-	wait $$types || failed=1; cat $(VENV)/types.log; exit $$failed
+	wait $$check || failed=1; cat $(VENV)/check.log; exit $$failed
 
 test-all: setup  ## Run all tests, also the slow ones that `make test` skips
 	@$(BIN)/python tests/ros/rig.py $(ROS)

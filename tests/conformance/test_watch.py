@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -80,6 +81,10 @@ def begin_long_run(watch: Watch, tmp_path: Path) -> None:
     long_run = SCENARIO.replace("time_limit: 0.5 s", "time_limit: 8000 s\nlinger: 3600 s")
     (tmp_path / "a.scenario.yaml").write_text(long_run)
     watch.until("1 scenario ·")
+    deadline = time.monotonic() + 60.0
+    while not list(tmp_path.rglob("run.partial.mcap")):
+        assert time.monotonic() < deadline, "the run did not start"
+        time.sleep(0.05)
 
 
 def test_sigterm_ends_the_running_session_with_its_reports(watch: Watch, tmp_path: Path) -> None:

@@ -217,6 +217,7 @@ def _run_in_child(request: SessionRequest, state: WatchState) -> tuple[int, File
             for line in lines:
                 state.update(line)
             code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+            code = 128 - code if code < 0 else code  # a signal ended the process before it handled signals
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)
