@@ -79,7 +79,10 @@ class Forked:
 
 
 def serve(requests: socket.socket) -> None:
-    """Fork a fork server for each request, and send its process id and its exit code, until no requests can come."""
+    """Fork a fork server for each request, and send its process id and its exit code, until no requests can come.
+
+    As with `subprocess.Popen`, an ended process can be sent signals until `wait` has returned its exit code.
+    """
     import simscen.cli.session.fork_server_main  # noqa: F401 - for the forks
 
     selector = selectors.DefaultSelector()
@@ -87,11 +90,17 @@ def serve(requests: socket.socket) -> None:
     while True:
         for key, _ in selector.select():
             if key.data is not None:
-                pid, messages = key.data
                 selector.unregister(key.fileobj)
                 os.close(key.fd)
-                with messages, suppress(BrokenPipeError):  # the session has ended
-                    messages.send(str(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])).encode())
+                pid, messages = key.data
+                if messages is None:  # `wait` has closed its end of the socket
+                    os.waitpid(pid, 0)
+                    continue
+                ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
+                code = ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
+                with suppress(BrokenPipeError):  # the session has ended
+                    messages.send(str(code).encode())
+                selector.register(messages.detach(), selectors.EVENT_READ, (pid, None))
                 continue
             request, descriptors, _, _ = socket.recv_fds(requests, MESSAGE_BYTES, 4)
             if not request:
