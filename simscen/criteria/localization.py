@@ -99,11 +99,15 @@ class LocalizationError(Spec, Criterion):
         return findings
 
     def _if_known_early(self, trace: Trace, first: int, finding: Finding) -> Finding:
-        """Return the finding, or an inconclusive one if it passes, but the `first` belief is long after `after`."""
-        if finding.status is not Status.PASS or first <= (self.after + BELIEF_TIMEOUT_S) * trace.tick_rate:
+        """Return the finding, or an inconclusive one if it passes, but the `first` belief comes late.
+
+        The evaluation begins at `after`, or at the first true pose if that is later.
+        """
+        begin = max(self.after, trace.seconds(int(trace.truth.ticks[0])))
+        if finding.status is not Status.PASS or first <= (begin + BELIEF_TIMEOUT_S) * trace.tick_rate:
             return finding
         known = f"the first belief is from t = {trace.seconds(first):.2f} s"
-        because = f"{known}, but the evaluation begins at {self.after:.2f} s"
+        because = f"{known}, but the evaluation begins at {begin:.2f} s"
         return undecided(finding.what, because, finding.limit)
 
 

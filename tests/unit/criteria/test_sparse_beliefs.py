@@ -33,6 +33,17 @@ def test_unknown_error_at_the_start_of_the_evaluation_does_not_pass(first, statu
         assert found.limit.startswith("≤ 0.30")
 
 
+@pytest.mark.parametrize(("first", "status"), [(21.0, Status.PASS), (21.1, Status.INCONCLUSIVE)])
+def test_evaluation_does_not_begin_before_the_first_true_pose(first, status):
+    """Logs of real robots can begin before the ground truth."""
+    trace = trace_of([(first, 0.0)])
+    trace = replace(trace, truth=trace.truth.select(trace.truth.ticks >= 20 * TICK_RATE_HZ))
+    (found,) = LocalizationError(max=0.3, after=5.0).judge(trace, CASE)
+    assert found.status is status
+    if status is Status.INCONCLUSIVE:
+        assert found.measured == "the first belief is from t = 21.10 s, but the evaluation begins at 20.00 s"
+
+
 def test_late_first_belief_can_fail_and_decides_the_final_error():
     criterion = LocalizationError(max=0.3, rmse=0.3, final=0.3)
     findings = criterion.judge(trace_of([(30, 2.0), (60, 0.0)]), CASE)
