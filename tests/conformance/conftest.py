@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import pytest
 
-from simscen.cli.main import main
+from tests.command_line import exit_code
 
 WORLD = """\
 simscen: 1
@@ -78,20 +78,11 @@ def simscen(folder: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest
     """Return a function that runs the command line in this process."""
 
     def call(*arguments: object) -> Ended:
-        code = _exit_code(monkeypatch, *arguments)
+        code = exit_code(monkeypatch, *arguments)
         out, err = capfd.readouterr()
         return Ended(code, out, err)
 
     return call
-
-
-def _exit_code(patch: pytest.MonkeyPatch, *arguments: object) -> int:
-    patch.setattr(sys, "argv", ["simscen", *map(str, arguments)])
-    try:
-        main()
-    except SystemExit as end:
-        return int(end.code or 0)
-    return 0
 
 
 @pytest.fixture(scope="session")
@@ -103,7 +94,7 @@ def finished_session(tmp_path_factory: pytest.TempPathFactory, texts: dict[str, 
         (home / name).write_text(text)
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(StringIO()):
         patch.chdir(home)
-        assert _exit_code(patch, "run", "a.scenario.yaml", "--out", "out") == 0
+        assert exit_code(patch, "run", "a.scenario.yaml", "--out", "out") == 0
     return home / "out"
 
 

@@ -1,7 +1,6 @@
 """Fixtures that call the command line without a new process."""
 
 import signal
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
@@ -10,7 +9,7 @@ from typing import NamedTuple
 
 import pytest
 
-from simscen.cli.main import main
+from tests.command_line import exit_code
 
 
 class CommandResult(NamedTuple):
@@ -48,18 +47,9 @@ def simscen_in() -> Call:
             redirect_stderr(StringIO()) as err,
         ):
             patch.chdir(folder)
-            return CommandResult(_exit_code(patch, arguments), out.getvalue(), err.getvalue())
+            return CommandResult(exit_code(patch, *arguments), out.getvalue(), err.getvalue())
 
     return call
-
-
-def _exit_code(patch: pytest.MonkeyPatch, arguments: tuple[object, ...]) -> int:
-    patch.setattr(sys, "argv", ["simscen", *map(str, arguments)])
-    try:
-        main()
-    except SystemExit as end:
-        return int(end.code or 0)
-    return 0
 
 
 @pytest.fixture
@@ -70,7 +60,7 @@ def simscen(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
     (tmp_path / "good.scenario.yaml").write_text(GOOD)
 
     def call(*arguments: object) -> CommandResult:
-        code = _exit_code(monkeypatch, arguments)
+        code = exit_code(monkeypatch, *arguments)
         out, err = capsys.readouterr()
         return CommandResult(code, out, err)
 
