@@ -36,14 +36,19 @@ class Particles:
     def with_weights(self, weights: Array) -> "Particles":
         """Return particles with the same poses and these weights (n,)."""
         other = Particles(self.poses, weights)
-        if "extent" in self.__dict__:
-            other.__dict__["extent"] = self.extent
+        if "bounds" in self.__dict__:
+            other.__dict__["bounds"] = self.bounds
         return other
 
     @cached_property
+    def bounds(self) -> list[tuple[float, float]]:
+        """Minimum and maximum of x and y in m, and of yaw in rad."""
+        return [(values.item(values.argmin()), values.item(values.argmax())) for values in self.poses.T]
+
+    @property
     def extent(self) -> tuple[float, float, float]:
         """Extent of the poses along x and y in m, and in yaw in rad (across ±π if that is smaller)."""
-        dx, dy, turned = [values.item(values.argmax()) - values.item(values.argmin()) for values in self.poses.T]
+        dx, dy, turned = [highest - lowest for lowest, highest in self.bounds]
         if turned > math.pi:
             turned = min(turned, float(np.ptp(self.poses[:, 2] % (2 * math.pi))))
         return dx, dy, turned
@@ -148,12 +153,15 @@ def summarize(particles: Particles, peak_power: float = 1.0) -> tuple[Pose2, Arr
     by the inverse of their variances (see docs/reference/localizers.md).
     """
     poses, weights = particles.poses, particles.weights
-    if not are_compact(particles):
+    if are_compact(particles):
+        if peak_power == 1.0:
+            return _summarize_compact(particles)
+    elif _are_in_adjacent_bins(particles):
+        poses = np.ascontiguousarray(poses)  # so that sums are rounded like those of a selected cluster
+    else:
         labels = cluster_labels(bin_keys(poses))
         heaviest = labels == np.bincount(labels, weights=weights).argmax()
         poses, weights = poses[heaviest], weights[heaviest]
-    elif peak_power == 1.0:
-        return _summarize_compact(particles)
     mean = _mean(poses, weights)
     if peak_power == 1.0:
         return mean, covariance_about(particles, mean)
@@ -185,6 +193,15 @@ def are_compact(particles: Particles) -> bool:
     """Return whether the extent of the particles is less than one histogram bin, so that they are one cluster."""
     x, y, yaw = particles.extent
     return x < BIN_SIZE_M and y < BIN_SIZE_M and yaw < 2 * math.pi / YAW_BINS
+
+
+def _are_in_adjacent_bins(particles: Particles) -> bool:
+    """Return whether all particles are in adjacent histogram bins, so that they are one cluster. Does not wrap yaw."""
+    bins_per_unit = (1 / BIN_SIZE_M, 1 / BIN_SIZE_M, YAW_BINS / (2 * math.pi))
+    return all(
+        math.floor(highest * scale) - math.floor(lowest * scale) <= 1
+        for (lowest, highest), scale in zip(particles.bounds, bins_per_unit, strict=True)
+    )
 
 
 def _mean(poses: Array, weights: Array) -> Pose2:

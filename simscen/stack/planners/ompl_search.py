@@ -62,14 +62,6 @@ class _MotionValidator(ob.MotionValidator):  # type: ignore[misc] # ompl has no 
         return self.motion_cost(a[0], a[1], b[0], b[1]) < math.inf
 
 
-class _AcceptEveryMotion(ob.MotionValidator):  # type: ignore[misc] # ompl has no types
-    """Accepts all motions: BIT* drops motions with infinite cost by itself."""
-
-    def checkMotion(self, _a: Any, _b: Any) -> bool:
-        """Return True."""
-        return True
-
-
 class _CostBeyondLengthObjective(ob.OptimizationObjective):  # type: ignore[misc] # ompl has no types
     """Objective: the cost of a motion minus its length."""
 
@@ -147,7 +139,11 @@ class OmplSearch:
         planner = PLANNERS[self.spec.type](information)
         self._configure(planner)
         if self.spec.type == "bit_star":
-            information.setMotionValidator(_AcceptEveryMotion(information))
+            # BIT* drops motions with infinite cost by itself. This validator accepts all without calling Python.
+            everywhere_free = ob.SpaceInformation(information.getStateSpace())
+            everywhere_free.setStateValidityChecker(ob.AllValidStateValidityChecker(everywhere_free))
+            everywhere_free.setup()
+            information.setMotionValidator(everywhere_free.getMotionValidator())
         planner.setProblemDefinition(definition)
         planner.setup()
         planner.solve(ob.PlannerTerminationCondition(self._make_termination(planner)))

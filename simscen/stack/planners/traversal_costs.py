@@ -3,6 +3,7 @@
 import copy
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -71,7 +72,17 @@ class TraversalCosts:
         costs = copy.copy(self)
         costs.rates = np.where(narrow, np.float32(np.inf), self.rates)
         costs._flat_rates, costs.cache, costs._last_motion = _padded_view(costs.rates), {}, None
+        costs.__dict__.pop("_costly_cells", None)
         return costs
+
+    @cached_property
+    def _costly_cells(self) -> Any:
+        """Summed-area table (height + 1, width + 1) of the cells that do not cost 1 per meter, as a flat memoryview."""
+        table = np.zeros((self.height + 1, self.width + 1), dtype=np.int32)
+        np.cumsum(self.rates != 1.0, axis=0, out=table[1:, 1:])
+        np.cumsum(table, axis=1, out=table)
+        flat: Any = table.reshape(-1)
+        return memoryview(flat)
 
     def reusing_cache(self, previous: "TraversalCosts | None") -> "TraversalCosts":
         """Use the cache of `previous`, the costs of the previous plan, if both costs are equal. Return this object."""
@@ -112,16 +123,30 @@ class TraversalCosts:
         total: float = flat_rates[int(v + 0.5 * dv) * width + int(u + 0.5 * du)]
         if total < math.inf:
             count = int(length / self.stride) + 1
-            du, dv = du / count, dv / count
-            u, v = u + 0.5 * du, v + 0.5 * dv
-            total = 0.0
-            for _ in range(count):
-                total += flat_rates[int(v) * width + int(u)]
-                u += du
-                v += dv
+            if total == 1.0 and self._is_free_box(u, v, u + du, v + dv):
+                total = count
+            else:
+                du, dv = du / count, dv / count
+                u, v = u + 0.5 * du, v + 0.5 * dv
+                total = 0.0
+                for _ in range(count):
+                    total += flat_rates[int(v) * width + int(u)]
+                    u += du
+                    v += dv
             total *= length / count
         self._last_motion, self._last_cost = motion, total
         return total
+
+    def _is_free_box(self, u: float, v: float, end_u: float, end_v: float) -> bool:
+        """Return whether all cells between two corners (column, row) cost 1 per meter."""
+        table, width = self._costly_cells, self.width + 1
+        if u > end_u:
+            u, end_u = end_u, u
+        if v > end_v:
+            v, end_v = end_v, v
+        bottom, top, left, right = int(v) * width, (int(end_v) + 1) * width, int(u), int(end_u) + 1
+        is_free: bool = table[top + right] - table[top + left] == table[bottom + right] - table[bottom + left]
+        return is_free
 
     def along(self, points: Array) -> float:
         """Return the cost of a polyline (n, 2); inf if it leads through a blocked cell."""

@@ -140,3 +140,22 @@ def test_pose_of_a_single_particle_is_its_pose() -> None:
     pose, covariance = summarize(Particles.with_equal_weights(np.array([[1.0, 2.0, 3.0]])))
     assert pose == pytest.approx((1, 2, 3))
     assert not covariance.any()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_pose_is_the_mean_of_the_heaviest_connected_component(seed: int) -> None:
+    """The particles of some clouds are in two adjacent bins along each axis, those of others in more bins."""
+    rng = np.random.default_rng(seed)
+    std = (0.12, 0.12, 0.05) if seed % 2 else (0.02, 0.02, 0.05)
+    poses = rng.uniform((-1, -1, -0.3), (1, 1, 0.3), 3) + rng.normal(0, std, (300, 3))
+    poses[: seed % 3 * 40] += (1.0, 0.0, 0.0)  # a lighter cluster if the standard deviation is small
+    weights = rng.uniform(0.5, 1, 300)
+    weights /= weights.sum()
+    cells = np.column_stack(decode_bins(bin_keys(poses)))
+    apart = np.abs(cells[:, None] - cells)
+    apart[..., 2] = np.minimum(apart[..., 2], 36 - apart[..., 2])
+    labels = connected_components(coo_array((apart <= 1).all(axis=2)))[1]
+    kept = labels == np.bincount(labels, weights=weights).argmax()
+    x, y, yaw = np.average(poses[kept], axis=0, weights=weights[kept])
+    pose, _ = summarize(Particles(poses, weights))
+    assert pose == pytest.approx((x, y, yaw), abs=1e-4)
