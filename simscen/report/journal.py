@@ -124,9 +124,9 @@ class Journal:
         data = json.dumps(message, sort_keys=True, ensure_ascii=True, allow_nan=False).encode() + b"\n"
         size = os.fstat(self._file).st_size
         try:
-            written = os.write(self._file, data)
-            if written < len(data):  # the disk is full: writing the rest raises the error
-                os.write(self._file, data[written:])
+            unwritten = memoryview(data)
+            while unwritten:  # if the disk is full, a part is written first, and the next call raises the error
+                unwritten = unwritten[os.write(self._file, unwritten) :]
             if self._sync:
                 os.fdatasync(self._file)
         except OSError as error:

@@ -169,16 +169,15 @@ def _progress(live: RunningSession, done: int) -> str:
 
 
 def _group_element(group: list[RunFinished], report: SessionReport, totals: Totals, pictures: dict[RunKey, str]) -> str:
-    """Return the entries of the runs of one scenario. `pictures` is the HTML of the pictures by run key."""
-    ranked = sorted(group, key=_severity_order)
-    entries = "\n".join(
-        run_element(run, report.folder, pictures.get(run.key, ""), past_outcomes(run, report.past), len(group) > 1)
-        for run in ranked
-    )
-    if len(group) == 1:
-        return f'<div class="group">{entries}</div>'
+    """Return the entries of the listed runs of one scenario. `pictures` is the HTML of the pictures by run key."""
     name = group[0].key.scenario
     good, number = totals.good[name], totals.runs[name]
+    entries = "\n".join(
+        run_element(run, report.folder, pictures.get(run.key, ""), past_outcomes(run, report.past), number > 1)
+        for run in sorted(group, key=_severity_order)
+    )
+    if number == 1:
+        return f'<div class="group">{entries}</div>'
     changed = sum(outcome_change(run, report.past) != "" for run in group)
     summary = f"{good} of {number} as expected" + (f", {changed} changed" if changed else "")
     opened = "" if good == number else " open"

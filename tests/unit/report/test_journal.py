@@ -135,6 +135,18 @@ def test_full_disk_loses_only_whole_lines(tmp_path, runs, monkeypatch):
     assert [run.outcome for run in read_journal(tmp_path).runs] == [Outcome.ERROR, Outcome.FAILED, Outcome.ERROR]
 
 
+def test_lines_that_are_written_in_several_parts_are_complete(tmp_path, runs, monkeypatch):
+    import os
+
+    journal, write = Journal(tmp_path), os.write
+    monkeypatch.setattr(os, "write", lambda file, data: write(file, data[:100]))
+    journal.plan(planned(runs), "0.1.0", 2)
+    journal(runs[1])
+    journal.close()
+    assert journal.error is None
+    assert [run.outcome for run in read_journal(tmp_path).runs] == [Outcome.ERROR, Outcome.FAILED, Outcome.ERROR]
+
+
 @pytest.mark.parametrize(
     ("content", "told"),
     [

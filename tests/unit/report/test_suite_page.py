@@ -236,6 +236,13 @@ def test_share_of_good_runs_includes_runs_that_are_not_listed(sessions, passed, 
     assert "share of runs as expected, oldest first: 100%, 50%, 75%" in html
 
 
+def test_heading_of_a_scenario_counts_runs_that_are_not_listed(passed, failed, monkeypatch):
+    monkeypatch.setattr(page, "MAX_LISTED_RUNS", 1)
+    html = to_html(SessionReport([called(passed, "a/flaky", seed) for seed in (1, 2)] + [called(failed, "a/flaky", 3)]))
+    assert [run.get("data-status") for run in runs_on(html)] == ["failed"]
+    assert ">2 of 3 as expected<" in html
+
+
 def test_sessions_with_missing_or_damaged_results_are_ignored(sessions, tmp_path):
     (sessions / "two/results.json").write_text("{")
     (sessions / "one/results.json").unlink()
