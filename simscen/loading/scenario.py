@@ -110,8 +110,6 @@ class ChangedScenario:
         if isinstance(read, list):
             raise InvalidInput(read)
         self.file, self.merged_tree = read
-        self.path = self._library.sandbox.display_name(self.file)
-        self.text = self._library.texts[self.path]
         self.base_tree = self.tree = self.merged_tree.without_keys(VARIATIONS)
         self.changes: tuple[Change, ...] = ()
         if variation:
@@ -127,6 +125,18 @@ class ChangedScenario:
             return problems
         varied = Variation("", merged.without_keys(VARIATIONS))
         return _load_variation(varied, self._library, self.file, self._choice)
+
+    def text_in(self, folder: Path, tree: MappingNode, comment: str) -> str:
+        """Return the content `tree` as text for a file in `folder`, with `comment` at the top.
+
+        Unchanged parts keep their lines. Paths in the text are relative to `folder`.
+        """
+        from simscen.loading.files.copying import with_paths_relative_to  # most commands write no scenarios
+        from simscen.loading.yaml.rewriting import changed_text
+
+        name = self._library.sandbox.display_name(self.file)
+        content = with_paths_relative_to(folder, tree, self._library.files)
+        return changed_text(self._library.texts[name], name, content.plain, comment)
 
 
 def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Path, MappingNode] | list[Problem]:

@@ -1,16 +1,14 @@
-"""Text of a scenario for logs and copies, and the criteria in such a text."""
+"""Text of a scenario for logs, and the criteria in such a text."""
 
 from collections.abc import Mapping
 from dataclasses import replace
 
 from simscen.core.errors import InvalidInput
-from simscen.loading.files.paths import PathSandbox
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.multirobot import split_by_robot
 from simscen.loading.named_places import places_of, resolve_criteria_places
 from simscen.loading.plugins import missing_plugins
 from simscen.loading.schema.validate import Model, check
-from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.tree import MappingNode, Node
 from simscen.loading.yaml.writing import to_yaml
@@ -29,15 +27,6 @@ def resolved_text(loaded: LoadedScenario) -> str:
     if isinstance(own, MappingNode) and own.plain == plain:
         return loaded.text
     return to_yaml(plain)
-
-
-def unexpanded_text(loaded: LoadedScenario) -> str:
-    """Return the scenario as one YAML text without `extends`, with its `variations`."""
-    if not loaded.variation:
-        return resolved_text(loaded)
-    own, _ = parse_yaml(loaded.text, loaded.path)
-    tree, _ = Library(PathSandbox.around(loaded.root, loaded.world_path)).read(loaded.file, defaults=True)
-    return loaded.text if tree is None or own is None or own.plain == tree.plain else to_yaml(tree.plain)
 
 
 def criteria_and_tree(text: str, robot: str) -> tuple[CriteriaSpec, MappingNode]:

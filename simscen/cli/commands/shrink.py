@@ -30,7 +30,6 @@ from simscen.core.records.run_result import RunResult
 from simscen.loading.files.discovery import default_root, sibling
 from simscen.loading.reduction import changed_values, removed_parts, with_inline_world, with_only_criterion
 from simscen.loading.scenario import ChangedScenario
-from simscen.loading.yaml.rewriting import changed_text
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, child, nodes_with_keys
 from simscen.report.journal_reader import JOURNAL_FILE, read_journal
 from simscen.run.sessions.output_folder import RUNS_FOLDER, write_atomically
@@ -111,7 +110,7 @@ def command(
     source = f"{chosen.file.name}, seed {first_seed}" + (f", {chosen.variation}" if chosen.variation else "")
     failure = shrinker.failure.verdict_id or "an error of the stack"
     comment = f"The smallest scenario that simscen shrink found to fail in {failure}, from {source}."
-    text = changed_text(scenario.text, scenario.path, shrinker.tree.plain, comment)
+    text = scenario.text_in(target.parent, shrinker.tree, comment)
     save(target, lambda file: write_atomically(file, text.encode()))
     _print_summary(shrinker, before, target, chosen.stack)
     sys.exit(Exit.PASSED if shrinker.is_complete else Exit.FAILED)

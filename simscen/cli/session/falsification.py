@@ -32,7 +32,6 @@ from simscen.loading.scenario import ChangedScenario
 from simscen.loading.variations.conditions import ConditionError
 from simscen.loading.variations.expand import Variation
 from simscen.loading.variations.search_space import SearchSpace, search_space
-from simscen.loading.yaml.rewriting import changed_text
 from simscen.report.display_text import number_with_noun
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
@@ -268,9 +267,9 @@ class Falsification:
         variation = self._variations[result.key.variation]
         tree = with_seed(variation.tree, result.key.seed)
         comment = f"Found by simscen falsify: {self._request.file.name} fails with these values."
-        text = changed_text(self._scenario.text, self._scenario.path, tree.plain, comment)
         # The first free name: earlier searches may have written files beside the scenario.
         file = next(one for k in count(1) if not (one := sibling(self._request.file, f"failure-{k}")).exists())
+        text = self._scenario.text_in(file.parent, tree, comment)
         write_atomically(file, text.encode())
         self.found.append(FoundFailure(file, finished, variation.values))
 

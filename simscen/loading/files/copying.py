@@ -1,17 +1,18 @@
 """Copying of a scenario, and of the files that it names, to another folder."""
 
 import shutil
-from collections.abc import Iterable, Iterator
-from os.path import commonpath, relpath
+from collections.abc import Iterable, Mapping
+from os.path import commonpath, realpath, relpath
 from pathlib import Path
 
 from simscen.core.errors import Problem, UsageError
-from simscen.loading.files.paths import is_file
+from simscen.loading.files.paths import PathSandbox, is_file
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.scenario_text import unexpanded_text
+from simscen.loading.yaml.library import Library
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.loading.yaml.textfile import read_text
-from simscen.loading.yaml.tree import Node, ScalarNode, nodes_with_keys
+from simscen.loading.yaml.tree import Keys, MappingNode, Node, ScalarNode, node_at, nodes_with_keys
+from simscen.loading.yaml.writing import to_yaml
 
 _MODELINE = "# yaml-language-server:"
 """Beginning of the comment that tells editors the path of the JSON schema."""
@@ -28,13 +29,17 @@ def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path
     folder next to `target` with the name of `target` without suffixes. Raises UsageError if a file cannot be copied, or
     if a copy already exists.
     """
-    lines = unexpanded_text(loaded).split("\n")
-    text = "\n".join(line for line in lines if not line.startswith(_MODELINE))
+    library = Library(PathSandbox.around(loaded.root, loaded.world_path))
+    merged, _ = library.read(loaded.file, defaults=True)
+    own, _ = parse_yaml(loaded.text, loaded.path)
+    assert merged is not None
+    assert own is not None
+    whole = loaded.text if own.plain == merged.plain else to_yaml(merged.plain)
+    text = "\n".join(line for line in whole.split("\n") if not line.startswith(_MODELINE))
     tree, _ = parse_yaml(text, loaded.path)
     assert tree is not None
-    folders = {file.parent for file in loaded.files.values()}
-    named = {leaf: _existing_file(leaf, folders) for leaf in _scalars(tree)}
-    files = {leaf: file for leaf, file in named.items() if file is not None}
+    named = [(node_at(tree, keys), file) for keys, (_, file) in _named_files(merged, library.files).items()]
+    files = {leaf: file for leaf, file in named if isinstance(leaf, ScalarNode)}
     needed = _with_dependencies(files.values())
     same_root = root == loaded.root
     common_folder = Path(commonpath([file.parent for file in needed])) if needed else loaded.root
@@ -46,20 +51,40 @@ def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(file, copy)
     for leaf, file in sorted(files.items(), key=lambda item: item[0].position, reverse=True):
-        text = _with_path(text, leaf, relpath(copies.get(file, file), target.parent))
+        is_copied = file in copies
+        path = relpath(copies[file], target.parent) if is_copied else relpath(file, realpath(target.parent))
+        text = _with_path(text, leaf, path)
     target.write_text(text, encoding="utf-8")
     return [target, *copies.values()]
 
 
-def _scalars(tree: Node) -> Iterator[ScalarNode]:
-    return (node for _, node in nodes_with_keys(tree) if isinstance(node, ScalarNode))
+def with_paths_relative_to(folder: Path, tree: MappingNode, yaml_files: Mapping[str, Path]) -> MappingNode:
+    """Return a scenario with paths relative to `folder`, instead of to the folders of the YAML files with these paths.
+
+    `yaml_files` are the absolute paths of these files, by path in messages.
+    """
+    start = Path(realpath(folder))
+    for keys, (leaf, file) in _named_files(tree, yaml_files).items():
+        if yaml_files[leaf.position.path].parent != start:
+            tree = tree.with_value(keys, ScalarNode(leaf.position, relpath(file, start)), leaf.position)
+    return tree
 
 
-def _existing_file(leaf: ScalarNode, folders: set[Path]) -> Path | None:
-    """Return the existing file that the scalar `leaf` names relative to one of `folders`; None if there is none."""
+def _named_files(tree: Node, yaml_files: Mapping[str, Path]) -> dict[Keys, tuple[ScalarNode, Path]]:
+    """Return the scalars that name existing files, and these files, by keys. See `with_paths_relative_to`."""
+    found = {}
+    for keys, leaf in nodes_with_keys(tree):
+        yaml_file = yaml_files.get(leaf.position.path)
+        if isinstance(leaf, ScalarNode) and yaml_file is not None and (file := _existing_file(leaf, yaml_file.parent)):
+            found[keys] = leaf, file
+    return found
+
+
+def _existing_file(leaf: ScalarNode, folder: Path) -> Path | None:
+    """Return the existing file that the scalar `leaf` names relative to `folder`; None if there is none."""
     if not isinstance(leaf.value, str) or "." not in leaf.value or "\n" in leaf.value or len(leaf.value) > 4096:
         return None
-    return next((path.resolve() for folder in sorted(folders) if is_file(path := folder / leaf.value)), None)
+    return path.resolve() if is_file(path := folder / leaf.value) else None
 
 
 def _with_dependencies(files: Iterable[Path]) -> list[Path]:
@@ -75,8 +100,7 @@ def _with_dependencies(files: Iterable[Path]) -> list[Path]:
         found.add(file)
         text = read_text(file, file.name) if file.name.endswith(_SEARCHED_SUFFIXES) else ""
         tree = None if isinstance(text, Problem) else parse_yaml(text, file.name)[0]
-        named = (_existing_file(leaf, {file.parent}) for leaf in (() if tree is None else _scalars(tree)))
-        waiting += [other for other in named if other is not None]
+        waiting += [other for _, other in _named_files(tree, {file.name: file}).values()] if tree is not None else []
     return sorted(found)
 
 
