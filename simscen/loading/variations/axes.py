@@ -145,7 +145,6 @@ class AxisBuilder:
             for path, entry in entries.items():
                 if (target := self._resolve_target(path, entry)) is not None:
                     changes.append(Change(target, entry.value, number))
-            self._report_overlaps([[Option((change,))] for change in changes])
             found.append(Option(tuple(changes), name))
         return found
 
@@ -194,14 +193,21 @@ class AxisBuilder:
         return target
 
     def _report_overlaps(self, axes: Sequence[Axis]) -> None:
-        """Report paths of different axes that lead to the same value, or to a value and to a part of it."""
-        targets = [_targets_by_path(axis) for axis in axes]
-        for first, second in combinations(targets, 2):
+        """Report changes in one variation that lead to the same value, or to a value and to a part of it."""
+        together = [
+            tuple(change.target for change in option.changes) for axis in axes for option in typical_options(axis)
+        ]
+        for targets in dict.fromkeys(together):
+            for one, other in combinations(targets, 2):
+                self._report_overlap(one, other)
+        for first, second in combinations(map(_targets_by_path, axes), 2):
             for one, other in product(first.values(), second.values()):
-                if _overlap(one.keys, other.keys):
-                    same = len(one.keys) == len(other.keys)
-                    what = "change the same value" if same else "overlap: one is part of the other"
-                    self.add_problem(other.position, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
+                self._report_overlap(one, other)
+
+    def _report_overlap(self, one: Target, other: Target) -> None:
+        if _overlap(one.keys, other.keys):
+            what = "change the same value" if len(one.keys) == len(other.keys) else "overlap: one is part of the other"
+            self.add_problem(other.position, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
 
     def add_problem(self, position: Position, code: str, message: str, hint: str = "") -> None:
         """Add a problem to `problems` unless it is there already."""
