@@ -14,7 +14,7 @@ from simscen.cli.session.stacks import parse_stacks
 from simscen.core.errors import InvalidInput, NothingSelected, Problem, UsageError
 from simscen.loading.codes import UNSUPPORTED_BY_STACK
 from simscen.loading.files.discovery import default_root, discover
-from simscen.loading.files.paths import is_folder
+from simscen.loading.files.paths import absolute_path, is_folder
 from simscen.loading.keywords import select
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.schema.messages import quoted, suggestion
@@ -160,7 +160,7 @@ def load_selection(
     loaded: dict[str, list[LoadedScenario]] = {}
     problems: dict[Problem, None] = {}
     warnings: dict[str, list[Problem]] = {}
-    named = {path.absolute() for path in paths if not is_folder(path)}
+    named = {absolute_path(path) for path in paths if not is_folder(path)}
     for file, choice in product(discover(paths, root_folder), choices):
         variations, found = checker.check_scenario(file, choice, selection.variation_numbers)
         if choice is not None and file not in named and (reason := _stack_limitation(choice, found)):

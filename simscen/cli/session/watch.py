@@ -21,6 +21,7 @@ from simscen.cli.session.scenario_session import SessionRequest, execute_session
 from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, UsageError
 from simscen.core.records.session_events import RunFinished, SessionEvent
 from simscen.loading.files.discovery import default_root, discover
+from simscen.loading.files.paths import absolute_path
 from simscen.loading.loaded import LoadedScenario
 from simscen.report.display_text import number_with_noun
 from simscen.report.journal_reader import JOURNAL_FILE
@@ -145,7 +146,7 @@ class WatchState:
 
     def _below(self, path: Path) -> list[Path]:
         """Return the watched scenarios in a folder, or the scenario at `path` itself."""
-        return [file for file in self._files if file.is_relative_to(path.absolute())]
+        return [file for file in self._files if file.is_relative_to(absolute_path(path))]
 
     def _discover(self) -> Sequence[Path]:
         """Return the existing scenarios (none if the search fails), and watch the folders in which they can be."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from simscen.core.errors import InvalidInput, NothingSelected, Problem
 from simscen.core.files import expand_home
-from simscen.loading.files.paths import exists, is_folder, path_in_messages, scenario_id
+from simscen.loading.files.paths import absolute_path, exists, is_folder, path_in_messages, scenario_id
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
 
@@ -29,7 +29,7 @@ SCENARIOS_FOLDER = "scenarios"
 
 
 def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCENARIO_SUFFIXES) -> list[Path]:
-    """Return the absolute paths of the files that `paths` select, sorted.
+    """Return the absolute paths (see `absolute_path`) of the files that `paths` select, sorted and each once.
 
     A folder selects all files with one of `suffixes` in it and in its subfolders that are not hidden. Raises
     InvalidInput for missing paths and conflicting output folders, and NothingSelected.
@@ -41,7 +41,7 @@ def discover(paths: Sequence[Path], root: Path, suffixes: tuple[str, ...] = SCEN
         except (OSError, ValueError) as error:
             message = os_error_reason(error) if isinstance(error, OSError) else "no such file or directory"
             problems.append(Problem(str(path), 0, 0, "SC001", message))
-    found = dict.fromkeys(file.absolute() for path in paths for file in _selected_files(path, suffixes, problems))
+    found = dict.fromkeys(absolute_path(file) for path in paths for file in _selected_files(path, suffixes, problems))
     if problems:
         raise InvalidInput(problems)
     if not found:

@@ -60,11 +60,8 @@ class PathSandbox:
         return path
 
     def resolve_argument(self, path: Path) -> Path | Problem:
-        """Return the absolute path of a file on the command line, which need not exist; or a problem.
-
-        If the file is a symbolic link, the path is that of the link.
-        """
-        file = _resolved(path.parent) / path.name
+        """Return the `absolute_path` of a file on the command line, which need not exist; or a problem."""
+        file = absolute_path(path)
         if self.contains(file):
             return _name_problem(path, self.display_name(file)) or file
         return Problem(str(path), 0, 0, "SC020", "the file is outside the scenario root", "choose the root with --root")
@@ -84,6 +81,11 @@ class PathSandbox:
             return None
         candidates = ((folder, _resolved(folder / written)) for folder in self.world_path)
         return next((found for folder, found in candidates if found.is_relative_to(folder) and exists(found)), None)
+
+
+def absolute_path(path: Path) -> Path:
+    """Return the absolute path of a file or folder with symbolic links resolved, except a link to a file itself."""
+    return _resolved(path) if is_folder(path) else _resolved(path.parent) / path.name
 
 
 def path_in_messages(path: Path, root: Path) -> str:

@@ -154,3 +154,18 @@ def test_an_empty_folder_with_the_name_of_a_scenario_is_invalid(tmp_path, others
     (tmp_path / "good.scenario.yaml").touch()
     with pytest.raises(InvalidInput, match=r"x\.scenario\.yaml: is a folder"):
         discover([tmp_path / name for name in ["x.scenario.yaml", *others]], tmp_path)
+
+
+def test_links_in_the_path_of_a_folder_are_resolved(tmp_path: Path) -> None:
+    _touch(tmp_path, "project/a/goal.scenario.yaml", "project/b/goal.scenario.yaml")
+    (tmp_path / "link").symlink_to(tmp_path / "project")
+    project = tmp_path / "project"
+    expected = [project / "a" / "goal.scenario.yaml", project / "b" / "goal.scenario.yaml"]
+    assert discover([tmp_path / "link", project / "a" / ".." / "b"], tmp_path / "link") == expected
+
+
+def test_a_link_to_a_scenario_keeps_its_own_name(tmp_path: Path) -> None:
+    _touch(tmp_path, "shared/goal.scenario.yaml")
+    link = tmp_path / "own.scenario.yaml"
+    link.symlink_to(tmp_path / "shared" / "goal.scenario.yaml")
+    assert discover([link], tmp_path) == [link]
