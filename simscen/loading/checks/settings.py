@@ -13,7 +13,6 @@ from simscen.loading.spec_walk import angles_of
 from simscen.loading.yaml.tree import Keys, MappingNode, ScalarNode, dotted_path, existing_keys, node_at
 from simscen.model.localizers import Amcl
 from simscen.model.navigation import expected_failure_name
-from simscen.model.robot import RobotSpec
 from simscen.model.scenario import MAX_GOALS
 from simscen.model.stack import StackSpec
 
@@ -24,11 +23,11 @@ TICK_RATE_KEYS = ("physics", "tick_rate")
 def uneven_rates(scope: NameScope) -> Iterator[CheckProblem]:
     """Find rates that do not divide the tick rate. The problem marks the tick rate if the scenario sets it."""
     loaded = scope.loaded
-    rates: list[tuple[MappingNode, Keys, float]] = [
+    rates: list[tuple[MappingNode | None, Keys, float]] = [
         (loaded.tree, ("stack", "controller_frequency"), loaded.spec.stack.controller_frequency),
         (loaded.tree, ("physics", "truth_rate"), loaded.spec.physics.truth_rate),
     ]
-    if isinstance(loaded.robot.spec, RobotSpec) and loaded.robot.tree is not None:
+    if loaded.robot.spec is not None:  # without a YAML tree, it is inferred from a URDF
         rates += [
             (loaded.robot.tree, ("sensors", name, sensor.kind, "rate"), getattr(sensor.chosen, "rate", 1.0))
             for name, sensor in loaded.robot.spec.sensors.items()
@@ -40,7 +39,7 @@ def uneven_rates(scope: NameScope) -> Iterator[CheckProblem]:
         except ValueError as error:
             owner = "" if tree is loaded.tree else f" of robot `{loaded.robot.name}`"
             message = f"{'.'.join(map(str, keys))}{owner}: {error}"
-            if existing_keys(loaded.tree, TICK_RATE_KEYS) == TICK_RATE_KEYS:
+            if tree is None or existing_keys(loaded.tree, TICK_RATE_KEYS) == TICK_RATE_KEYS:
                 yield CheckProblem(TICK_RATE_KEYS, message)
             else:
                 yield CheckProblem(keys, message, at_key=existing_keys(tree, keys) != keys, tree=tree)
