@@ -3,7 +3,8 @@
 `parameters` are the parameters of a costmap in the Nav2 file. `section` is the key of the costmap under `stack`.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any
 
 from simscen.loading.stacks.nav2_mapping import (
     Parameters,
@@ -26,6 +27,7 @@ def translate_costmap(parameters: Parameters, section: str) -> Iterator[Translat
     layers: Mapping[str, str] = DEFAULT_LAYERS
     if isinstance(listed := parameters.get("plugins"), list):
         layers = {layer: class_of(parameters.get(f"{layer}.plugin", "")) for layer in strings(listed)}
+        yield from _note_other_layers(layers.values(), listed, section)
     handled = {*layers, *strings(parameters.get("filters"))}
     for name, value in parameters.items():
         layer, _, rest = name.partition(".")
@@ -43,9 +45,23 @@ def translate_costmap(parameters: Parameters, section: str) -> Iterator[Translat
         elif layer not in handled:
             handled.add(layer)
             yield Translation(name, (), value, f"`plugins` does not list {layer}", covers=f"{layer}.")
+    for layer, kind in layers.items():
+        if kind == "DenoiseLayer" and f"{layer}.enabled" not in parameters:  # Nav2 enables layers by default
+            yield Translation(f"{layer}.plugin", (section, "denoise_layer", "enabled"), True)
     yield from _translate_observation_sources(parameters, layers, section)
     for zones in strings(parameters.get("filters")):
         yield Translation("filters", (), None, covers=f"{zones}.")  # the scenario defines zones
+
+
+def _note_other_layers(kinds: Collection[str], listed: Any, section: str) -> Iterator[Translation]:
+    """Yield notes about layers that simscen's costmap has, but `plugins` does not list, and the other way around."""
+    hint = "simscen always has this layer"
+    if "InflationLayer" not in kinds:
+        yield Translation("plugins", (), listed, "it lists no inflation layer", hint=hint)
+    if not any(kind in OBSERVATION_LAYERS for kind in kinds):
+        yield Translation("plugins", (), listed, "it lists no obstacle layer", hint=hint)
+    if section == "local_costmap" and "StaticLayer" in kinds:
+        yield Translation("plugins", (), listed, "the local costmap does not contain the map")
 
 
 LASER_SCAN = "LaserScan"

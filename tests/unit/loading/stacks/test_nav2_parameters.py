@@ -236,6 +236,7 @@ def test_every_parameter_that_changes_nothing_here_is_named_with_its_line(tmp_pa
         (18, "controller_server: `FollowPath.critics`: not supported: PreferForward"),
         (23, "global_costmap: `robot_radius`: the robot file defines the size of the robot"),
         (24, "global_costmap: `rolling_window`: the local costmap always rolls, the global one with `map: none`"),
+        (25, "global_costmap: `plugins`: it lists no inflation layer"),
         (29, "global_costmap: simscen has no obstacle_layer.scan.clearing (29),"
          " obstacle_layer.old.obstacle_max_range (30)"),
         (31, "global_costmap: `static_layer.plugin`: `plugins` does not list static_layer"),
@@ -268,6 +269,7 @@ def test_only_laser_scans_set_the_ranges_of_the_lidar(tmp_path: Path) -> None:
     costmap = found.spec.stack.local_costmap
     assert (costmap.obstacle_max_range, costmap.raytrace_max_range, costmap.max_obstacle_height) == (10.0, 11.0, 0.8)
     assert [(note.line, note.message) for note in found.notes] == [
+        (4, "local_costmap: `plugins`: it lists no inflation layer"),
         (9, "local_costmap: `obstacle_layer.rear.raytrace_max_range`: only the value of the first source is used:"
          " obstacle_layer.front"),
         (15, "local_costmap: `voxel_layer.depth.obstacle_max_range`: PointCloud2 data does not set the ranges of the"
@@ -338,3 +340,41 @@ def test_only_the_last_of_several_nodes_with_the_same_name_is_used(tmp_path: Pat
     assert [(note.line, note.message) for note in found.notes] == [
         (1, "only the last of the nodes called amcl is used")
     ]
+
+
+COSTMAP = "{name}:\n  {name}:\n    ros__parameters:\n      plugins: [{layers}]\n"
+LAYER = "      {layer}: {{plugin: 'nav2_costmap_2d::{kind}'{values}}}\n"
+
+
+def _costmap(name: str, kinds: str, values: str = "") -> str:
+    """Return the part of a Nav2 file with a costmap that has layers of these kinds, all with the same values."""
+    layers = {kind: kind.lower() for kind in kinds.split()}
+    texts = [LAYER.format(layer=layer, kind=kind, values=values) for kind, layer in layers.items()]
+    return COSTMAP.format(name=name, layers=", ".join(layers.values())) + "".join(texts)
+
+
+@pytest.mark.parametrize(
+    ("name", "kinds", "noted"),
+    [
+        ("global_costmap", "StaticLayer ObstacleLayer InflationLayer", []),
+        ("local_costmap", "VoxelLayer InflationLayer", []),
+        ("global_costmap", "StaticLayer InflationLayer", ["obstacle layer"]),
+        ("local_costmap", "ObstacleLayer", ["inflation layer"]),
+        ("local_costmap", "StaticLayer ObstacleLayer InflationLayer", ["the map"]),
+    ],
+)
+def test_layers_unlike_those_of_simscen_are_named(tmp_path: Path, name: str, kinds: str, noted: list[str]) -> None:
+    notes = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", _costmap(name, kinds)).notes
+    assert len(notes) == len(noted)
+    for note, text in zip(notes, noted, strict=True):
+        assert note.line == 4
+        assert f"{name}: `plugins`: " in note.message
+        assert text in note.message
+
+
+@pytest.mark.parametrize(("values", "is_enabled"), [("", True), (", enabled: true", True), (", enabled: false", False)])
+def test_a_listed_denoise_layer_is_enabled_by_default(tmp_path: Path, values: str, is_enabled: bool) -> None:
+    params = _costmap("local_costmap", "ObstacleLayer InflationLayer DenoiseLayer", values)
+    stack = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", params).spec.stack
+    assert stack.local_costmap.denoise_layer.enabled is is_enabled
+    assert not stack.costmap.denoise_layer.enabled
