@@ -45,7 +45,7 @@ def test_2_a_folder_without_scenarios_is_not_a_success(simscen, folder: Path, co
         pytest.param("[" * 200_000, "1:41", "nested deeper than 40", id="21 brackets"),
         pytest.param("{a: " * 200_000, "1:161", "nested deeper than 40", id="21 braces"),
         pytest.param(LAUGHS, "6:25", "aliases expand to more than 100000 values", id="20"),
-        pytest.param("simscen: 99\nwarp: 9\n", "1:10", "needs schema 99; this version of simscen supports 1", id="30"),
+        pytest.param("simscen: 99\nwarp: 9\n", "1:10", "written for language version 99", id="30"),
         pytest.param("simscen: 1\nseed: " + "9" * 5000, "2:7", "integer too large", id="14"),
         pytest.param(b"simscen: 1\nname: caf\xe9\n", "2:10", "not valid UTF-8 at byte 20", id="16"),
         pytest.param("simscen: 1\n".encode("utf-16"), "1:1", "not valid UTF-8 at byte 0", id="17 UTF-16"),

@@ -98,7 +98,7 @@ def _list_hint(node: Node, in_list: bool) -> str:
 
 def _sequence_for_mapping_hint(models: Iterable[type[BaseModel]], node: SequenceNode) -> str:
     """Return a hint on how to write a list as a mapping: without `-`, or as a pose; "" if unknown."""
-    if all(isinstance(item, MappingNode) for item in node.items):
+    if node.items and all(isinstance(item, MappingNode) for item in node.items):
         return "remove the `-`: a mapping is expected, not a list"
     values = [str(item.value) for item in node.items if isinstance(item, ScalarNode)]
     if len(values) != len(node.items) or len(values) not in (2, 3):

@@ -15,6 +15,7 @@ _EXPECTED_TYPES = {
     "model_attributes_type": "a mapping",
     "dict_type": "a mapping",
     "list_type": "a list",
+    "tuple_type": "a list",
     "string_type": "text",
     "int_type": "an integer",
     "int_from_float": "an integer",
@@ -107,7 +108,8 @@ def translate_error(error_type: str, context: Mapping[str, Any], node: Node, tex
     if error_type == "literal_error":
         word = str(node.value) if isinstance(node, ScalarNode) else ""
         choices = str(context["expected"]).replace(" or ", ", ").split(",")  # pydantic writes "'a', 'b' or 'c'"
-        hint = suggestion(word, [choice.strip().strip("'") for choice in choices])
+        known = [choice.strip().strip("'") for choice in choices]
+        hint = "remove the quotes" if word in known else suggestion(word, known)  # the text "1" is not the number 1
         return Message("SC014", f"{short_value(node)} is not one of the choices", hint)
     if error_type == "value_error":
         reason = str(context["error"])

@@ -96,7 +96,7 @@ def _version_problem(tree: MappingNode) -> Problem | None:
     version = child(tree, "simscen")
     if version is None or type(version.plain) is not int or version.plain == LANGUAGE_VERSION:
         return None
-    message = f"needs schema {version.plain}; this version of simscen supports {LANGUAGE_VERSION}"
+    message = f"written for language version {version.plain}; this simscen supports {LANGUAGE_VERSION}"
     return Problem(*version.position, "SC009", message)
 
 

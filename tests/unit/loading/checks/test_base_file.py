@@ -37,7 +37,7 @@ def test_a_base_may_say_a_part_of_a_mapping(write) -> None:
         (BASE + "goals: [{timeout: 3 s}]\n", "5:9 missing key `pose` in `goals[0]`"),
         (BASE + "pass:\n", "5:1 `pass` has no value"),
         (BASE + "pass: [{collisions: {}}]\npass+: [{collisions: {}}]\n", "6:1 unknown key `pass+`"),
-        ("simscen: 2\n", "1:10 needs schema 2"),
+        ("simscen: 2\n", "1:10 written for language version 2"),
         ("- a\n", "1:1 expected a mapping at top level"),
         ("extends: b.base.yaml\n", "1:10 no such file or directory"),
         ("map: no.yaml\n", "1:6 no such file or directory"),

@@ -123,8 +123,19 @@ def test_null_values_are_refused() -> None:
 
 def test_unsupported_version_is_the_only_reported_problem() -> None:
     assert _told(ScenarioSpec, "simscen: 2\nnonsense: 1\n") == [
-        (1, 10, "needs schema 2; this version of simscen supports 1")
+        (1, 10, "written for language version 2; this simscen supports 1")
     ]
+
+
+def test_a_number_in_quotes_is_no_choice() -> None:
+    problem = _problems(ScenarioSpec, SCENARIO.replace("simscen: 1", "simscen: '1'"))[0]
+    assert (problem.line, problem.col, problem.hint) == (1, 10, "remove the quotes")
+
+
+def test_a_tuple_is_called_a_list() -> None:
+    estimate = "robot: {pose: {x: 1, y: 1}, initial_estimate: {x: 1, y: 1, std: 0.5}}\n"
+    text = "".join(estimate if line.startswith("robot") else line for line in SCENARIO.splitlines(keepends=True))
+    assert [message for *_, message in _told(ScenarioSpec, text)] == ["expected a list, got the number 0.5"]
 
 
 def test_control_characters_by_escape_are_refused_in_names() -> None:
