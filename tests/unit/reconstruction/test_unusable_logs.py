@@ -1,0 +1,192 @@
+"""Logs that cannot be reconstructed, or only in part: errors, notes, and the files that are left."""
+
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "record"))
+import foreign_logs as logs
+from logged_drive import GOAL, messages
+
+from simscen.cli.main import app
+from simscen.core.errors import InvalidInput, UsageError
+from simscen.loading.scenario import load_scenario
+from simscen.reconstruction import scenario_from_log as scenario_module
+from simscen.reconstruction.drive.reader import read_drive
+from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory):
+    """Return the bag of a drive with a map and a goal."""
+    return logs.write_bag(tmp_path_factory.mktemp("drive") / "bag", messages())
+
+
+def test_poses_with_an_invalid_orientation_are_named(tmp_path):
+    said = logs.drive()
+    turned = [one.message.pose.orientation for one in said if one.topic == "/mocap"][3:5]
+    for orientation in turned:
+        orientation.w = 0.0
+    drive = read_drive(logs.write_mcap(tmp_path / "a.mcap", said), "/mocap")
+    assert "2 poses on /mocap, whose orientation is invalid" in drive.notes
+    assert len(drive.poses.times) > 190
+    for one in said:
+        if one.topic == "/mocap":
+            one.message.pose.orientation.w = 0.0
+    with pytest.raises(InvalidInput, match="all messages of /mocap have an invalid orientation"):
+        read_drive(logs.write_mcap(tmp_path / "b.mcap", said), "/mocap")
+
+
+def test_a_log_without_poses_is_refused_with_a_hint(tmp_path):
+    only_scans = [said for said in messages() if said.topic == "/scan"]
+    with pytest.raises(InvalidInput, match="no poses of the robot") as error:
+        read_drive(logs.write_bag(tmp_path / "bag", only_scans))
+    assert "--topic" in error.value.problems[0].hint
+
+
+def test_log_without_scans_lists_what_could_not_be_reconstructed(tmp_path):
+    without = [said for said in messages() if said.topic != "/scan"]
+    bag = logs.write_bag(tmp_path / "bag", without)
+    made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
+    assert made.contents.estimated.objects == []
+    assert any("no scans" in unknown for unknown in made.contents.unknowns)
+
+
+@pytest.mark.parametrize(
+    ("truth", "topics", "text"),
+    [
+        ("/mocap", {}, "it has no topic /mocap"),
+        ("map:base_link", {}, "it has no topic map:base_link"),
+        ("/scan", {}, "/scan is a sensor_msgs/msg/LaserScan, expected nav_msgs/msg/Odometry or"),
+        (None, {"scan": "/front"}, "it has no topic /front"),
+        (None, {"odom": "/amcl_pose"}, "expected nav_msgs/msg/Odometry"),
+    ],
+)
+def test_topics_that_the_user_names_must_have_usable_messages(truth, topics, text, bag):
+    with pytest.raises(InvalidInput, match=text):
+        read_drive(bag, truth, topics)
+
+
+def test_a_ground_truth_far_from_the_origin_is_refused(tmp_path):
+    """UTM coordinates are up to 10,000 km."""
+    said = messages()
+    for one in said:
+        if one.topic == "/odom":
+            one.message.pose.pose.position.y += 3e6
+    with pytest.raises(InvalidInput, match="no pose with valid coordinates"):
+        read_drive(logs.write_bag(tmp_path / "bag", said), "/odom")
+
+
+@pytest.mark.parametrize(("name", "content"), [
+    ("missing.mcap", None),
+    ("text.mcap", b"not a log"),
+    ("empty.mcap", b""),
+    ("ros1.bag", b"#ROSBAG V2.0\n"),
+])  # fmt: skip
+def test_an_unusable_log_ends_with_exit_code_2_and_leaves_no_file(name, content, tmp_path):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    target = tmp_path / "new.scenario.yaml"
+    result = CliRunner().invoke(app, ["new", "--from-log", str(tmp_path / name), "--out", str(target)])
+    assert isinstance(result.exception, InvalidInput) or result.exit_code == 2
+    assert not target.exists()
+
+
+def with_nan(said):
+    said.message.pose.pose.position.x = math.nan
+
+
+def without_stamp(said):
+    said.message.header.stamp = logs.stamp_of(0)
+
+
+def without_beams(said):
+    said.message.ranges = np.zeros(0, dtype=np.float32)
+
+
+def with_one_direction(said):
+    said.message.angle_increment = 0.0
+
+
+def with_nan_angles(said):
+    said.message.angle_min = math.nan
+
+
+def with_nan_limit(said):
+    said.message.range_max = math.nan
+
+
+def without_resolution(said):
+    said.message.info.resolution = 0.0
+
+
+@pytest.mark.parametrize(
+    ("topic", "change", "changes_all", "text"),
+    [
+        ("/odom", with_nan, False, "valid numbers in 1 messages of `odom`, which are ignored"),
+        ("/amcl_pose", with_nan, True, "messages of `amcl_pose`, which are ignored"),
+        ("/odom", without_stamp, False, ""),
+        ("/scan", without_beams, True, "usable scans of `lidar`, because their angles"),
+        ("/scan", with_one_direction, True, "usable scans of `lidar`, because their angles"),
+        ("/scan", with_nan_angles, True, "usable scans of `lidar`, because their angles"),
+        ("/scan", with_nan_limit, True, "usable scans of `lidar`, because their angles"),
+        ("/map", without_resolution, True, "a usable map, because its map has no cells"),
+    ],
+)
+def test_a_log_with_invalid_messages_gives_a_valid_scenario(topic, change, changes_all, text, tmp_path):
+    said = messages()
+    chosen = [one for one in said if one.topic == topic]
+    for one in chosen if changes_all else chosen[30:31]:
+        change(one)
+    bag = logs.write_bag(tmp_path / "bag", said)
+    made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
+    load_scenario(made.file, tmp_path)
+    assert any(text in unknown for unknown in made.contents.unknowns)
+    (only,) = made.contents.goals
+    assert math.dist(only.pose[:2], GOAL) < 0.1
+
+
+def test_a_clock_that_jumps_by_more_than_the_drive_is_refused(tmp_path):
+    said = messages()
+    odometry_messages = [one for one in said if one.topic == "/odom"]
+    odometry_messages[30].message.header.stamp = logs.stamp_of(logs.BEGIN + 10**8 * logs.SECOND)
+    with pytest.raises(InvalidInput, match="the stamps of the topic for `odom` jump by 99999998"):
+        read_drive(logs.write_bag(tmp_path / "bag", said))
+
+
+def test_a_drive_across_a_country_needs_a_map(tmp_path):
+    far = [replace(one, message=logs.odometry(one.time, "odom", 1e4 * k, 0.5)) for k, one in enumerate(
+        one for one in messages() if one.topic == "/odom"
+    )]  # fmt: skip
+    far[-1].message.pose.pose.position.y = 1e5
+    bag = logs.write_bag(tmp_path / "bag", far)
+    with pytest.raises(InvalidInput, match="too much to build a map"):
+        scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
+
+
+@pytest.mark.parametrize("existing", ["site_map.yaml", "site_map.pgm", "site.robot.yaml"])
+def test_existing_files_are_never_overwritten(existing, tmp_path):
+    bag = logs.write_bag(tmp_path / "bag", messages(with_map=False))
+    (tmp_path / existing).write_text("mine")
+    arguments = ["new", "--from-log", str(bag), "--out", str(tmp_path / "site")]
+    result = CliRunner().invoke(app, arguments)
+    assert isinstance(result.exception, UsageError)
+    assert f"{existing} already exists" in str(result.exception)
+    assert (tmp_path / existing).read_text() == "mine"
+    assert sorted(file.name for file in tmp_path.iterdir()) == sorted(["bag", existing])
+
+
+def test_an_invalid_log_leaves_no_map_and_no_robot_file(tmp_path, monkeypatch):
+    def fail(*_):
+        raise InvalidInput([])
+
+    monkeypatch.setattr(scenario_module, "run_estimators", fail)
+    bag = logs.write_bag(tmp_path / "bag", messages(with_map=False))
+    with pytest.raises(InvalidInput):
+        scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
+    assert [file.name for file in tmp_path.iterdir()] == ["bag"]
