@@ -67,6 +67,14 @@ class ScanMatchingAmcl(AmclParameters):
         chosen = PARAMETER_SETS.get(name) if isinstance(name, str) else None
         return {**chosen, **values} if chosen else values
 
+    @model_validator(mode="after")
+    def _check_map_trust(self) -> "ScanMatchingAmcl":
+        if 0 < self.map_trust_full <= self.map_trust_none:
+            raise ValueError(
+                f"`map_trust_none` {self.map_trust_none:g} must be less than `map_trust_full` {self.map_trust_full:g}"
+            )
+        return self
+
 
 class SlipEkf(EkfParameters):
     """EKF of odometry and gyroscope that detects wheel slip in turns, with optional scan matching. Uses no map."""

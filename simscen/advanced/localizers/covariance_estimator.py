@@ -4,6 +4,7 @@ A correction is an update of the estimated pose by comparing a scan with the map
 """
 
 import math
+import sys
 from collections import deque
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -54,7 +55,8 @@ class MapResiduals:
         hit = self.z_hit * np.exp(-0.5 * np.square(distances, dtype=np.float64))
         if not len(hit) or not hit.any():
             return None
-        explained = hit / (hit + self.z_rand / beams.range_max)
+        # Without random measurements, both terms are 0 far from all obstacles; the map does not explain such a beam.
+        explained = hit / (hit + max(self.z_rand / beams.range_max, sys.float_info.min))
         return ScanResiduals(float(explained.mean()), float(np.mean(np.square(explained * distances))))
 
 

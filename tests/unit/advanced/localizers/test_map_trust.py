@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from simscen.advanced.localizers.map_trust import MapTrust, unmapped_cells
+from simscen.advanced.spec import ScanMatchingAmcl
 from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from simscen.core.geometry import Array, Pose2
 from simscen.stack.localizers.beams import Beams, ComplexPoints
@@ -89,3 +91,13 @@ def test_beam_ends_are_computed_for_the_requested_poses() -> None:
     for poses, first in ((origin, (50, 50)), (shifted, (55, 50)), (origin, (50, 50)), (shifted, (55, 50))):
         column, row = first
         assert beams.cells(field, poses)[0, 0] == (row + 1) * 82 + column + 1
+
+
+@pytest.mark.parametrize("values", [{"map_trust_none": 0.8}, {"map_trust_none": 0.9}, {"map_trust_full": 0.3}])
+def test_limits_of_the_map_trust_are_in_order(values: dict[str, float]) -> None:
+    with pytest.raises(ValidationError, match="map_trust_none"):
+        ScanMatchingAmcl.model_validate(values)
+
+
+def test_map_trust_can_be_turned_off() -> None:
+    assert ScanMatchingAmcl.model_validate({"map_trust_full": 0}).map_trust_full == 0.0

@@ -14,7 +14,9 @@ WALL = 4.05
 SIGMA = 0.1
 
 
-def residuals(*ends: float, unmapped: bool = False) -> ScanResiduals | None:
+def residuals(
+    *ends: float, unmapped: bool = False, z_rand: float = 0.5, sigma_hit: float = SIGMA
+) -> ScanResiduals | None:
     """Return the residuals of beams along x that end at these distances in m from the corner of the map."""
     cells = np.full((40, 60), FREE, dtype=np.int8)
     cells[:, 40] = OCCUPIED
@@ -22,7 +24,7 @@ def residuals(*ends: float, unmapped: bool = False) -> ScanResiduals | None:
     is_unmapped = np.full(field.table.shape, unmapped)
     ranges = np.array(ends)
     beams = Beams(ranges, np.ones(len(ends), dtype=np.complex128), 0j, 10.0)
-    return MapResiduals(field, is_unmapped, 0.5, 0.5, SIGMA).residuals(beams, Pose2(0.0, 2.0, 0.0))
+    return MapResiduals(field, is_unmapped, 0.5, z_rand, sigma_hit).residuals(beams, Pose2(0.0, 2.0, 0.0))
 
 
 def explained(distance: float) -> float:
@@ -46,6 +48,11 @@ def test_person_far_from_walls_counts_as_unexplained() -> None:
     assert found is not None
     assert found.explained == pytest.approx(explained(0.0) / 2)
     assert found.mean_square == pytest.approx(0.0, abs=1e-9)
+
+
+def test_without_random_measurements_the_map_explains_only_beams_near_walls() -> None:
+    found = residuals(WALL, 2.0, z_rand=0.0, sigma_hit=0.02)
+    assert found == pytest.approx((0.5, 0.0))
 
 
 def test_unknown_space_gives_no_residuals() -> None:
