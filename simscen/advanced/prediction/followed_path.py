@@ -1,5 +1,6 @@
 """Path that a controller follows, and predictions of the robot's trajectory along it."""
 
+import cmath
 import math
 from bisect import bisect_right
 from collections.abc import Callable
@@ -62,12 +63,13 @@ class FollowedPath:
         speeds = scale * command.vx
         rate = np.where(np.abs(speeds) >= abs(twist.vx), robot.linear_acceleration, robot.linear_deceleration) * TIMES
         vx = twist.vx + np.minimum(np.maximum(speeds - twist.vx, -rate), rate)
-        driven = np.cumsum(vx, axis=1) * STEP_S
+        is_backward = self._is_backward(pose, command, nearest)
+        driven = np.cumsum(vx, axis=1) * (-STEP_S if is_backward else STEP_S)
         arc_lengths = np.minimum(np.maximum(driven, 0.0) + along[nearest], along[-1])
         decay = np.exp(np.abs(driven) / -max(RETURN_TIME_S * abs(command.vx), 0.2))
         x = np.interp(arc_lengths, along, self._x) + (pose.x - self._x[nearest]) * decay
         y = np.interp(arc_lengths, along, self._y) + (pose.y - self._y[nearest]) * decay
-        yaw = self._headings(arc_lengths, nearest, command.vx < 0.0) if with_headings else np.zeros_like(x)
+        yaw = self._headings(arc_lengths, nearest, is_backward) if with_headings else np.zeros_like(x)
         return Rollouts(x, y, yaw, vx, scale * np.array(command))
 
     def position_over_time(
@@ -83,14 +85,24 @@ class FollowedPath:
         ramp, rate = abs(then - now) / rate, math.copysign(rate, then - now)
         start, end = self._lengths[nearest], self._lengths[-1]
         offset, decay_distance = complex(pose.x, pose.y) - self._points[nearest], max(RETURN_TIME_S * abs(then), 0.2)
+        sign = -1.0 if self._is_backward(pose, command, nearest) else 1.0
 
         def position(seconds: float) -> complex:
             ramped_for = min(seconds, ramp)
-            driven = (now + 0.5 * rate * ramped_for) * ramped_for + then * (seconds - ramped_for)
+            driven = sign * ((now + 0.5 * rate * ramped_for) * ramped_for + then * (seconds - ramped_for))
             return self._point_at(min(max(driven, 0.0) + start, end)) + offset * math.exp(-abs(driven) / decay_distance)
 
         factor = 1.0 + abs(offset) / decay_distance
         return position, max(abs(now), abs(then)) * factor, 0.5 * STEP_S * abs(then - now) * factor
+
+    def _is_backward(self, pose: Pose2, command: Twist, nearest: int) -> bool:
+        """Return whether the robot drives backward toward the end of the path, as a car does on a Reeds-Shepp path.
+
+        Its heading is then opposite to the direction of the path at the point with the index `nearest`.
+        """
+        index = min(nearest, len(self) - 2)
+        direction = self._points[index + 1] - self._points[index]
+        return command.vx < 0.0 and (direction * cmath.rect(1.0, -pose.yaw)).real < 0.0
 
     def _point_at(self, length: float) -> complex:
         """Return the point at a length in m along the path."""
@@ -100,7 +112,7 @@ class FollowedPath:
         part = (length - before) / segment if segment > 0.0 else 0.0
         return points[after - 1] + part * (points[after] - points[after - 1])
 
-    def _headings(self, arc_lengths: Array, nearest: int, backward: bool) -> Array:
+    def _headings(self, arc_lengths: Array, nearest: int, is_backward: bool) -> Array:
         """Return the headings (…,) of the robot at arc lengths in m. Path points before `nearest` are ignored."""
         along, x, y = self._along, self._x, self._y
         later = np.minimum(arc_lengths + 0.1, along[-1])
@@ -109,4 +121,4 @@ class FollowedPath:
             np.interp(later, along, y) - np.interp(before, along, y),
             np.interp(later, along, x) - np.interp(before, along, x),
         )
-        return yaw + math.pi if backward else yaw
+        return yaw + math.pi if is_backward else yaw
