@@ -203,7 +203,7 @@ class Adapter:
             self._bring_up.remember_latest(messages)
             if not warming_up:
                 self._bring_up.wait(now, MAX_WAIT_FRACTION * limit_s)
-                # `wait` has published the others.
+                # `wait` has published the messages on latched topics.
                 messages = [message for message in messages if message[0] not in LATCHED_TOPICS]
                 self._begin()
         messages = [*messages, *self._bring_up.due_initial_pose()]

@@ -72,8 +72,9 @@ def check(
         if name in COSTMAPS:
             for layer in node.items("plugins"):
                 sources = node.get(f"{layer}.observation_sources")
-                for source in sources.split() if isinstance(sources, str) else ():
-                    _check_source(node, f"{layer}.{source}")
+                if isinstance(sources, str) and node.get(f"{layer}.enabled") is not False:
+                    for source in sources.split():
+                        _check_source(node, f"{layer}.{source}")
         if name == "collision_monitor":
             for source in node.items("observation_sources"):
                 _check_source(node, str(source))
@@ -147,11 +148,13 @@ class _Node(NamedTuple):
 
 
 def _check_source(node: _Node, source: str) -> None:
-    """Check an observation source of a costmap layer or of the collision monitor."""
+    """Check an observation source of a costmap layer or of the collision monitor, unless it is disabled."""
+    if node.get(f"{source}.enabled") is False:
+        return
     kind = node.get(f"{source}.data_type") or node.get(f"{source}.type") or "LaserScan"
     if kind in ("LaserScan", "scan"):
         node.check_topic(f"{source}.topic", node.published.scans, "scans")
-    elif node.get(f"{source}.enabled") is not False:
+    else:
         key = f"{source}.data_type" if node.get(f"{source}.data_type") else f"{source}.type"
         node.add_problem(key, f"is {kind!r}: simscen publishes scans only", is_severe=False)
 

@@ -81,6 +81,19 @@ def test_a_point_cloud_source_is_a_warning_unless_it_is_disabled() -> None:
     assert found("local_costmap", **source, o__cloud__enabled=False) == []
 
 
+@pytest.mark.parametrize("disabled", ["o", "o.front"], ids=["layer", "source"])
+def test_topics_of_disabled_sources_are_not_checked(disabled: str) -> None:
+    layer = {"plugins": ["o"], "o.observation_sources": "front", "o.front.topic": "/front"}
+    assert len(found("local_costmap", **layer)) == 1
+    assert found("local_costmap", **layer, **{f"{disabled}.enabled": False}) == []
+
+
+def test_disabled_source_of_the_collision_monitor_is_not_checked() -> None:
+    monitor = {"observation_sources": ["front"], "front.type": "scan", "front.topic": "/front"}
+    assert len(found("collision_monitor", **monitor)) == 1
+    assert found("collision_monitor", **monitor, **{"front.enabled": False}) == []
+
+
 def test_wall_time_is_a_warning_because_a_launch_file_may_set_it() -> None:
     [problem] = found("planner_server", use_sim_time=False)
     assert not problem.is_severe
