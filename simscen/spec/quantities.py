@@ -128,8 +128,9 @@ class WholeQuantity(Quantity):
 Length = Annotated[float, Field(ge=-1e4, le=1e4), Quantity("length")]
 PositiveLength = Annotated[float, Field(gt=0, le=1e4), Quantity("length")]
 NonNegativeLength = Annotated[float, Field(ge=0, le=1e4), Quantity("length")]
-Duration = Annotated[float, Field(ge=0, le=86400), Quantity("duration")]
-PositiveDuration = Annotated[float, Field(gt=0, le=86400), Quantity("duration")]
+MAX_DURATION_S = 86400.0
+Duration = Annotated[float, Field(ge=0, le=MAX_DURATION_S), Quantity("duration")]
+PositiveDuration = Annotated[float, Field(gt=0, le=MAX_DURATION_S), Quantity("duration")]
 Angle = Annotated[float, Field(ge=-100, le=100), Quantity("angle")]
 NonNegativeAngle = Annotated[float, Field(ge=0, le=100), Quantity("angle")]
 PositiveAngle = Annotated[float, Field(gt=0, le=100), Quantity("angle")]

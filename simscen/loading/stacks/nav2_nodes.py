@@ -4,6 +4,7 @@ There is one function for each kind of node. `parameters` are the parameters of 
 a key under `stack`, such as "controller".
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
@@ -33,12 +34,15 @@ from simscen.loading.stacks.nav2_mapping import (
     strings,
     translate_same_name,
 )
+from simscen.spec.quantities import MAX_DURATION_S
 
 CONTROLLER_SERVER_PARAMETERS = (
     "controller_frequency", "failure_tolerance",
     "min_x_velocity_threshold", "min_y_velocity_threshold", "min_theta_velocity_threshold",
 )  # fmt: skip
 """Parameters of the controller server itself, which have the same names under `stack`."""
+POSE_PROGRESS_ANGLE_RAD = 0.5
+"""Default of `required_movement_angle` of Nav2's PoseProgressChecker."""
 
 
 def _translate_controller_server(parameters: Parameters) -> Iterator[Translation]:
@@ -49,9 +53,30 @@ def _translate_controller_server(parameters: Parameters) -> Iterator[Translation
     for kind in ("progress_checker", "goal_checker"):
         chosen = _first_plugin(parameters, kind, kind)
         yield from _note_unused_plugins(parameters, kind, chosen)
+        yield from _translate_checker_class(parameters, kind, chosen)
         for key, value in parameters_below(parameters, chosen):
             yield from translate_same_name(f"{chosen}.{key}", value, (kind,), kind, key)
     yield from _translate_plugin(parameters, "controller", "FollowPath", CONTROLLERS)
+
+
+def _translate_checker_class(parameters: Parameters, kind: str, chosen: str) -> Iterator[Translation]:
+    """Translate the class of the progress checker or goal checker `chosen`: its effect, or a note about another class.
+
+    Yield nothing for the simple classes, whose parameters have the same names in simscen.
+    """
+    name = f"{chosen}.plugin"
+    if name not in parameters:
+        return
+    match class_of(parameters[name]):
+        case "SimpleProgressChecker" | "SimpleGoalChecker":
+            pass
+        case "PoseProgressChecker":
+            if f"{chosen}.required_movement_angle" not in parameters:
+                yield Translation(name, (kind, "required_movement_angle"), POSE_PROGRESS_ANGLE_RAD)
+        case "PositionGoalChecker":
+            yield Translation(name, (kind, "yaw_goal_tolerance"), math.pi)
+        case other:
+            yield Translation(name, (), other, f"{other} is not supported; the simple {kind} is used")
 
 
 def _first_plugin(parameters: Parameters, kind: str, default: str) -> str:
@@ -169,8 +194,11 @@ def _translate_velocity_smoother(parameters: Parameters) -> Iterator[Translation
 
 def _translate_collision_monitor(parameters: Parameters) -> Iterator[Translation]:
     """Translate the first enabled `approach` polygon. Other enabled polygons get a note."""
-    if "source_timeout" in parameters:
-        yield Translation("source_timeout", ("collision_monitor", "source_timeout"), parameters["source_timeout"])
+    timeout = parameters.get("source_timeout")
+    if timeout is not None:
+        is_off = timeout == 0 and not isinstance(timeout, bool)
+        timeout = MAX_DURATION_S if is_off else timeout
+        yield Translation("source_timeout", ("collision_monitor", "source_timeout"), timeout)
     on = parameters.get("enabled", True)
     actions = {polygon: parameters.get(f"{polygon}.action_type") for polygon in strings(parameters.get("polygons"))}
     enabled = {polygon: parameters.get(f"{polygon}.enabled", True) for polygon in actions}

@@ -378,3 +378,42 @@ def test_a_listed_denoise_layer_is_enabled_by_default(tmp_path: Path, values: st
     stack = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", params).spec.stack
     assert stack.local_costmap.denoise_layer.enabled is is_enabled
     assert not stack.costmap.denoise_layer.enabled
+
+
+def _checkers(folder: Path, goal: str, progress: str) -> LoadedScenario:
+    """Return a scenario with a Nav2 file that has these plug-ins as goal checker and progress checker."""
+    params = f"""\
+controller_server:
+  ros__parameters:
+    goal_checker: {{plugin: "nav2_controller::{goal}", yaw_goal_tolerance: 0.1}}
+    progress_checker: {{plugin: "nav2_controller::{progress}"}}
+collision_monitor:
+  ros__parameters: {{source_timeout: 0.0}}
+"""
+    return loaded(folder, "stack: {nav2_params: nav2.yaml}", params)
+
+
+def test_turns_are_progress_for_the_pose_progress_checker(tmp_path: Path) -> None:
+    found = _checkers(tmp_path, "SimpleGoalChecker", "PoseProgressChecker")
+    assert found.spec.stack.progress_checker.required_movement_angle == 0.5
+    assert not found.notes
+    simple = _checkers(tmp_path, "SimpleGoalChecker", "SimpleProgressChecker")
+    assert simple.spec.stack.progress_checker.required_movement_angle is None
+
+
+def test_the_position_goal_checker_accepts_any_heading(tmp_path: Path) -> None:
+    stack = _checkers(tmp_path, "PositionGoalChecker", "SimpleProgressChecker").spec.stack
+    assert stack.goal_checker.yaw_goal_tolerance == pytest.approx(3.1416, abs=1e-4)
+
+
+def test_unknown_checkers_are_named(tmp_path: Path) -> None:
+    notes = _checkers(tmp_path, "StoppedGoalChecker", "Mine").notes
+    assert [(note.line, note.message.partition(": ")[2]) for note in notes] == [
+        (3, "`goal_checker.plugin`: StoppedGoalChecker is not supported; the simple goal_checker is used"),
+        (4, "`progress_checker.plugin`: Mine is not supported; the simple progress_checker is used"),
+    ]
+
+
+def test_a_source_timeout_of_zero_never_stops_the_robot(tmp_path: Path) -> None:
+    stack = _checkers(tmp_path, "SimpleGoalChecker", "SimpleProgressChecker").spec.stack
+    assert stack.collision_monitor.source_timeout == 86400.0
