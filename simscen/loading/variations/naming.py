@@ -10,6 +10,8 @@ from simscen.loading.variations.paths import Target, split_path
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
 
 MAX_NAME_CHARS = 100
+MAX_NAME_BYTES = 180
+"""Largest length of a name in UTF-8. Names of folders, which also contain seed and stack, have at most 255 bytes."""
 _MAX_VALUE_CHARS = 40
 _VALID_NAME_PATTERN = re.compile(r"[^\W][\w.,=+%-]*")
 _NUMBERED_NAME_PATTERN = re.compile(r"variation-([1-9][0-9]{0,8})")
@@ -18,12 +20,12 @@ _INVALID_CHARS_PATTERN = re.compile(r"[^\w.+%-]+")
 
 def name_error(name: str) -> str | None:
     """Return the reason why a name of a variation is invalid; None if it is valid."""
-    if len(name) <= MAX_NAME_CHARS and _VALID_NAME_PATTERN.fullmatch(name):
-        return None
-    return f"{quoted(name)} is not a valid name of a variation"
+    is_short = len(name) <= MAX_NAME_CHARS and len(name.encode(errors="replace")) <= MAX_NAME_BYTES
+    is_valid = is_short and _VALID_NAME_PATTERN.fullmatch(name)
+    return None if is_valid else f"{quoted(name)} is not a valid name of a variation"
 
 
-NAME_HINT = f"up to {MAX_NAME_CHARS} letters, digits, and `_.,=+-%`, starting with a letter, a digit, or `_`"
+NAME_HINT = f"up to {MAX_NAME_CHARS} letters, digits, and `_.,=+-%`; start with a letter or digit"
 
 
 def short_names(targets: Sequence[Target]) -> dict[str, str]:

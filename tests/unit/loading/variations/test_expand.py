@@ -50,6 +50,12 @@ def test_a_grid_is_every_combination_and_each_is_called_by_what_differs() -> Non
     assert all("variations" not in one.tree.entries for one in found)
 
 
+def test_values_that_are_too_long_for_the_name_of_a_folder_are_numbered() -> None:
+    short, long = 21 * "名", 39 * "名"
+    assert names(f"  grid: {{robot.a: [{short}, b], robot.b: [{long}]}}")[0] == f"a={short}"
+    assert names(f"  grid: {{robot.a: [{long}, b], robot.b: [{long}, b]}}")[0] == "variation-1"
+
+
 def test_pairs_go_together() -> None:
     assert names("  pairs: {robot.pose.x: [1, 2], robot.pose.y: [3, 4]}") == ["x=1,y=3", "x=2,y=4"]
 
@@ -130,6 +136,7 @@ def test_derived_names_are_readable_unique_and_safe_as_folders(variations: str, 
             "`robot.pose.x` and `robot.pose` overlap",
         ),
         ("  pairs: {robot.pose.x: [1, 2], robot.pose.y: [1]}", "`robot.pose.y` has 1 values, `robot.pose.x` has 2"),
+        (f"  list: [{{name: {61 * '名'}, tags: [x]}}]", "is not a valid name of a variation"),
         ("  list: [{name: a b, tags: [x]}]", "`a b` is not a valid name of a variation"),
         ("  list: [{name: ../x, tags: [x]}]", "`../x` is not a valid name of a variation"),
         ("  list: [{name: a, tags: [x]}, {name: A, tags: [y]}]", "the variation at line 5 is also called `A`"),
