@@ -29,6 +29,9 @@ from simscen.record.trace_builder import TraceRows, to_planar
 
 MAX_TRUTH_GAP_S = 1.0
 """Maximum time without ground truth. With a longer gap, the ground truth is partial evidence."""
+MAX_UNSEEN_SCAN_AGE_S = 0.25
+"""Maximum difference between the longest time without a scan and the largest age of a scan at a sample of the ground
+truth. Signals have no other samples. With a larger difference, the scans are partial evidence."""
 MIN_LATE_SUBSCRIPTION_S, MAX_LATE_SUBSCRIPTION_S = 0.05, 2.0
 """If the first ground truth or the first scan comes between these times after the first message, the recorder
 subscribed late. The log is then judged from this ground truth or scan on."""
@@ -81,6 +84,7 @@ class ForeignTraceReader:
         if belief is not None and not belief.covariances.any():
             self.missing[Evidence.COVARIANCE] = f"{belief.source} has no covariance"
         self._add_other_roles()
+        self._check_scan_ages()
         self._add_goals()
 
     def _truth(self) -> Track | None:
@@ -225,6 +229,20 @@ class ForeignTraceReader:
             logged = np.array([time for time, _ in messages], dtype=np.int64)
             ticks = self.time.ticks_of_logged(logged) if stamped is None else self.time.ticks_of_stamped(stamped)
             self._add_role(role, ticks, values)
+
+    def _check_scan_ages(self) -> None:
+        """Add the scans to `partial` if the log has the longest time without a scan in a gap of the ground truth."""
+        samples, scans = self.rows.truth.columns()[0], np.unique(np.array(self.rows.scans, dtype=np.int64))
+        if not len(samples) or not len(scans):
+            return
+        begins, ends = np.concatenate(([0], scans)), np.append(scans, self.time.end)
+        last_samples = samples[np.maximum(np.searchsorted(samples, ends) - 1, 0)]
+        longest = int(np.argmax(ends - begins))
+        unseen = int((ends - begins)[longest] - (last_samples - begins).max()) / self.time.rate
+        if unseen > max(MAX_UNSEEN_SCAN_AGE_S, 2 * float(np.median(np.diff(samples))) / self.time.rate):
+            begin, end = (int(ticks[longest]) / self.time.rate for ticks in (begins, ends))
+            reason = f"there is no scan from t = {begin:.2f} s to {end:.2f} s, and no ground truth to show its age"
+            self.partial[Evidence.SCANS] = reason
 
     def _short_reason(self, role: str) -> str:
         """Return the reason why the log has no messages with a role, without other topics."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.records.trace import Ticks
@@ -18,6 +19,8 @@ from simscen.record.messages.decode import NO_COVARIANCE, StampedPose
 
 DIFFERENCE_WINDOW_S = 0.2
 """Time over which velocities are computed from poses."""
+MIN_GAP_PERIODS = 3.0
+"""Minimum time without a sample, in median times between samples, that is a gap."""
 MIN_MOTION_M_RAD = 0.1
 """Motion in m or rad above which twists of zero count as missing."""
 
@@ -95,22 +98,42 @@ def transform_tree(decoded: DecodedMessages) -> TransformTree:
 
 
 def velocity_from_poses(ticks: Ticks, poses: Array, rate: int) -> Array:
-    """Return vx, vy, wz (n, 3) in the body frame for poses x, y, yaw (n, 3).
+    """Return vx, vy, wz (n, 3) in the body frame for poses x, y, yaw (n, 3) at increasing `ticks` (n,).
 
-    They are averaged over at least DIFFERENCE_WINDOW_S, and over longer times where samples are sparse.
+    They are averaged over at least DIFFERENCE_WINDOW_S, and over longer times where samples are sparse. Beside a gap,
+    only samples on the same side are used, unless the robot moved faster in the gap.
     """
     if len(ticks) < 2:
         return np.zeros((len(ticks), 3))
     half = max(1, round(DIFFERENCE_WINDOW_S / 2 * rate))
-    before = np.searchsorted(ticks, ticks - half, side="right") - 1
-    after = np.searchsorted(ticks, ticks + half, side="left")
-    before, after = np.maximum(before, 0), np.minimum(after, len(ticks) - 1)
-    span = (ticks[after] - ticks[before]) / rate
-    dx, dy = ((poses[after, axis] - poses[before, axis]) / span for axis in (0, 1))
-    unwrapped = np.unwrap(poses[:, 2])
-    wz = (unwrapped[after] - unwrapped[before]) / span
+    is_gap, first, last = _parts_between_gaps(ticks, half)
+    before = np.maximum(np.searchsorted(ticks, ticks - half, side="right") - 1, first)
+    after = np.minimum(np.searchsorted(ticks, ticks + half, side="left"), last)
+    moved = np.column_stack((poses[:, :2], np.unwrap(poses[:, 2])))
+    velocities = (moved[after] - moved[before]) * rate / (ticks[after] - ticks[before])[:, None]
+    for index in np.flatnonzero(is_gap).tolist():
+        mean = (moved[index + 1] - moved[index]) * rate / (ticks[index + 1] - ticks[index])
+        for part in (slice(0, 2), slice(2, 3)):
+            beside = velocities[index : index + 2, part]
+            if np.linalg.norm(mean[part]) > np.linalg.norm(beside, axis=1).max():
+                beside[:] = mean[part]
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    return np.column_stack((c * dx + s * dy, c * dy - s * dx, wz))
+    vx, vy, wz = velocities.T
+    return np.column_stack((c * vx + s * vy, c * vy - s * vx, wz))
+
+
+def _parts_between_gaps(ticks: Ticks, min_length: int) -> tuple[npt.NDArray[np.bool_], Ticks, Ticks]:
+    """Return a mask (n - 1,) of gaps, and the first and the last sample (n,) between the gaps beside each sample.
+
+    Parts shorter than `min_length` ticks have too few samples for a velocity. For their samples, all gaps are ignored.
+    """
+    steps = np.diff(ticks)
+    is_gap: npt.NDArray[np.bool_] = steps > max(2 * min_length, MIN_GAP_PERIODS * float(np.median(steps)))
+    part = np.concatenate(([0], np.cumsum(is_gap)))
+    first = np.flatnonzero(np.concatenate(([True], is_gap)))[part]
+    last = np.flatnonzero(np.concatenate((is_gap, [True])))[part]
+    is_short = ticks[last] - ticks[first] < min_length
+    return is_gap, np.where(is_short, 0, first), np.where(is_short, len(ticks) - 1, last)
 
 
 def is_twist_missing(twists: Array, poses: Array) -> bool:

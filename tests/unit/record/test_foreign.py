@@ -31,6 +31,7 @@ from simscen.core.records.events import EventKind
 from simscen.core.records.verdict import Evidence
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.read import ForeignLog, read_foreign_log
+from simscen.record.foreign.tracks import velocity_from_poses
 
 MOCAP = ForeignLogOptions(truth="/mocap")
 WRITERS: dict[str, Callable[[Path, list[Message]], Path]] = {
@@ -127,6 +128,18 @@ def test_gap_in_the_ground_truth_is_partial_coverage(read: Callable[..., Foreign
     assert late.coverage.partial[Evidence.TRUTH].startswith("/mocap has no message from t = 0.00 s to 6.0")
 
 
+def test_an_age_of_scans_that_no_sample_of_the_ground_truth_shows_is_partial_coverage(
+    read: Callable[..., ForeignLog],
+) -> None:
+    """Without any message for 0.9 s, the age of a scan is never seen above 0.5 s."""
+    gone = (BEGIN + 4.03 * SECOND, BEGIN + 4.99 * SECOND)
+    log = read([one for one in drive() if not gone[0] < one.time < gone[1]])
+    assert list(log.coverage.partial) == [Evidence.SCANS]
+    assert "no scan from t = 4.00 s to 5.00 s" in log.coverage.partial[Evidence.SCANS]
+    seen = read([one for one in drive() if one.topic != "/scan" or not gone[0] < one.time < gone[1]])
+    assert not seen.coverage.partial
+
+
 def test_belief_that_starts_after_a_meter_is_partial_coverage(read: Callable[..., ForeignLog]) -> None:
     log = read([one for one in drive() if one.topic != "/amcl_pose" or one.time > BEGIN + 2 * SECOND])
     assert log.coverage.partial[Evidence.BELIEF].startswith("/amcl_pose starts at t = 2.0")
@@ -140,6 +153,31 @@ def test_velocity_is_computed_from_poses_if_all_twists_are_zero(read: Callable[.
         "/gps: all twists are zero although the robot moves, so velocities are computed from the poses"
     ]
     np.testing.assert_allclose(log.trace.velocity.values[:, 0], SPEED, atol=1e-6)
+
+
+def test_velocities_beside_a_gap_are_not_averaged_over_the_gap() -> None:
+    """A robot drives 1 m/s along an arc, and brakes with 1 m/s² in a gap, as if seen 50 times per second."""
+    times = np.delete(np.arange(0, 4001, 20), slice(100, 145))
+    speed = 1 - np.clip(times / 1000 - 2.0, 0.0, 1.0)
+    path = np.where(times <= 2000, times / 1000, 2.0 + (1 - speed**2) / 2)
+    poses = np.column_stack((np.sin(path), 1 - np.cos(path), path))
+    found = velocity_from_poses(times, poses, 1000)
+    still, driving = times >= 3000, times <= 2000
+    np.testing.assert_allclose(found[driving], np.tile([1.0, 0.0, 1.0], (driving.sum(), 1)), atol=0.06)
+    np.testing.assert_allclose(found[still], 0.0, atol=0.03)
+
+
+def test_a_robot_that_is_faster_in_a_gap_does_not_seem_slower() -> None:
+    times = np.delete(np.arange(0, 4001, 20), slice(101, 125))
+    poses = np.column_stack((np.where(times <= 2000, 0.0, 2.0), np.zeros((len(times), 2))))
+    assert velocity_from_poses(times, poses, 1000)[:, 0].max() == pytest.approx(2.0 / 0.5)
+
+
+def test_velocities_of_rare_and_single_samples_are_averaged_over_longer_times() -> None:
+    for times in (np.arange(0, 9000, 500), np.array([0, 20, 40, 700, 720, 740, 1400])):
+        poses = np.column_stack((times / 2000, np.zeros((len(times), 2))))
+        found = velocity_from_poses(times, poses, 1000)
+        np.testing.assert_allclose(found, np.tile([0.5, 0.0, 0.0], (len(times), 1)), atol=1e-9)
 
 
 @pytest.mark.parametrize("size", [0.2, 0.5, 0.9, 0.995])
