@@ -9,7 +9,9 @@ import numpy as np
 
 from simscen.core.geometry import Pose2
 from simscen.reconstruction.compared_scans import compare_scans
-from simscen.reconstruction.drive.recorded_drive import RecordedDrive, motion_steps
+from simscen.reconstruction.drive.motion_steps import motion_steps
+from simscen.reconstruction.drive.pose_gaps import pose_gaps, scans_with_pose
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.faults.commands import command_faults
 from simscen.reconstruction.faults.false_returns import false_return_faults, glass_fault
 from simscen.reconstruction.faults.lidar_calibration import (
@@ -46,7 +48,8 @@ SENSORS = ("lidar", "odom", "imu")
 NEVER_ESTIMATED = "doors that open or close, pushes, slippery floor, and changes of the payload; add them by hand"
 """Disturbances that no estimator looks for, as part of a message to the user."""
 MIN_KIDNAP_M, MAX_KIDNAP_S = 0.5, 0.3
-"""Minimum distance and maximum duration of a jump of the true pose that counts as a kidnapping."""
+"""Minimum distance and maximum duration of a jump of the true pose that counts as a kidnapping. The distance that the
+robot drives at its speed before or after the jump does not count."""
 
 
 def run_estimators(
@@ -61,7 +64,7 @@ def run_estimators(
     `is_map_built` states that the walls of `world` were built from the scans of this drive. `other_robots` are the
     other robots in the log, which become objects of the scenario. Their scan hits are not reported as further objects.
     """
-    unknowns = [NEVER_ESTIMATED]
+    unknowns = [NEVER_ESTIMATED, *_unknown_poses(drive)]
     is_calibrated = drive.has_true_poses and not is_map_built
     faults, objects = _faults_and_objects_of_scans(drive, world, robot, other_robots, unknowns, is_calibrated)
     kidnaps = list(_kidnaps(drive))
@@ -118,6 +121,9 @@ def _faults_and_objects_of_scans(
         return [], [*other_robots]
     faults = [*stream_faults("lidar", scans.times, scans.arrivals, drive.duration)]
     faults += stuck_scans(scans, drive.duration)
+    scans = scans_with_pose(drive, scans)
+    if len(scans) < 3:
+        return faults, [*other_robots]
     if len(scans) > MAX_SCANS:
         step = -(-len(scans) // MAX_SCANS)
         scans = scans.subset(slice(None, None, step))
@@ -146,6 +152,12 @@ def _faults_and_objects_of_scans(
     return faults, fit_pedestrians(objects, PedestrianTrial(drive, PedestrianMap(world.built), robot.radius))
 
 
+def _unknown_poses(drive: RecordedDrive) -> Iterator[str]:
+    """Yield a phrase for each gap in the poses."""
+    for begin, end in pose_gaps(drive):
+        yield f"where the robot was from t = {begin:.2f} s to {end:.2f} s, so that scans of this time are not used"
+
+
 def _unknown_reactions(objects: Sequence[FoundObject]) -> Iterator[str]:
     """Yield phrases about reactions of objects to the robot that the log does not show."""
     if any(thing.is_moving and thing.pedestrian is None for thing in objects):
@@ -160,8 +172,9 @@ def _kidnaps(drive: RecordedDrive) -> Iterator[tuple[float, Pose2, Reason]]:
     if not drive.has_true_poses or len(drive.poses) < 2:
         return
     poses, times = drive.poses.values, drive.poses.times
-    jumps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    steps = np.diff(times)
+    distances, steps = np.hypot(*np.diff(poses[:, :2], axis=0).T), np.diff(times)
+    speeds = np.pad(distances / np.maximum(steps, 1e-9), 1)
+    jumps = distances - steps * np.maximum(speeds[:-2], speeds[2:])
     for index in np.flatnonzero((jumps > MIN_KIDNAP_M) & (steps < MAX_KIDNAP_S)).tolist():
-        text = f"the true pose jumps by {jumps[index]:.2f} m"
+        text = f"the true pose jumps by {distances[index]:.2f} m"
         yield float(times[index + 1]), Pose2(*poses[index + 1].tolist()), Reason(text, float(times[index + 1]))

@@ -11,9 +11,9 @@ from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, Occ
 from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Array, Pose2
+from simscen.reconstruction.drive.motion_steps import MAX_STEP_M, STEP_S
+from simscen.reconstruction.drive.pose_gaps import scans_with_pose
 from simscen.reconstruction.drive.recorded_drive import (
-    MAX_STEP_M,
-    STEP_S,
     Indices,
     Mask,
     RecordedDrive,
@@ -125,10 +125,11 @@ def map_from_scans(drive: RecordedDrive) -> OccupancyGrid:
     Raises InvalidInput if the map would have more than MAX_CELLS cells.
     """
     path = drive.poses.values[:, :2]
-    if drive.scans is None or not len(drive.scans):
+    known = None if drive.scans is None else scans_with_pose(drive, drive.scans)
+    if known is None or not len(known):
         low, high = path.min(axis=0) - 5.0, path.max(axis=0) + 5.0
         return OccupancyGrid(np.zeros(_shape(drive, low, high), dtype=np.int8), RESOLUTION_M, Pose2(*low.tolist()))
-    scans = drive.scans.thinned(TARGET_SCANS)
+    scans = known.thinned(TARGET_SCANS)
     poses, hits = lidar_poses(drive, scans), scans.is_hit() & (scans.ranges <= MAX_RANGE_M)
     ends = beam_ends(poses, scans.angles, scans.ranges)
     everything = np.concatenate((ends[hits], path))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap, wrap_array
+from simscen.reconstruction.drive.pose_gaps import belief_with_pose
 from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive
 from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
@@ -27,14 +29,13 @@ def localizer_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
     """Yield the faults of the localizer; none for a drive with fewer than five estimates."""
     if len(drive.belief) < 5:
         return
-    yield from _jump(drive)
+    if drive.has_true_poses:
+        yield from _jump(replace(drive, belief=belief_with_pose(drive)))
     yield from _outages(drive)
 
 
 def _jump(drive: RecordedDrive) -> Iterator[FoundFault]:
     """Yield the first jump of the estimated pose away from the true pose and back, or a single jump without return."""
-    if not drive.has_true_poses:
-        return
     belief, truth = drive.belief.values[:, :3], drive.poses.poses_at(drive.belief.times)
     errors = belief - truth
     errors[:, 2] = wrap_array(errors[:, 2])

@@ -11,7 +11,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from simscen.core.geometry import Array
-from simscen.reconstruction.drive.recorded_drive import STEP_S, Mask, MotionSteps, RecordedDrive
+from simscen.reconstruction.drive.motion_steps import STEP_S, MotionSteps
+from simscen.reconstruction.drive.pose_gaps import pose_is_known
+from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive
 from simscen.reconstruction.reasons import FoundFault, Reason, Window, windows
 
 MIN_DISTANCE_M, MIN_TURN_RAD = 1.0, 1.5
@@ -239,7 +241,8 @@ def _turn_rates(drive: RecordedDrive) -> tuple[Array, Array, Array]:
     count = np.bincount(index[inside], minlength=len(edges) - 1)
     total = np.bincount(index[inside], imu.values[inside, 0], minlength=len(edges) - 1)
     yaw = np.unwrap(drive.poses.poses_at(edges)[:, 2])
-    kept = count > 0
+    known = pose_is_known(drive, edges)
+    kept = (count > 0) & known[:-1] & known[1:]
     return edges[:-1][kept], total[kept] / count[kept], (np.diff(yaw) / BIN_S)[kept]
 
 

@@ -19,6 +19,7 @@ from simscen.loading.files.discovery import default_root
 from simscen.loading.files.single_files import load_world_file
 from simscen.model.world import WorldSpec
 from simscen.reconstruction.compared_scans import compare_scans
+from simscen.reconstruction.drive.pose_gaps import scans_with_pose
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.drive.run_description import RunDescription
 from simscen.reconstruction.reasons import Reason
@@ -212,9 +213,10 @@ def prepare_given_parts(
 
 def _lidar_noise(drive: RecordedDrive, static_world: StaticWorld) -> float:
     """Return the median standard deviation of the range noise in m; the value of a typical robot without scans."""
-    if drive.scans is None or len(drive.scans) < 3:
+    scans = None if drive.scans is None else scans_with_pose(drive, drive.scans)
+    if scans is None or len(scans) < 3:
         return TYPICAL_ROBOT.lidar_noise
-    return float(np.median(compare_scans(drive, drive.scans.thinned(NOISE_SCANS), static_world).noise))
+    return float(np.median(compare_scans(drive, scans.thinned(NOISE_SCANS), static_world).noise))
 
 
 def relative_path(file: Path, out: Path) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.goals import BEND_SOURCE, STOP_SOURCE
+from simscen.reconstruction.drive.pose_gaps import belief_with_pose
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, TimedValues
 from simscen.reconstruction.reasons import windows
 
@@ -102,9 +103,9 @@ def longest_stay(times: Array, positions: Array, radius: float) -> tuple[float, 
 
 def _lost(drive: RecordedDrive) -> Iterator[Incident]:
     """Yield an incident for each time window in which the belief was wrong or, without a ground truth, uncertain."""
-    if not len(drive.belief):
+    belief = belief_with_pose(drive) if drive.has_true_poses else drive.belief
+    if not len(belief):
         return
-    belief = drive.belief
     if drive.has_true_poses:
         errors = np.hypot(*(belief.values[:, :2] - drive.poses.poses_at(belief.times)[:, :2]).T)
         for window in windows(errors > LOST_ERROR_M, belief.times, max_gap=1.0):

@@ -14,6 +14,7 @@ from PIL import Image
 
 from simscen.core.environment.occupancy_grid import OCCUPIED, UNKNOWN
 from simscen.core.geometry import Array
+from simscen.reconstruction.drive.pose_gaps import scans_with_pose
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.scenario.incidents import Incident
@@ -169,9 +170,9 @@ def _picture(world: StaticWorld, drive: RecordedDrive) -> str:
 
 def _returns_not_from_walls(world: StaticWorld, drive: RecordedDrive) -> Array:
     """Return the ends (n, 2) in the map frame of beams that did not end at walls."""
-    if drive.scans is None or not len(drive.scans):
+    if drive.scans is None:
         return np.empty((0, 2))
-    scans = drive.scans.thinned(TARGET_SCANS)
+    scans = scans_with_pose(drive, drive.scans).thinned(TARGET_SCANS)
     ends: Array = beam_ends(lidar_poses(drive, scans), scans.angles, scans.ranges)[scans.is_hit()]
     return ends[world.distance_to_walls(ends) > WALL_DISTANCE_M]
 

@@ -5,7 +5,7 @@ import pytest
 import synthetic_drives as drives
 
 from simscen.core.geometry import Pose2
-from simscen.reconstruction.drive.recorded_drive import motion_steps
+from simscen.reconstruction.drive.motion_steps import motion_steps
 from simscen.reconstruction.faults.commands import command_faults
 from simscen.reconstruction.faults.localizer import localizer_faults
 from simscen.reconstruction.faults.odometry import gyroscope_faults, odometry_faults

@@ -1,0 +1,63 @@
+"""Times of a drive at which the pose of the robot is unknown, because the source of the poses was interrupted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from simscen.core.geometry import Array
+from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive, Scans, TimedValues
+
+MIN_GAP_S, MIN_GAP_PERIODS = 1.0, 5.0
+"""Minimum time between two poses that is a gap: the larger of a time and a multiple of the period of the poses."""
+MAX_EXTRAPOLATION_S = 0.25
+"""Maximum time before the first and after the last pose for which the pose counts as known."""
+STANDING_M_RAD = 0.05
+"""Maximum change of the pose in a gap, in m and rad, with which the robot counts as standing."""
+
+
+def pose_gaps(drive: RecordedDrive) -> list[tuple[float, float]]:
+    """Return start and end in s of the times at which the pose of the robot is unknown.
+
+    Poses are known while the robot stands. If AMCL is their only source, they are always known: AMCL publishes a pose
+    whenever the robot has moved.
+    """
+    times = drive.poses.times
+    if not drive.has_true_poses and not len(drive.odometry):
+        return []
+    long = np.flatnonzero(np.diff(times) > max(MIN_GAP_S, MIN_GAP_PERIODS * drive.poses.period))
+    gaps = list(zip(times[long].tolist(), times[long + 1].tolist(), strict=True))
+    first, last = float(times[0]) - MAX_EXTRAPOLATION_S, float(times[-1]) + MAX_EXTRAPOLATION_S
+    if first > 0.0:
+        gaps.insert(0, (0.0, first))
+    if last < drive.duration:
+        gaps.append((last, drive.duration))
+    return [gap for gap in gaps if not _is_standing(drive, *gap)]
+
+
+def pose_is_known(drive: RecordedDrive, times: Array) -> Mask:
+    """Return a mask (n,) of the `times` (n,) in s at which the pose of the robot is known."""
+    is_known = np.ones(len(times), dtype=bool)
+    for begin, end in pose_gaps(drive):
+        is_known &= (times < begin) | (times > end)
+    return is_known
+
+
+def scans_with_pose(drive: RecordedDrive, scans: Scans) -> Scans:
+    """Return the scans at whose times the pose of the robot is known."""
+    return scans.subset(pose_is_known(drive, scans.times))
+
+
+def belief_with_pose(drive: RecordedDrive) -> TimedValues:
+    """Return the belief of a drive at the times at which the pose of the robot is known."""
+    is_known, belief = pose_is_known(drive, drive.belief.times), drive.belief
+    return TimedValues(belief.times[is_known], belief.values[is_known], belief.arrivals[is_known])
+
+
+def _is_standing(drive: RecordedDrive, begin: float, end: float) -> bool:
+    """Return whether neither poses nor odometry change between two times in s; False without poses and odometry."""
+    changes = []
+    for signal in (drive.poses, drive.odometry):
+        poses = signal.values[(signal.times >= begin) & (signal.times <= end), :3]
+        if len(poses) > 1:
+            changes += [*np.ptp(poses[:, :2], axis=0).tolist(), float(np.ptp(np.unwrap(poses[:, 2])))]
+    return bool(changes) and max(changes) <= STANDING_M_RAD
