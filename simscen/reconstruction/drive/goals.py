@@ -127,27 +127,31 @@ def goals_from_motion(poses: TimedValues) -> Iterator[RecordedGoal]:
     """Yield a goal for each stop of at least MIN_STOP_S, each bend of the path between stops, and the last pose."""
     if len(poses) < 2:
         return
-    steps = np.maximum(np.diff(poses.times), 1e-6)
-    speeds = np.hypot(*np.diff(poses.values[:, :2], axis=0).T) / steps
-    turns = np.abs(np.diff(np.unwrap(poses.values[:, 2]))) / steps
-    window = max(1, round(0.5 / float(np.median(steps))))
+    is_last = np.append(np.diff(poses.times) > 0.0, True)  # of several poses with the same stamp
+    times, values = poses.times[is_last], poses.values[is_last]
+    if len(times) < 2:
+        return
+    steps = np.diff(times)
+    speeds = np.hypot(*np.diff(values[:, :2], axis=0).T) / steps
+    turns = np.abs(np.diff(np.unwrap(values[:, 2]))) / steps
+    window = min(max(1, round(0.5 / float(np.median(steps)))), len(steps))
     kernel = np.ones(window) / window
     still = (np.convolve(speeds, kernel, "same") < STOPPED_SPEED_M_S) & (
         np.convolve(turns, kernel, "same") < STOPPED_TURN_RAD_S
     )
-    last, sent, since = Pose2(*poses.values[0].tolist()), float(poses.times[0]), 0
-    stops = windows(still, poses.times[1:], min_length=MIN_STOP_S, max_gap=0.5)
-    ends = [(stop.begin, stop.end, stop.first + 1) for stop in stops if stop.begin > float(poses.times[0]) + 1e-3]
-    if not ends or ends[-1][2] < len(poses) - 1:
-        ends.append((float(poses.times[-1]), float(poses.times[-1]), len(poses) - 1))
+    last, sent, since = Pose2(*values[0].tolist()), float(times[0]), 0
+    stops = windows(still, times[1:], min_length=MIN_STOP_S, max_gap=0.5)
+    ends = [(stop.begin, stop.end, stop.first + 1) for stop in stops if stop.begin > float(times[0]) + 1e-3]
+    if not ends or ends[-1][2] < len(times) - 1:
+        ends.append((float(times[-1]), float(times[-1]), len(times) - 1))
     for begin, end, index in ends:
-        pose = Pose2(*poses.values[index].tolist())
-        bends = [since + bend for bend in path_corners(poses.values[since : index + 1, :2], MIN_BEND_M)]
+        pose = Pose2(*values[index].tolist())
+        bends = [since + bend for bend in path_corners(values[since : index + 1, :2], MIN_BEND_M)]
         if pose.distance(last) < MIN_LEG_M and not bends:
             continue
         for bend in bends:
-            passed = float(poses.times[bend])
-            yield RecordedGoal("", Pose2(*poses.values[bend].tolist()), sent, passed, "reached", source=BEND_SOURCE)
+            passed = float(times[bend])
+            yield RecordedGoal("", Pose2(*values[bend].tolist()), sent, passed, "reached", source=BEND_SOURCE)
             sent = passed
         yield RecordedGoal("", pose, sent, begin, "reached", source=STOP_SOURCE)
         last, sent, since = pose, end, index

@@ -29,11 +29,14 @@ from simscen.reconstruction.drive.recorded_drive import (
 )
 from simscen.record import topics
 from simscen.record.foreign.raw_messages import UnusableLog, is_simscen_log, unusable_log_as_invalid_input
+from simscen.record.foreign.tracks import is_twist_missing, velocity_from_poses
 from simscen.record.foreign.transforms import TransformTree, UnknownTransform, is_upside_down
 from simscen.record.messages.decode import ScanMessage, StampedPose
 
 NO_TRUTH = "none"
 """Value of `truth` to ignore the ground truth of a log."""
+TICK_RATE_HZ = 1000
+"""Rate of the ticks to which times are rounded for the computation of velocities."""
 MIN_POSES = 2
 """Minimum number of poses of a topic or transform that is used as the source of poses."""
 MAX_COORDINATE_M = 1e6
@@ -85,7 +88,7 @@ class _DriveReader:
 
     def drive(self) -> RecordedDrive:
         """Return the entire drive."""
-        odometry = self._signal("odom", 6, lambda odom: (*Pose3(*odom.pose).plane, *(odom.twist or (0.0, 0.0, 0.0))))
+        odometry = self._odometry()
         belief = self._signal("amcl_pose", 9, lambda pose: (*Pose3(*pose.pose).plane, *pose.covariance))
         poses, source, is_truth = self._poses(odometry, belief)
 
@@ -153,6 +156,17 @@ class _DriveReader:
         order = np.argsort(times, kind="stable")
         order = order[is_valid[order]]
         return TimedValues(times[order], values[order], arrivals[order])
+
+    def _odometry(self) -> TimedValues:
+        """Return the odometry. If all twists are zero although the robot moves, they are computed from the poses."""
+        signal = self._signal("odom", 6, lambda odom: (*Pose3(*odom.pose).plane, *(odom.twist or (0.0, 0.0, 0.0))))
+        if not is_twist_missing(signal.values[:, 3:], signal.values[:, :3]):
+            return signal
+        self._notes.append("velocities in the odometry; they are computed from its poses")
+        ticks, first = np.unique(np.rint(signal.times * TICK_RATE_HZ).astype(np.int64), return_index=True)
+        poses = signal.values[first, :3]
+        velocities = velocity_from_poses(ticks, poses, TICK_RATE_HZ)
+        return TimedValues(signal.times[first], np.column_stack((poses, velocities)), signal.arrivals[first])
 
     def _poses(self, odometry: TimedValues, belief: TimedValues) -> tuple[TimedValues, str, bool]:
         """Return the best known poses in the map frame, the source in words, and whether it is a ground truth."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from simscen.core.geometry import Pose2, wrap
+from simscen.core.records.verdict import unique_name
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, RecordedGoal
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.reasons import FoundFault, Reason
@@ -200,10 +201,7 @@ def _goals(drive: RecordedDrive) -> Iterator[ScenarioGoal]:
     """Yield the goals of the scenario with unique names."""
     taken: set[str] = set()
     for number, goal in enumerate(drive.goals):
-        name = goal.name.replace("#", " loop ")
-        if name in taken:
-            name = f"{name}-{number + 1}"
-        taken.add(name)
+        name = unique_name(goal.name.replace("#", " loop "), taken, "-")
         following = drive.goals[number + 1] if number + 1 < len(drive.goals) else None
         refused = goal.ended is not None and goal.ended - goal.sent < MAX_REFUSAL_S
         expect = goal.error if refused and goal.error in INVALID_GOAL_CODES else ""

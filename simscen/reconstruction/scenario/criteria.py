@@ -10,7 +10,9 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.criteria.trace_signals.ground_truth import MIN_MOVE_M
-from simscen.reconstruction.drive.recorded_drive import RecordedDrive
+from simscen.reconstruction.drive.motion_steps import true_speeds
+from simscen.reconstruction.drive.pose_gaps import belief_with_pose
+from simscen.reconstruction.drive.recorded_drive import RecordedDrive, TimedValues
 from simscen.reconstruction.reasons import FoundFault, Reason
 from simscen.reconstruction.scenario.incidents import LOST_ERROR_M, STUCK_S, Incident
 
@@ -53,8 +55,8 @@ def propose_criteria(
     yield ProposedCriterion("collisions", {"max": 0}, contact)
     if "stuck" in broken:
         yield ProposedCriterion("stuck", {"max": f"{STUCK_S:g} s"}, _limit_reason(broken, "stuck", ""))
-    if drive.has_true_poses and len(drive.belief):
-        yield _localization(drive, broken)
+    if drive.has_true_poses and len(belief := belief_with_pose(drive)):
+        yield _localization(drive, belief, broken)
     if not is_refusal_expected and not {"goals_reached", "stuck"} & set(broken):
         yield from _efficiency(drive)
     yield from _speed(drive)
@@ -62,9 +64,10 @@ def propose_criteria(
 
 
 def _speed(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
-    if not len(drive.odometry):
+    speeds = true_speeds(drive) if drive.has_true_poses else np.hypot(*drive.odometry.values[:, 3:5].T)
+    if not len(speeds):
         return
-    fastest = float(np.percentile(np.hypot(*drive.odometry.values[:, 3:5].T), SPEED_PERCENTILE))
+    fastest = float(np.percentile(speeds, SPEED_PERCENTILE))
     if fastest > REST_SPEED_M_S:
         limit = math.ceil(10 * SPEED_MARGIN * fastest) / 10
         yield ProposedCriterion("speed", {"max": f"{limit:.1f} m/s"}, Reason(f"held: at most {fastest:.2f} m/s"))
@@ -78,8 +81,8 @@ def _limit_reason(broken: Mapping[str, Incident], criterion: str, held: str) -> 
     return Reason(f"broken: {incident.detail}", incident.time)
 
 
-def _localization(drive: RecordedDrive, broken: Mapping[str, Incident]) -> ProposedCriterion:
-    errors = np.hypot(*(drive.belief.values[:, :2] - drive.poses.poses_at(drive.belief.times)[:, :2]).T)
+def _localization(drive: RecordedDrive, belief: TimedValues, broken: Mapping[str, Incident]) -> ProposedCriterion:
+    errors = np.hypot(*(belief.values[:, :2] - drive.poses.poses_at(belief.times)[:, :2]).T)
     largest = float(errors.max())
     limit = LOST_ERROR_M if "localization_error" in broken else max(MIN_ERROR_LIMIT_M, ERROR_MARGIN * largest)
     text = f"the largest error was {largest:.2f} m"

@@ -15,6 +15,7 @@ from simscen.core.geometry import Array
 from simscen.loading.files.discovery import default_root
 from simscen.loading.files.single_files import load_robot_file
 from simscen.loading.yaml.writing import CompactDumper, to_yaml
+from simscen.reconstruction.drive.motion_steps import true_speeds
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, Scans, TimedValues, usual_period
 
 
@@ -144,9 +145,12 @@ def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float, clear
 def observed_limits(drive: RecordedDrive) -> tuple[float, float]:
     """Return limits for the speed in m/s and the turn rate in rad/s: the maximum in the drive, with a margin.
 
-    Speeds are from odometry and commands, or from the poses if the log has neither.
+    Speeds are from odometry and commands, or from the poses if the log has neither. A ground truth replaces the speeds
+    of the odometry.
     """
-    speeds = _largest(drive.odometry, 3), _largest(drive.commands, 0)
+    of_truth = true_speeds(drive) if drive.has_true_poses else np.empty(0)
+    driven = float(np.percentile(of_truth, SPEED_PERCENTILE)) if len(of_truth) else _largest(drive.odometry, 3)
+    speeds = driven, _largest(drive.commands, 0)
     turns = _largest(drive.odometry, 5), _largest(drive.commands, 2)
     if not len(drive.odometry) and not len(drive.commands):
         of_poses = _velocities(drive.poses)
@@ -181,18 +185,17 @@ def _sensors(drive: RecordedDrive, lidar_noise: float) -> dict[str, Any]:
 
 def _lidar(scans: Scans, noise: float) -> dict[str, Any]:
     """Return the value of the key `lidar`. `noise` is the standard deviation of the ranges in m."""
-    beams = min(len(scans.angles), MAX_BEAMS)
-    step = abs(float(scans.angles[1] - scans.angles[0])) if beams > 1 else 0.01
-    view = beams * step
-    full = view > 2 * math.pi - 1.5 * step
+    step = abs(float(scans.angles[1] - scans.angles[0]))
+    full = len(scans.angles) * step > 2 * math.pi - 1.5 * step
+    view = 2 * math.pi if full else float(np.ptp(scans.angles))
     center = 0.0 if full else float(scans.angles.mean())
     x, y, yaw = scans.mount
     mount = {"x": round(x, 3), "y": round(y, 3), "z": round(max(scans.height, MIN_LIDAR_HEIGHT_M), 3)}
     mount["yaw"] = round(yaw + center, 4)
     return {
         "rate": _rate(scans.times, 10.0),
-        "beams": beams,
-        "field_of_view": round(2 * math.pi if full else view, 5),
+        "beams": min(len(scans.angles), MAX_BEAMS),
+        "field_of_view": round(view, 5),
         "min_range": round(float(scans.range_min), 3),
         "max_range": round(float(min(scans.range_max, 100.0)), 2),
         "noise": round(noise, 4),

@@ -93,6 +93,19 @@ def test_held_criteria_leave_a_margin():
     assert found["localization_error"] == {"max": 0.25}
 
 
+@pytest.mark.parametrize("scale", [0.5, 2.0])
+def test_limit_of_the_speed_is_from_the_ground_truth(scale):
+    odometry = drives.drive().odometry
+    assert limits(drive(odometry=replace(odometry, values=scale * odometry.values)))["speed"] == {"max": "0.7 m/s"}
+
+
+def test_limit_of_the_speed_ignores_a_robot_that_is_carried_off():
+    poses = drives.drive().poses.values.copy()
+    poses[200:, 1] += 1.0
+    carried = drive(poses=drives.signal(drives.drive().poses.times, poses))
+    assert limits(carried)["speed"] == {"max": "0.7 m/s"}
+
+
 def test_a_broken_criterion_has_the_limit_that_was_broken():
     times = np.arange(0.0, 30.0, 0.1)
     stands = np.tile([1.0, 3.0, 0.0], (len(times), 1))

@@ -17,6 +17,7 @@ from logged_drive import GOAL, LIDAR_SILENT, messages, odometry, walk
 from rosbags.rosbag2 import StoragePlugin
 
 from simscen.cli.main import app
+from simscen.loading.files.single_files import load_robot_file
 from simscen.loading.scenario import load_scenario
 from simscen.reconstruction import scenario_from_log as scenario_module
 from simscen.reconstruction.drive.goals import BEND_SOURCE, STOP_SOURCE, goals_from_motion
@@ -209,6 +210,40 @@ def test_the_speed_limits_of_a_log_of_transforms_are_those_of_its_poses():
     speed, turn_rate = observed_limits(drives.drive(odometry=no_values(6), commands=no_values(3)))
     assert speed == pytest.approx(1.05 * drives.SPEED_M_S, abs=0.02)
     assert turn_rate == 0.5
+
+
+def test_the_speed_limit_is_from_the_ground_truth_and_the_commands():
+    plain = drives.drive(commands=no_values(3))
+    fast = replace(plain, odometry=replace(plain.odometry, values=3 * plain.odometry.values))
+    assert observed_limits(fast)[0] == pytest.approx(1.05 * drives.SPEED_M_S, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("count", "step", "beams", "view"),
+    [
+        (181, math.radians(1), 181, math.pi),
+        (360, math.radians(1), 360, 2 * math.pi),
+        (5521, math.radians(0.05), 4096, math.radians(276)),
+        (7200, math.radians(0.05), 4096, 2 * math.pi),
+    ],
+)
+def test_the_lidar_of_the_robot_file_has_the_directions_of_the_log(count, step, beams, view, tmp_path):
+    angles = step * (np.arange(count) - (count - 1) / 2)
+    measured = replace(drives.scans(), angles=angles, ranges=np.ones((len(drives.scans()), count)))
+    file = write_robot_file(drives.drive(measured), tmp_path / "a.robot.yaml", 0.01, 1.0).file
+    lidar = load_robot_file(str(file), tmp_path).robot.spec.sensors["lidar"].lidar
+    assert (lidar.beams, lidar.field_of_view) == (beams, pytest.approx(view, abs=1e-4))
+
+
+def test_velocities_of_odometry_without_twists_are_computed_from_its_poses(tmp_path):
+    said = messages()
+    for one in said:
+        if one.topic == "/odom":
+            one.message.twist.twist = logs.twist(0.0)
+    drive = read_drive(logs.write_bag(tmp_path / "bag", said))
+    assert float(np.median(drive.odometry.values[:, 3])) == pytest.approx(drives.SPEED_M_S, abs=0.01)
+    assert any("velocities in the odometry" in note for note in drive.notes)
+    assert observed_limits(drive)[0] == pytest.approx(1.05 * drives.SPEED_M_S, abs=0.03)
 
 
 def plan_and_statuses(begin: float, end: float) -> list[logs.Message]:
