@@ -23,6 +23,16 @@ def require_regular_file(path: Path) -> None:
         raise OSError(errno.EINVAL, "it is not a regular file")
 
 
+def probe_writable(path: Path) -> None:
+    """Raise OSError unless a regular file can be written at `path`. Leaves no new file."""
+    require_regular_file(path)
+    existed = path.exists()
+    with path.open("ab"):
+        pass
+    if not existed:
+        path.unlink()
+
+
 def require_not_input(path: Path, inputs: Iterable[Path]) -> None:
     """Raise OSError if the output file `path` is one of the `inputs`."""
     real = os.path.realpath(path)

@@ -10,7 +10,6 @@ import typer
 from simscen.bench.localization.log_evaluation import LocalizationResult, PoseErrors, compare_with_reference, localize
 from simscen.cli.diagnostics import escaped, paths_from_working_folder, print_text
 from simscen.cli.session.user_files import save
-from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Estimate
@@ -18,6 +17,7 @@ from simscen.core.random_streams import MAX_SEED
 from simscen.loading.files.criteria_file import load_criteria
 from simscen.loading.files.discovery import default_root
 from simscen.loading.files.single_files import load_robot_file, load_world_file
+from simscen.loading.loaded import LoadedMap
 from simscen.loading.yaml.tree import value_position
 from simscen.model.stack import StackSpec
 from simscen.record.localization_logs.read import LocalizationLog, read_localization_log
@@ -68,9 +68,11 @@ def command(
 
     Exit code 0: the log was processed, independently of the figures; 2: an input is unusable.
     """
+    from simscen.loading.builders import load_map
+
     log_data = read_localization_log(log, odom, scan, reference)
-    spec, grid, model = _load_inputs(scenario, map_, robot, root)
-    grid = grid.refined(spec.costmap.resolution)
+    spec, map_file, model = _load_inputs(scenario, map_, robot, root)
+    grid = load_map(map_file).refined(spec.costmap.resolution)
     estimate = _estimate(start, log_data)
     localized = localize(log_data, spec, Surroundings(model, grid, TICK_RATE_HZ), estimate, seed)
     errors = compare_with_reference(localized, log_data, lost)
@@ -80,7 +82,8 @@ def command(
         from simscen.report.picture.drive_plots import write_localization_picture
 
         positions, truth = localized.poses[:, :2], log_data.truth[:, :2]
-        save(picture, lambda path: write_localization_picture(grid, positions, truth, path), [log, map_])
+        inputs = [log, map_, map_file.image]
+        save(picture, lambda path: write_localization_picture(grid, positions, truth, path), inputs)
     cpu_ms = localized.cpu_s * 1e3 / max(1, localized.scan_count)
     print_text(f"{cpu_ms:.2f} ms of CPU time per scan", sys.stderr)
     if json_:
@@ -92,9 +95,9 @@ def command(
 
 def _load_inputs(
     scenario: Path | None, map_: Path, robot: str, root: Path | None
-) -> tuple[StackSpec, OccupancyGrid, RobotModel]:
+) -> tuple[StackSpec, LoadedMap, RobotModel]:
     """Return the stack of the scenario, the map, and the robot. Raises InvalidInput."""
-    from simscen.loading.builders import load_map, robot_from_file
+    from simscen.loading.builders import robot_from_file
     from simscen.run.robot_interface import robot_model
 
     spec = StackSpec()
@@ -118,7 +121,7 @@ def _load_inputs(
     with paths_from_working_folder(root_folder):
         file = load_robot_file(robot, root_folder)
         body = robot_from_file(file.robot, file.roots)[1]
-    return spec, load_map(world.map), robot_model(body)
+    return spec, world.map, robot_model(body)
 
 
 def _estimate(start: str | None, log_data: LocalizationLog) -> Estimate:

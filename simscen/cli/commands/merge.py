@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from simscen.cli.commands.report import write_reports
-from simscen.cli.session.output_files import Reports
+from simscen.cli.session.output_files import Reports, require_writable_junit
 from simscen.cli.shared_options import Format, FormatOption, JunitFamily, JunitFamilyOption, JunitOption
 from simscen.core.errors import UsageError
 from simscen.report.journal import require_unlocked
@@ -36,6 +36,7 @@ def command(
     sessions = read_shards(shards, allow_missing)
     for shard in shards:
         require_unlocked(shard)
+    require_writable_junit(junit, out)
     folder = create_output_folder(out)
     try:
         merge_shards(sessions, folder, RUNS_FOLDER)

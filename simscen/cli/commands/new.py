@@ -1,6 +1,7 @@
 """Command `simscen new`, which writes a commented scenario, a copy of a scenario, or a scenario from a log."""
 
 import os
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -121,7 +122,7 @@ def command(
     for other in others:
         print_text(f"wrote {escaped(str(other))}")
     verb = "validate" if is_base else "run"
-    print_text(f"wrote {escaped(str(file))}; try: simscen {verb} {escaped(str(file))}")
+    print_text(f"wrote {escaped(str(file))}; try: simscen {verb} {escaped(shlex.quote(str(file)))}")
 
 
 def _target(name: str, out: Path | None, log: Path) -> Path:

@@ -11,7 +11,7 @@ import typer
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped, print_text
 from simscen.cli.session.judging import LogJudge
-from simscen.cli.session.logs import COMPLETE_LOG, PARTIAL_LOG, find_logs
+from simscen.cli.session.logs import COMPLETE_LOG, PARTIAL_LOG, find_logs, log_name
 from simscen.cli.session.user_files import save
 from simscen.cli.shared_options import (
     RootOption,
@@ -71,7 +71,7 @@ def command(
     if len(others) > 1:
         raise UsageError(f"--against takes one run, but {escaped(str(against))} contains {len(others)}")
     for file in files:
-        prefix = "" if file.name in (COMPLETE_LOG, PARTIAL_LOG) else f"{file.stem}."
+        prefix = "" if file.name in (COMPLETE_LOG, PARTIAL_LOG) else f"{log_name(file)}."
         page = out or file.with_name(f"{prefix}replay.html")
         shown = [judging.judge_for_replay(one) for one in (file, *others)]
         try:

@@ -41,6 +41,7 @@ def command(
     """
     require_unlocked(folder)
     past = read_journal(folder)
+    require_writable_junit(junit, folder)
     if parquet is not None:
         try:
             files = write_parquet(parquet, past.runs, {run.key: run.varied for run in past.planned})
@@ -60,7 +61,6 @@ def write_reports(
     only_junit: bool,
 ) -> NoReturn:
     """Write the reports of an output folder from its session `past`, print the session, and exit with its code."""
-    require_writable_junit(junit, folder)
     reports = Reports(folder, junit, junit_family.value, junit_only=only_junit)
     finished_runs = past.runs
     with open_screen(format_) as output:

@@ -1,5 +1,6 @@
 """Command `simscen shrink`, which writes the smallest scenario that still fails in the same way."""
 
+import shlex
 import sys
 from dataclasses import dataclass
 from functools import reduce
@@ -14,7 +15,7 @@ from simscen.cli.session.backends import backend_of, workers_and_cluster
 from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.shrinking import BudgetSpent, CandidateRuns, Failure, Shrinker, Stopped, failure_of
 from simscen.cli.session.stacks import parse_stacks
-from simscen.cli.session.user_files import save
+from simscen.cli.session.user_files import require_writable, save
 from simscen.cli.shared_options import (
     AddressOption,
     BackendName,
@@ -93,6 +94,7 @@ def command(
     target = out or sibling(chosen.file, "minimal")
     if target.exists():
         raise UsageError(f"{target} exists already; choose another file with --out")
+    require_writable(target)
     workers, cluster = workers_and_cluster(workers, backend, address)
     options = SessionOptions(workers, wall_limit=wall_limit, cluster=cluster)
     checker = FileChecker(root_folder, world_path or (), lenient, stacks=stacks)
@@ -204,5 +206,5 @@ def _print_summary(shrinker: Shrinker, before: MappingNode, target: Path, stack:
             print_text("\n".join([title, *(f"  {escaped(text)}" for text in texts)]))
     incomplete = "" if shrinker.is_complete else ", which were not enough to try everything; increase --runs"
     print_text(f"{_size(shrinker.tree)} values left after {shrinker.candidates.runs} runs{incomplete}")
-    option = "" if stack is None else f" --stack {escaped(stack)}"
-    print_text(f"wrote {escaped(str(target))}; try: simscen run {escaped(display_path(target))}{option}")
+    command = shlex.join(["simscen", "run", display_path(target), *([] if stack is None else ["--stack", stack])])
+    print_text(f"wrote {escaped(str(target))}; try: {escaped(command)}")

@@ -11,7 +11,7 @@ import typer
 from pydantic import ValidationError
 
 from simscen.cli.diagnostics import as_text, escaped, paths_from_working_folder, print_text, relative_to_working_folder
-from simscen.cli.session.user_files import save
+from simscen.cli.session.user_files import require_writable, save
 from simscen.cli.shared_options import LenientOption, WorldPathOption
 from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.errors import InvalidInput, Problem
@@ -75,7 +75,7 @@ def inspect(
     if png is not None:
         from simscen.worlds.maps.world_picture import draw_world
 
-        save(png, lambda file: draw_world(built, height).save(file, format="PNG"), [path])
+        save(png, lambda file: draw_world(built, height).save(file, format="PNG"), _input_files(source))
 
 
 @app.command()
@@ -97,9 +97,11 @@ def export(
     from simscen.worlds.maps.ros_map import save_map
 
     root_folder = root or default_root([path])
-    world = _build(_load(path, root_folder, world_path), root_folder, world_path, lenient)
+    source = _load(path, root_folder, world_path)
+    world = _build(source, root_folder, world_path, lenient)
     grid = _with_map(world, path, height, resolution, "choose larger cells with --resolution").map
-    save(map_, lambda file: save_map(grid, file), [path])
+    require_writable(map_.with_suffix(".pgm"), _input_files(source))
+    save(map_, lambda file: save_map(grid, file), _input_files(source))
     rows, columns = grid.shape
     print_text(f"{escaped(str(map_))}: {columns} x {rows} cells of {grid.resolution:g} m")
 
@@ -127,7 +129,7 @@ def convert(
         path_of_map = os.path.relpath(source.map.path.resolve(), out.resolve().parent)
         spec = spec.model_copy(update={"map": Path(path_of_map).as_posix()})
     content = world_text(spec).encode()
-    save(out, lambda file: write_atomically(file, content), [path])
+    save(out, lambda file: write_atomically(file, content), _input_files(source))
     for change in changes:
         print_text(f"changed: {escaped(change)}")
     count = len(spec.walls) + len(spec.obstacles) + len(spec.objects) + len(spec.doors)
@@ -159,6 +161,12 @@ def _convert(
 def _load(path: Path, root_folder: Path, world_path: list[Path] | None) -> LoadedWorld:
     with paths_from_working_folder(root_folder):
         return load_world_file(path, root_folder, world_path or ())
+
+
+def _input_files(source: LoadedWorld) -> list[Path]:
+    """Return the file of a world, and the files of its map and of its SDF world."""
+    map_files = [] if source.map is None else [source.map.path, source.map.image]
+    return [source.path, *map_files, *([] if source.sdf is None else [source.sdf])]
 
 
 def _build(source: LoadedWorld, root_folder: Path, world_path: list[Path] | None, lenient: bool) -> World:

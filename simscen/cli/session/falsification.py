@@ -1,6 +1,7 @@
 """Implementation of `simscen falsify`, which searches for values in given ranges with which a scenario fails."""
 
 import math
+import shlex
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from simscen.cli.session.scenario_session import finish_session, start_session
 from simscen.cli.session.selection import require_not_skipped
 from simscen.cli.session.stacks import parse_stacks
 from simscen.cli.session.terminal import Screen, open_screen
+from simscen.cli.session.user_files import require_writable
 from simscen.cli.shared_options import OutputOptions
 from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, UsageError
 from simscen.core.records.run_result import Outcome, RunResult
@@ -97,6 +99,7 @@ def execute_search(request: FalsifyRequest) -> tuple[Exit, "Falsification"]:
     Raises InvalidInput, UsageError, and NothingSelected.
     """
     falsification = Falsification(request)
+    require_writable(_new_failure_file(request.file))
     reports, journal = start_session(request.output, [request.file], is_resumable=False)
     with open_screen(request.output.format_) as screen, backend_of(request.options) as backend:
         return screen.exit_code(falsification.execute(backend, journal, reports, screen)), falsification
@@ -267,11 +270,15 @@ class Falsification:
         variation = self._variations[result.key.variation]
         tree = with_seed(variation.tree, result.key.seed)
         comment = f"Found by simscen falsify: {self._request.file.name} fails with these values."
-        # The first free name: earlier searches may have written files beside the scenario.
-        file = next(one for k in count(1) if not (one := sibling(self._request.file, f"failure-{k}")).exists())
+        file = _new_failure_file(self._request.file)
         text = self._scenario.text_in(file.parent, tree, comment)
         write_atomically(file, text.encode())
         self.found.append(FoundFailure(file, finished, variation.values))
+
+
+def _new_failure_file(scenario: Path) -> Path:
+    """Return the first path beside the scenario that neither this nor an earlier search has used for a failure."""
+    return next(file for k in count(1) if not (file := sibling(scenario, f"failure-{k}")).exists())
 
 
 def signature(result: RunResult) -> Signature:
@@ -293,7 +300,7 @@ def summary_lines(falsification: Falsification) -> list[str]:
         values = ", ".join(f"{path} = {value_text(value)}" for path, value in failure.values.items())
         lines += [f"failure: {display_path(failure.file)}", f"with {values}"]
         lines += [f"replay: {failure.run.artifacts.replay}"] if failure.run.artifacts.replay else []
-        lines += [f"smaller: simscen shrink {display_path(failure.file)}", ""]
+        lines += [f"smaller: simscen shrink {shlex.quote(display_path(failure.file))}", ""]
     number = len(falsification.found)
     if number:
         lines.append(f"found {number} {'failure' if number == 1 else 'different failures'} in {runs}")

@@ -14,7 +14,7 @@ from rich.text import Text
 
 from simscen.cli.diagnostics import escaped, paths_from_working_folder, print_text
 from simscen.cli.session.backends import interrupt_on_signals
-from simscen.cli.session.user_files import create_file, save
+from simscen.cli.session.user_files import create_file, require_writable, save
 from simscen.cli.shared_options import parse_topics
 from simscen.core.errors import Exit, InvalidInput, Problem, RunError
 from simscen.loading.files.discovery import default_root
@@ -46,8 +46,7 @@ def write_scenario_from_log(
         print_text(f"wrote {escaped(str(file))}")
     for line in made.summary():
         print_text(escaped(line))
-    name = escaped(str(out))
-    print_text(f"wrote {name}; try: simscen run {name}")
+    print_text(f"wrote {escaped(str(out))}; try: simscen run {escaped(shlex.quote(str(out)))}")
     for unknown in made.contents.unknowns:
         print_text(f"note: the log does not show: {escaped(unknown)}", sys.stderr)
     if verify:
@@ -62,7 +61,7 @@ def _verify(reconstruction: Reconstruction) -> None:
     """
     name = reconstruction.file.name.partition(".")[0]
     log = reconstruction.file.with_name(f"{name}.verified.mcap")
-    _run(reconstruction.file, log)
+    _run(reconstruction.file, log, reconstruction.log)
     verified = compare_with_run(reconstruction, log)
     _print_table(verified)
     for incident in verified.incidents:
@@ -85,8 +84,12 @@ def _verify(reconstruction: Reconstruction) -> None:
         sys.exit(Exit.FAILED)
 
 
-def _run(scenario: Path, log: Path) -> None:
-    """Run a scenario in another process, and copy its log to `log`. Raises RunError if the run is not completed."""
+def _run(scenario: Path, log: Path, recorded: Path) -> None:
+    """Run a scenario in another process, and copy its log to `log`.
+
+    Raises RunError if the run is not completed, and UsageError if `log` is the `recorded` log or cannot be written.
+    """
+    require_writable(log, [recorded])
     with interrupt_on_signals(), tempfile.TemporaryDirectory(prefix="simscen-") as folder:
         out = Path(folder) / "out"
         command = [sys.executable, "-m", "simscen", "run", str(scenario), "--out", str(out), "-j", "1"]
@@ -94,7 +97,7 @@ def _run(scenario: Path, log: Path) -> None:
         logs = sorted(out.glob("**/run.mcap"))
         if not logs:
             raise RunError("crashed", f"the run of {scenario} was not completed", tail=done.stdout + done.stderr)
-        shutil.copyfile(logs[0], log)
+        save(log, lambda file: shutil.copyfile(logs[0], file), [recorded])
 
 
 def _print_table(verified: Verification) -> None:

@@ -7,7 +7,14 @@ from functools import cached_property
 from pathlib import Path
 
 from simscen.cli.diagnostics import paths_from_working_folder, relative_to_working_folder
-from simscen.cli.session.logs import COMPLETE_LOG, PARTIAL_LOG, evaluate_recorded_criteria, recorded_result
+from simscen.cli.session.logs import (
+    COMPLETE_LOG,
+    PARTIAL_LOG,
+    evaluate_recorded_criteria,
+    find_sessions,
+    log_name,
+    recorded_result,
+)
 from simscen.core.environment.costmap_filters import MaskBlocks
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Pose2
@@ -31,7 +38,7 @@ from simscen.record.foreign.raw_messages import is_simscen_log
 from simscen.record.foreign.read import ForeignLog, read_foreign_log
 from simscen.record.log_header import LogHeader
 from simscen.record.log_reader import Log, read_run
-from simscen.report.journal_reader import JOURNAL_FILE, read_journal
+from simscen.report.journal_reader import read_journal
 from simscen.run.sessions.output_folder import run_folder
 
 
@@ -86,7 +93,7 @@ class LogJudge:
         self.foreign_count += 1
         if self._criteria is None:
             foreign, case = read_foreign_log(log, self._options, with_sensors=True), Case(Pose2(0.0, 0.0), ())
-            result = skipped_result(RunKey(log.stem, 0), "", "not evaluated; set criteria with --scenario")
+            result = skipped_result(RunKey(log_name(log), 0), "", "not evaluated; set criteria with --scenario")
             result = replace(
                 result, simulated=foreign.trace.seconds(foreign.trace.end), tick_rate=foreign.trace.tick_rate
             )
@@ -95,7 +102,7 @@ class LogJudge:
             case = self._foreign_case
         self.notes += [f"{log}: {note}" for note in foreign.notes]
         text = "" if self._scenario is None else self._scenario.read_text(encoding="utf-8")
-        header = LogHeader(log.stem, 0, case, text, foreign.map)
+        header = LogHeader(log_name(log), 0, case, text, foreign.map)
         return Log(header, foreign.trace, "", complete=has_ended(foreign.trace), sensors=foreign.sensors), result
 
     def _judge_simscen_log(self, log: Path) -> RunFinished:
@@ -150,7 +157,7 @@ class LogJudge:
         if case.footprint:
             del missing[Evidence.FOOTPRINT]
         coverage = replace(read.coverage, missing=missing)
-        key, expected = RunKey(log.stem, 0), expected_failure(criteria.spec)
+        key, expected = RunKey(log_name(log), 0), expected_failure(criteria.spec)
         return read, self._judge_by_file(log, key, read.trace, case, coverage, criteria, expected).result
 
     def _masks(self, criteria: LoadedCriteria) -> Mapping[str, MaskBlocks]:
@@ -230,7 +237,7 @@ def _names(plain: object, keys: Set[str] | None = None, key: str = "") -> set[st
 def _not_judged(log: Path, failure: RunFailure) -> RunFinished:
     """Return an error as the result of a log."""
     return RunFinished(
-        error_result(RunKey(log.stem, 0), str(log), failure), artifacts=Artifacts(mcap=str(log)), file=str(log)
+        error_result(RunKey(log_name(log), 0), str(log), failure), artifacts=Artifacts(mcap=str(log)), file=str(log)
     )
 
 
@@ -252,17 +259,16 @@ def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
         raise UnusableScenario(relative_to_working_folder(error.problems, criteria.library.sandbox.root)) from error
 
 
-def runs_without_log(folders: Sequence[Path]) -> list[tuple[str, RunFinished]]:
-    """Return the folder and the result of each run without a log in the output folders of sessions.
+def runs_without_log(paths: Sequence[Path]) -> list[tuple[str, RunFinished]]:
+    """Return the folder and the result of each run without a log, for the sessions at and below the paths.
 
     The result is an error, except for skipped runs.
     """
     return [
-        (str(run_folder(folder, run.key)), _as_error(run))
-        for folder in folders
-        if (folder / JOURNAL_FILE).is_file()
-        for run in read_journal(folder).runs
-        if not any((run_folder(folder, run.key) / log).exists() for log in (COMPLETE_LOG, PARTIAL_LOG))
+        (str(run_folder(session, run.key)), _as_error(run))
+        for session in find_sessions(paths)
+        for run in read_journal(session).runs
+        if not any((run_folder(session, run.key) / log).exists() for log in (COMPLETE_LOG, PARTIAL_LOG))
     ]
 
 

@@ -16,6 +16,7 @@ from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
 from simscen.model.scenario import CriteriaSpec, expected_failure
 from simscen.record.log_reader import Log, invalid_log
+from simscen.report.journal_reader import JOURNAL_FILE
 
 COMPLETE_LOG, PARTIAL_LOG = "run.mcap", "run.partial.mcap"
 """Names of the log in the folder of a run: of a completed run, and of an aborted run."""
@@ -50,20 +51,51 @@ def find_logs(paths: Sequence[Path]) -> list[Path]:
 
 def _logs(path: Path) -> Iterator[Path]:
     """Yield the logs in a folder and its visible subfolders, without a PARTIAL_LOG beside a COMPLETE_LOG."""
-    for folder, subfolders, names in os.walk(path):
-        current = Path(folder)
+    for folder, subfolders, names in _walk(path):
         if is_bag(names):
             subfolders.clear()
-            yield current
+            yield folder
             continue
-        subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
         logs = sorted(name for name in names if name.endswith(LOG_SUFFIXES))
-        yield from (current / name for name in logs if not (name == PARTIAL_LOG and COMPLETE_LOG in logs))
+        yield from (folder / name for name in logs if not (name == PARTIAL_LOG and COMPLETE_LOG in logs))
+
+
+def find_sessions(paths: Sequence[Path]) -> list[Path]:
+    """Return the output folders of sessions at and below the paths, without sessions that planned no runs."""
+    found: dict[Path, None] = {}
+    for path in paths:
+        for folder, subfolders, names in _walk(path):
+            if JOURNAL_FILE in names:
+                subfolders.clear()
+                if (folder / JOURNAL_FILE).stat().st_size:
+                    found[folder] = None
+    return list(found)
+
+
+def _walk(path: Path) -> Iterator[tuple[Path, list[str], list[str]]]:
+    """Yield each folder at and below `path`, the names of its visible subfolders, and the names of its files.
+
+    Subfolders that the caller removes from the list are not searched. Raises InvalidInput for an unreadable folder.
+    """
+
+    def fail(error: OSError) -> None:
+        raise InvalidInput([Problem(str(error.filename), 0, 0, "SC800", os_error_reason(error))]) from error
+
+    if not is_folder(path):
+        return
+    for folder, subfolders, names in os.walk(path, onerror=fail):
+        subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
+        yield Path(folder), subfolders, names
 
 
 def is_bag(names: Sequence[str]) -> bool:
     """Return whether a folder with these file names is a rosbag2 folder."""
     return BAG_METADATA in names and any(name.endswith((".db3", ".mcap", ".db3.zstd", ".mcap.zstd")) for name in names)
+
+
+def log_name(log: Path) -> str:
+    """Return the name of a log without its suffix; for a rosbag2 folder, its whole name."""
+    return log.name if log.is_dir() else log.stem
 
 
 def log_file(run: Path) -> Path:

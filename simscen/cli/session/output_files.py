@@ -1,6 +1,5 @@
 """Output files of a session: results.json, junit.xml, report.html, and run.json."""
 
-import errno
 import json
 import os
 import platform
@@ -12,8 +11,8 @@ from functools import cached_property
 from pathlib import Path
 
 from simscen.cli.diagnostics import print_text
+from simscen.cli.session.user_files import require_writable
 from simscen.core.errors import UsageError
-from simscen.core.files import require_not_input
 from simscen.core.records.comparison import Comparison
 from simscen.core.records.run_result import Outcome
 from simscen.core.records.session_events import RunFinished, SessionFinished
@@ -24,7 +23,7 @@ from simscen.report.results_json import json_parts
 from simscen.report.session_history import PastSession, past_sessions
 from simscen.report.suite import RunningSession, SessionReport, to_html
 from simscen.run.platform_fingerprint import arithmetic_fingerprints, cpu_flags, software_versions
-from simscen.run.sessions.output_folder import RUNS_FOLDER, probe_writable, write_atomically
+from simscen.run.sessions.output_folder import RUNS_FOLDER, write_atomically
 
 PAGE = "report.html"
 """Name of the HTML report in the output folder."""
@@ -131,26 +130,17 @@ class Reports:
 def require_writable_junit(junit: Path | None, folder: Path | None, inputs: Iterable[Path] = ()) -> None:
     """Raise UsageError if the file `junit` of --junit cannot be written. Do nothing if `junit` is None.
 
-    The file must not be one of the `inputs`, and must not have one of RESERVED_NAMES in the output `folder`.
+    The file must not be one of the `inputs`, and must not have one of RESERVED_NAMES in the output `folder`, or in the
+    output folder of another session.
     """
     if junit is None:
         return
-    try:
-        _require_free_name(junit, folder)
-        require_not_input(junit, inputs)
-        junit.parent.mkdir(parents=True, exist_ok=True)
-        probe_writable(junit)
-    except OSError as error:
-        raise UsageError(f"cannot write {junit}: {error.strerror}") from error
-
-
-def _require_free_name(junit: Path, folder: Path | None) -> None:
-    """Raise OSError if the file has one of RESERVED_NAMES in the output folder of this or another session."""
     real = Path(os.path.realpath(junit))
     for parent in real.parents:
         is_output = parent == (folder and Path(os.path.realpath(folder))) or (parent / JOURNAL_FILE).exists()
         if is_output and real.relative_to(parent).parts[0] in RESERVED_NAMES:
-            raise OSError(errno.EINVAL, "simscen writes another file with this name there")
+            raise UsageError(f"cannot write {junit}: simscen writes another file with this name there")
+    require_writable(junit, inputs)
 
 
 def _write(path: Path, data: bytes | Iterable[bytes]) -> bool:

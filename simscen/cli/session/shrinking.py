@@ -249,10 +249,14 @@ def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
         raise RunError(result.error.kind, f"the run could not be completed: {result.error.message}")
     failed = [verdict for verdict in result.verdicts if verdict.status is Status.FAIL]
     chosen = next((one for one in failed if criterion in ("", one.id, one.criterion)), None)
-    if result.outcome is not Outcome.FAILED or chosen is None:
-        names = ", ".join(one.id for one in failed)
-        reason = f"did not fail in {criterion}, but in {names}" if failed else f"did not fail: {result.outcome.value}"
-        raise UsageError(f"the run {reason}")
+    if result.outcome is Outcome.FAILED_AS_EXPECTED:
+        raise UsageError("the run failed as expected; remove `expected` from the scenario to shrink it")
+    if result.outcome is not Outcome.FAILED:
+        raise UsageError(f"the run did not fail: {result.outcome.value}")
+    if not failed:
+        raise UsageError("the run failed without violating a criterion, such as by an inconclusive verdict")
+    if chosen is None:
+        raise UsageError(f"the run did not fail in {criterion}, but in {', '.join(one.id for one in failed)}")
     margin = _smallest_margin(chosen)
     return Failure(chosen.criterion, chosen.id, None if margin is None or margin >= 0.0 else share * margin)
 

@@ -11,11 +11,11 @@ from simscen.cli.diagnostics import print_text
 from simscen.cli.process import discard_output
 from simscen.cli.shared_options import Format
 from simscen.core.errors import Exit, UsageError
+from simscen.core.files import probe_writable
 from simscen.core.records.session_events import SessionEvent
 from simscen.report.console_reporter import text_reporter
 from simscen.report.github import GitHubReporter
 from simscen.report.reporters import JsonReporter, Reporter
-from simscen.run.sessions.output_folder import probe_writable
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 """Environment variable with the path of the file for the job summary of GitHub Actions."""

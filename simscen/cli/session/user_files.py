@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from simscen.core.errors import UsageError
-from simscen.core.files import require_not_input, require_regular_file
+from simscen.core.files import probe_writable, require_not_input
 from simscen.loading.yaml.textfile import os_error_reason
 
 
@@ -32,15 +32,23 @@ def create_file(file: Path, name: str) -> Iterator[None]:
         raise
 
 
+def require_writable(path: Path, inputs: Iterable[Path] = ()) -> None:
+    """Create the folder of an output file. Raises UsageError if the file is not writable, or one of the `inputs`."""
+    try:
+        require_not_input(path, inputs)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        probe_writable(path)
+    except OSError as error:
+        raise UsageError(f"cannot write {path}: {error.strerror}") from error
+
+
 def save(path: Path, write: Callable[[Path], object], inputs: Iterable[Path] = ()) -> None:
     """Create or replace a file by calling `write` with its path.
 
     Raises UsageError if that fails, and if the file is one of the `inputs`.
     """
+    require_writable(path, inputs)
     try:
-        require_regular_file(path)
-        require_not_input(path, inputs)
-        path.parent.mkdir(parents=True, exist_ok=True)
         write(path)
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror}") from error

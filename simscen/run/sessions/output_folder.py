@@ -8,7 +8,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from simscen.core.errors import UsageError
-from simscen.core.files import require_regular_file
+from simscen.core.files import probe_writable, require_regular_file
 from simscen.core.records.run_result import RunKey
 
 DEFAULT_FOLDER = Path("simscen-out")
@@ -37,16 +37,6 @@ def create_output_folder(out: Path | None) -> Path:
 def run_folder(folder: Path, key: RunKey) -> Path:
     """Return the folder of a run in the output folder `folder` of its session."""
     return folder / RUNS_FOLDER / key.scenario / key.folder
-
-
-def probe_writable(path: Path) -> None:
-    """Raise OSError unless a regular file can be written at `path`. Leaves no new file."""
-    require_regular_file(path)
-    existed = path.exists()
-    with path.open("ab"):
-        pass
-    if not existed:
-        path.unlink()
 
 
 def write_atomically(path: Path, data: bytes | Iterable[bytes]) -> None:

@@ -1,6 +1,8 @@
 """`simscen judge` on logs of simscen, with their recorded criteria and with those of a file."""
 
+import errno
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -177,11 +179,32 @@ def test_unusable_log_among_several_is_an_error_result(simscen, out: Path) -> No
     assert simscen("judge", str(_log(out, "bad"))).code == 2
 
 
-def test_run_without_log_is_reported(simscen, out: Path) -> None:
+@pytest.mark.parametrize("folder", ["out", "."])
+def test_run_without_log_is_reported(simscen, out: Path, folder: str) -> None:
     _log(out, "bad").unlink()
-    ended = simscen("judge", "out")
+    ended = simscen("judge", folder)
     assert ended.code == 3
     assert "it left no log" in ended.out
+
+
+def test_session_that_planned_no_runs_has_no_missing_logs(simscen, out: Path) -> None:
+    (out.parent / "killed").mkdir()
+    (out.parent / "killed/events.jsonl").touch()
+    assert simscen("judge", ".", "--scenario", "good.scenario.yaml").code == 0
+
+
+def test_unreadable_folder_is_an_error(simscen, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scandir = os.scandir
+
+    def deny(path: str) -> object:
+        if Path(path).name == "bad":
+            raise PermissionError(errno.EACCES, "Permission denied", path)
+        return scandir(path)
+
+    monkeypatch.setattr(os, "scandir", deny)
+    ended = simscen("judge", "out")
+    assert ended.code == 2
+    assert "out/runs/bad: error[SC800]" in ended.err
 
 
 def test_folder_without_logs_is_an_error(simscen, tmp_path: Path) -> None:

@@ -34,6 +34,15 @@ def test_drive_with_slipping_wheels_is_localized_in_every_format(simscen, tmp_pa
     assert simscen("localize", log, *OPTIONS, "--json").out == ended.out
 
 
+def test_picture_does_not_overwrite_the_map(simscen, tmp_path: Path) -> None:
+    write_map(tmp_path)
+    write_csv(tmp_path)
+    (image,) = tmp_path.glob("room.p*")
+    before = image.read_bytes()
+    assert simscen("localize", "drive.csv", *OPTIONS, "--picture", image.name).code == 2
+    assert image.read_bytes() == before
+
+
 def test_drift_of_odometry_is_reported(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     write_csv(tmp_path)

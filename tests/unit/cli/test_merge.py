@@ -92,6 +92,15 @@ def test_missing_shard_is_an_error_unless_it_is_allowed(
     assert simscen("merge", "s2", "--out", "partial", "--allow-missing").code == 0
 
 
+def test_unwritable_junit_is_an_error_before_anything_is_merged(
+    simscen, sessions: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(sessions)
+    done = simscen("merge", "s1", "s2", "--out", "unmerged", "--junit", "a.scenario.yaml/junit.xml")
+    assert done.code == 2
+    assert not Path("unmerged").exists()
+
+
 def test_output_folder_must_be_empty(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(sessions)
     done = CliRunner().invoke(app, ["merge", "s1", "s2", "--out", "whole"])

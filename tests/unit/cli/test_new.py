@@ -1,3 +1,4 @@
+import shlex
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,21 @@ def test_new_writes_a_valid_scenario(simscen, tmp_path: Path, name: str) -> None
     written = f"{name.removesuffix('.scenario.yaml')}.scenario.yaml"
     assert simscen("validate", written) == (0, "1 scenario is valid\n", "")
     assert (tmp_path / written).read_text().count("#") >= 8
+
+
+def test_suggested_command_works_for_a_name_with_spaces(simscen, tmp_path: Path) -> None:
+    suggestion = simscen("new", "narrow aisle").out.rstrip().partition("; try: ")[2]
+    assert shlex.split(suggestion) == ["simscen", "run", "narrow aisle.scenario.yaml"]
+
+
+def test_verification_does_not_overwrite_the_recorded_log(simscen, tmp_path: Path) -> None:
+    assert simscen("run", "good.scenario.yaml", "--out", "out").code == 0
+    log = Path("out/runs/good/seed-1/run.mcap").rename("drive.verified.mcap")
+    before = log.read_bytes()
+    ended = simscen("new", "drive", "--from-log", log, "--verify")
+    assert ended.code == 2
+    assert "cannot write drive.verified.mcap: it is one of the input files" in ended.err
+    assert log.read_bytes() == before
 
 
 def test_new_never_overwrites_a_file(simscen, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from simscen.cli.session.logs import log_name
 from simscen.core.environment.scenery import Scenery
 from simscen.record.log_header import LogHeader
 from simscen.record.log_reader import read_run
@@ -67,6 +68,11 @@ def test_every_log_in_a_folder_gets_a_replay(simscen, out: Path) -> None:
     assert ended.code == 0 and ended.out.splitlines() == [str(page).replace("good", name) for name in ("bad", "good")]
     assert page.is_file()
     page.unlink()
+
+
+def test_bag_is_named_after_its_whole_folder(tmp_path: Path) -> None:
+    (tmp_path / "drive.2").mkdir()
+    assert [log_name(tmp_path / name) for name in ("drive.2", "drive.mcap")] == ["drive.2", "drive"]
 
 
 def test_two_runs_are_shown_side_by_side(simscen, out: Path, tmp_path: Path) -> None:

@@ -100,6 +100,8 @@ def test_a_run_in_an_output_folder_is_shrunk_with_its_variation(simscen: Callabl
     [
         (["a.scenario.yaml", "--criterion", "collisions"], "the run did not fail in collisions, but in clearance"),
         (["good.scenario.yaml"], "the run did not fail: passed"),
+        (["expected.scenario.yaml"], "remove `expected` from the scenario"),
+        (["inconclusive.scenario.yaml"], "the run failed without violating a criterion"),
         (["a.scenario.yaml", "--runs", "1"], "1 run is not enough to reproduce the failure; increase --runs"),
     ],
 )
@@ -107,7 +109,10 @@ def test_unshrinkable_run_is_an_error(
     simscen: Callable[..., Any], tmp_path: Path, options: list[str], message: str
 ) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
-    (tmp_path / "good.scenario.yaml").write_text(SCENARIO.replace("min: 1 m", "min: 10 cm"))
+    good = SCENARIO.replace("min: 1 m", "min: 10 cm")
+    (tmp_path / "good.scenario.yaml").write_text(good)
+    (tmp_path / "expected.scenario.yaml").write_text(f"{SCENARIO}expected: {{fail: clearance}}\n")
+    (tmp_path / "inconclusive.scenario.yaml").write_text(f"{good}  - smoothness: {{min_sparc: -3}}\n")
     done = simscen("shrink", *options)
     assert done.code == 2
     assert message in done.err
@@ -119,6 +124,7 @@ def test_unshrinkable_run_is_an_error(
     [
         (["nothing.scenario.yaml"], "no such file"),
         (["a.scenario.yaml", "--out", "a.scenario.yaml"], "exists already"),
+        (["a.scenario.yaml", "--out", "a.scenario.yaml/b.scenario.yaml"], "cannot write"),
         ([".", "--seed", "3"], "are for a scenario file"),
         (["."], "is not the folder of a run"),
         (["a.scenario.yaml", "--variation", "x"], "has no variations"),
@@ -184,6 +190,15 @@ def test_a_found_failure_is_written_as_a_scenario_that_fails(
     if method == "tpe":  # the method that depends on the order of the results
         simscen("falsify", "a.scenario.yaml", "--method", method, "--out", "out1", "-j", 1)
         assert (tmp_path / "out/results.json").read_bytes() == (tmp_path / "out1/results.json").read_bytes()
+
+
+def test_search_that_could_not_save_a_failure_does_not_start(simscen: Callable[..., Any], tmp_path: Path) -> None:
+    file = tmp_path / f"{238 * 'a'}.scenario.yaml"  # its name with `.failure-1` is too long
+    file.write_text(SCENARIO + RANGES)
+    done = simscen("falsify", file.name, "--out", "out")
+    assert done.code == 2
+    assert "File name too long" in done.err
+    assert not (tmp_path / "out").exists()
 
 
 def test_interrupted_runs_do_not_count_as_searched() -> None:

@@ -125,7 +125,7 @@ def test_world_too_large_for_a_file_is_an_error(simscen, room: Path) -> None:
         (("inspect", "nowhere.world.yaml"), "no such file or directory"),
         (("inspect", "."), "not a regular file"),
         (("inspect", "room.world.yaml", "--png", "room.world.yaml/x.png"), "cannot write room.world.yaml/x.png"),
-        (("export", "room.world.yaml", "--map", "room.world.yaml/x.yaml"), "cannot write room.world.yaml/x.yaml"),
+        (("export", "room.world.yaml", "--map", "room.world.yaml/x.yaml"), "cannot write room.world.yaml/x.pgm"),
         (("convert", "room.world.yaml", "room.world.yaml/x"), "cannot write room.world.yaml/x"),
     ],
 )
@@ -133,6 +133,25 @@ def test_impossible_conversions_are_errors(simscen, room: Path, arguments, expec
     ended = simscen("world", *arguments)
     assert ended.code == 2
     assert expected_text in ended.err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("inspect", "hall.yaml", "--png", "plan.pgm"),
+        ("inspect", "site.world.yaml", "--png", "plan.pgm"),
+        ("export", "site.world.yaml", "--map", "hall.yaml"),
+        ("export", "site.world.yaml", "--map", "plan.yaml"),
+        ("convert", "site.world.yaml", "hall.yaml"),
+    ],
+)
+def test_map_of_a_world_is_not_overwritten(simscen, room: Path, arguments) -> None:
+    assert simscen("world", "export", "room.world.yaml", "--map", "plan.yaml").code == 0
+    (room / "plan.yaml").rename(room / "hall.yaml")
+    (room / "site.world.yaml").write_text("simscen: 1\nmap: hall.yaml\n")
+    before = {file.name: file.read_bytes() for file in room.iterdir()}
+    assert simscen("world", *arguments).code == 2
+    assert {file.name: file.read_bytes() for file in room.iterdir()} == before
 
 
 @pytest.mark.parametrize(
