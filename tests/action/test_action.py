@@ -1,5 +1,6 @@
 """Tests of action.yml: run its steps like the GitHub runner, in the checkout of another repository."""
 
+import json
 import os
 import re
 import shutil
@@ -76,9 +77,9 @@ def test_failure_gets_annotation_summary_picture_and_artifact(action, tmp_path: 
     assert ran.summary.startswith("### simscen: 1 passed, 1 failed, 0 errors\n")
     assert "[Logs, pictures and pages](https://example.org/artifact)" in ran.summary
     (address,) = re.findall(r"!\[map of the run\]\((.*)\)", ran.summary)
-    place = "41-2-scenarios/runs/scenarios/a bad one/seed-1/map.png"
     server = tmp_path / "server/team/robot"
-    assert address == f"file://{server}/raw/pictures/{place.replace(' ', '%20')}"
+    place = address.removeprefix(f"file://{server}/raw/pictures/").replace("%20", " ")
+    assert re.fullmatch(r"41-2-scenarios-\w{8}/runs/scenarios/a bad one/seed-1/map.png", place)
     pushed = subprocess.run(["git", "-C", str(server), "show", f"pictures:{place}"], capture_output=True, check=True)
     assert pushed.stdout.startswith(b"\x89PNG")
     upload = ran.used["actions/upload-artifact@v4"]
@@ -100,6 +101,48 @@ def test_invalid_file_fails_the_job_without_reports(action, tmp_path: Path) -> N
     assert "wrong.scenario.yaml:4:1: error[SC012]" in ran.printed
     assert "actions/upload-artifact@v4" not in ran.used
     assert ran.outcomes["reports"] == "success"
+
+
+def run_step(name: str, folder: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Run the script of a step in a folder, with a command `simscen` that writes its arguments to the file `called`."""
+    steps = yaml.safe_load((ROOT / "action.yml").read_text())["runs"]["steps"]
+    (folder / "bin").mkdir()
+    (folder / "bin/simscen").write_text('#!/bin/sh\nprintf "%s\\n" "$@" > called\n')
+    (folder / "bin/simscen").chmod(0o755)
+    environ = {
+        "PATH": f"{folder / 'bin'}:{BIN}:{os.environ['PATH']}", "HOME": str(folder), "RUNNER_TEMP": str(folder),
+        "GITHUB_OUTPUT": str(folder / "output"), "GITHUB_SERVER_URL": f"file://{folder}", **variables,
+    }  # fmt: skip
+    script = next(step["run"] for step in steps if step.get("id") == name)
+    command = ["bash", "--noprofile", "--norc", "-e", "-o", "pipefail", "-c", script]
+    return subprocess.run(command, cwd=folder, env=environ, capture_output=True, text=True, check=False)
+
+
+def test_paths_and_arguments_are_split_as_by_a_shell(tmp_path: Path) -> None:
+    done = run_step("run", tmp_path, PATHS="a\n'b c'", ARGUMENTS='-k "not slow"', OUT="out", BRANCH="")
+    assert done.returncode == 0, done.stderr
+    called = (tmp_path / "called").read_text().splitlines()
+    assert called == ["run", "a", "b c", "-k", "not slow", "--format", "github", "--out", "out"]
+
+
+@pytest.mark.parametrize("inputs", [{"PATHS": "a 'b", "ARGUMENTS": ""}, {"PATHS": "a", "ARGUMENTS": '-k "not slow'}])
+def test_missing_quote_fails_the_step_before_anything_runs(tmp_path: Path, inputs: dict[str, str]) -> None:
+    done = run_step("run", tmp_path, OUT="out", BRANCH="", **inputs)
+    assert done.returncode != 0
+    assert "unmatched" in done.stderr
+    assert not (tmp_path / "called").exists()
+
+
+def test_pictures_that_cannot_be_pushed_to_a_new_branch_are_reported(tmp_path: Path) -> None:
+    subprocess.run(["git", "init", "--quiet", "--bare", str(tmp_path / "team/robot")], check=True)
+    (tmp_path / "team/robot/hooks/pre-receive").write_text("#!/bin/sh\nexit 1\n")
+    (tmp_path / "team/robot/hooks/pre-receive").chmod(0o755)
+    (tmp_path / "map.png").touch()
+    runs = [{"outcome": "failed", "artifacts": {"picture": "map.png"}}]
+    (tmp_path / "results.json").write_text(json.dumps({"runs": runs}))
+    repository = {"GITHUB_REPOSITORY": "team/robot", "TOKEN": "secret-token"}
+    done = run_step("pictures", tmp_path, OUT=str(tmp_path), BRANCH="pictures", PLACE="41-2-job", **repository)
+    assert "::warning::the pictures could not be pushed to pictures" in done.stdout, done.stderr
 
 
 def test_actionlint_accepts_action_workflows_and_guide(tmp_path: Path) -> None:
