@@ -128,7 +128,7 @@ class WholeQuantity(Quantity):
 Length = Annotated[float, Field(ge=-1e4, le=1e4), Quantity("length")]
 PositiveLength = Annotated[float, Field(gt=0, le=1e4), Quantity("length")]
 NonNegativeLength = Annotated[float, Field(ge=0, le=1e4), Quantity("length")]
-MAX_DURATION_S = 86400.0
+MAX_DURATION_S = 86400
 Duration = Annotated[float, Field(ge=0, le=MAX_DURATION_S), Quantity("duration")]
 PositiveDuration = Annotated[float, Field(gt=0, le=MAX_DURATION_S), Quantity("duration")]
 Angle = Annotated[float, Field(ge=-100, le=100), Quantity("angle")]
