@@ -132,7 +132,7 @@ class ChangedScenario:
         Unchanged parts keep their lines. Paths in the text are relative to `folder`.
         """
         from simscen.loading.files.copying import with_paths_relative_to  # most commands write no scenarios
-        from simscen.loading.yaml.rewriting import changed_text
+        from simscen.loading.yaml.writing import changed_text
 
         name = self._library.sandbox.display_name(self.file)
         content = with_paths_relative_to(folder, tree, self._library.files)

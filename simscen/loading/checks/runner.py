@@ -4,11 +4,11 @@ from collections.abc import Iterable
 
 from simscen.core.environment.world_model import World
 from simscen.core.errors import Problem
-from simscen.loading.checks import actions, criteria, events, faults, names, settings, world_file
+from simscen.loading.checks import criteria, events, faults, names, settings, world_file
 from simscen.loading.checks.registry import MEANING, NAMES, WORLD_FILE, NameScope
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 
-MODULES = (actions, criteria, events, faults, names, settings, world_file)
+MODULES = (criteria, events, faults, names, settings, world_file)
 """Modules that register checks when they are imported."""
 
 

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from simscen.loading.yaml.lookalikes import lookalike_hint
+from simscen.loading.yaml.syntax_problems import lookalike_hint
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
 from simscen.spec.places import ROS_NAMESPACE_PATTERN
 from simscen.spec.quantities import exact_text, possible_units

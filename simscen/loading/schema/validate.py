@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 from simscen.core.errors import Problem
 from simscen.loading.schema import common_mistakes, messages
 from simscen.loading.schema.lookup import has_no_required_keys, keys_of, models_at, type_values_at, type_values_with_key
-from simscen.loading.yaml.lookalikes import lookalike_hint
+from simscen.loading.yaml.syntax_problems import lookalike_hint
 from simscen.loading.yaml.tree import (
     Keys,
     MappingNode,

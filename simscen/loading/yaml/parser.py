@@ -7,9 +7,8 @@ import yaml
 from yaml import events as ev
 
 from simscen.core.errors import Problem
-from simscen.loading.yaml.lookalikes import LOOKALIKES, describe_lookalike, find_lookalike
 from simscen.loading.yaml.scalars import parse_scalar
-from simscen.loading.yaml.syntax_messages import MISSING_COLON, syntax_message, unclosed_part
+from simscen.loading.yaml.syntax_problems import syntax_problem
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode, nodes_with_keys
 
 MAX_DEPTH = 40
@@ -85,7 +84,7 @@ class _Composer:
         except yaml.MarkedYAMLError as error:
             if end is None and error.problem == _LIBYAML_TOO_DEEP and error.problem_mark:
                 yield from self._parse_events(error.problem_mark.index, count)
-            raise _ParseError(self._syntax_problem(error)) from None
+            raise _ParseError(syntax_problem(error, self.text, self.path)) from None
         except yaml.YAMLError as error:
             raise _ParseError(self._problem(None, "SC003", str(error).splitlines()[0])) from None
 
@@ -201,35 +200,3 @@ class _Composer:
     def _problem(self, event: ev.Event | None, code: str, message: str, hint: str = "") -> Problem:
         position = self._position_of(event) if event is not None else Position(self.path, 0, 0)
         return Problem(*position, code=code, message=message, hint=hint)
-
-    def _syntax_problem(self, error: yaml.MarkedYAMLError) -> Problem:
-        mark = error.problem_mark or error.context_mark
-        if mark is None:
-            return self._problem(None, "SC003", error.problem or "cannot be read as YAML")
-        lines = self.text.split("\n")
-        line = lines[mark.line] if mark.line < len(lines) else ""
-        if line[mark.column : mark.column + 1] == "\t" or line[: len(line) - len(line.lstrip())].find("\t") >= 0:
-            col = line.find("\t") + 1
-            return Problem(self.path, mark.line + 1, col, "SC003", "tab character", "indent with spaces")
-        start = error.context_mark
-        if (lookalike := self._lookalike(lines, start.line if start else mark.line, mark.line)) is not None:
-            return lookalike
-        is_at_end = mark.index >= len(self.text.rstrip())
-        if start is not None and is_at_end and start.index < mark.index and (part := unclosed_part(error)):
-            return Problem(self.path, start.line + 1, start.column + 1, "SC003", f"this {part} is not closed")
-        message, hint = syntax_message(error)
-        if start is not None and error.problem == MISSING_COLON:
-            mark = start
-        if mark.line < len(lines):
-            return Problem(self.path, mark.line + 1, mark.column + 1, "SC003", message, hint)
-        return Problem(self.path, len(lines), len(lines[-1]) + 1, "SC003", message, hint)
-
-    def _lookalike(self, lines: list[str], first: int, last: int) -> Problem | None:
-        """Return a problem for the first lookalike character in the lines `first` to `last` (from 0), or None."""
-        for number in range(first, min(last + 1, len(lines))):
-            index = find_lookalike(lines[number].partition(" #")[0])
-            if index is not None:
-                character = lines[number][index]
-                message, hint = describe_lookalike(character), f"write {LOOKALIKES[character][1]}"
-                return Problem(self.path, number + 1, index + 1, "SC003", message, hint)
-        return None

@@ -15,8 +15,8 @@ from simscen.loading.reduction import (
     without_parts,
 )
 from simscen.loading.yaml.parser import parse_yaml
-from simscen.loading.yaml.rewriting import changed_text
 from simscen.loading.yaml.tree import MappingNode, Position, ScalarNode
+from simscen.loading.yaml.writing import changed_text
 
 TEXT = """\
 # What this tests.
