@@ -5,13 +5,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+import yaml
+
 from simscen.core.errors import Problem
 from simscen.core.external_command import ExternalCommand
+from simscen.core.records.disturbances import Disturbance
 from simscen.core.records.run_result import RunKey, scenario_title
 from simscen.core.records.verdict import ExpectedFailure
 from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.yaml.textfile import with_source_line
-from simscen.loading.yaml.tree import Key, Keys, MappingNode, Position, key_position, value_position
+from simscen.loading.yaml.tree import Key, Keys, MappingNode, Position, child, key_position, node_at, value_position
 from simscen.model.robot import RobotSpec
 from simscen.model.scenario import ScenarioSpec, expected_failure
 from simscen.model.world import RosMapSpec, WorldSpec
@@ -185,6 +188,30 @@ class LoadedScenario:
         """The failure that the scenario expects, or None. Its line is 0 if `expected` is in a file that is extended."""
         failure, position = expected_failure(self.spec), self.key_position_of("expected")
         return failure and replace(failure, line=position.line if position.path == self.path else 0)
+
+    @property
+    def disturbances(self) -> tuple[Disturbance, ...]:
+        """The events, each followed by the steps of its sequence, and then the faults, as logs contain them."""
+        events = [
+            self._disturbance("event", step.name, step.keys, step.required, step.after) for step in self.spec.steps
+        ]
+        faults = [
+            self._disturbance("fault", fault.label, ("faults", index), fault.required)
+            for index, fault in enumerate(self.spec.faults)
+        ]
+        return (*events, *faults)
+
+    def _disturbance(
+        self, kind: Literal["event", "fault"], name: str, keys: Keys, required: bool, after: int | None = None
+    ) -> Disturbance:
+        """Return the event or fault at `keys`. Its line is 0 if it is in a file that is extended."""
+        node = node_at(self.tree, keys)
+        when, position = child(node, "when"), node.position
+        text = ""
+        if when is not None:
+            text = yaml.safe_dump(when.plain, default_flow_style=True, sort_keys=False, allow_unicode=True, width=10**9)
+        line = position.line if position.path == self.path else 0
+        return Disturbance(name, kind, text.strip().removeprefix("{").removesuffix("}"), required, line, after)
 
     def key(self, seed: int) -> RunKey:
         """Return the key of the run with this seed."""

@@ -14,7 +14,6 @@ from simscen.core.messages.navigation import Estimate
 from simscen.core.records.case import CLEARANCE_RANGE_M, ROBOT_NAME, Case
 from simscen.criteria.base import Criterion
 from simscen.loading.builders import load_criterion_masks, load_map, load_masks, load_robot, load_world
-from simscen.loading.disturbances import disturbances_of
 from simscen.loading.goals import event_goals, expected_failures, scenario_goals
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.open_ground import with_stops_in_bounds
@@ -139,7 +138,7 @@ def _prepare_robot(
         inscribed_radius=body.inscribed_radius,
         time_limit=spec.time_limit,
         clearance_range=_clearance_range(spec),
-        disturbances=tuple(disturbances_of(loaded)),
+        disturbances=loaded.disturbances,
         masks=load_criterion_masks(loaded.criterion_masks, loaded.tree, loaded.sources),
     )
     return PreparedScenario(
