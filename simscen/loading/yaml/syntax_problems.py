@@ -80,7 +80,7 @@ def syntax_problem(error: yaml.MarkedYAMLError, text: str, path: str) -> Problem
         return Problem(path, mark.line + 1, line.find("\t") + 1, "SC003", "tab character", "indent with spaces")
     for number in range(start.line if start else mark.line, min(mark.line + 1, len(lines))):
         if (found := _first_lookalike(lines[number].partition(" #")[0])) is not None:
-            return Problem(path, number + 1, found.index + 1, "SC003", found.name, f"write {found.replacement}")
+            return Problem(path, number + 1, found.at + 1, "SC003", found.name, f"write {found.replacement}")
     is_at_end = mark.index >= len(text.rstrip())
     unclosed = _UNCLOSED.get(error.context or "", "")
     if start is not None and is_at_end and start.index < mark.index and unclosed:
@@ -109,9 +109,9 @@ def _message(error: yaml.MarkedYAMLError) -> tuple[str, str]:
 
 
 class _Lookalike(NamedTuple):
-    """Lookalike character in a text: its index, its name such as "no-break space (U+00A0)", and what to write."""
+    """Lookalike character: its index in a text, its name such as "no-break space (U+00A0)", and what to write."""
 
-    index: int
+    at: int
     name: str
     replacement: str
 
