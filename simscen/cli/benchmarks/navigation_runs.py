@@ -39,14 +39,14 @@ class LocalizationAccuracy:
 
     rmse:        mean over the runs of the root mean square position error in m; None without values
     worst_rmse:  maximum over the runs of the root mean square position error in m; None without values
-    anees:       average NEES over the runs at each of ANEES_TIMES_S, by time in s
-    bounds:      95 % interval of the ANEES of a consistent localizer
+    anees:       average NEES at each of ANEES_TIMES_S, by time in s, over the runs that have not ended by then
+    bounds:      95 % interval of the ANEES of a consistent localizer over as many runs, by the same times
     """
 
     rmse: float | None
     worst_rmse: float | None
     anees: dict[float, float]
-    bounds: tuple[float, float]
+    bounds: dict[float, tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -149,9 +149,10 @@ def _localization_accuracy(trials: list[Trial]) -> LocalizationAccuracy:
     samples = {
         seconds: [v for trace in traces if (v := nees_at(trace, seconds)) is not None] for seconds in ANEES_TIMES_S
     }
+    known = {seconds: values for seconds, values in samples.items() if values}
     return LocalizationAccuracy(
         rmse=mean(errors),
         worst_rmse=max(errors, default=None),
-        anees={seconds: sum(values) / len(values) for seconds, values in samples.items() if values},
-        bounds=anees_bounds(max(1, len(traces))),
+        anees={seconds: sum(values) / len(values) for seconds, values in known.items()},
+        bounds={seconds: anees_bounds(len(values)) for seconds, values in known.items()},
     )

@@ -104,10 +104,16 @@ def _value_text(value: float | None, number_format: str, unit: str = "") -> str:
 
 
 def _localization_lines(experiment: str, localized: LocalizationAccuracy) -> list[str]:
-    low, high = localized.bounds
-    anees = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in localized.anees.items())
     errors = (
         f"{_value_text(localized.rmse, '.3f', ' m')} RMSE, worst run {_value_text(localized.worst_rmse, '.3f', ' m')}"
     )
-    interval = f"95 % interval of a consistent localizer: {low:.2f} … {high:.2f}"
-    return [f"{experiment}: {errors}", f"  ANEES {anees}; {interval}"]
+    lines = [f"{experiment}: {errors}"]
+    if localized.anees:
+        anees = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in localized.anees.items())
+        intervals = [f"{low:.2f} … {high:.2f}" for low, high in localized.bounds.values()]
+        if len(set(intervals)) == 1:
+            label = f"95 % interval of a consistent localizer: {intervals[0]}"
+        else:  # some runs ended before the last time
+            label = f"95 % intervals of a consistent localizer: {', '.join(intervals)}"
+        lines.append(f"  ANEES {anees}; {label}")
+    return lines

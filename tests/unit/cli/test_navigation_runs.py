@@ -1,14 +1,21 @@
 """Runs of the experiments of `simscen bench nav`."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from simscen.bench.localization.consistency import anees_bounds
 from simscen.bench.navigation import generated_worlds
 from simscen.bench.navigation.experiments import Experiment
+from simscen.bench.navigation.summary import Trial
+from simscen.cli.benchmarks import navigation_runs
 from simscen.cli.benchmarks.navigation import with_stack
-from simscen.cli.benchmarks.navigation_runs import _plan_jobs
+from simscen.cli.benchmarks.navigation_runs import _plan_jobs, summarize_experiment
+from simscen.core.records.run_result import Outcome, RunKey, RunResult
+from simscen.core.records.session_events import Artifacts, RunFinished
+from simscen.testing.synthetic_trace import synthetic_trace
 
 
 def hall(folder: Path) -> Experiment:
@@ -23,6 +30,23 @@ def test_runs_with_another_stack_have_different_keys(tmp_path: Path) -> None:
     jobs, owners = _plan_jobs(changed, tmp_path / "out")
     assert [owners[job.key][0] for job in jobs] == [0, 0, 1, 1]
     assert len({job.folder for job in jobs}) == 4
+
+
+def test_interval_of_the_anees_counts_only_the_runs_that_have_not_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    def read_log(file: Path) -> Any:
+        # An error of 0.1 m with a standard deviation of 0.1 m: the NEES is 1.
+        drive = {"seconds": float(file.stem), "truth": [[0, 0, 0]], "belief": {"offset": [0.1, 0, 0]}}
+        return SimpleNamespace(trace=synthetic_trace(drive))
+
+    monkeypatch.setattr(navigation_runs, "read_log", read_log)
+    trials = [
+        Trial(RunFinished(RunResult(RunKey("s", 1), "s", Outcome.PASSED), artifacts=Artifacts(mcap=f"{seconds}.mcap")))
+        for seconds in (12, 25)
+    ]
+    accuracy = summarize_experiment(Experiment("tour", (), Path(), measures_localization=True), trials).localized
+    assert accuracy is not None
+    assert accuracy.anees == pytest.approx({5.0: 1.0, 10.0: 1.0, 20.0: 1.0})
+    assert accuracy.bounds == {5.0: anees_bounds(2), 10.0: anees_bounds(2), 20.0: anees_bounds(1)}
 
 
 NAV2 = """\

@@ -11,7 +11,7 @@ from simscen.cli.benchmarks.navigation_table import as_json, as_text
 
 BARN = ExperimentSummary("BARN", 30, 29 / 30, (0.833, 0.994), 1 / 30, 0.0, 0.0, 0.0, 7.24, 0.476, 1.031, 0.71)
 TOUR = ExperimentSummary("localization, tour", 20, 1.0, None, 0.0, 0.0, 0.0, 0.0, 48.8, None, 0.99, 0.625)
-KNOWN = LocalizationAccuracy(0.0301, 0.0402, {5.0: 0.02, 10.0: 2.5}, (2.02, 4.17))
+KNOWN = LocalizationAccuracy(0.0301, 0.0402, {5.0: 0.02, 10.0: 2.5}, {5.0: (2.02, 4.17), 10.0: (2.02, 4.17)})
 
 TABLE = """\
 experiment          runs  success  95 % interval  collision  timeout  failed    time  path    SCT  score
@@ -40,6 +40,16 @@ SLOWER = ExperimentComparison(
 
 def test_table_is_followed_by_localization_comparison_and_published_figures() -> None:
     assert as_text([ExperimentResult(BARN), ExperimentResult(TOUR, KNOWN)], [SLOWER]) == TABLE
+
+
+def test_intervals_of_the_anees_are_listed_if_they_differ() -> None:
+    early_end = replace(KNOWN, bounds={5.0: (2.02, 4.17), 10.0: (0.22, 9.35)})
+    shown = as_text([ExperimentResult(TOUR, early_end)])
+    assert "2.50 at 10 s; 95 % intervals of a consistent localizer: 2.02 … 4.17, 0.22 … 9.35" in shown
+
+
+def test_runs_that_end_before_all_times_have_no_anees() -> None:
+    assert "ANEES" not in as_text([ExperimentResult(TOUR, replace(KNOWN, anees={}, bounds={}))])
 
 
 NARROW = """\
