@@ -131,17 +131,20 @@ class AdvancedPlanManager(PlanManager):
     def _planning_view(self, pose: Pose2) -> CostmapView:
         return add_predicted_costs(self._costmap.view, pose, self._speed, self._radius)
 
-    def _call_planner(self, view: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+    def _plan_leg(self, view: CostmapView, start: Pose2, goal: Pose2, tolerance: float, seed: int) -> Path:
         for clearance in CAUTIOUS_CLEARANCES_M if self._is_cautious else ():
             with contextlib.suppress(NavigationFailure):
-                path = self.planner.plan(view.with_grown_obstacles(clearance), start, goal, seed)
-                return self._with_preferred_clearance(path, view, start, goal, seed)
-        return self.planner.plan(view, start, goal, seed)
+                path = super()._plan_leg(view.with_grown_obstacles(clearance), start, goal, tolerance, seed)
+                return self._with_preferred_clearance(path, view, start, goal, tolerance, seed)
+        return super()._plan_leg(view, start, goal, tolerance, seed)
 
-    def _with_preferred_clearance(self, path: Path, view: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+    def _with_preferred_clearance(
+        self, path: Path, view: CostmapView, start: Pose2, goal: Pose2, tolerance: float, seed: int
+    ) -> Path:
         """Return a path with the preferred clearance if it is not much longer, otherwise `path`."""
         with contextlib.suppress(NavigationFailure):
-            alternative = self.planner.plan(view.with_grown_obstacles(PREFERRED_CLEARANCE_M), start, goal, seed)
+            grown = view.with_grown_obstacles(PREFERRED_CLEARANCE_M)
+            alternative = super()._plan_leg(grown, start, goal, tolerance, seed)
             if alternative.length() <= MAX_DETOUR_RATIO * path.length():
                 return alternative
         return path

@@ -1,5 +1,6 @@
 """Planning part of Nav2's default behavior trees: request a plan, monitor it while the robot follows it, replace it."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -197,14 +198,15 @@ class PlanManager:
         self._plan_count += 1
         aim = self._costmap.goal_in_window(start, goal.pose)
         is_partial = aim is not goal.pose
-        path = self._call_planner(view, start, aim, self._plan_seed(self._plan_count))
-        x, y, yaw = path.points[-1].tolist()
-        if not is_partial and goal.pose.distance(Pose2(x, y, yaw)) > goal.xy_tolerance:
-            raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, "the robot does not fit within the goal's tolerance")
-        return path.points, is_partial
+        tolerance = math.inf if is_partial else goal.xy_tolerance
+        return self._plan_leg(view, start, aim, tolerance, self._plan_seed(self._plan_count)).points, is_partial
 
-    def _call_planner(self, view: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        return self.planner.plan(view, start, goal, seed)
+    def _plan_leg(self, view: CostmapView, start: Pose2, goal: Pose2, tolerance: float, seed: int) -> Path:
+        """Return the planner's path. Raises NavigationFailure, also if it ends over `tolerance` m from the goal."""
+        path = self.planner.plan(view, start, goal, seed)
+        if goal.distance(Pose2(*path.points[-1].tolist())) > tolerance:
+            raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, "the robot does not fit within the goal's tolerance")
+        return path
 
     def _make_followed_plan(self, path: Path) -> FollowedPlan:
         return FollowedPlan(path, self._radius, self._costmap.view)

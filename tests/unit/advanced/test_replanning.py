@@ -196,6 +196,21 @@ def test_plans_keep_more_clearance_after_a_control_failure() -> None:
     assert asked == pytest.approx([0.0, 0.1, 0.15, 0.0])
 
 
+@pytest.mark.parametrize(("xy_tolerance", "end_x"), [(0.25, 6.9), (0.05, 7.0)])
+def test_clearance_does_not_move_the_end_of_the_plan_beyond_the_tolerance(xy_tolerance: float, end_x: float) -> None:
+    bench = Bench()
+    straight = bench.script.plan
+
+    def plan(costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
+        is_grown = costmap.distance is not bench.costmap.view.distance
+        return straight(costmap, start, Pose2(goal.x - 0.1, goal.y) if is_grown else goal, seed)
+
+    bench.script.plan = plan
+    bench.manager.report_control_failure()
+    assert bench.steps(2, Goal("g", GOAL.pose, xy_tolerance=xy_tolerance)) == ["goal"]
+    assert bench.manager.plan.path.points[-1, 0] == pytest.approx(end_x)
+
+
 @pytest.mark.parametrize(("bulge", "kept"), [(0.3, True), (2.5, False)])
 def test_clearance_increases_if_the_path_is_hardly_longer(bulge: float, kept: bool) -> None:
     bench = Bench()
