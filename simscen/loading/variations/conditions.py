@@ -103,7 +103,7 @@ def _path_text(node: ast.expr, text: str) -> str:
             return name
         case ast.Attribute(value=owner, attr=name):
             return f"{_path_text(owner, text)}.{name}"
-        case ast.Subscript(value=owner, slice=ast.Constant(value=int(index))) if index >= 0:
+        case ast.Subscript(value=owner, slice=ast.Constant(value=int(index))) if type(index) is int and index >= 0:
             return f"{_path_text(owner, text)}[{index}]"
         case ast.Subscript(value=owner, slice=ast.Constant(value=str(name))):
             return f'{_path_text(owner, text)}["{name}"]'

@@ -43,7 +43,7 @@ def test_conditions_count_in_si_units(text: str, holds: bool) -> None:
 @pytest.mark.parametrize(
     "text",
     ["", "a <", "lambda: 1", "[x for x in y]", "a.b()", "__import__('os')", "a if b else c", "x := 1", "a ** b",
-     "a in b", "f'{a}'", "None", "a[b] < 1", "a[-1] < 1", "(a + b).c < 1", "value(a) < 1", "abs() < 1",
+     "a in b", "f'{a}'", "None", "a[b] < 1", "a[-1] < 1", "a[True] < 1", "(a + b).c < 1", "value(a) < 1", "abs() < 1",
      "open('x') < 1"],
 )  # fmt: skip
 def test_everything_else_is_refused(text: str) -> None:
