@@ -18,8 +18,10 @@ from simscen.criteria.trace_signals.estimation_errors import (
     BELIEF_TIMEOUT_S,
     DIMENSIONS,
     NO_BELIEF,
+    durations,
     nees_samples,
     pose_error,
+    root_mean_square,
 )
 from simscen.spec.base import Spec
 from simscen.spec.places import DisturbanceName
@@ -35,7 +37,8 @@ class LocalizationError(Spec, Criterion):
 
     What is measured: the distance between the estimated and the true position, and the heading error. Both are measured
         whenever the stack publishes an estimated pose (belief), and continuously while its newest belief is over 1 s
-        old. The trajectories are not aligned, because an alignment would hide the error.
+        old. In the root mean square, an error counts for the time until the next one. The trajectories are not
+        aligned, because an alignment would hide the error.
     When it fails: the largest error, the root mean square, or the last error exceeds its bound. If the first belief is
         over 1 s later than `after`, only `final` can pass.
     Why this: a robot whose error is half a meter may reach goals in open space, but not near obstacles.
@@ -86,7 +89,7 @@ class LocalizationError(Spec, Criterion):
             largest = _judge_largest(trace, error, distances, "localization_error", self.max, "m")
             findings.append(self._if_known_early(trace, first, largest))
         if self.rmse is not None:
-            rmse = float(np.sqrt(np.mean(distances**2)))
+            rmse = root_mean_square(distances, durations(error))
             bound = at_most("localization_error rmse", rmse, self.rmse, "m", context="(not aligned)")
             findings.append(self._if_known_early(trace, first, if_complete(trace, bound)))
         if self.final is not None:

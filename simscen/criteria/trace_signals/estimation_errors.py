@@ -11,6 +11,7 @@ import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
 from simscen.criteria.trace_signals.ground_truth import check_samples, truth
+from simscen.criteria.trace_signals.sampling import usual_period
 
 if TYPE_CHECKING:
     from simscen.core.records.trace import Samples, Ticks, Trace
@@ -37,6 +38,16 @@ def pose_error(trace: Trace) -> Samples:
     x, y, yaw = interpolate_poses(poses, ticks).T
     distances = np.hypot(believed[:, 0] - x, believed[:, 1] - y)
     return Samples(ticks, np.column_stack((distances, np.abs(wrap_array(believed[:, 2] - yaw)))))
+
+
+def durations(samples: Samples) -> Array:
+    """Return the time (n,) in ticks from each sample to the next one; for the last one, the median of these times."""
+    return np.append(np.diff(samples.ticks), usual_period(samples.ticks)).astype(np.float64)
+
+
+def root_mean_square(values: Array, weights: Array) -> float:
+    """Return the weighted root mean square of `values` (n,)."""
+    return float(np.sqrt(np.average(values**2, weights=weights)))
 
 
 def interpolate_poses(poses: Samples, ticks: Ticks) -> Array:

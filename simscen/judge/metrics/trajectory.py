@@ -7,7 +7,14 @@ import numpy as np
 from simscen.core.geometry import Array, wrap_array
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Trace
-from simscen.criteria.trace_signals.estimation_errors import NO_BELIEF, interpolate_poses, nees_samples, pose_error
+from simscen.criteria.trace_signals.estimation_errors import (
+    NO_BELIEF,
+    durations,
+    interpolate_poses,
+    nees_samples,
+    pose_error,
+    root_mean_square,
+)
 from simscen.criteria.trace_signals.ground_truth import DrivenPath, teleport_samples, truth
 
 CURVATURE_SPACING_M = 0.3
@@ -110,22 +117,32 @@ def pose_metrics(trace: Trace) -> Values:
     if not len(error):
         return dict.fromkeys(POSE_METRICS, NO_BELIEF)
     distances, angles = error.values.T
+    weights = durations(error)
     return {
-        **_error_statistics("ape_trans", distances),
+        **_error_statistics("ape_trans", distances, weights),
         "ape_trans_final": float(distances[-1]),
-        **_error_statistics("ape_rot", angles),
+        **_error_statistics("ape_rot", angles, weights),
         **_relative_errors(trace),
         "nees": _nees(trace),
     }
 
 
-def _error_statistics(name: str, errors: Array) -> Values:
+def _error_statistics(name: str, errors: Array, weights: Array) -> Values:
+    """Return the weighted statistics of errors (n,)."""
     return {
-        f"{name}_rmse": float(np.sqrt(np.mean(errors**2))),
-        f"{name}_mean": float(np.mean(errors)),
-        f"{name}_median": float(np.median(errors)),
+        f"{name}_rmse": root_mean_square(errors, weights),
+        f"{name}_mean": float(np.average(errors, weights=weights)),
+        f"{name}_median": _median(errors, weights),
         f"{name}_max": float(np.max(errors)),
     }
+
+
+def _median(values: Array, weights: Array) -> float:
+    """Return the weighted median: half of the weight belongs to lower values. Between two values, return their mean."""
+    order = np.argsort(values)
+    below = np.cumsum(weights[order])
+    first, second = (np.searchsorted(below, below[-1] / 2, side=side) for side in ("left", "right"))
+    return float(values[order[[first, second]]].mean())
 
 
 def _relative_errors(trace: Trace) -> Values:
@@ -143,10 +160,10 @@ def _relative_errors(trace: Trace) -> Values:
             for one in _STATISTICS
         }
     moved_true, moved_believed = _between(true[i], true[j]), _between(believed[i], believed[j])
-    error = _between(moved_true, moved_believed)
+    error, weights = _between(moved_true, moved_believed), np.ones(len(i))
     return {
-        **_error_statistics("rpe_trans", np.hypot(error[:, 0], error[:, 1])),
-        **_error_statistics("rpe_rot", np.abs(wrap_array(error[:, 2]))),
+        **_error_statistics("rpe_trans", np.hypot(error[:, 0], error[:, 1]), weights),
+        **_error_statistics("rpe_rot", np.abs(wrap_array(error[:, 2])), weights),
     }
 
 
