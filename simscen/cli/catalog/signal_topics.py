@@ -8,7 +8,9 @@ SIGNALS_TEXT = """\
 - A signal has one value per sample of the truth (`physics: truth_rate`, 40 Hz by default). Its values are the same in
   the run and in its log.
 - Data with a lower rate (belief, command, scans, plans) keeps its value until the next message. Unless the table states
-  otherwise, the first value also holds before it.
+  otherwise, the first value also holds before it. The first belief holds for at most 1 s before it; earlier, the
+  signals `localization_error`, `localization_yaw_error`, `position_std`, `yaw_std`, `nees`, and `distance_remaining`
+  are unknown. A condition is undecided if it depends on an unknown value.
 - An event that is shorter than a sample counts at the next sample.
 - Derivatives are differences between two samples, divided by the time between them.
 - A jump by `kidnap` does not count as motion.

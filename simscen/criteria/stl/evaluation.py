@@ -27,7 +27,6 @@ from simscen.criteria.stl.robustness import (
     WindowRobustness,
 )
 from simscen.criteria.trace_signals.catalog import read_signal
-from simscen.criteria.trace_signals.ground_truth import reject_samples
 from simscen.criteria.trace_signals.sampling import usual_period
 
 if TYPE_CHECKING:
@@ -161,18 +160,19 @@ def _combine(parts: Sequence[Robustness], operator: Literal["all", "any"]) -> Ro
 
 def _compare(condition: Condition, context: EvaluationContext) -> Robustness:
     assert condition.signal is not None
-    trace = context.trace
-    values = read_signal(condition.signal, trace, context.case, condition.arguments)
-    reject_samples(trace, trace.truth.ticks, np.isnan(values), f"{condition.signal} is not a number at")
+    values = read_signal(condition.signal, context.trace, context.case, condition.arguments)
     if condition.definition.is_boolean:
         certain = np.where(values, math.inf, -math.inf)
         return ComparisonRobustness(certain, certain, (), condition, values)
     distances = _distances(condition, values)
-    if condition.signal != "clearance":
-        return ComparisonRobustness(distances, distances, (), condition, values)
-    # Clearance is measured up to a maximum range; beyond it, the true distance may have any larger value.
-    farther = _distances(condition, np.where(values >= context.case.clearance_range, math.inf, values))
-    return ComparisonRobustness(np.minimum(distances, farther), np.maximum(distances, farther), (), condition, values)
+    if condition.signal == "clearance":
+        # Clearance is measured up to a maximum range; beyond it, the true distance may have any larger value.
+        farther = _distances(condition, np.where(values >= context.case.clearance_range, math.inf, values))
+        low, high = np.minimum(distances, farther), np.maximum(distances, farther)
+    else:
+        is_unknown = np.isnan(values)
+        low, high = np.where(is_unknown, -math.inf, distances), np.where(is_unknown, math.inf, distances)
+    return ComparisonRobustness(low, high, (), condition, values)
 
 
 def _distances(condition: Condition, values: Array) -> Array:

@@ -72,10 +72,15 @@ class Robustness:
         for part in self.parts:
             yield from part.untested_responses()
 
+    def comparisons(self) -> Iterator[ComparisonRobustness]:
+        """Yield the robustness of each comparison in the condition."""
+        for part in self.parts:
+            yield from part.comparisons()
+
 
 @dataclass(frozen=True, eq=False)
 class ComparisonRobustness(Robustness):
-    """Robustness of a comparison. `values` (n,) are the values of its signal."""
+    """Robustness of a comparison. `values` (n,) are the values of its signal; nan where the signal is unknown."""
 
     comparison: Condition
     values: Array
@@ -83,6 +88,10 @@ class ComparisonRobustness(Robustness):
     def witness(self, sample: int, bound: Bound) -> Witness:
         """Return this comparison."""
         return Witness(self.comparison, sample, float(self.values[sample]))
+
+    def comparisons(self) -> Iterator[ComparisonRobustness]:
+        """Yield this comparison."""
+        yield self
 
 
 @dataclass(frozen=True, eq=False)

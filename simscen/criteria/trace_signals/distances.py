@@ -16,8 +16,8 @@ from simscen.core.geometry.polygon_separation import POINT, separation
 from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Samples
 from simscen.criteria.findings import MissingEvidence
-from simscen.criteria.trace_signals.ground_truth import check_samples
-from simscen.criteria.trace_signals.readers import goal_distance, true_poses
+from simscen.criteria.trace_signals.ground_truth import check_samples, reject_samples
+from simscen.criteria.trace_signals.readers import goal_distance, sample_and_hold_belief, true_poses
 from simscen.criteria.trace_signals.sampling import SignalQuery
 
 if TYPE_CHECKING:
@@ -64,13 +64,13 @@ def object_positions(trace: Trace, name: str) -> Array:
         and isinstance(y := event.data.get("y"), int | float)
     ]
     if name in trace.objects:  # its first sample is of the object that was spawned first
-        parts[:1] = [check_samples(trace.objects[name], f"the pose of {name}", trace)]
+        parts[:1] = [trace.objects[name]]
     if not parts:
         raise MissingEvidence(f"`{name}` never existed, or does not move")
     ticks = np.concatenate([part.ticks for part in parts])
     positions = np.concatenate([part.values[:, :2] for part in parts])
     order = np.argsort(ticks, kind="stable")  # the sample at the tick of an event precedes the event
-    return Samples(ticks[order], positions[order]).at(trace.truth.ticks)
+    return check_samples(Samples(ticks[order], positions[order]), f"the pose of {name}", trace).at(trace.truth.ticks)
 
 
 def is_present(trace: Trace, name: str) -> Array:
@@ -93,9 +93,7 @@ def distance_remaining(query: SignalQuery) -> Array:
     Before the first plan, return the true distance to the goal.
     """
     belief, clock = check_samples(query.trace.belief, "the belief", query.trace), query.trace.truth.ticks
-    if not len(belief):
-        raise MissingEvidence("no belief was recorded")
-    believed = belief.at(clock)[:, :2]
+    believed = sample_and_hold_belief(query.trace, belief, "belief")[:, :2]
     remaining = goal_distance(query)
     for first, last, points in _newest_plans(query.trace, clock):
         remaining[first:last] = _project_on_path(believed[first:last], points)[1]
@@ -123,6 +121,8 @@ def _newest_plans(trace: Trace, ticks: Ticks) -> list[tuple[int, int, Array]]:
     A tuple contains the index of the first sample, the index after the last sample, and the points (m, 2) of the plan.
     """
     plans = [plan for plan in trace.plans if len(plan.points)]
+    is_invalid = np.array([not np.isfinite(plan.points[:, :2]).all() for plan in plans], dtype=bool)
+    reject_samples(trace, np.array([plan.tick for plan in plans]), is_invalid, "the plan is not finite at")
     begins: list[int] = np.searchsorted(ticks, [plan.tick for plan in plans]).tolist()
     ends = [*begins, len(ticks)][1:]
     followed = [k for k, end in enumerate(ends) if begins[k] < end]

@@ -3,7 +3,8 @@
 A reader is a function that computes the values (n,) of a signal at the n samples of the truth.
 
 The value of a yes-or-no signal is 0 or 1. Readers raise MissingEvidence if the trace lacks the data of the signal,
-and InvalidTrace if the data are not finite. A belief is an estimated pose with its covariance.
+and InvalidTrace if the data are not finite. A belief is an estimated pose with its covariance. Signals of the belief
+are nan (unknown) up to BELIEF_TIMEOUT_S before the first belief; from then on, the first belief counts.
 """
 
 from __future__ import annotations
@@ -73,12 +74,12 @@ def jerk(query: SignalQuery) -> Array:
 
 def localization_error(query: SignalQuery) -> Array:
     """Return the distance in m between the estimated and the true position."""
-    return sample_and_hold(query.trace, pose_error(query.trace), "belief")[:, 0]
+    return sample_and_hold_belief(query.trace, pose_error(query.trace), "belief")[:, 0]
 
 
 def localization_yaw_error(query: SignalQuery) -> Array:
     """Return the angle in rad between the estimated and the true heading."""
-    return sample_and_hold(query.trace, pose_error(query.trace), "belief")[:, 1]
+    return sample_and_hold_belief(query.trace, pose_error(query.trace), "belief")[:, 1]
 
 
 def position_std(query: SignalQuery) -> Array:
@@ -96,7 +97,7 @@ def yaw_std(query: SignalQuery) -> Array:
 
 def nees(query: SignalQuery) -> Array:
     """Return the NEES (normalized estimation error squared) of the newest belief; inf if the covariance is singular."""
-    return sample_and_hold(query.trace, nees_samples(query.trace), "covariance")[:, 0]
+    return sample_and_hold_belief(query.trace, nees_samples(query.trace), "covariance")[:, 0]
 
 
 def belief_age(query: SignalQuery) -> Array:
@@ -176,7 +177,18 @@ def _covariance(trace: Trace) -> Array:
     belief = check_samples(trace.belief, "the belief", trace)
     if not len(belief) or belief.values.shape[1] < 9:
         raise MissingEvidence("no covariance of the belief was recorded")
-    return sample_and_hold(trace, belief, "belief")[:, 3:]
+    return sample_and_hold_belief(trace, belief, "belief")[:, 3:]
+
+
+def sample_and_hold_belief(trace: Trace, samples: Samples, what: str) -> Array:
+    """Return the newest values (n, k) of `samples`, which begin with the first belief; nan where they are unknown.
+
+    Raises MissingEvidence if `samples` are empty; `what` is the name of the data in the message.
+    """
+    values = sample_and_hold(trace, samples, what)
+    is_known = sample_ticks(trace) >= samples.ticks[0] - BELIEF_TIMEOUT_S * trace.tick_rate
+    known_values: Array = np.where(is_known[:, np.newaxis], values, np.nan)
+    return known_values
 
 
 def _newest_command(trace: Trace) -> Array:
@@ -238,4 +250,5 @@ def _current_goals(trace: Trace, case: Case) -> Array:
         raise MissingEvidence("there was no goal")
     if not poses:
         return np.array([case.goals[0].pose], dtype=np.float64)
-    return Samples(np.array(ticks, dtype=np.int64), np.array(poses, dtype=np.float64)).at(clock)
+    accepted = Samples(np.array(ticks, dtype=np.int64), np.array(poses, dtype=np.float64))
+    return check_samples(accepted, "the pose of the goal", trace).at(clock)

@@ -1,13 +1,17 @@
 """Tests of the localization criteria with few beliefs, as of AMCL, which publishes only while the robot moves."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from simscen.core.messages.navigation import Path
 from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import Status
 from simscen.criteria.localization import LocalizationConsistency, LocalizationError, RelocalizedWithin
+from simscen.criteria.temporal import Always, Eventually
+from simscen.criteria.trace_signals.catalog import read_signal
 from simscen.testing.synthetic_trace import TICK_RATE_HZ, synthetic_case, synthetic_trace
 
 CASE = synthetic_case({})
@@ -90,3 +94,45 @@ def test_consistency_is_undefined_without_beliefs_or_covariances(columns, belief
     (found,) = LocalizationConsistency().judge(trace_of(beliefs, columns=columns), CASE)
     assert found.status is Status.INCONCLUSIVE
     assert reason in found.measured
+
+
+BELIEF_SIGNALS = ("localization_error", "localization_yaw_error", "position_std", "yaw_std", "nees")
+
+
+@pytest.mark.parametrize("signal", BELIEF_SIGNALS)
+def test_signals_of_the_belief_are_unknown_until_one_second_before_the_first_belief(signal):
+    values = read_signal(signal, trace_of([(3.0, 0.1)], seconds=10), CASE, {})
+    assert np.isnan(values).sum() == 2 * 40
+    assert np.isfinite(values[2 * 40 :]).all()
+
+
+@pytest.mark.parametrize("signal", BELIEF_SIGNALS)
+def test_small_error_before_the_first_belief_does_not_pass(signal):
+    (found,) = Eventually(signal=signal, op="<=", value=2.0, within=5.0).judge(trace_of([(30, 0.0)]), CASE)
+    assert found.status is Status.INCONCLUSIVE
+    assert found.detail == (f"{signal} is unknown up to t = 28.98 s: there was no belief yet",)
+    assert found.measured.startswith("the run ended at t = 60.00 s")
+    (found,) = Eventually(signal=signal, op="<=", value=2.0, within=30.0).judge(trace_of([(30, 0.0)]), CASE)
+    assert found.status is Status.PASS
+
+
+@pytest.mark.parametrize(("op", "status"), [("<=", Status.INCONCLUSIVE), (">=", Status.FAIL)])
+def test_unknown_error_decides_neither_way(op, status):
+    (found,) = Always(signal="localization_error", op=op, value=0.5).judge(trace_of([(30, 0.0)]), CASE)
+    assert found.status is status
+
+
+def test_length_of_the_plan_is_unknown_without_a_belief():
+    trace = replace(trace_of([(3.0, 0.5)]), plans=(Path(np.array([[0.0, 0, 0], [2.0, 0, 0]]), TICK_RATE_HZ),))
+    values = read_signal("distance_remaining", trace, synthetic_case({"goals": [{"name": "g", "pose": [5, 0]}]}), {})
+    assert values[:40].tolist() == [5.0] * 40  # before the plan, the true distance from the goal
+    assert np.isnan(values[40:80]).all()
+    assert values[80:].tolist() == [1.5] * (len(values) - 80)
+
+
+@pytest.mark.parametrize("bound", ["max", "rmse"])
+def test_beliefs_at_rest_have_no_more_weight_than_beliefs_on_the_way(bound):
+    """For 50 s, there are 5 beliefs per second without an error. The last belief has an error of 1 m for 10 s."""
+    trace = trace_of([*((k / 5, 0.0) for k in range(250)), (50.0, 1.0)])
+    (found,) = LocalizationError(**{bound: 0.5}).judge(trace, CASE)
+    assert found.value == pytest.approx(1.0 if bound == "max" else math.sqrt(10 / 60), rel=2e-3)

@@ -139,7 +139,7 @@ def test_premise_with_an_undecided_future_may_be_tested(clearance: float, may_be
 def test_nan_signal_is_reported_with_its_first_time():
     lost = Path(np.full((2, 3), np.nan), 480)
     trace = replace(run([1.0] * 5, [0.0] * 5), plans=(lost,))
-    with pytest.raises(InvalidTrace, match=r"plan_deviation is not a number at t = 2.00 s"):
+    with pytest.raises(InvalidTrace, match=r"the plan is not finite at t = 2.00 s"):
         robustness(
             validated({"signal": "plan_deviation", "op": "<", "value": 1.0}),
             EvaluationContext(trace, CASE, run_ended=True),
