@@ -76,7 +76,7 @@ def violations(verdict: Verdict) -> tuple[Finding, ...]:
 def tightest_margin(verdicts: Sequence[Verdict]) -> str:
     """Return the smallest relative margin of a pass, e.g. "path_length +0.14 m, 1 % of its limit"; "" if there is none.
 
-    Values without a unit, and the distance, heading error, and waiting time at goals are left out.
+    Counts and other values without a unit, and the distance, heading error, and waiting time at goals are left out.
     """
     # Robots always stop near the limit of the distance from a goal.
     tightest = _tightest_finding(verdicts)
@@ -104,7 +104,9 @@ def run_margin(result: RunResult) -> float:
 def _tightest_finding(verdicts: Sequence[Verdict]) -> tuple[Verdict, Finding] | None:
     """Return the passed finding with the smallest relative margin, with its verdict; see `tightest_margin`."""
     findings = [(v, f) for v in verdicts for f in v.findings if f.status is Status.PASS and not _is_about_arrival(v, f)]
-    measured = [(v, f) for v, f in findings if f.unit and f.margin is not None and isfinite(f.margin)]
+    # A margin without value and unit is in multiples of the `scale` of a condition, and therefore relative.
+    has_size = [(v, f) for v, f in findings if f.unit or f.value is None]
+    measured = [(v, f) for v, f in has_size if f.margin is not None and isfinite(f.margin)]
     return min(measured, key=lambda pair: relative_margin(pair[1]), default=None)
 
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from simscen.core.records.verdict import Evidence, Finding, Status
 from simscen.criteria.base import Criterion
@@ -65,7 +68,8 @@ class TemporalCriterion(Criterion):
         if untested is not None:
             return [_untested_finding(untested, formula, with_hint=untested is result)]
         ended = f"the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"
-        return [undecided("", f"{ended} before `{formula}` was decided", formula)]
+        because = f"{ended} before `{formula}` was decided"
+        return [undecided("", because, formula, list(dict.fromkeys(_unknown_signals(trace, result))))]
 
     def _decisive_finding(self, trace: Trace, result: Robustness, bound: Bound, value: float) -> Finding:
         """Return the finding of a decided condition. `value` is its robustness: `bound` of `result` at the start."""
@@ -85,11 +89,20 @@ class TemporalCriterion(Criterion):
             limit=describe_limit(witness),
             margin=margin,
             unit=unit,
-            value=None if signal.is_boolean else witness.value,
+            value=None if signal.is_boolean or witness.comparison.scale is not None else witness.value,
             tick=tick,
             place=trace.place(tick),
             detail=(f"condition: {describe(self.condition)}", *notes),
         )
+
+
+def _unknown_signals(trace: Trace, result: Robustness) -> Iterator[str]:
+    """Yield a line for each comparison with a signal that is unknown at the beginning of the run."""
+    for one in result.comparisons():
+        unknown = np.flatnonzero(np.isnan(one.values))
+        if len(unknown):
+            until = trace.seconds(int(trace.truth.ticks[unknown[-1]]))
+            yield f"{describe_signal(one.comparison)} is unknown up to t = {until:.2f} s: there was no belief yet"
 
 
 def _untested_finding(response: ResponseRobustness, formula: str, with_hint: bool) -> Finding:

@@ -178,3 +178,12 @@ def test_margin_of_a_failed_run_ignores_infinite_margins() -> None:
     assert margins(Outcome.FAILED, replace(broken, margin=math.inf), broken) == pytest.approx(-0.25)
     assert margins(Outcome.FAILED, replace(broken, margin=-math.inf), broken) == pytest.approx(-0.25)
     assert margins(Outcome.FAILED, replace(broken, margin=0.1, value=0.5), broken) == pytest.approx(-0.25)
+
+
+def test_margin_in_multiples_of_a_scale_is_a_relative_margin() -> None:
+    """A `scale` of the conditions of temporal criteria makes margins of different quantities comparable."""
+    scaled = Finding(Status.PASS, "speed", "0.25 m/s", "≤ 0.50 m/s", 0.25)
+    count = Finding(Status.PASS, "collisions", "0 collisions", "≤ 0", 0.0, "", 0.0)
+    assert margins(Outcome.PASSED, scaled, count, measured(Status.PASS, 0.6, 0.4)) == pytest.approx(0.25)
+    failed = Finding(Status.FAIL, "speed", "0.75 m/s", "≤ 0.50 m/s", -0.25)
+    assert margins(Outcome.FAILED, failed) == pytest.approx(-0.25)
