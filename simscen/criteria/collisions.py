@@ -45,8 +45,8 @@ class Collisions(Spec, Criterion):
     Source: Arena's get_collisions, which also counts beginning contacts; ScenarioRunner's CollisionTest for
         `caused_by_robot`.
 
-    With `people`, inconclusive if the run had no people. With `max_impulse`, inconclusive if a contact had not ended
-    and no impulse exceeds the limit.
+    With `people`, inconclusive if the run had no people. With `max_impulse`, inconclusive if a contact had not ended or
+    its impulse was not recorded, and no known impulse exceeds the limit.
 
     Example: `collisions: {max: 0}`
     """
@@ -101,11 +101,11 @@ class Collisions(Spec, Criterion):
     def _judge_impulse(self, trace: Trace, contacts: list[_Contact]) -> Finding:
         assert self.max_impulse is not None
         what, limit = "collision impulse", f"≤ {self.max_impulse:.2f} N s"
-        unknown = next((contact for contact in contacts if contact.impulse is None), None)
-        if unknown is not None:
-            return undecided(what, f"the impulse of the contact with {unknown.name} was not recorded", limit)
-        hardest = max(contacts, key=_impulse, default=None)
+        hardest = max((contact for contact in contacts if contact.impulse is not None), key=_impulse, default=None)
         value = 0.0 if hardest is None else _impulse(hardest)
+        unknown = next((contact for contact in contacts if contact.impulse is None), None)
+        if unknown is not None and value <= self.max_impulse:
+            return undecided(what, f"the impulse of the contact with {unknown.name} was not recorded", limit)
         ongoing = next((contact for contact in contacts if contact.end is None), None)
         if ongoing is not None and value <= self.max_impulse:
             return undecided(what, f"the contact with {ongoing.name} had not ended", limit)
