@@ -85,7 +85,11 @@ class PersonalSpace(Spec, Criterion):
     while_driving: bool = False
     """Check only while the robot drives at more than 0.1 m/s, because people may approach a standing robot."""
 
-    evidence: ClassVar[frozenset[Evidence]] = POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT, Evidence.VELOCITY}
+    @property
+    def evidence(self) -> frozenset[Evidence]:
+        """Evidence in the log that the criterion needs."""
+        speed_needed = {Evidence.VELOCITY} if self.while_driving else set()
+        return POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT, *speed_needed}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return the finding for the smallest gap."""

@@ -44,7 +44,11 @@ TRUTH, ALIGNMENT, GOALS, BELIEF = Evidence.TRUTH, Evidence.ALIGNMENT, Evidence.N
         ({"localization_consistency": {"every": 5}}, {TRUTH, ALIGNMENT, BELIEF, Evidence.COVARIANCE}),
         ({"relocalized_within": {"time": 9}}, {TRUTH, ALIGNMENT, BELIEF}),
         ({"relocalized_within": {"time": 9, "after": "gust"}}, {TRUTH, ALIGNMENT, BELIEF, Evidence.DISTURBANCES}),
-        ({"personal_space": {}}, {TRUTH, ALIGNMENT, Evidence.OBJECTS, Evidence.FOOTPRINT, Evidence.VELOCITY}),
+        ({"personal_space": {}}, {TRUTH, ALIGNMENT, Evidence.OBJECTS, Evidence.FOOTPRINT}),
+        (
+            {"personal_space": {"while_driving": True}},
+            {TRUTH, ALIGNMENT, Evidence.OBJECTS, Evidence.FOOTPRINT, Evidence.VELOCITY},
+        ),
         ({"replans": {"max": 2}}, {Evidence.PLANNING}),
         ({"recoveries": {"max": 2}}, {Evidence.RECOVERIES}),
     ],
