@@ -13,7 +13,7 @@ from simscen.core.records.events import EventKind
 from simscen.core.records.verdict import Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, missed, undecided
-from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes
+from simscen.criteria.goal_outcomes import GoalOutcome, first_acceptance, goal_outcomes
 from simscen.criteria.timeline import has_ended
 from simscen.criteria.trace_signals.ground_truth import DrivenPath, drive
 from simscen.spec.base import Spec
@@ -57,12 +57,12 @@ class TimeToGoal(Spec, Criterion):
             return [self._judge_time(trace, f"goal {outcome.goal.name}", outcome.accepted, outcome) for outcome in own]
         if not outcomes:
             return [undecided("time_to_goal", "the scenario has no goals")]
-        start = next((outcome.accepted for outcome in outcomes if outcome.accepted is not None), None)
         required = [outcome for outcome in outcomes if outcome.must_be_reached]
         if not required:
             return [undecided("time_to_goal", "every goal was preempted or is expected to fail")]
         unreached = [outcome for outcome in required if outcome.reached is None]
-        return [self._judge_time(trace, "time_to_goal", start, unreached[0] if unreached else required[-1])]
+        decisive = unreached[0] if unreached else required[-1]
+        return [self._judge_time(trace, "time_to_goal", first_acceptance(outcomes), decisive)]
 
     def _judge_time(self, trace: Trace, what: str, start: int | None, outcome: GoalOutcome) -> Finding:
         """Return the finding for the time from the tick `start` until the goal was reached."""

@@ -103,6 +103,15 @@ def outcome_start(outcome: GoalOutcome) -> float:
     return math.inf if outcome.end is None else outcome.end.tick
 
 
+def first_acceptance(outcomes: Sequence[GoalOutcome]) -> int | None:
+    """Return the tick at which the robot accepted its first goal; None if the log does not contain this acceptance.
+
+    `outcomes` contains the outcomes of all goals in order. A goal that failed without an acceptance was rejected.
+    """
+    first = next((each for each in outcomes if each.accepted is not None or each.reached is not None), None)
+    return None if first is None else first.accepted
+
+
 def closest_approach(trace: Trace, outcome: GoalOutcome, outcomes: Sequence[GoalOutcome]) -> tuple[int, float]:
     """Return the tick at which the true position was nearest to a via pose, and the distance in m.
 

@@ -12,6 +12,7 @@ from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import ExpectedFailure, Verdict
 from simscen.criteria.timeline import has_ended
 from simscen.judge.finding_text import DISTURBANCE
+from simscen.judge.metrics.compute import NO_GOALS
 from simscen.judge.outcome import apply_expectation
 
 T = TypeVar("T")
@@ -27,8 +28,8 @@ def combine_robots(
     """Return the result of a run from the results and traces of its robots, by name of the robot.
 
     The run passes if all robots pass. Verdicts, metrics, and faults of a robot get the name `robot/name`. Events of the
-    world and verdicts on them are listed once. The metric `success` of the run is 1 if it is 1 for all robots.
-    `expected` is the expected failure of the run; None to expect success.
+    world and verdicts on them are listed once. The metric `success` of the run is 1 if it is 1 for all robots
+    with goals. `expected` is the expected failure of the run; None to expect success.
     """
     first = next(iter(results.values()))
     shared = {one.disturbance.name for one in first.disturbances if one.disturbance.kind == "event"}
@@ -53,8 +54,9 @@ def combine_robots(
         for name, result in results.items()
         if result.error is not None
     ]
-    successes = [result.metrics.get(SUCCESS) for result in results.values()]
-    success = None if None in successes else min(value for value in successes if value is not None)
+    with_goals = [result for result in results.values() if result.undefined.get(SUCCESS) != NO_GOALS]
+    successes = [result.metrics.get(SUCCESS) for result in with_goals]
+    success = min((value for value in successes if value is not None), default=None) if None not in successes else None
     return replace(
         first,
         outcome=outcome,

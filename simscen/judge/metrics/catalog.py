@@ -35,7 +35,10 @@ _ERROR_STATISTICS = {"rmse": "root mean square", "mean": "mean", "median": "medi
 
 METRICS: dict[str, Metric] = {
     "success": Metric(
-        "", "1 if every goal was truly reached and nothing was touched, otherwise 0.", "BARN, run.py", evidence=_SUCCESS
+        "",
+        "1 if every goal was truly reached and nothing was touched, otherwise 0; undefined without goals.",
+        "BARN, run.py",
+        evidence=_SUCCESS,
     ),
     "time_to_goal": Metric(
         "s", "Time from the acceptance of the first goal to the report that the last one is reached.", evidence=_GOALS
@@ -130,7 +133,7 @@ METRICS: dict[str, Metric] = {
     **{
         f"ape_trans_{name}": Metric(
             "m",
-            f"Absolute pose error, position: {text} distance between belief and truth, not aligned.",
+            f"Absolute pose error, position: {text} distance between belief and truth over time, not aligned.",
             "evo",
             evidence=_BELIEF,
         )
@@ -139,7 +142,10 @@ METRICS: dict[str, Metric] = {
     "ape_trans_final": Metric("m", "Final distance between belief and truth.", evidence=_BELIEF),
     **{
         f"ape_rot_{name}": Metric(
-            "rad", f"Absolute pose error, heading: {text} angle between belief and truth.", "evo", evidence=_BELIEF
+            "rad",
+            f"Absolute pose error, heading: {text} angle between belief and truth over time.",
+            "evo",
+            evidence=_BELIEF,
         )
         for name, text in _ERROR_STATISTICS.items()
     },

@@ -17,7 +17,7 @@ from simscen.core.records.verdict import COMPLETE_COVERAGE, Evidence, LogCoverag
 from simscen.criteria.base import AnyMeasure
 from simscen.criteria.efficiency import shortest_path_length
 from simscen.criteria.findings import InvalidTrace, MissingEvidence
-from simscen.criteria.goal_outcomes import goal_outcomes
+from simscen.criteria.goal_outcomes import first_acceptance, goal_outcomes
 from simscen.criteria.goals_reached import GoalsReached
 from simscen.criteria.trace_signals.catalog import read_signal
 from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, PERSONAL_SPACE_M, SOCIAL_SPACE_M, pedestrian_gap
@@ -40,6 +40,9 @@ PERSON_SPACES = {
     "social": (PERSONAL_SPACE_M, SOCIAL_SPACE_M),
 }
 """Hall's spaces around a person: smallest and largest distance in m."""
+
+NO_GOALS = "the robot has no goals"
+"""Reason why a robot without goals has no `success`."""
 
 _SHORTEST_PATH_METRICS = ("barn_score", "shortest_length", "path_length_ratio", "spl", "soft_spl")
 _NAVIGATION_METRICS = ("success", "path_length", "time_to_goal", *_SHORTEST_PATH_METRICS)
@@ -115,7 +118,11 @@ def barn_score(success: bool, seconds: float, reference_length: float) -> float:
 def _navigation_metrics(trace: Trace, case: Case, length: float) -> Values:
     shortest, unknown_reason = shortest_path_length(trace, case)
     success, seconds = _success(trace, case), _time_to_goal(trace, case)
-    found: Values = {"success": float(success), "path_length": length, "time_to_goal": seconds}
+    found: Values = {
+        "success": float(success) if goal_outcomes(trace, case) else NO_GOALS,
+        "path_length": length,
+        "time_to_goal": seconds,
+    }
     if unknown_reason:
         return {**found, **dict.fromkeys(_SHORTEST_PATH_METRICS, unknown_reason)}
     return {
@@ -136,11 +143,12 @@ def _success(trace: Trace, case: Case) -> bool:
 
 
 def _time_to_goal(trace: Trace, case: Case) -> float | str:
-    ends = [outcome.reached for outcome in goal_outcomes(trace, case) if outcome.must_be_reached]
-    starts = trace.of_kind(EventKind.GOAL_ACCEPTED)
-    if not starts or not ends or ends[-1] is None:
+    outcomes = goal_outcomes(trace, case)
+    ends = [outcome.reached for outcome in outcomes if outcome.must_be_reached]
+    if not ends or ends[-1] is None:
         return "the last goal was not reached"
-    return trace.seconds(ends[-1] - starts[0].tick)
+    start = first_acceptance(outcomes)
+    return "the acceptance of the first goal was not recorded" if start is None else trace.seconds(ends[-1] - start)
 
 
 def _barn_score(case: Case, success: bool, seconds: float | str, shortest: float) -> float | str:

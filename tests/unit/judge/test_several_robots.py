@@ -9,6 +9,7 @@ from simscen.core.records.run_result import Outcome, RunFailure, RunKey, RunResu
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import ExpectedFailure, Finding, Status, Verdict
 from simscen.judge.finding_text import DISTURBANCE
+from simscen.judge.metrics.compute import NO_GOALS
 from simscen.judge.several_robots import combine_robots
 from simscen.testing.synthetic_trace import synthetic_trace
 
@@ -81,6 +82,14 @@ def test_the_first_error_is_reported_with_its_robot() -> None:
 def test_all_robots_must_succeed(values: tuple[float | None, float | None], success: float | None) -> None:
     results = {name: result(metrics={"success": value}) for name, value in zip("ab", values, strict=True)}
     assert combine_robots(results, TRACES).metrics["success"] == success
+
+
+@pytest.mark.parametrize(("value", "success"), [(1.0, 1.0), (0.0, 0.0), (None, None)])
+def test_robot_without_goals_does_not_count_for_the_success(value: float | None, success: float | None) -> None:
+    idle = result(metrics={"success": None}, undefined={"success": NO_GOALS})
+    results = {"a": result(metrics={"success": value}), "b": idle}
+    assert combine_robots(results, TRACES).metrics["success"] == success
+    assert combine_robots({"b": idle}, TRACES).metrics["success"] is None
 
 
 def test_a_missing_event_of_the_world_is_reported_once_and_a_fault_for_its_robot() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from simscen.core.records.trace import Samples
 from simscen.criteria.trace_signals.sparc_ldlj import sparc
-from simscen.judge.metrics.compute import barn_score, compute_metrics
+from simscen.judge.metrics.compute import NO_GOALS, barn_score, compute_metrics
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 NAMES = "abc"
@@ -37,12 +37,32 @@ def test_time_to_goal_is_from_first_acceptance_to_last_arrival():
     assert measures([*EVENTS[:3], *EVENTS[4:]]).values["time_to_goal"] == 8.0
 
 
-@pytest.mark.parametrize("events", [[], EVENTS[:5], EVENTS[:2], [EVENTS[1], EVENTS[3], EVENTS[5]]])
-def test_time_to_goal_needs_an_acceptance_and_the_last_arrival(events):
+@pytest.mark.parametrize("events", [[], EVENTS[:5], EVENTS[:2]])
+def test_time_to_goal_needs_the_last_arrival(events):
     found = measures(events)
     assert found.values["time_to_goal"] is None
     assert found.undefined["time_to_goal"] == "the last goal was not reached"
     assert measures([*EVENTS], case={}).values["time_to_goal"] is None
+
+
+@pytest.mark.parametrize("events", [EVENTS[1::2], EVENTS[1:]])
+def test_time_to_goal_needs_the_first_acceptance(events):
+    """Logs of real robots can begin during a drive."""
+    found = measures(events)
+    assert found.values["time_to_goal"] is None
+    assert found.undefined["time_to_goal"] == "the acceptance of the first goal was not recorded"
+
+
+def test_time_to_goal_begins_after_a_rejected_goal():
+    rejected = [1, "goal.failed", "a", {"error_code": 206}]
+    found = measures([rejected, *EVENTS[2:]], case={**GOALS, "expected": {"a": "failed"}})
+    assert found.values["time_to_goal"] == 6.0
+
+
+def test_robot_without_goals_has_no_success():
+    found = measures(case={})
+    assert found.values["success"] is None
+    assert found.undefined["success"] == NO_GOALS
 
 
 def test_reaching_some_of_several_goals_is_no_success():
