@@ -32,8 +32,8 @@ class LidarSensor:
         self._tilted_mount = None if spec.mount.is_level else spec.mount.pose
         yaw = spec.mount.yaw if spec.mount.is_level else 0.0  # the ray fan of a tilted lidar is in the lidar frame
         self._fan = RayFan(self._first + yaw, self._increment, spec.beams)
-        angles = self._first + self._increment * np.arange(spec.beams)
-        self._directions = np.column_stack((np.cos(angles), np.sin(angles)))  # in the lidar frame
+        angles = self._first + yaw + self._increment * np.arange(spec.beams)
+        self._directions = np.column_stack((np.cos(angles), np.sin(angles)))  # in the frame of the ray fan
         # Beyond this distance, a range exceeds the maximum in spite of noise and rounding.
         self._cast_range = spec.max_range + MAX_NOISE_STDS * spec.noise + spec.resolution
         self._origin = spec.mount.x, spec.mount.y, spec.mount.z
@@ -44,15 +44,19 @@ class LidarSensor:
         pose, spec = self._view.base_pose(), self._spec
         if self._tilted_mount is not None:
             lidar = pose.compose(self._tilted_mount)
-            distances = np.asarray(self._rays.sweep(self._fan, lidar, self._cast_range), dtype=np.float64)
+            hits = np.asarray(self._rays.sweep(self._fan, lidar, self._cast_range), dtype=np.float64)
             to_floor = floor_distances(lidar.z, self._directions @ lidar.rotation()[2, :2])
-            ranges = self._to_ranges(np.minimum(distances, to_floor))
+            ranges = self._to_ranges(np.minimum(hits, to_floor))
             limits = self._first, self._increment, spec.min_range, spec.max_range
             return Scan(self.name, tick, ranges, *limits, self._mount, self._tilted_mount)
         px, py, pz, i, j, k, w = pose
         x, y, z = rotated((i, j, k, w), self._origin)
         origin = Pose3(px + x, py + y, pz + z, i, j, k, w)
-        ranges = self._to_ranges(self._rays.sweep(self._fan, origin, self._cast_range))
+        distances: Array | Float32Array = self._rays.sweep(self._fan, origin, self._cast_range)
+        slopes = 2 * (i * k - j * w), 2 * (j * k + i * w)  # z components of the x and y axes of the base
+        if math.hypot(*slopes) * self._cast_range > origin.z:  # the base is tilted so much that beams can hit the floor
+            distances = np.minimum(distances, floor_distances(origin.z, self._directions @ np.array(slopes)))
+        ranges = self._to_ranges(distances)
         return Scan(self.name, tick, ranges, self._first, self._increment, spec.min_range, spec.max_range, self._mount)
 
     def _to_ranges(self, distances: Array | Float32Array) -> Array:

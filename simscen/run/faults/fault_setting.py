@@ -78,8 +78,6 @@ class HypotheticalSensor:
         directions = flat @ pose.rotation().T
         origins = np.repeat([pose.position], len(directions), axis=0)
         hits = self._ray_caster_without(frozenset(without)).cast(origins, directions, 2 * scan.range_max)
-        if error is None and self._mount.is_level:
-            return hits
         return np.minimum(hits, floor_distances(pose.z, directions[:, 2]))
 
     def image(self, error: Pose3) -> Image:

@@ -1,4 +1,4 @@
-"""Lidars and IMUs with roll and pitch: raw readings in closed form, and readings converted to the plane of the base."""
+"""Lidars and IMUs with roll and pitch, on level and tilted robots: raw readings, and readings in the base frame."""
 
 import math
 from dataclasses import replace
@@ -51,6 +51,25 @@ def test_pitched_lidar_measures_the_floor_and_its_level_scan_does_not():
     assert np.isnan(level.ranges[ahead])
     assert np.isposinf(level.ranges[0])
     assert not len(level.points())
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1.0])
+def test_level_lidar_measures_the_floor_when_the_robot_is_tilted(yaw):
+    pitch = math.radians(3)
+    view = Puppet(Pose3.from_rpy(1.0, 2.0, 0.05, 0.0, pitch, 0.7))
+    measured = scan(view, Nothing(), {"yaw": yaw}, max_range=20.0)
+    # The lidar is 5 cm higher than on level ground, and the plane of its beams falls to the front of the robot.
+    height = 0.05 + HEIGHT * math.cos(pitch)
+    fall = math.sin(pitch) * np.cos(measured.angles() + yaw)
+    with np.errstate(divide="ignore"):
+        to_floor = np.where(fall > height / 20.0, height / fall, np.inf)
+    assert np.isfinite(to_floor).sum() > 50
+    assert measured.ranges == pytest.approx(to_floor, abs=0.001)
+
+
+def test_level_lidar_does_not_measure_the_floor_beyond_its_range():
+    view = Puppet(Pose3.from_rpy(0.0, 0.0, 0.0, 0.0, math.radians(1), 0.0))
+    assert np.isposinf(scan(view, Nothing(), {}, max_range=12.0).ranges).all()
 
 
 @pytest.mark.parametrize("mount", [{"pitch": 0.03}, {"roll": 0.05}, {"pitch": -0.04, "roll": 0.02, "yaw": 1.0}])
