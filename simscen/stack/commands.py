@@ -137,6 +137,7 @@ class CommandPipeline:
         allowed = self._monitor.limit_command(smoothed, odometry)
         if allowed is not smoothed:
             self._smoother.reset(allowed)
-        if command == STOP or not is_standstill(allowed):
+        is_slow_by_itself = allowed is smoothed and is_standstill(command)
+        if command == STOP or is_slow_by_itself or not is_standstill(allowed):
             self._last_free_tick = tick
         return allowed

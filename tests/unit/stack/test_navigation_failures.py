@@ -7,8 +7,9 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import ErrorCode, Path
-from simscen.model.controllers import ProgressChecker
+from simscen.model.controllers import ProgressChecker, RegulatedPurePursuit
 from simscen.model.costmaps import Costmap
+from simscen.model.guards import CollisionMonitor
 from simscen.model.planners import OmplPlanner
 from simscen.model.recovery import Recovery
 from simscen.model.stack import StackSpec
@@ -186,6 +187,19 @@ def test_obstacle_seen_only_by_the_collision_monitor_fails_soon() -> None:
     assert held
     assert held[0].tick / 240 - standing * 14 / len(d.track) < 4.0
     assert d.min_clearance > 0.0
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_a_controller_that_drives_slowly_is_not_held_by_the_collision_monitor(enabled: bool) -> None:
+    spec = StackSpec(
+        localizer=TRUTH,
+        controller=RegulatedPurePursuit(desired_linear_vel=0.015),
+        collision_monitor=CollisionMonitor(enabled=enabled),
+        progress_checker=ProgressChecker(required_movement_radius=0.1),
+    )
+    d = start(rooms(), Goal("near", Pose2(1.5, 1.0)), spec=spec).run(60)
+    assert d.result == "SUCCEEDED"
+    assert not d.events_of_kind("recovery.started")
 
 
 @pytest.mark.parametrize("seconds", [0.4, 0.8])
