@@ -17,6 +17,8 @@ from simscen.stack.protocols import Surroundings
 
 MIN_LOCAL_SIZE_M = 3.0
 """Smallest default size of the local costmap: the size in Nav2."""
+MAX_UPDATE_DELAY_S = 1.0
+"""Delay of an update after which windows and zones move with the robot without the update."""
 ZONE_TOLERANCE_M = 0.02
 """Shift of the map frame in the odom frame above which keepout zones are moved in the local costmap."""
 
@@ -49,7 +51,10 @@ class Costmaps:
         self._zones = Zones(surroundings.keepout, (), surroundings.masks)
         self._odom_from_map: Pose2 | None = None
         """Transform with which the keepout zones were put into the local costmap; None if the zones have changed."""
-        self._has_readings = False
+        slowest = max(self._global_schedule.period, self._local_schedule.period)
+        self._max_update_age = slowest + round(MAX_UPDATE_DELAY_S * tick_rate)
+        self._updated_at: int | None = None
+        """Tick of the latest update or, before it, of the first reading; None without any reading."""
         self._has_local_zones = False
         """Whether the local costmap has or had keepout zones."""
         self.next: float = 0
@@ -57,7 +62,8 @@ class Costmaps:
 
     def add_reading(self, reading: Scan | Image) -> None:
         """Store a reading for the next update of each costmap. It replaces earlier readings of the same sensor."""
-        self._has_readings = True
+        if self._updated_at is None:
+            self._updated_at = reading.tick
         for schedule in (self._global_schedule, self._local_schedule):
             schedule.readings[reading.sensor] = reading
 
@@ -73,19 +79,21 @@ class Costmaps:
     def update(self, tick: int, frames: Frames, odometry: OdometryHistory) -> None:
         """Update the costmaps that are due with the newest reading of each sensor.
 
-        Without any reading so far, for example of a robot without a lidar, only windows and zones move with the robot.
+        Without usable readings, for example of a robot without a lidar, only windows and zones move with the robot.
         """
-        if not self._has_readings:
+        if self._updated_at is None or tick - self._updated_at > self._max_update_age:
             self.global_costmap.follow(frames.pose)
             self._update_local_zones(frames)
             self.local_costmap.follow(frames.odometry)
         if tick >= self._global_schedule.next:
             for base, reading, _ in self._global_schedule.take(tick, frames, frames.pose, odometry):
                 self.global_costmap.update(base, reading)
+                self._updated_at = tick
         if tick >= self._local_schedule.next:
             for base, reading, frames_at_start in self._local_schedule.take(tick, frames, frames.odometry, odometry):
                 self._update_local_zones(frames_at_start)
                 self.local_costmap.update(base, reading)
+                self._updated_at = tick
         self.next = min(self._global_schedule.next, self._local_schedule.next)
 
     def clear(self) -> None:
@@ -143,8 +151,9 @@ class _UpdateSchedule:
 
         If an update takes longer than `period`, the next update starts at its end.
         """
-        self._period = max(period, latency)
-        self._updated_at = -self._period
+        self.period = max(period, latency)
+        """Minimum time between two starts of updates in ticks."""
+        self._updated_at = -self.period
         self._updates = LatencyQueue[_Update](latency)
         self.next: float = 0
         """The tick of the next start or end of an update."""
@@ -152,7 +161,7 @@ class _UpdateSchedule:
 
     def is_due(self, tick: int) -> bool:
         """Return whether an update may start at this tick."""
-        return tick - self._updated_at >= self._period
+        return tick - self._updated_at >= self.period
 
     def take(self, tick: int, frames: Frames, base: Pose2, odometry: OdometryHistory) -> list[_Update]:
         """Start an update if it is due and there are readings. Return the updates that are complete at this tick.
@@ -168,7 +177,7 @@ class _UpdateSchedule:
         complete: list[_Update] = []
         while tick >= self._updates.due:
             complete.append(self._updates.take())
-        self.next = min(self._updated_at + self._period, self._updates.due)
+        self.next = min(self._updated_at + self.period, self._updates.due)
         return complete
 
 

@@ -12,6 +12,7 @@ from simscen.core.messages.goals import Goal
 from simscen.core.messages.sensor_data import Odometry, Readings
 from simscen.core.records.trace import Decision
 from simscen.model.costmaps import Costmap, LocalCostmap
+from simscen.model.guards import CollisionMonitor
 from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec
 from simscen.stack.costmap.costmaps import Costmaps
@@ -154,3 +155,13 @@ def test_windows_and_zones_follow_a_robot_without_a_lidar() -> None:
     view = costmaps.local_costmap.view
     lethal = np.argwhere(view.costs == 254)
     assert lethal[:, 1].min() * view.resolution + view.origin[0] == pytest.approx(4.0, abs=0.06)
+
+
+@pytest.mark.parametrize("mapped", [True, False])
+def test_windows_follow_a_robot_whose_lidar_has_failed(mapped: bool) -> None:
+    grid = CORRIDOR.grid((-0.5, -0.5, 14.5, 2.1)) if mapped else None
+    spec = StackSpec(localizer=TRUTH, collision_monitor=CollisionMonitor(enabled=False))
+    d = drive(CORRIDOR, START, GOAL, grid=grid, spec=spec).run(2.0)
+    d.is_blind = True
+    assert d.run(60.0).result == "SUCCEEDED"
+    assert not d.events_of_kind("recovery.started")
