@@ -101,7 +101,7 @@ def crossed_cells(
         return in_front, nearest
     distance, free_length = distance.take(in_front), free_length.take(in_front)
     # Up to this distance, neighboring beams are so close that one of them crosses each cell.
-    dense_distance = half / abs(math.sin(step / 2))
+    dense_distance = half / math.sin(min(abs(step), math.pi) / 2)
     if (
         spec.raytrace_min_range == 0.0
         and (distance <= np.minimum(free_length - (half + RANGE_TOLERANCE_M), dense_distance)).all()

@@ -65,6 +65,17 @@ def test_only_valid_beams_clear_cells(ranges: float, inf_is_valid: bool, cleared
     assert (at(map_, 3.92, 3.0)[0] != 254) == cleared
 
 
+@pytest.mark.parametrize(("yaw", "cleared"), [(0.0, True), (0.5, False), (math.pi / 2, False), (math.pi, False)])
+def test_a_single_beam_clears_only_the_cells_that_it_crosses(yaw: float, cleared: bool) -> None:
+    world = Flatland().room(8, 6)
+    map_ = costmap(world)
+    world.discs.append((4.0, 3.0, 0.1))
+    map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
+    beam = Scan("lidar", 1, np.array([10.0]), 0.0, 2 * math.pi, 0.05, 12.0)  # of a lidar with `beams: 1`
+    map_.update(Pose2(2.0, 3.0, yaw), beam)
+    assert (at(map_, 3.92, 3.0)[0] != 254) == cleared
+
+
 def test_an_obstacle_beyond_the_ray_tracing_range_persists() -> None:
     world = Flatland().room(8, 6)
     map_ = costmap(world)
