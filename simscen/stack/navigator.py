@@ -101,10 +101,11 @@ class Navigator:
         self._goal_checker.reset()
         self._progress.reset()
 
-    def stop(self) -> None:
-        """Remove the goal, so that `step` requests a stop."""
-        self.goal, self.via = None, ()
+    def stop(self, tick: int) -> tuple[Event, ...]:
+        """Remove the goal, so that `step` requests a stop. Return the event that ends the active behavior, if any."""
+        behavior, self.goal, self.via = self._behavior, None, ()
         self._reset()
+        return () if behavior is None else (_recovery_ended(tick, behavior, {"outcome": "canceled"}),)
 
     def step(self, tick: int, frames: Frames, twist: Twist, is_held: bool = False, periods: int = 1) -> StepResult:
         """Run one step, `periods` controller periods after the previous one. `twist` is the measured velocity.
@@ -213,12 +214,16 @@ class Navigator:
             return StepResult(command)
         self._behavior = None
         self._progress.reset()
-        return StepResult(events=(Event(tick, EventKind.RECOVERY_ENDED, behavior.name, result),))
+        return StepResult(events=(_recovery_ended(tick, behavior, result),))
 
 
 def _above_thresholds(velocity: Twist, thresholds: Twist) -> Twist:
     """Return the velocity with 0 for each component up to its threshold (getThresholdedTwist of nav2_controller)."""
     return Twist(*(0.0 if abs(value) <= limit else value for value, limit in zip(velocity, thresholds, strict=True)))
+
+
+def _recovery_ended(tick: int, behavior: Behavior, result: dict[str, Value]) -> Event:
+    return Event(tick, EventKind.RECOVERY_ENDED, behavior.name, result)
 
 
 def _failure_data(failure: NavigationFailure) -> dict[str, Value]:

@@ -83,19 +83,19 @@ class ReferenceStack:
         self._process_readings(self._tick, ())
         self._localizer.reset(estimate)
         self._monitor.start(self._tick)
-        self._navigator.stop()
+        self._events += self._navigator.stop(self._tick)
         self._task.start(goals)
 
     def preempt(self, tick: int, goal: Goal) -> None:
         """Replace the current goal and the rest of its action."""
         self._events += self._task.preempt(tick, goal)
-        self._navigator.stop()
+        self._events += self._navigator.stop(tick)
 
     def cancel(self, tick: int) -> None:
         """Cancel the current goal and all after it."""
         self._events += self._task.cancel(tick)
         self._events += self._standstill.report_release(tick)
-        self._navigator.stop()
+        self._events += self._navigator.stop(tick)
         self._commands.stop(tick)
 
     def set_zones(self, tick: int, zones: Zones) -> None:
@@ -368,5 +368,5 @@ class ReferenceStack:
 
     def _stop(self, tick: int) -> None:
         self._events += self._standstill.report_release(tick)
-        self._navigator.stop()
+        self._events += self._navigator.stop(tick)
         self._commands.stop(tick)

@@ -20,7 +20,7 @@ class EventKind(str, Enum):
     PLAN_MADE = "plan.made"  # ""; reason (goal, blocked, …), length
     PLAN_FAILED = "plan.failed"  # ""; error_code, error_name, message
     RECOVERY_STARTED = "recovery.started"  # behavior: clear_costmap, spin, wait, …; error_code, error_name, message
-    RECOVERY_ENDED = "recovery.ended"  # behavior; outcome
+    RECOVERY_ENDED = "recovery.ended"  # behavior; outcome: succeeded, failed, or canceled
     ROBOT_HELD = "robot.held"  # what it waits for: collision_monitor, planner, controller; message: why
     ROBOT_RELEASED = "robot.released"  # what it waited for
     COLLISION_STARTED = "collision.started"  # what was hit; x, y, impulse (N s), speed (m/s), robot_caused, …

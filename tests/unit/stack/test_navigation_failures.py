@@ -38,6 +38,28 @@ def test_recoveries_alternate_and_end_after_the_retries() -> None:
     assert d.result == "FAILED"
 
 
+@pytest.mark.parametrize("how", ["preempt", "cancel", "timeout"])
+def test_a_recovery_ends_with_its_goal(how: str) -> None:
+    """While `wait` runs. Otherwise, the signal `recovery_active` would be true until the end of the run."""
+    spec = StackSpec(localizer=TRUTH, recovery=Recovery(behaviors=["wait"], wait_duration=20.0))
+    goal = Goal("far", Pose2(9.0, 1.0), timeout=20.0 if how == "timeout" else 90.0)
+    d = start(rooms(DOOR), goal, Goal("near", Pose2(2.0, 1.0)), grid=rooms(), spec=spec, stop_on_failure=False)
+    while not d.events_of_kind("recovery.started"):
+        d.run(0.5)
+    assert [e.name for e in d.events_of_kind("recovery.started")] == ["wait"]
+    assert not d.events_of_kind("recovery.ended")
+    tick = d.tick
+    if how == "preempt":
+        d.stack.preempt(tick, Goal("other", Pose2(1.0, 2.0)))
+    if how == "cancel":
+        d.stack.cancel(tick)
+    d.run(60)
+    (ended,) = d.events_of_kind("recovery.ended")
+    assert (ended.name, ended.data) == ("wait", {"outcome": "canceled"})
+    assert ended.tick == (d.events_of_kind("goal.failed")[0].tick if how == "timeout" else tick)
+    assert d.result == {"preempt": "SUCCEEDED", "cancel": "CANCELED", "timeout": "FAILED"}[how]
+
+
 @pytest.mark.parametrize(
     ("goal", "code"), [(Pose2(30.0, 1.0), "GOAL_OUTSIDE_MAP"), (Pose2(4.95, 1.0), "GOAL_OCCUPIED")]
 )
