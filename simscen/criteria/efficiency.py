@@ -99,9 +99,9 @@ class PathLength(Spec, Criterion):
     Source: HuNavSim and bench-mr for the length; SEAN's "path efficiency" for the ratio. SPL (Anderson 2018) is the
         inverse of the ratio, averaged over many runs.
 
-    The ratio is inconclusive if the shortest path is unknown or has no length: an event sends a goal, several goals
-    have one name, or no path is known. It is also inconclusive if a goal was not reached, unless the path is already
-    too long.
+    The ratio is inconclusive if the shortest path is unknown or has no length: an event sends a goal or moves the robot
+    (`kidnap`), several goals have one name, or no path is known. It is also inconclusive if a goal was not reached,
+    unless the path is already too long.
 
     Example: `path_length: {max_ratio: 1.4}`
     """
@@ -153,6 +153,8 @@ def shortest_path_length(trace: Trace, case: Case) -> tuple[float, str]:
     length = sum(case.shortest.get(name, math.nan) for name in names)
     sent = trace.of_kind(EventKind.GOAL_ACCEPTED)
     sent_by_events = sorted({event.name for event in sent} & {goal.name for goal in case.sent})
+    if trace.of_kind(EventKind.ROBOT_PLACED):
+        return math.nan, "an event moved the robot to another place"
     if sent_by_events:
         return math.nan, f"{', '.join(sent_by_events)} was sent by an event, from a position not known in advance"
     if repeated:
