@@ -89,7 +89,9 @@ def _margins(result: RunResult) -> dict[str, tuple[float, str]]:
     """Return the smallest margin of each criterion and its unit, by verdict ID."""
     found: dict[str, tuple[float, str]] = {}
     for verdict in result.verdicts:
-        margins = [(one.margin, one.unit) for one in verdict.findings if one.margin is not None]
+        margins = [
+            (one.margin, one.unit) for one in verdict.findings if one.margin is not None and math.isfinite(one.margin)
+        ]
         if margins:
             found[verdict.id] = min(margins)
     return found

@@ -1,5 +1,6 @@
 """Tests of the evaluation of studies, against scipy and counting by hand."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -97,7 +98,7 @@ def test_the_worst_margin_of_each_criterion_is_the_smallest_of_all_runs_and_find
     study = evaluate_study(
         plan_of([]),
         [
-            run(1, margins={"speed": [0.5, 0.2], "clearance": [0.9], "collisions": [None]}),
+            run(1, margins={"speed": [0.5, 0.2], "clearance": [0.9, -math.inf], "collisions": [None, math.inf]}),
             run(2, margins={"speed": [0.3], "clearance": [0.4, None]}),
             run(3, margins={"speed": [0.2], "clearance": [0.4]}),
         ],
