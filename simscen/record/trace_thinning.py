@@ -1,6 +1,7 @@
 """Selection of the samples of a run that the log and the Trace contain."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 from simscen.core.geometry import Pose3
 from simscen.core.geometry.kinematics import Twist
@@ -17,17 +18,20 @@ STANDSTILL_RATE_HZ = 1
 class Thinning:
     """Selects the samples to keep. `rate` is the number of ticks per second.
 
+    `sensors` are the class names of readings ("Odometry", …) by sensor name. The readings of the first odometry sensor
+    are kept; if `sensors` has none, those of the sensor that delivers first.
+
     Changed commands and changed poses of objects are always kept. Repeated calls for the same tick return the same
     result.
     """
 
-    def __init__(self, rate: int) -> None:
+    def __init__(self, rate: int, sensors: Mapping[str, str] = MappingProxyType({})) -> None:
         self._command_period = max(1, rate // COMMAND_RATE_HZ)
         self._standstill_period = max(1, rate // STANDSTILL_RATE_HZ)
         self._command: Twist | None = None
         self._command_kept_tick = 0
         self._command_checked_tick = -1
-        self._odometry: str | None = None
+        self._odometry = next((name for name, kind in sensors.items() if kind == Odometry.__name__), None)
         self._kept_poses: dict[str, tuple[int, Pose3]] = {}
         self._previous_poses: Mapping[str, Pose3] | None = None
         """Poses of the previous sample. If the next sample is the same Python object, nothing has moved."""
@@ -46,7 +50,7 @@ class Thinning:
         return self._command_kept_tick == tick
 
     def keeps_odometry(self, odometry: Odometry) -> bool:
-        """Return whether to keep a reading: only readings of the first odometry sensor."""
+        """Return whether to keep a reading."""
         if self._odometry is None:
             self._odometry = odometry.sensor
         return odometry.sensor == self._odometry

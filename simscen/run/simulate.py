@@ -16,12 +16,14 @@ from simscen.judge.several_robots import combine_robots
 from simscen.record.moment_buffer import MOMENT_DELAY_S, MomentBuffer, MomentSink
 from simscen.record.recorder import Recorder
 from simscen.record.trace_builder import TraceBuilder
+from simscen.record.trace_thinning import Thinning
 from simscen.run.assembly import assemble
 from simscen.run.external.stack import ExternalStack
 from simscen.run.faults.map_faults import apply_map_faults
 from simscen.run.lockstep import RunSetup, run_lockstep
 from simscen.run.log_header import log_header
 from simscen.run.preparation import PreparedScenario
+from simscen.run.robot_interface import sensor_kinds
 from simscen.spec.registry import RegisteredType
 
 AttachLogs = Callable[[RunSetup, Sequence[MomentSink]], Sequence[MomentSink]]
@@ -65,8 +67,12 @@ def _run_and_judge(
         # Plug-ins could modify an array after they returned it, so logging must not be delayed.
         delay, robot_logs = 0 if prepared.plugins else clock.ticks(MOMENT_DELAY_S), recorder.robots if recorder else {}
         backlog = cleanup.enter_context(MomentBuffer(delay, next(iter(robot_logs.values()), None)))
-        thinnings = {name: one.thinning for name, one in robot_logs.items()}
-        builders = {name: TraceBuilder(clock, thinnings.get(name)) for name in prepared.by_robot}
+        builders = {
+            name: TraceBuilder(
+                clock, robot_logs[name].thinning if recorder else Thinning(clock.rate, sensor_kinds(part))
+            )
+            for name, part in prepared.by_robot.items()
+        }
         setup = assemble(prepared, seed, stack_log)
         cleanup.callback(setup.simulation.close)
         agents = dict(zip(prepared.by_robot, setup.robots, strict=True))

@@ -65,7 +65,7 @@ class RobotPublisher:
         publishes_clock: bool,
     ) -> None:
         self._time, frames = time, RobotFrames(robot)
-        self.thinning = thinning = Thinning(time.rate)
+        self.thinning = thinning = Thinning(time.rate, header.sensors)
         """Selects the samples to publish. A TraceBuilder of the same robot can use it as well."""
         self.flush_if_due = out.flush_if_due
         if header.map is not None:

@@ -41,7 +41,7 @@ class StepPublisher:
         self._requested_sensors: set[str] = set()
         self._latched: list[tuple[Topic, bytes]] = []
         self._time = Clock(tick_rate)
-        self._sensors = SensorPublisher(self, self._time, Thinning(tick_rate), mounts, sensors, RobotFrames())
+        self._sensors = SensorPublisher(self, self._time, Thinning(tick_rate, sensors), mounts, sensors, RobotFrames())
         self.sensor_topics = self._sensors.sensor_topics
         """Pairs of a sensor name and a topic with readings of that sensor."""
 

@@ -1,15 +1,21 @@
 """Tests of the trace builder."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
-from moments import CLOCK, moments
+from moments import CLOCK, moments, sample_header
 
-from simscen.core.geometry import Pose3, wrap_array
+from simscen.core.geometry import Pose2, Pose3, wrap_array
 from simscen.core.geometry.kinematics import STOP
 from simscen.core.messages.sensor_data import Odometry, Scan
 from simscen.core.records.events import Event
 from simscen.core.records.trace import Decision, Moment, Trace, Truth
+from simscen.record.log_reader import read_log
+from simscen.record.recorder import Recorder
 from simscen.record.trace_builder import TraceBuilder
+from simscen.record.trace_difference import first_difference
 
 RUN = list(moments(2.0))
 
@@ -90,3 +96,25 @@ def test_run_aborted_at_the_start_has_an_empty_trace() -> None:
     assert trace.truth.values.shape == (0, 3)
     assert trace.belief.values.shape == (0, 9)
     assert len(trace.scans) == len(trace.events) == trace.end == 0
+
+
+def test_odometry_is_from_the_first_sensor_of_the_robot_also_if_it_delivers_later(tmp_path: Path) -> None:
+    """As in the log, where the first sensor has the topic /odom."""
+    header = replace(sample_header(), sensors={"slow": "Odometry", "fast": "Odometry"})
+    readings = [("fast", 0), ("fast", 6), ("slow", 6), ("fast", 12), ("slow", 12)]
+    decision = Decision(STOP)
+    with Recorder(tmp_path / "run.mcap", CLOCK, header) as recorder:
+        builder = TraceBuilder(CLOCK, recorder.robots[""].thinning)
+        for tick in (0, 6, 12):
+            given = tuple(
+                Odometry(name, tick, Pose2(1.0 if name == "slow" else 2.0, 0.0), STOP)
+                for name, at in readings
+                if at == tick
+            )
+            moment = Moment(tick, None, given, decision)
+            recorder.append(moment)
+            builder.append(moment)
+        recorder.close(12)
+    trace = builder.finish(12)
+    assert (trace.odometry.ticks.tolist(), trace.odometry.values[:, 0].tolist()) == ([6, 12], [1.0, 1.0])
+    assert first_difference(trace, read_log(tmp_path / "run.mcap").trace) is None
