@@ -63,7 +63,7 @@ class LogContents:
         match record:
             case records.Message():
                 self._add_message(record)
-            case records.Metadata(name="simscen"):
+            case records.Metadata(name=log_header.RUN_RECORD):
                 self._set_metadata(record.metadata)
             case records.Metadata(name=log_header.END_RECORD):
                 if self.end is not None:

@@ -18,6 +18,8 @@ from simscen.core.records.run_result import RunKey
 
 FORMAT_VERSION = "1"
 """Version of the log format. Logs of another version are rejected."""
+RUN_RECORD = "simscen"
+"""Name of the metadata record at the start of a log with the description of the run."""
 STACK_RECORD = "simscen.stack"
 """Name of the metadata record at the end of the log with facts about the external stacks."""
 _FACT_PREFIX = "fact."

@@ -8,6 +8,7 @@ from mcap import records
 
 from simscen.record.log_contents import NotSimscenLog
 from simscen.record.log_file import write_error
+from simscen.record.log_header import RUN_RECORD
 from simscen.record.log_reader import unreadable_log_as_invalid_input
 from simscen.record.mcap_reader import RecordReader, is_mcap, open_log
 from simscen.record.mcap_writer import MAGIC, Channel, McapWriter
@@ -17,8 +18,8 @@ from simscen.record.topics import MessageType
 def recover(path: Path) -> bool:
     """Rewrite a log with an index, and return True. Return False if the log already has an index.
 
-    Raises InvalidInput if the file cannot be read or is not MCAP. Raises RunError of kind "output" if the new file
-    cannot be written.
+    Raises InvalidInput if the file cannot be read or is not a log of simscen. Raises RunError of kind "output" if the
+    new file cannot be written.
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     with unreadable_log_as_invalid_input(path):
@@ -50,8 +51,9 @@ def _ends_with_magic(stream: IO[bytes]) -> bool:
 
 
 def _copy(stream: IO[bytes], file: IO[bytes]) -> None:
-    """Write all complete records of `stream` to `file`, followed by an index."""
+    """Write all complete records of a log of simscen to `file`, followed by an index."""
     writer: McapWriter | None = None
+    is_simscen_log = False
     types: dict[int, MessageType] = {}
     channels: dict[int, Channel] = {}
     for record in RecordReader(stream):
@@ -66,11 +68,14 @@ def _copy(stream: IO[bytes], file: IO[bytes]) -> None:
             case records.Channel():
                 channels[record.id] = writer.channel(record.topic, types[record.schema_id], record.metadata)
             case records.Message():
+                if not is_simscen_log:
+                    raise NotSimscenLog("another program recorded it; recover it with `mcap recover`")
                 channels[record.channel_id].write(record.log_time, record.data)
             case records.Attachment():
                 writer.add_attachment(record.name, record.media_type, record.data)
             case records.Metadata():
                 writer.add_metadata(record.name, record.metadata)
+                is_simscen_log |= record.name == RUN_RECORD
             case _:
                 pass  # indexes are written again
     if writer is None:

@@ -29,7 +29,7 @@ class Recorder:
         sink = self._file if self._file is not None else target
         assert not isinstance(sink, str | Path)
         self._writer = McapWriter(sink, profile="ros2", library="simscen")
-        self._writer.add_metadata("simscen", log_header.run_metadata(header, clock))
+        self._writer.add_metadata(log_header.RUN_RECORD, log_header.run_metadata(header, clock))
         for name, data in log_header.attachments(header).items():
             self._writer.add_attachment(name, log_header.media_type(name), data)
         headers, scenery = header.robots or {"": header}, scenery_from_header(header)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from mcap import records
 
 from simscen.record.foreign.bag_metadata import read_bag_metadata
-from simscen.record.log_header import ROBOTS_KEY
+from simscen.record.log_header import ROBOTS_KEY, RUN_RECORD
 from simscen.record.log_reader import invalid_log, unreadable_log_as_invalid_input
 from simscen.record.mcap_reader import RecordReader, is_mcap, open_log
 from simscen.record.messages.decode import InvalidOrientation, MessageReader, decode_checked
@@ -155,7 +155,7 @@ def _run_metadata(path: Path) -> dict[str, str] | None:
     """Return the metadata record of simscen before the first message; None if it is missing."""
     with open_log(path) as stream:
         for record in RecordReader(stream):
-            if isinstance(record, records.Metadata) and record.name == "simscen":
+            if isinstance(record, records.Metadata) and record.name == RUN_RECORD:
                 return dict(record.metadata)
             if isinstance(record, records.Message):
                 break

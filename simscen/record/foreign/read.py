@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -26,6 +27,7 @@ from simscen.record.foreign.timebase import Timebase
 from simscen.record.foreign.trace_reader import ForeignTraceReader
 from simscen.record.foreign.tracks import transform_tree
 from simscen.record.foreign.transforms import is_upside_down
+from simscen.record.messages.decode import InvalidOrientation
 from simscen.record.sensor_messages import SensorMessages
 
 
@@ -97,10 +99,14 @@ class SensorMessageCollector:
         self._messages: list[RawMessage] = []
 
     def collect(self, messages: Iterable[RawMessage]) -> Iterator[RawMessage]:
-        """Yield all messages, and collect the sensor messages. Raises ValueError for an invalid sensor message."""
+        """Yield all messages, and collect the sensor messages. Raises ValueError for an invalid sensor message.
+
+        Plans with an invalid orientation are ignored.
+        """
         for message in messages:
             if message.encoding == "cdr":
-                self._add(message)
+                with suppress(InvalidOrientation):
+                    self._add(message)
             yield message
 
     def sensors(self, time: Timebase, decoded: DecodedMessages) -> SensorMessages:

@@ -29,7 +29,7 @@ def read_csv_rows(path: Path) -> LocalizationRows:
     mount:        x, y, yaw of the lidar on the base, for the scans that follow
     """
     rows, mount = LocalizationRows(hint="see `simscen localize --help` for its columns"), Pose2(0.0, 0.0)
-    with path.open(encoding="utf-8", newline="") as lines:
+    with path.open(encoding="utf-8-sig", newline="") as lines:
         reader = csv.reader(lines)
         try:
             for number, row in enumerate(reader, 1):
@@ -78,7 +78,7 @@ def read_carmen_rows(path: Path) -> LocalizationRows:
     contain reference poses. Other lines are ignored.
     """
     rows = LocalizationRows(hint="its lines must start with ODOM, FLASER or ROBOTLASER1")
-    with path.open(encoding="utf-8", errors="strict") as lines:
+    with path.open(encoding="utf-8-sig") as lines:
         for number, line in enumerate(lines, 1):
             words = line.split()
             if words and words[0] in _LINE_PARSERS:

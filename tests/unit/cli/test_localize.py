@@ -89,6 +89,8 @@ def test_log_without_reference_needs_a_start(simscen, tmp_path: Path) -> None:
         ("bad.csv", "odom,0,1,2\n", "line 1: expected 3 numbers"),
         ("bad.csv", "odometry,0,1,2,3\n", "unknown kind of row"),
         ("bad.csv", "odom,0,1,2,3,,\n", "it has no scans"),
+        ("bad.csv", "\ufeffodom,0,1,2,3\r\n", "it has no scans"),
+        ("bad.log", "\ufeffODOM 1 2 3 0 0 0 0 a 0\r\n", "it has no scans"),
         ("bad.csv", "scan,0,-1,0.1,0.1,9,1.0,,2.0\n", "line 1: could not convert string to float: ''"),
         ("bad.log", "FLASER 3 1.0 2.0\n", "line 1 is not a FLASER line"),
         ("bad.log", "ODOM 1 2 nan 0 0 0 1 host 1\n", "invalid coordinates 1, 2, nan"),

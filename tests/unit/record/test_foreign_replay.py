@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from foreign_logs import BEGIN, Message, T, drive, header, link, write_bag, write_mcap
+from foreign_logs import BEGIN, Message, T, drive, header, link, stamped_pose, write_bag, write_mcap
 
 from simscen.cli.main import main
 from simscen.cli.session.judging import LogJudge
@@ -64,6 +64,18 @@ def test_scans_map_and_lidar_mounts_are_read(tmp_path: Path, write: Callable[...
     (messages,) = read.sensors.scans.values()
     assert [tick for tick, _ in messages] == sorted(tick for tick, _ in messages) and len(messages) == 5
     assert read.sensors.mounts["laser"].x == pytest.approx(0.2)
+
+
+def test_local_plans_with_an_invalid_orientation_are_ignored(tmp_path: Path) -> None:
+    plans = []
+    for number, w in enumerate((1.0, 0.0)):
+        pose = stamped_pose(BEGIN, "map", 1.0)
+        pose.pose.orientation = T["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=w)
+        path = T["nav_msgs/msg/Path"](header=header(BEGIN, "map"), poses=[pose])
+        plans.append(Message("/local_plan", BEGIN + number, path))
+    write_mcap(tmp_path / "log.mcap", [*plans, *drive(2.0)])
+    read = read_foreign_log(tmp_path / "log.mcap", ForeignLogOptions("/mocap"), with_sensors=True)
+    assert len(read.sensors.local_plans) == 1
 
 
 def test_scan_of_a_lidar_that_is_upside_down_is_mirrored(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ import signal
 from pathlib import Path
 
 import pytest
+from foreign_logs import UNINDEXED, drive, write_mcap
 from mcap.reader import make_reader
 from moments import CLOCK, moments, sample_header
 
@@ -91,6 +92,17 @@ def test_aborted_run_leaves_a_readable_log(tmp_path: Path) -> None:
     log = read_log(partial)
     assert not log.complete
     assert log.trace.end == CLOCK.ticks(1.0)
+
+
+def test_truncated_log_of_another_program_is_unchanged(tmp_path: Path) -> None:
+    """Its encodings, publish times, and sequence numbers would be lost."""
+    file = write_mcap(tmp_path / "a.mcap", drive(), encoding="json", **UNINDEXED)
+    file.write_bytes(file.read_bytes()[: int(0.9 * file.stat().st_size)])
+    before = file.read_bytes()
+    with pytest.raises(InvalidInput, match="another program recorded it"):
+        recover(file)
+    assert file.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [file]
 
 
 @pytest.mark.parametrize("content", [b"", b"no log", b"\x89MCAP0\r\n", b"\x89MCAP0\r\n" + bytes(100)])
