@@ -9,8 +9,8 @@ import numpy as np
 
 from simscen.core.geometry import Pose2
 from simscen.reconstruction.compared_scans import compare_scans
+from simscen.reconstruction.drive.gaps import pose_gaps, recording_gaps, scans_with_pose
 from simscen.reconstruction.drive.motion_steps import motion_steps
-from simscen.reconstruction.drive.pose_gaps import pose_gaps, scans_with_pose
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.faults.commands import command_faults
 from simscen.reconstruction.faults.false_returns import false_return_faults, glass_fault
@@ -64,12 +64,12 @@ def run_estimators(
     `is_map_built` states that the walls of `world` were built from the scans of this drive. `other_robots` are the
     other robots in the log, which become objects of the scenario. Their scan hits are not reported as further objects.
     """
-    unknowns = [NEVER_ESTIMATED, *_unknown_poses(drive)]
+    unknowns = [NEVER_ESTIMATED, *_unknown_times(drive)]
     is_calibrated = drive.has_true_poses and not is_map_built
     faults, objects = _faults_and_objects_of_scans(drive, world, robot, other_robots, unknowns, is_calibrated)
-    kidnaps = list(_kidnaps(drive))
-    faults += stream_faults("odom", drive.odometry.times, drive.odometry.arrivals, drive.duration)
-    faults += stream_faults("imu", drive.turn_rates.times, drive.turn_rates.arrivals, drive.duration)
+    kidnaps, gaps = list(_kidnaps(drive)), recording_gaps(drive)
+    for target, signal in (("odom", drive.odometry), ("imu", drive.turn_rates)):
+        faults += stream_faults(target, signal.times, signal.arrivals, drive.duration, gaps)
     if drive.has_true_poses:
         faults += odometry_faults(motion_steps(drive), robot.wheel_separation, robot.skids)
         if not kidnaps:
@@ -119,7 +119,7 @@ def _faults_and_objects_of_scans(
     if scans is None or len(scans) < 3:
         unknowns.append("objects that are not on the map, and faults of the lidar, because the log has no scans")
         return [], [*other_robots]
-    faults = [*stream_faults("lidar", scans.times, scans.arrivals, drive.duration)]
+    faults = [*stream_faults("lidar", scans.times, scans.arrivals, drive.duration, recording_gaps(drive))]
     faults += stuck_scans(scans, drive.duration)
     scans = scans_with_pose(drive, scans)
     if len(scans) < 3:
@@ -152,8 +152,10 @@ def _faults_and_objects_of_scans(
     return faults, fit_pedestrians(objects, PedestrianTrial(drive, PedestrianMap(world.built), robot.radius))
 
 
-def _unknown_poses(drive: RecordedDrive) -> Iterator[str]:
-    """Yield a phrase for each gap in the poses."""
+def _unknown_times(drive: RecordedDrive) -> Iterator[str]:
+    """Yield a phrase for each gap in the recording and in the poses."""
+    for begin, end in recording_gaps(drive):
+        yield f"what happened from t = {begin:.2f} s to {end:.2f} s, when no message was recorded"
     for begin, end in pose_gaps(drive):
         yield f"where the robot was from t = {begin:.2f} s to {end:.2f} s, so that scans of this time are not used"
 

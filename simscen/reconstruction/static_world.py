@@ -11,8 +11,8 @@ from simscen.core.environment.occupancy_grid import FREE, OCCUPIED, UNKNOWN, Occ
 from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Array, Pose2
+from simscen.reconstruction.drive.gaps import scans_with_pose
 from simscen.reconstruction.drive.motion_steps import MAX_STEP_M, STEP_S
-from simscen.reconstruction.drive.pose_gaps import scans_with_pose
 from simscen.reconstruction.drive.recorded_drive import (
     Indices,
     Mask,

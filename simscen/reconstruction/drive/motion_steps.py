@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Array, wrap_array
-from simscen.reconstruction.drive.pose_gaps import pose_is_known
+from simscen.reconstruction.drive.gaps import pose_is_known
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, TimedValues
 
 STEP_S = 0.5

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from simscen.core.geometry import Array, Pose2, wrap, wrap_array
-from simscen.reconstruction.drive.pose_gaps import belief_with_pose
+from simscen.reconstruction.drive.gaps import belief_with_pose, recording_gaps, seconds_in_gaps
 from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive
 from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
@@ -109,9 +109,10 @@ def _outages(drive: RecordedDrive) -> Iterator[FoundFault]:
         return
     times = np.append(drive.belief.times, drive.odometry.times[-1])
     limit = max(MIN_OUTAGE_S, MIN_OUTAGE_PERIODS * drive.belief.period)
+    silent = np.diff(times) - seconds_in_gaps(recording_gaps(drive), times[:-1], times[1:])
     gaps = [
         (index, float(times[index]), float(times[index + 1]))
-        for index in np.flatnonzero(np.diff(times) > limit).tolist()
+        for index in np.flatnonzero(silent > limit).tolist()
         if _distance(drive, float(times[index]), float(times[index + 1])) > MIN_DRIVEN_M
     ]
     for index, begin, end in gaps:

@@ -1,6 +1,7 @@
 """Finds outages, lost messages, delays, and low rates in the messages of a sensor, and repeated scans of a lidar.
 
-In all functions, `target` is the name of the sensor, and `end` is the end of the drive in s.
+In all functions, `target` is the name of the sensor, `end` is the end of the drive in s, and `gaps` are the times at
+which the recorder lost all messages.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from simscen.core.geometry import Array
+from simscen.reconstruction.drive.gaps import Gaps, seconds_in_gaps
 from simscen.reconstruction.drive.recorded_drive import Mask, Scans, usual_period
 from simscen.reconstruction.reasons import FoundFault, Reason, windows
 
@@ -34,7 +36,7 @@ MIN_EQUAL_BEAMS = 20
 """Minimum number of beams with a return in both of two equal scans."""
 
 
-def stream_faults(target: str, times: Array, arrivals: Array, end: float) -> Iterator[FoundFault]:
+def stream_faults(target: str, times: Array, arrivals: Array, end: float, gaps: Gaps = ()) -> Iterator[FoundFault]:
     """Yield the faults of a sensor whose messages were measured at `times` (n,) and logged at `arrivals` (n,), in s."""
     if len(times) < 3:
         return
@@ -42,13 +44,13 @@ def stream_faults(target: str, times: Array, arrivals: Array, end: float) -> Ite
     if period <= 0.0:
         return
     yield from _delay_faults(target, times, arrivals, period, end)
-    yield from _rate_and_gap_faults(target, times, period, end)
+    yield from _rate_and_gap_faults(target, times, period, end, gaps)
 
 
-def _rate_and_gap_faults(target: str, times: Array, period: float, end: float) -> Iterator[FoundFault]:
+def _rate_and_gap_faults(target: str, times: Array, period: float, end: float, gaps: Gaps) -> Iterator[FoundFault]:
     """Yield a low rate or, if the rate is normal, outages and lost messages."""
     edges = np.append(times, max(end, float(times[-1])))
-    steps = np.diff(edges)
+    steps = np.diff(edges) - seconds_in_gaps(gaps, edges[:-1], edges[1:])
     steps[-1] = max(steps[-1], period)
     long = np.flatnonzero(steps > MIN_OUTAGE_PERIODS * period)
     slow = _slow_fault(target, times, period, end)

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from simscen.core.geometry import Array
+from simscen.reconstruction.drive.gaps import pose_is_known
 from simscen.reconstruction.drive.motion_steps import STEP_S, MotionSteps
-from simscen.reconstruction.drive.pose_gaps import pose_is_known
 from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive
 from simscen.reconstruction.reasons import FoundFault, Reason, Window, windows
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from simscen.core.geometry import Array
 from simscen.criteria.trace_signals.ground_truth import MIN_MOVE_M
+from simscen.reconstruction.drive.gaps import belief_with_pose
 from simscen.reconstruction.drive.motion_steps import true_speeds
-from simscen.reconstruction.drive.pose_gaps import belief_with_pose
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, TimedValues
 from simscen.reconstruction.reasons import FoundFault, Reason
 from simscen.reconstruction.scenario.incidents import LOST_ERROR_M, STUCK_S, Incident

@@ -19,7 +19,7 @@ from simscen.loading.files.discovery import default_root
 from simscen.loading.files.single_files import load_world_file
 from simscen.model.world import WorldSpec
 from simscen.reconstruction.compared_scans import compare_scans
-from simscen.reconstruction.drive.pose_gaps import scans_with_pose
+from simscen.reconstruction.drive.gaps import scans_with_pose
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.drive.run_description import RunDescription
 from simscen.reconstruction.reasons import Reason

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from simscen.core.geometry import Array
+from simscen.reconstruction.drive.gaps import belief_with_pose
 from simscen.reconstruction.drive.goals import BEND_SOURCE, STOP_SOURCE
-from simscen.reconstruction.drive.pose_gaps import belief_with_pose
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, TimedValues
 from simscen.reconstruction.reasons import windows
 

@@ -14,7 +14,7 @@ from PIL import Image
 
 from simscen.core.environment.occupancy_grid import OCCUPIED, UNKNOWN
 from simscen.core.geometry import Array
-from simscen.reconstruction.drive.pose_gaps import scans_with_pose
+from simscen.reconstruction.drive.gaps import scans_with_pose
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
 from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.scenario.incidents import Incident

@@ -233,7 +233,7 @@ class ForeignTraceReader:
     def _check_scan_ages(self) -> None:
         """Add the scans to `partial` if the log has the longest time without a scan in a gap of the ground truth."""
         samples, scans = self.rows.truth.columns()[0], np.unique(np.array(self.rows.scans, dtype=np.int64))
-        if not len(samples) or not len(scans):
+        if len(samples) < 2 or not len(scans):
             return
         begins, ends = np.concatenate(([0], scans)), np.append(scans, self.time.end)
         last_samples = samples[np.maximum(np.searchsorted(samples, ends) - 1, 0)]

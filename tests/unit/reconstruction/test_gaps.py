@@ -7,8 +7,8 @@ import pytest
 import synthetic_drives as drives
 
 from simscen.core.geometry import Pose2
+from simscen.reconstruction.drive.gaps import pose_gaps
 from simscen.reconstruction.drive.motion_steps import motion_steps
-from simscen.reconstruction.drive.pose_gaps import pose_gaps
 from simscen.reconstruction.drive.recorded_drive import TimedValues, no_values
 from simscen.reconstruction.estimators import run_estimators
 from simscen.reconstruction.scenario.incidents import find_incidents
@@ -30,6 +30,23 @@ def test_a_gap_in_the_ground_truth_shows_no_objects_and_faults(begin, end):
     (gap,) = pose_gaps(drive)
     assert gap == (pytest.approx(max(begin, 0.0), abs=0.3), pytest.approx(min(end, drives.DURATION_S), abs=0.3))
     assert any(f"where the robot was from t = {gap[0]:.2f} s" in unknown for unknown in found.unknowns)
+
+
+def test_a_gap_of_the_recorder_is_no_outage_of_the_sensors():
+    drive = drives.drive(drives.scans())
+
+    def cut(signal):
+        kept = (signal.times < 5.0) | (signal.times > 7.2)
+        return TimedValues(signal.times[kept], signal.values[kept], signal.arrivals[kept])
+
+    names = ("poses", "odometry", "commands", "turn_rates", "belief")
+    kept = (drive.scans.times < 5.0) | (drive.scans.times > 7.2)
+    lost = replace(drive, scans=drive.scans.subset(kept), **{name: cut(getattr(drive, name)) for name in names})
+    found = run_estimators(lost, drives.room())
+    assert (found.objects, found.faults) == ([], [])
+    assert any("what happened from t = 4.9" in unknown for unknown in found.unknowns)
+    only_lidar = run_estimators(replace(drive, scans=lost.scans), drives.room())
+    assert [(fault.target, fault.kind) for fault in only_lidar.faults] == [("lidar", "off")]
 
 
 def test_a_map_is_not_built_from_scans_without_a_pose():

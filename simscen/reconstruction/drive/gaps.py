@@ -1,6 +1,8 @@
-"""Times of a drive at which the pose of the robot is unknown, because the source of the poses was interrupted."""
+"""Gaps of a drive: times at which the pose of the robot is unknown, and times at which nothing was recorded."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,8 +16,14 @@ MAX_EXTRAPOLATION_S = 0.25
 STANDING_M_RAD = 0.05
 """Maximum change of the pose in a gap, in m and rad, with which the robot counts as standing."""
 
+MIN_RECORDING_GAP_S, MIN_RECORDING_GAP_PERIODS = 0.5, 10.0
+"""Minimum time without any message that is a gap: the larger of a time and a multiple of the median time between two
+messages of any topic."""
+Gaps = Sequence[tuple[float, float]]
+"""Start and end in s of each gap."""
 
-def pose_gaps(drive: RecordedDrive) -> list[tuple[float, float]]:
+
+def pose_gaps(drive: RecordedDrive) -> Gaps:
     """Return start and end in s of the times at which the pose of the robot is unknown.
 
     Poses are known while the robot stands. If AMCL is their only source, they are always known: AMCL publishes a pose
@@ -51,6 +59,29 @@ def belief_with_pose(drive: RecordedDrive) -> TimedValues:
     """Return the belief of a drive at the times at which the pose of the robot is known."""
     is_known, belief = pose_is_known(drive, drive.belief.times), drive.belief
     return TimedValues(belief.times[is_known], belief.values[is_known], belief.arrivals[is_known])
+
+
+def recording_gaps(drive: RecordedDrive) -> Gaps:
+    """Return start and end in s of the times at which the recorder lost the messages of all topics.
+
+    There are none in a log of a single topic, which does not show whether the recorder or the sensor was interrupted.
+    """
+    signals = (drive.poses, drive.odometry, drive.commands, drive.turn_rates, drive.belief, drive.scans)
+    topics = {signal.arrivals.tobytes(): signal.arrivals for signal in signals if signal is not None and len(signal)}
+    if len(topics) < 2:
+        return []
+    arrivals = np.sort(np.concatenate([*topics.values()]))
+    steps = np.diff(arrivals)
+    long = np.flatnonzero(steps > max(MIN_RECORDING_GAP_S, MIN_RECORDING_GAP_PERIODS * float(np.median(steps))))
+    return list(zip(arrivals[long].tolist(), arrivals[long + 1].tolist(), strict=True))
+
+
+def seconds_in_gaps(gaps: Gaps, begins: Array, ends: Array) -> Array:
+    """Return how many seconds (n,) of the times from `begins` (n,) to `ends` (n,) are in gaps."""
+    total = np.zeros(len(begins))
+    for begin, end in gaps:
+        total += np.maximum(np.minimum(ends, end) - np.maximum(begins, begin), 0.0)
+    return total
 
 
 def _is_standing(drive: RecordedDrive, begin: float, end: float) -> bool:
