@@ -16,7 +16,7 @@ from simscen.core.clock import NS_PER_SECOND
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.reconstruction.drive.clocks import MAX_CLOCK_DIFFERENCE_NS, adjust_clock_rate, clock_offset
-from simscen.reconstruction.drive.goals import find_goals, trim_to_first_goal
+from simscen.reconstruction.drive.goals import find_goals, goals_from_motion, trim_to_first_goal
 from simscen.reconstruction.drive.log_messages import LoggedMessage, LogMessages, PolygonMessage, collect_messages
 from simscen.reconstruction.drive.recorded_drive import (
     DEFAULT_LIDAR_HEIGHT_M,
@@ -37,6 +37,8 @@ NO_TRUTH = "none"
 """Value of `truth` to ignore the ground truth of a log."""
 TICK_RATE_HZ = 1000
 """Rate of the ticks to which times are rounded for the computation of velocities."""
+ODOMETRY = "odometry"
+"""Source of poses if the log has no pose of the robot in the map frame."""
 MIN_POSES = 2
 """Minimum number of poses of a topic or transform that is used as the source of poses."""
 MAX_COORDINATE_M = 1e6
@@ -99,7 +101,13 @@ class _DriveReader:
             of_robot = self._pose_in(stamped.frame, time, poses, odometry)
             return Pose2(*poses.poses_at(np.array([time]))[0].tolist()).compose(of_robot.between(pose))
 
-        goals = [*find_goals(self._messages, self._seconds, to_map, poses)]
+        # Without poses in the map frame, the map, the belief, and goals in the map frame cannot be used.
+        is_on_map = source != ODOMETRY or self._odom_frame == "map"
+        frames = {message.content.frame for message in self._messages.of("goal")}
+        if is_on_map or (frames and not frames & {"map", ""}):
+            goals = [*find_goals(self._messages, self._seconds, to_map, poses)]
+        else:
+            goals = [*goals_from_motion(poses)]
         if not goals:
             self._notes.append("a goal, because the robot got none and did not drive anywhere")
         return RecordedDrive(
@@ -108,14 +116,14 @@ class _DriveReader:
             poses=poses,
             pose_source=source,
             has_true_poses=is_truth,
-            belief=belief,
+            belief=belief if is_on_map else no_values(9),
             corrections=self._poses_of_tf("map", self._odom_frame) or no_values(3),
             odometry=odometry,
             commands=self._signal("cmd_vel", 3, lambda twist: twist.values),
             turn_rates=self._signal("imu", 1, lambda imu: (imu.turn_rate,)),
             bumper=self._signal("bumper", 1, lambda is_pressed: (float(is_pressed),)),
             scans=self._scans(),
-            map=self._map(),
+            map=self._map() if is_on_map else None,
             goals=tuple(
                 goal if goal.name else replace(goal, name=f"goal-{number}") for number, goal in enumerate(goals, 1)
             ),
@@ -183,13 +191,11 @@ class _DriveReader:
             return _belief_along_odometry(belief, odometry), "/amcl_pose with the odometry in between", False
         if len(belief) >= MIN_POSES:
             return TimedValues(belief.times, belief.values[:, :3], belief.arrivals), "/amcl_pose", False
-        if len(odometry) >= MIN_POSES:
+        of_tf = (self._poses_of_tf(self._odom_frame, base) for base in self._base_frames)
+        known = odometry if len(odometry) >= MIN_POSES else next(filter(None, of_tf), None)
+        if known is not None:
             self._notes.append("poses in a map; the odometry is used, and the map is built along it")
-            return TimedValues(odometry.times, odometry.values[:, :3], odometry.arrivals), "odometry", False
-        for base in self._base_frames:
-            poses = self._poses_of_tf(self._odom_frame, base)
-            if poses is not None:
-                return poses, f"transform from {self._odom_frame} to {base}", False
+            return TimedValues(known.times, known.values[:, :3], known.arrivals), ODOMETRY, False
         kinds = [name for name, kind in sorted(self._messages.topics.items()) if "Pose" in kind or "Odometry" in kind]
         listed = f"; topics with poses: {', '.join(kinds[:12])}" if kinds else ""
         raise UnusableLog("it has no poses of the robot", f"name a topic with --topic odom=/TOPIC{listed}")

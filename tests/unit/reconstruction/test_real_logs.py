@@ -109,6 +109,26 @@ def test_a_goal_can_be_in_another_frame_than_the_map(frame, tmp_path):
     assert math.dist(only.pose[:2], GOAL) < 0.1
 
 
+@pytest.mark.parametrize("as_tf", [False, True])
+def test_without_a_pose_in_the_map_frame_map_and_goal_in_this_frame_are_not_used(as_tf, tmp_path):
+    """The odometry begins at (0, 0), the robot at (1, 3) on the map."""
+    said = [one for one in messages() if one.topic != "/amcl_pose"]
+    if as_tf:
+        for number, one in enumerate(said):
+            if one.topic == "/odom":
+                x, y = one.message.pose.pose.position.x, one.message.pose.pose.position.y
+                turn = one.message.pose.pose.orientation
+                transform = logs.link(one.time - 5_000_000, "odom", "base_link", x, y, 2 * math.atan2(turn.z, turn.w))
+                said[number] = replace(one, topic="/tf", message=transform)
+    bag = logs.write_bag(tmp_path / "bag", said)
+    made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
+    assert made.drive.map is None and made.contents.estimated.objects == []
+    (only,) = made.contents.goals
+    end = made.drive.poses.values[-1]
+    assert math.dist(only.pose[:2], end[:2]) < 0.01
+    assert made.contents.start.distance(drives.Pose2(0.0, 0.0)) < 0.1
+
+
 def test_a_robot_that_stands_still_has_no_goal(tmp_path):
     said = [
         replace(one, message=logs.odometry(one.time, "odom", 0.0, 0.0)) for one in messages() if "odom" in one.topic
