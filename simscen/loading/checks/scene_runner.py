@@ -6,7 +6,7 @@ from pathlib import Path
 
 from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput, Problem, UsageError
-from simscen.core.files import require_regular_file
+from simscen.core.files import require_not_input, require_regular_file
 from simscen.loading.builders import load_robot, world_from_file
 from simscen.loading.checks import masks, placement, regions, routes
 from simscen.loading.checks.built_world import check_built_world
@@ -14,7 +14,7 @@ from simscen.loading.checks.registry import TIMING, WORLD
 from simscen.loading.checks.runner import check_scenario
 from simscen.loading.checks.scene import Scene
 from simscen.loading.files.paths import path_in_messages
-from simscen.loading.loaded import LoadedScenario, LoadedWorld
+from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
 from simscen.loading.open_ground import with_stops_in_bounds
 from simscen.loading.robot_size import blocking_world, robot_size
 from simscen.loading.world_cache import WorldCache
@@ -105,10 +105,12 @@ def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path
     poses = [scene.start, *(goal.pose for _, goal in scene.expected_goals)]
     outlines = [place_polygon(scene.size.footprint, pose) for pose in poses]
     image = draw_world(build_world_and_map(scene.world, height), height, outlines, gaps)
-    robot = scene.loaded.robot_name
-    file = folder / f"{scene.loaded.title}{f'_{robot}' if robot else ''}.png"
+    loaded, robot = scene.loaded, scene.loaded.robot_name
+    maps = (loaded.world.map, loaded.map, loaded.keepout_mask, loaded.speed_mask)
+    file = folder / f"{loaded.title}{f'_{robot}' if robot else ''}.png"
     try:
         require_regular_file(file)
+        require_not_input(file, [map_.image for map_ in maps if isinstance(map_, LoadedMap)])
         file.parent.mkdir(parents=True, exist_ok=True)
         image.save(file)
     except OSError as error:

@@ -2,6 +2,8 @@ import json
 from pathlib import Path
 
 import pytest
+import yaml
+from PIL import Image
 
 BAD = "simscen: 1\nwrold: x\nrobot: {pose: {x: 1, y: 2 s}}\npass: [{goals_reached: {}}]\n"
 
@@ -102,6 +104,19 @@ def test_geometric_problems_are_drawn_on_request(simscen, tmp_path: Path) -> Non
     ended = simscen("validate", ".", "--picture", "pictures")
     assert (ended.code, ended.out.count("picture: pictures/sub/bad.png")) == (2, 1)
     assert [path.name for path in (tmp_path / "pictures").rglob("*.png")] == ["bad.png"]
+
+
+def test_picture_does_not_overwrite_the_map_of_the_world(simscen, tmp_path: Path) -> None:
+    Image.new("L", (100, 100), 255).save(tmp_path / "hall.png")
+    origin = "origin: [-1, -1, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n"
+    (tmp_path / "hall.yaml").write_text(f"image: hall.png\nresolution: 0.1\n{origin}")
+    text = (tmp_path / "good.scenario.yaml").read_text()
+    world = yaml.safe_dump({**yaml.safe_load(text), "world": "hall.yaml", "robot": {"pose": {"x": 20, "y": 1}}})
+    (tmp_path / "hall.scenario.yaml").write_text(world)
+    before = (tmp_path / "hall.png").read_bytes()
+    ended = simscen("validate", "hall.scenario.yaml", "--picture", ".")
+    assert (ended.code, "cannot write the picture hall.png: it is one of the input files" in ended.err) == (2, True)
+    assert (tmp_path / "hall.png").read_bytes() == before
 
 
 def test_unwritable_picture_is_an_error(simscen, tmp_path: Path) -> None:
