@@ -20,7 +20,7 @@ from simscen.cli.session.terminal import Screen, open_screen
 from simscen.cli.session.user_files import require_writable
 from simscen.cli.shared_options import OutputOptions
 from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, UsageError
-from simscen.core.records.run_result import Outcome, RunResult
+from simscen.core.records.run_result import PROPOSAL_PREFIX, Outcome, RunResult
 from simscen.core.records.session_events import RunFinished, SessionStarted, broadcast
 from simscen.core.records.verdict import Status
 from simscen.core.version import __version__
@@ -213,7 +213,7 @@ class Falsification:
         options = self._request.options
         for point in points:
             self._proposed += 1
-            scenario = self._load(f"search-{self._proposed}", point)
+            scenario = self._load(f"{PROPOSAL_PREFIX}{self._proposed}", point)
             if scenario is None:
                 jobs.append(None)
                 continue

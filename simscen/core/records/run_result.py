@@ -27,6 +27,8 @@ class Outcome(str, Enum):
 
 REPEAT_SUFFIX = "again"
 """Suffix of `RunKey.stack_name` for the repetition of a run."""
+PROPOSAL_PREFIX = "search-"
+"""Prefix of `RunKey.variation` for values that `simscen falsify` proposed. A number follows."""
 _SEPARATOR = "@"
 """Separator between variation and stack in folder names."""
 
@@ -63,6 +65,11 @@ class RunKey:
         """Name of the output folder of the run, e.g. "seed-7", "seed-7-slow", or "seed-7-speed=0.5@slow"."""
         label = _SEPARATOR.join(part for part in (self.variation, self.stack_name) if part)
         return "-".join(part for part in (f"seed-{self.seed}", label) if part)
+
+    @property
+    def is_proposal(self) -> bool:
+        """Whether `simscen falsify` proposed the values of the run, so that `simscen run` cannot select it."""
+        return self.variation.startswith(PROPOSAL_PREFIX) and self.variation.removeprefix(PROPOSAL_PREFIX).isdecimal()
 
     @property
     def repetition(self) -> "RunKey":
@@ -161,7 +168,9 @@ class RunResult:
 
     @property
     def again(self) -> str:
-        """Command that repeats the run if it is executed in the root."""
+        """Command that repeats the run if it is executed in the root; "" if no command does."""
+        if self.key.is_proposal:
+            return ""
         varied = ["--variation", self.key.variation] if self.key.variation else []
         chosen = ["--stack", self.stack] if self.stack else []
         return shlex.join(["simscen", "run", self.path, "--seed", str(self.key.seed), *varied, *chosen])

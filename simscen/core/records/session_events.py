@@ -83,7 +83,8 @@ class RunFinished:
     Attributes:
         wall: Wall time of the run in s.
         artifacts: Output files.
-        again: Command that repeats the run from the working folder; "" if it is the same as `result.again`.
+        again: Command that repeats the run from the working folder; "" if it is the same as `result.again`, or if no
+            command repeats the run.
         file: Path of the scenario, relative to the working folder; "" if it is the same as `result.path`.
         tags: Tags of the scenario.
         warnings: Warnings of the external stack.

@@ -144,7 +144,9 @@ def _crash_place(end: ProcessEnd | ForkServerDeath) -> str:
 
 
 def repeat_command(scenario: LoadedScenario, seed: int) -> str:
-    """Return the shell command that repeats a run from the working folder."""
+    """Return the shell command that repeats a run from the working folder; "" if no command does."""
+    if scenario.key(seed).is_proposal:
+        return ""
     words = ["simscen", "run", display_path(scenario.file), "--seed", str(seed)]
     if scenario.variation:
         words += ["--variation", scenario.variation]

@@ -187,6 +187,8 @@ def test_a_found_failure_is_written_as_a_scenario_that_fails(
     (rerun,) = runs_of(tmp_path / "rerun")
     assert verdicts_of(rerun) in [verdicts_of(run) for run in runs_of(tmp_path / "out")]
     assert "smaller: simscen shrink a.failure-1.scenario.yaml" in done.out
+    assert {run["again"] for run in runs_of(tmp_path / "out")} == {""}
+    assert "--variation" not in done.out
     if method == "tpe":  # the method that depends on the order of the results
         simscen("falsify", "a.scenario.yaml", "--method", method, "--out", "out1", "-j", 1)
         assert (tmp_path / "out/results.json").read_bytes() == (tmp_path / "out1/results.json").read_bytes()
