@@ -58,10 +58,10 @@ def _rate_and_gap_faults(target: str, times: Array, period: float, end: float, g
         yield slow
         return
     if len(long) >= MIN_OUTAGES_INTERMITTENT:
-        gaps = steps[long] - period
+        outages = steps[long] - period
         begin, last = float(edges[long[0]] + period), float(edges[long[-1] + 1])
-        down = float(gaps.mean())
-        up = max(period, (last - begin - float(gaps.sum())) / max(1, len(long) - 1))
+        down = float(outages.mean())
+        up = max(period, (last - begin - float(outages.sum())) / max(1, len(long) - 1))
         text = f"{len(long)} outages of {down:.2f} s on average"
         reason = Reason(text, begin, last)
         whole = begin < up * 3 and last > end - 3 * up
