@@ -72,9 +72,10 @@ class OmplPlanner(OmplParameters):
     """Number of samples per batch; `bit_star` only (OMPL: 100)."""
     max_batches: Annotated[int, Field(ge=1, le=1000)] = 2
     """Number of batches after which the search ends if it has found a path; `bit_star` only."""
-    rewire_factor: Annotated[float, Field(ge=0.1, le=10)] | None = None
+    rewire_factor: Annotated[float, Field(ge=1, le=10)] | None = None
     """OMPL's rewire factor: with a larger value, a sample is connected to more neighbors. `bit_star`, `rrt_star`, and
-    `informed_rrt_star` only. Default: 1.3 for `bit_star`, otherwise 1.1 as in OMPL."""
+    `informed_rrt_star` only. Default: 1.3 for `bit_star`, otherwise 1.1 as in OMPL. With less than 1, a search may need
+    minutes to find a path."""
     range: PositiveLength | None = None
     """Maximum length of a motion that is added to a tree; all planners except `bit_star`. Default: OMPL's default in
     searches over poses, otherwise 1 m."""
