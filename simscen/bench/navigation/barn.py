@@ -59,7 +59,7 @@ def read_barn_worlds(folder: Path) -> list[BarnWorld]:
     """Return the worlds listed in the file scenarios.csv in `folder`. Raises UsageError if it is missing or invalid."""
     file = folder / "scenarios.csv"
     try:
-        with file.open(newline="", encoding="utf-8") as lines:
+        with file.open(newline="", encoding="utf-8-sig") as lines:  # spreadsheets write a byte order mark
             worlds = list(_parse_rows(file, csv.DictReader(lines)))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise UsageError(f"cannot read the list of BARN's worlds: {error}") from error

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from simscen.bench.navigation.barn import read_barn_worlds, scenario_text
+from simscen.bench.navigation.barn import BarnWorld, read_barn_worlds, scenario_text
 from simscen.core.errors import UsageError
 from simscen.loading.scenario import load_scenario
 
@@ -34,6 +34,11 @@ def test_invalid_list_of_worlds_is_reported(tmp_path: Path, text: str, said: str
         read_barn_worlds(tmp_path)
     assert f"{tmp_path / 'scenarios.csv'}" in str(raised.value)
     assert said in str(raised.value)
+
+
+def test_list_of_worlds_from_a_spreadsheet_is_read(tmp_path: Path) -> None:
+    (tmp_path / "scenarios.csv").write_bytes(b"\xef\xbb\xbfworld,ref_path_len\r\n7,10.5\r\n")
+    assert read_barn_worlds(tmp_path) == [BarnWorld(tmp_path / "world_7.world", 10.5)]
 
 
 def test_folder_without_a_list_of_worlds_is_reported(tmp_path: Path) -> None:
