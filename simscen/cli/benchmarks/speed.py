@@ -54,7 +54,7 @@ def _growth_text(figures: Measurements) -> str:
 
 
 def worlds_command(
-    as_json: Annotated[bool, typer.Option("--json", help="Print all numbers as JSON.")] = False,
+    format_: FormatOption = TextOrJson.TEXT,
     rounds: Annotated[int, typer.Option(min=1, max=100, help="Number of runs in each world; the median is used.")] = 3,
 ) -> None:
     """Measure the cost of a simulated second in large worlds.
@@ -67,7 +67,10 @@ def worlds_command(
         from simscen.bench.speed.large_worlds import measure_worlds
 
         costs = list(measure_worlds(rounds))
-    print_text(json.dumps([asdict(cost) for cost in costs], indent=2) if as_json else _worlds_text(costs))
+    if format_ is TextOrJson.JSON:
+        print(json.dumps([asdict(cost) for cost in costs], indent=2))
+    else:
+        print_text(_worlds_text(costs))
 
 
 def _worlds_text(costs: "Sequence[WorldCost]") -> str:
