@@ -172,9 +172,7 @@ class GlobalSearch:
                 total += np.uint32(weight) * part
             heading_scores[:] = total >> 3
         scores *= free > 0
-        flat = scores.ravel()
-        best = np.argpartition(flat, -min(COARSE_POSES, flat.size))[-COARSE_POSES:]
-        heading, row, column = np.unravel_index(np.sort(best), scores.shape)
+        heading, row, column = np.unravel_index(_highest(scores.ravel(), COARSE_POSES), scores.shape)
         positions: Array = (np.column_stack((column, row)).astype(np.float64) + 0.5) * cell
         yaw: Array = turns[heading] + self._grid.origin.yaw
         return np.column_stack((self._grid.origin.apply(positions), wrap_array(yaw)))
@@ -194,6 +192,15 @@ def _nearness(meters: Float32) -> Levels:
     nearness = np.exp(np.square(np.minimum(meters, np.float32(MAX_DISTANCE_M))) / (-2 * ENDPOINT_STD_M**2))
     levels: Levels = np.round(255 * nearness).astype(np.uint8)
     return levels
+
+
+def _highest(scores: npt.NDArray[np.uint16], count: int) -> npt.NDArray[np.int64]:
+    """Return the indices of the `count` highest scores in ascending order. Of equal scores, the first are chosen."""
+    # np.argpartition would need four times the memory of the scores.
+    count = min(count, len(scores))
+    lowest = np.partition(scores, -count)[-count]
+    better, equal = (scores > lowest).nonzero()[0], (scores == lowest).nonzero()[0]
+    return np.sort(np.concatenate((better, equal[: count - len(better)])))
 
 
 def select_distinct(poses: Array, scores: Array, max_count: int) -> tuple[Array, Array]:

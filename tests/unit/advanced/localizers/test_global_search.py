@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from simscen.advanced.localizers.global_search import MAX_RESULTS, PASSED_SHARES, GlobalSearch, View, select_distinct
+from simscen.advanced.localizers.global_search import (
+    MAX_RESULTS,
+    PASSED_SHARES,
+    GlobalSearch,
+    View,
+    _highest,
+    select_distinct,
+)
 from simscen.advanced.localizers.scan_memory import MEMORY_LENGTH_M, ScanMemory, endpoints_of
 from simscen.core.geometry import Pose2
 from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
@@ -49,6 +56,13 @@ def test_empty_scans_find_no_pose() -> None:
     poses, fits = GlobalSearch(grid()).search(View(np.empty(0, dtype=np.complex128), np.empty(0, dtype=np.complex128)))
     assert poses.shape == (0, 3)
     assert fits.shape == (0,)
+
+
+@pytest.mark.parametrize("count", [1, 3, 4, 6, 9])
+def test_highest_scores_are_chosen_and_of_equal_ones_the_first(count: int) -> None:
+    scores = np.array([2, 5, 3, 3, 9, 3], dtype=np.uint16)
+    by_score = sorted(range(6), key=lambda index: (-int(scores[index]), index))
+    assert _highest(scores, count).tolist() == sorted(by_score[:count])
 
 
 def test_nearby_matches_are_merged() -> None:
