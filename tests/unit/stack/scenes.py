@@ -1,4 +1,4 @@
-"""Short drives of a whole stack, step by step: where each of its parameters shows."""
+"""Scenes: short drives with the reference stack in which its parameters have an effect."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
@@ -19,13 +19,13 @@ from simscen.testing.flatland import Drive, Flatland, box_robot, drive, round_ro
 
 Boxes = tuple[tuple[float, float, float, float], ...]
 Scene = Callable[[StackSpec], Iterator[object]]
-"""Tells, step by step, all that the stack decides."""
+"""Drives with the stack of a specification, and yields each of its decisions in a form that can be compared."""
 Change = Callable[[int, Readings], Readings]
-A_SECOND = 40
+STEPS_PER_S = 40
 
 
-class Told:
-    """Remembers what a stack decided, whose readings may be others than the world's."""
+class RecordingStack:
+    """Stack that remembers its last decision. `change` can replace its readings."""
 
     def __init__(self, inner: Any, change: Change = lambda _tick, readings: readings) -> None:
         self.inner, self.change = inner, change
@@ -33,36 +33,37 @@ class Told:
 
     def decide(self, tick: int, readings: Readings) -> Decision:
         decision: Decision = self.inner.decide(tick, self.change(tick, readings))
-        self.last = plain(decision)
+        self.last = comparable(decision)
         return decision
 
 
-def plain(value: Any) -> object:
-    """Something that is equal exactly where the values are."""
+def comparable(value: Any) -> object:
+    """Return an object that is equal to that of another value if both values are equal."""
     if isinstance(value, np.ndarray):
         return value.shape, value.tobytes()
     if is_dataclass(value):
-        return tuple(plain(getattr(value, each.name)) for each in fields(value))
+        return tuple(comparable(getattr(value, each.name)) for each in fields(value))
     if isinstance(value, tuple):
-        return tuple(plain(each) for each in value)
+        return tuple(comparable(each) for each in value)
     return repr(value)
 
 
 def steps(d: Drive, seconds: float) -> Iterator[object]:
-    """Drive on, and tell what was decided."""
-    for _ in range(round(seconds * A_SECOND)):
+    """Drive for some seconds, and yield each decision."""
+    for _ in range(round(seconds * STEPS_PER_S)):
         d.step()
-        assert isinstance(d.stack, Told)
+        assert isinstance(d.stack, RecordingStack)
         yield d.stack.last
 
 
 @cache
-def mapped(boxes: Boxes = ()) -> OccupancyGrid:
-    """The map of a room of 5 x 4 m with a wall that leaves a door of 1 m, and of these boxes."""
+def room_map(boxes: Boxes = ()) -> OccupancyGrid:
+    """Return the map of the room with these boxes."""
     return room(*boxes).grid((-0.3, -0.3, 5.3, 4.3))
 
 
 def room(*boxes: tuple[float, float, float, float]) -> Flatland:
+    """Return a room of 5 x 4 m with a wall that has a door of 1 m, and with boxes (min x, min y, max x, max y)."""
     world = Flatland().room(5, 4)
     world.boxes += [(2.9, 0.0, 3.0, 1.5), (2.9, 2.5, 3.0, 4.0), *boxes]
     return world
@@ -71,17 +72,17 @@ def room(*boxes: tuple[float, float, float, float]) -> Flatland:
 def begin(
     world: Flatland, start: Pose2, spec: StackSpec, *goals: Pose2, change: Change | None = None, **options: Any
 ) -> Drive:
-    """A drive with few beams, on the map of the empty room unless told otherwise."""
-    grid = options.pop("grid", mapped())
+    """Return a drive with few lidar beams. The map is that of the room without boxes, unless `grid` is given."""
+    grid = options.pop("grid", room_map())
     named = [Goal(f"goal {number}", goal) for number, goal in enumerate(goals)]
     d = drive(world, start, *named, spec=spec, grid=grid, **{"beams": 120, "stop_on_failure": True, **options})
-    d.stack = Told(d.stack, *([change] if change else []))  # type: ignore[assignment]
+    d.stack = RecordingStack(d.stack, *([change] if change else []))  # type: ignore[assignment]
     return d
 
 
-def pushed(d: Drive, *ways: tuple[float, Twist]) -> Iterator[object]:
-    """Whatever the stack says, the robot moves so long with each of these velocities."""
-    for seconds, twist in ways:
+def move_robot(d: Drive, *motions: tuple[float, Twist]) -> Iterator[object]:
+    """Ignore the commands of the stack, and move the robot by pairs (duration in s, velocity); yield decisions."""
+    for seconds, twist in motions:
 
         def move(_command: Twist, dt: float, twist: Twist = twist) -> None:
             d.twist = twist
@@ -94,38 +95,40 @@ def pushed(d: Drive, *ways: tuple[float, Twist]) -> Iterator[object]:
 # Driving
 
 
-def through(spec: StackSpec) -> Iterator[object]:
-    """Through the door, past things that are not on the map: one, and a row that touches at corners only."""
+def through_door(spec: StackSpec) -> Iterator[object]:
+    """Drive through the door, past a box and a row of boxes that touch at corners only, which are not on the map."""
     row = tuple((1.6 + 0.05 * i, 2.85 + 0.05 * i, 1.64 + 0.05 * i, 2.89 + 0.05 * i) for i in range(3))
     world = room((2.0, 0.9, 2.3, 1.2), *row, (1.2, 1.0, 1.22, 1.02))
     yield from steps(begin(world, Pose2(0.8, 1.6), spec, Pose2(4.2, 2.8, 1.0)), 5.0)
 
 
-def arriving(spec: StackSpec) -> Iterator[object]:
-    """A short way to a goal with another heading."""
+def arrival(spec: StackSpec) -> Iterator[object]:
+    """Drive a short distance to a goal with another heading."""
     yield from steps(begin(room(), Pose2(0.8, 1.6), spec, Pose2(1.5, 1.7, 0.8)), 5.0)
 
 
-def drifting_past(spec: StackSpec) -> Iterator[object]:
-    """The robot comes near its goal and turns there, and is pushed off as far as the tolerance before it has turned."""
+def overshoot_goal(spec: StackSpec) -> Iterator[object]:
+    """Move the robot past its goal and back, up to the tolerance, before it turns to the heading of the goal."""
     d = begin(room(), Pose2(0.9, 1.6), spec, Pose2(1.5, 1.6, 1.0))
-    yield from pushed(d, (1.0, Twist(0.55, 0.0, 0.0)), (0.3, Twist(-0.45, 0.0, 0.0)), (2.0, Twist(0.0, 0.0, 0.5)))
+    yield from move_robot(d, (1.0, Twist(0.55, 0.0, 0.0)), (0.3, Twist(-0.45, 0.0, 0.0)), (2.0, Twist(0.0, 0.0, 0.5)))
 
 
-def stuck(spec: StackSpec) -> Iterator[object]:
-    """The robot creeps and turns, wherever it is told to go; then it stands."""
+def no_progress(spec: StackSpec) -> Iterator[object]:
+    """Move the robot slowly on a curve, and then stop it."""
     d = begin(room(), Pose2(0.8, 1.6), spec, Pose2(2.5, 1.6))
-    yield from pushed(d, (1.6, Twist(0.25, 0.0, 0.4)), (1.4, Twist()))
+    yield from move_robot(d, (1.6, Twist(0.25, 0.0, 0.4)), (1.4, Twist()))
 
 
-def two_ways(spec: StackSpec) -> Iterator[object]:
-    """A robot that does not move, before a narrow gap and a longer way that is wider."""
+def gap_and_detour(spec: StackSpec) -> Iterator[object]:
+    """Hold the robot in front of a narrow gap to the goal, and of a wide detour."""
     wall = ((1.6, 0.0, 1.7, 1.3), (1.6, 1.9, 1.7, 3.1))
-    yield from pushed(begin(room(*wall), Pose2(0.8, 1.6), spec, Pose2(2.5, 1.6), grid=mapped(wall)), (0.6, Twist()))
+    yield from move_robot(
+        begin(room(*wall), Pose2(0.8, 1.6), spec, Pose2(2.5, 1.6), grid=room_map(wall)), (0.6, Twist())
+    )
 
 
-def shut(spec: StackSpec) -> Iterator[object]:
-    """The door is shut, and something stands close behind the robot; later it opens."""
+def closed_door(spec: StackSpec) -> Iterator[object]:
+    """Drive to a closed door, with a box close behind the robot. Later, the door opens."""
     door = (2.9, 1.5, 3.0, 2.5)
     world = room(door, (0.9, 1.4, 1.0, 2.6))
     d = begin(world, Pose2(1.45, 2.0), spec, Pose2(4.0, 2.0))
@@ -134,14 +137,14 @@ def shut(spec: StackSpec) -> Iterator[object]:
     yield from steps(d, 3.0)
 
 
-def wedged(spec: StackSpec) -> Iterator[object]:
-    """The door is shut before a long robot, which has little room to turn."""
+def little_room_to_turn(spec: StackSpec) -> Iterator[object]:
+    """Drive a long robot, which has little room to turn, to a closed door."""
     world = room((2.9, 1.5, 3.0, 2.5), (1.4, 2.33, 1.6, 2.4))
     yield from steps(begin(world, Pose2(1.3, 2.0), spec, Pose2(4.0, 2.0), robot=box_robot(0.8, 0.3)), 4.0)
 
 
-def in_a_corridor(spec: StackSpec) -> Iterator[object]:
-    """Something shuts a corridor in which a long robot that came a meter cannot turn; later it goes."""
+def blocked_corridor(spec: StackSpec) -> Iterator[object]:
+    """Close the end of a corridor in which a long robot cannot turn, after it has driven 1 m, and open it later."""
     door = (2.9, 1.5, 3.0, 2.5)
     world = room((0.0, 2.3, 2.9, 2.4), (0.0, 1.6, 2.9, 1.7))
     d = begin(world, Pose2(0.8, 2.0), spec, Pose2(4.0, 2.0), robot=box_robot(0.8, 0.3, 1.0))
@@ -152,8 +155,8 @@ def in_a_corridor(spec: StackSpec) -> Iterator[object]:
     yield from steps(d, 2.0)
 
 
-def walled_in(spec: StackSpec) -> Iterator[object]:
-    """The goal is near a wall, in one, or off the map; or the robot is."""
+def invalid_start_or_goal(spec: StackSpec) -> Iterator[object]:
+    """Plan to goals near a wall, in a wall, and outside of the map, and from such starts."""
     inside, outside, wall = Pose2(1.0, 2.0), Pose2(9.0, 1.0), Pose2(2.95, 0.8)
     for start, goal in (
         (inside, Pose2(0.1, 1.0)),
@@ -165,35 +168,35 @@ def walled_in(spec: StackSpec) -> Iterator[object]:
         yield from steps(begin(room(), start, spec, goal), 0.3)
 
 
-def seen_by_one(spec: StackSpec) -> Iterator[object]:
-    """Something stands in the way that is not on the map."""
+def obstacle_not_on_map(spec: StackSpec) -> Iterator[object]:
+    """Drive towards an obstacle that is not on the map."""
     yield from steps(begin(room((1.7, 1.3, 1.8, 2.7)), Pose2(0.9, 2.0), spec, Pose2(2.4, 2.0)), 4.0)
 
 
-def silent(spec: StackSpec) -> Iterator[object]:
-    """The lidar falls silent for a while."""
+def lidar_outage(spec: StackSpec) -> Iterator[object]:
+    """Drive while the lidar sends no scans for some time."""
     d = begin(room(), Pose2(0.8, 2.0), spec, Pose2(2.4, 2.0))
     yield from steps(d, 0.5)
     d.is_blind = True
     yield from steps(d, 1.2)
 
 
-def crossed(spec: StackSpec) -> Iterator[object]:
-    """Two things come along, one of them slow."""
+def moving_obstacles(spec: StackSpec) -> Iterator[object]:
+    """Drive while two discs move through the room, one of them slowly."""
     world = room()
     world.discs += [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
     d = begin(world, Pose2(0.8, 2.0), spec, Pose2(2.5, 2.0), beams=360)
-    for step in range(round(4 * A_SECOND)):
-        t = step / A_SECOND
+    for step in range(round(4 * STEPS_PER_S)):
+        t = step / STEPS_PER_S
         world.discs[-2:] = [(2.7 - 0.6 * t, 2.1, 0.2), (1.7, 0.6 + 0.35 * t, 0.15)]
-        yield from steps(d, 1 / A_SECOND)
+        yield from steps(d, 1 / STEPS_PER_S)
 
 
 # Costmaps
 
 
-def no_map(spec: StackSpec) -> Iterator[object]:
-    """Nothing but a wall that comes into sight and goes away; a goal beyond the window."""
+def without_map(spec: StackSpec) -> Iterator[object]:
+    """Drive without a map to a goal outside of the costmap. A wall is removed during the drive."""
     world = Flatland([(1.2, -0.6, 1.3, 0.6)])
     d = begin(world, Pose2(0.0, 0.0), spec, Pose2(13.0, 0.0), grid=None, range_max=3.5)
     yield from steps(d, 1.0)
@@ -202,7 +205,7 @@ def no_map(spec: StackSpec) -> Iterator[object]:
 
 
 class Camera:
-    """A depth picture: a box that is 8 cm high, a lamp that hangs 0.85 m above the ground, and a ramp on the right."""
+    """Adds a depth image: a box 8 cm high, a lamp 0.85 m above the ground, and a ramp on the right."""
 
     def __init__(self) -> None:
         depth = np.full((24, 32), np.inf, np.float32)
@@ -215,39 +218,39 @@ class Camera:
         return (*readings, replace(self._image, tick=tick)) if tick % 24 == 0 else readings
 
 
-def seen_by_a_camera(spec: StackSpec) -> Iterator[object]:
-    """What only a camera sees is in the way."""
+def obstacles_in_depth_image(spec: StackSpec) -> Iterator[object]:
+    """Drive towards obstacles that only a depth camera sees."""
     yield from steps(begin(room(), Pose2(0.8, 2.0), spec, Pose2(2.4, 2.0), change=Camera()), 1.0)
 
 
 # Localization
 
 
-def slipping(share: float, bias: float) -> Change:
-    """Wheels that report so much of the way, and a gyroscope with a bias that lags behind what turns."""
+def slipping(fraction: float, bias: float) -> Change:
+    """Return a change of the readings: odometry with a fraction of the distance, and a biased gyroscope."""
 
     def change(tick: int, readings: Readings) -> Readings:
-        told: list[Reading] = []
+        changed: list[Reading] = []
         for each in readings:
             if isinstance(each, Odometry):
-                pose = Pose2(share * each.pose.x, share * each.pose.y, each.pose.yaw)
-                told.append(replace(each, pose=pose))
-                told.append(Imu("imu", tick, (0.0, 0.0, 0.9 * each.twist.wz + bias), (0.0, 0.0, 9.8)))
+                pose = Pose2(fraction * each.pose.x, fraction * each.pose.y, each.pose.yaw)
+                changed.append(replace(each, pose=pose))
+                changed.append(Imu("imu", tick, (0.0, 0.0, 0.9 * each.twist.wz + bias), (0.0, 0.0, 9.8)))
             else:
-                told.append(each)
-        return tuple(told)
+                changed.append(each)
+        return tuple(changed)
 
     return change
 
 
-WAY = (
+MOTIONS = (
     (0.4, Twist()), (1.0, Twist(0.5, 0.0, 0.0)), (0.6, Twist(0.0, 0.0, 0.8)), (1.2, Twist(0.4, 0.1, -0.7)),
     (0.8, Twist(0.4, 0.0, 0.3)),
 )  # fmt: skip
 
 
-def moved(spec: StackSpec) -> Iterator[object]:
-    """A robot that is driven about a room of which a part has changed, with a lidar that does not see far."""
+def changed_room(spec: StackSpec) -> Iterator[object]:
+    """Move the robot in a room that differs from the map, with a lidar of short range."""
     options = {
         "odometry": ("odom",),
         "beams": 72,
@@ -256,62 +259,62 @@ def moved(spec: StackSpec) -> Iterator[object]:
         "robot": round_robot(max_lateral=0.3),
     }
     d = begin(room((0.5, 2.6, 0.8, 2.9)), Pose2(1.0, 1.6), spec, change=slipping(0.95, 0.01), **options)
-    yield from pushed(d, *WAY)
+    yield from move_robot(d, *MOTIONS)
 
 
-def slipped(spec: StackSpec) -> Iterator[object]:
-    """Wheels that say half of the way, and a lidar whose scans can be matched."""
+def wheel_slip(spec: StackSpec) -> Iterator[object]:
+    """Move the robot with odometry that reports 60 % of the distance, and with enough beams for scan matching."""
     d = begin(room(), Pose2(0.9, 1.6), spec, change=slipping(0.6, 0.02), odometry=("odom",), beams=180)
-    yield from pushed(d, *WAY)
+    yield from move_robot(d, *MOTIONS)
 
 
 def kidnapped(spec: StackSpec) -> Iterator[object]:
-    """A robot that is carried elsewhere, which its odometry does not tell."""
+    """Move the robot to another place without a change of its odometry."""
     here, there = Pose2(0.9, 1.6), Pose2(4.2, 3.0, 2.0)
-    told = Pose2(0.0, 0.0)
+    offset = Pose2(0.0, 0.0)
 
     def change(_tick: int, readings: Readings) -> Readings:
         return tuple(
-            replace(each, pose=told.compose(each.pose)) if isinstance(each, Odometry) else each for each in readings
+            replace(each, pose=offset.compose(each.pose)) if isinstance(each, Odometry) else each for each in readings
         )
 
     d = begin(room(), here, spec, change=change, odometry=("odom",), beams=72)
-    yield from pushed(d, (0.5, Twist(0.3, 0.0, 0.0)), (0.5, Twist(-0.3, 0.0, 0.0)))
-    told, d.pose = d.pose.compose(there.inverse()), there
-    yield from pushed(d, *WAY)
+    yield from move_robot(d, (0.5, Twist(0.3, 0.0, 0.0)), (0.5, Twist(-0.3, 0.0, 0.0)))
+    offset, d.pose = d.pose.compose(there.inverse()), there
+    yield from move_robot(d, *MOTIONS)
 
 
-def unknown(spec: StackSpec) -> Iterator[object]:
-    """A robot that is not told where it is."""
+def unknown_start(spec: StackSpec) -> Iterator[object]:
+    """Move the robot with an unknown initial pose."""
     d = begin(room((0.5, 2.6, 0.8, 2.9)), Pose2(0.9, 1.6), spec, odometry=("odom",), beams=72)
-    assert isinstance(d.stack, Told)
+    assert isinstance(d.stack, RecordingStack)
     d.stack.inner.start(Estimate(None), ())
-    yield from pushed(d, *WAY)
+    yield from move_robot(d, *MOTIONS)
 
 
 # Planning
 
 
-def planned(spec: StackSpec) -> Iterator[object]:
-    """A plan past a box that is on the map."""
+def plan_past_box(spec: StackSpec) -> Iterator[object]:
+    """Plan past a box that is on the map."""
     box = ((1.6, 1.5, 2.0, 2.4),)
-    yield from steps(begin(room(*box), Pose2(0.8, 2.0), spec, Pose2(4.2, 2.2, 1.0), grid=mapped(box)), 0.1)
+    yield from steps(begin(room(*box), Pose2(0.8, 2.0), spec, Pose2(4.2, 2.2, 1.0), grid=room_map(box)), 0.1)
 
 
-def half_known(spec: StackSpec) -> Iterator[object]:
-    """The map does not know what is between the robot and its goal."""
-    cells = mapped().cells.copy()
+def unknown_cells(spec: StackSpec) -> Iterator[object]:
+    """Plan through cells that are unknown on the map."""
+    cells = room_map().cells.copy()
     cells[:, 60:66] = np.where(cells[:, 60:66] == 0, -1, cells[:, 60:66])
-    grid = OccupancyGrid(cells, mapped().resolution, mapped().origin)
+    grid = OccupancyGrid(cells, room_map().resolution, room_map().origin)
     yield from steps(begin(room(), Pose2(0.8, 2.0), spec, Pose2(4.2, 2.2, 1.0), grid=grid, range_max=1.0), 0.2)
 
 
-def at_a_wall(spec: StackSpec) -> Iterator[object]:
-    """A goal nearer to a wall than the robot can be."""
+def goal_near_wall(spec: StackSpec) -> Iterator[object]:
+    """Plan to goals nearer to a wall than the robot can be."""
     for away in (0.2, 0.1):
         yield from steps(begin(room(), Pose2(1.0, 2.0), spec, Pose2(away, 1.0)), 0.2)
 
 
-def long_way(spec: StackSpec) -> Iterator[object]:
-    """A way of some seconds, on which plans may be made anew: it ends more than 4 m away."""
+def replan_on_long_path(spec: StackSpec) -> Iterator[object]:
+    """Drive for some seconds to a goal more than 4 m away, so that plans can be replaced."""
     yield from steps(begin(room(), Pose2(0.4, 0.5), spec, Pose2(4.6, 3.6, 1.0)), 2.5)
