@@ -13,7 +13,15 @@ from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.distance_transform import SquaredDistanceTransform, squared_distances_within
-from simscen.stack.costmap.grid_frame import CellIndices, GridFrame, Mask
+from simscen.stack.costmap.grid_frame import (
+    CellIndices,
+    GridFrame,
+    Mask,
+    clip_goal,
+    shift_layer,
+    should_roll,
+    window_around,
+)
 from simscen.stack.costmap.inflation import DISTANCE_MARGIN_M, Costs, inflation_for
 from simscen.stack.costmap.obstacle_layer import (
     NO_CELLS,
@@ -23,7 +31,6 @@ from simscen.stack.costmap.obstacle_layer import (
     crossed_cells,
     remove_small_groups,
 )
-from simscen.stack.costmap.rolling_window import clip_goal, shift_layer, should_roll, window_around
 from simscen.stack.costmap.static_layer import StaticLayer, map_layer, static_layer
 from simscen.stack.localizers.beams import ComplexPoints
 from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES

@@ -11,14 +11,13 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.model.costmaps import DenoiseLayer
 from simscen.stack.costmap.depth_layer import Heights, is_seen_through, project_depth_image
 from simscen.stack.costmap.distance_transform import Squared
-from simscen.stack.costmap.grid_frame import CellIndices, Cells, GridFrame, Mask
-from simscen.stack.costmap.rolling_window import shift_layer
+from simscen.stack.costmap.grid_frame import CellIndices, Cells, GridFrame, Mask, shift_layer
 from simscen.stack.localizers.beams import ComplexPoints, directions
 
 RANGE_TOLERANCE_M = 1e-9
@@ -107,7 +106,7 @@ def crossed_cells(
         and (distance <= np.minimum(free_length - (half + RANGE_TOLERANCE_M), dense_distance)).all()
     ):
         return in_front, nearest
-    beam_offset = np.remainder(bearing[in_front] - beam[in_front] * step + math.pi, 2 * math.pi) - math.pi
+    beam_offset = wrap_array(bearing[in_front] - beam[in_front] * step)
     direction = first + bearing[in_front] - beam_offset
     # A line crosses a square of half-width h if its distance from the center is at most h (|cos| + |sin|).
     reach = half * (np.abs(np.cos(direction)) + np.abs(np.sin(direction)))

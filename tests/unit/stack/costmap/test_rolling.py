@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.stack.costmap.rolling_window import clip_goal, shift_layer, should_roll, window_around
+from simscen.stack.costmap.grid_frame import clip_goal, shift_layer, should_roll, window_around
 
 
 def test_windows_around_different_points_share_their_cells() -> None:
