@@ -58,7 +58,10 @@ def arc_poses(pose: Pose2, twist: Twist, times: Iterable[float]) -> Array:
 
 
 def mean_velocity(step: Pose2, seconds: float) -> Twist:
-    """Return the constant velocity that moves a base by `step` within `seconds`; `step` is in the base frame."""
+    """Return the constant velocity that moves a base by `step` within `seconds`; `step` is in the base frame.
+
+    The length of the arc is approximated by that of its chord.
+    """
     x, y, turn = step
     c, s = math.cos(turn / 2), math.sin(turn / 2)  # the chord of the arc is at half the turn
     return Twist((c * x + s * y) / seconds, (c * y - s * x) / seconds, turn / seconds)

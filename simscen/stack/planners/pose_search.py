@@ -10,7 +10,7 @@ from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Pose2, wrap_array
 from simscen.stack.planners.endpoints import MAX_ESCAPE_M
 from simscen.stack.planners.ompl_search import FIRST_PATH_PLANNERS, PLANNERS, stop_after
 from simscen.stack.protocols import CostmapView
@@ -166,7 +166,7 @@ def _arc(start: Pose2, length_along: Array, curvature: float, heading: float) ->
     turned = curvature * length_along
     chord = length_along * np.sinc(turned / (2.0 * math.pi))
     direction = start.yaw + heading + 0.5 * turned
-    yaw = np.remainder(start.yaw + turned + math.pi, 2.0 * math.pi) - math.pi
+    yaw = wrap_array(start.yaw + turned)
     yaw[0] = start.yaw
     return np.column_stack((start.x + chord * np.cos(direction), start.y + chord * np.sin(direction), yaw))
 

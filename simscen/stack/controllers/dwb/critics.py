@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.geometry import Array, Pose2, wrap
+from simscen.core.geometry import Array, Pose2, wrap, wrap_array
 from simscen.core.geometry.kinematics import Twist
 from simscen.model.controllers import DynamicWindow as DwbSpec
 from simscen.stack.controllers.collision_checker import APPROACH_TOLERANCE_M, UNCERTAINTY_SIGMAS
@@ -136,7 +136,7 @@ class RotateToGoalCritic:
         speed = math.hypot(now.vx, now.vy)
         self._is_rotating |= speed <= self._stopped_velocity
         squared_speed = velocities[:, 0] ** 2 + velocities[:, 1] ** 2
-        angle = np.abs((end_yaws - goal_yaw + np.pi) % (2.0 * np.pi) - np.pi)
+        angle = np.abs(wrap_array(end_yaws - goal_yaw))
         if self._is_rotating:
             return angle, np.asarray(squared_speed == 0.0)
         return np.asarray(squared_speed * self._slowing_factor + angle), np.asarray(squared_speed < speed**2)
