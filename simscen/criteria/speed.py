@@ -57,11 +57,11 @@ class Speed(Spec, Criterion):
     full_speed: PositiveSpeed | None = None
     """Speed that corresponds to 100 % in the mask."""
     tolerance: NonNegativeSpeed = 0.05
-    """Maximum speed above a limit of the mask."""
+    """Maximum speed above a limit of the mask; only with `mask`."""
     grace: Duration = 1.0
     """Time that the robot may take to slow down after it enters cells of the mask with a lower limit, or after a zone
-    is enabled. It may also accelerate this long before it leaves such cells. `grace` does not apply when the robot
-    enters the region `in`."""
+    is enabled. It may also accelerate this long before it leaves such cells. Only with `mask` or `while_on`; `grace`
+    does not apply when the robot enters the region `in`."""
 
     @model_validator(mode="after")
     def _check_keys(self) -> Speed:
@@ -74,6 +74,10 @@ class Speed(Spec, Criterion):
             raise ValueError("expected full_speed, to which the percentages of the mask refer (or `type: absolute`)")
         if not percent and self.full_speed is not None:
             raise ValueError("full_speed only applies to a mask of percentages")
+        if self.mask is None and "tolerance" in self.model_fields_set:
+            raise ValueError("tolerance only applies to a mask")
+        if self.mask is None and not self.while_on and "grace" in self.model_fields_set:
+            raise ValueError("grace only applies to a mask, or to a zone that is switched on (`while_on: true`)")
         return self
 
     @property

@@ -59,6 +59,9 @@ def test_each_bound_is_optional(kind, words):
         ("goals_reached", {"tolerance": 0}),
         ("keepout", {"region": "wet", "distance": -1}),
         ("clearance", {"min": -1}),
+        ("speed", {"max": 1, "tolerance": 0.05}),
+        ("speed", {"max": 1, "in": "wet", "while_on": True, "tolerance": 0.05}),
+        ("speed", {"max": 1, "in": "wet", "grace": 1}),
     ],
 )
 def test_criterion_without_a_valid_bound_is_refused(kind, words):
