@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from simscen.core.messages.navigation import ErrorCode
+from simscen.criteria.registry import verdict_names
 from simscen.loading.checks.possible_run import why_no_recovery
 from simscen.loading.checks.registry import MEANING, CheckProblem
 from simscen.loading.known_names import goal_names
@@ -157,3 +158,14 @@ def only_warnings(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find scenarios in which all criteria have `severity: warn`, so that no run can fail."""
     if all(entry.severity == "warn" for entry in loaded.spec.pass_):
         yield CheckProblem(("pass",), "no criterion can fail the run: all are `severity: warn`", at_key=True)
+
+
+@MEANING.check("SC051")
+def expected_warnings(loaded: LoadedScenario) -> Iterator[CheckProblem]:
+    """Find criteria with `severity: warn` under `expected.criteria`, which must fail although they cannot."""
+    spec = loaded.spec
+    severities = dict(zip(verdict_names(spec.pass_), (entry.severity for entry in spec.pass_), strict=True))
+    for index, name in enumerate(spec.expected.criteria if spec.expected else ()):
+        if severities.get(name) == "warn":
+            message = f"`{name}` cannot fail as expected: it has `severity: warn`"
+            yield CheckProblem(("expected", "criteria", index), message, "remove `severity: warn`")
