@@ -114,10 +114,10 @@ def criterion_masks_without_effect(scene: Scene) -> Iterator[CheckProblem]:
 
 @WORLD.check("SC051")
 def keepout_masks_on_goals(scene: Scene) -> Iterator[CheckProblem]:
-    """Find keepout criteria with a mask that forbids the start or a goal."""
+    """Find keepout criteria for the whole run with a mask that forbids the start or a goal."""
     masks = scene.cached(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
-        if entry.kind != "keepout" or entry.chosen.mask is None:
+        if entry.kind != "keepout" or entry.chosen.mask is None or entry.chosen.while_on:
             continue
         name, keys = entry.chosen.mask, ("pass", index, "keepout", "mask")
         mask = masks[name]

@@ -36,11 +36,11 @@ def unreachable_triggers(scene: Scene) -> Iterator[CheckProblem]:
 
 @WORLD.check("SC051")
 def keepout_regions_on_goals(scene: Scene) -> Iterator[CheckProblem]:
-    """Find keepout criteria with a region that contains the start or a goal."""
+    """Find keepout criteria for the whole run with a region that contains the start or a goal."""
     if _start_is_blocked(scene):
         return
     for index, entry in enumerate(scene.loaded.spec.pass_):
-        if entry.kind != "keepout" or entry.chosen.region is None:
+        if entry.kind != "keepout" or entry.chosen.region is None or entry.chosen.while_on:
             continue
         region, keys = entry.chosen.region, ("pass", index, "keepout", "region")
         corners = scene.world.regions[region]
