@@ -16,7 +16,7 @@ from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 CASE: dict[str, Any] = {"goals": [{"name": "shelf", "pose": [2.5, 0.5, 0]}], "shortest": {"shelf": 2.5}}
 DRIVE_TRACE: dict[str, Any] = {
     "seconds": 8,
-    "truth": [[0, 0, 0], [4, 2, 0.5], [8, 2.5, 0.5]],
+    "truth": [[0, 0.2, -0.1, 2.8], [4, 2, 0.5, -2.8], [8, 2.5, 0.5, 0.2]],
     "events": [
         [0.5, "goal.accepted", "shelf"],
         [2, "fault.started", "lidar.off"],
@@ -27,7 +27,10 @@ DRIVE_TRACE: dict[str, Any] = {
         [7, "navigation.ended", "SUCCEEDED", {"error_code": 0}],
     ],
 }
-"""Descriptions for `synthetic_case` and `synthetic_trace`: one goal, and a drive to this goal."""
+"""Descriptions for `synthetic_case` and `synthetic_trace`: one goal, and a drive to this goal.
+
+The drive does not start at the origin and turns past ±π, so that a component that normalizes the poses changes them.
+"""
 STATIONARY_TRACE: dict[str, Any] = {"seconds": 2, "truth": [[0, 0, 0]], "belief": None, "scans": []}
 TRUNCATED_TRACE: dict[str, Any] = {**DRIVE_TRACE, "seconds": 3, "ended": None, "events": DRIVE_TRACE["events"][:2]}
 TRACES = {

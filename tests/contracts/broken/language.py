@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, ClassVar
 
+import numpy as np
+
 from simscen.actions.base import Action
 from simscen.core.records.verdict import Finding, Status
 from simscen.core.stage import Effect
@@ -50,6 +52,20 @@ class CountsJudgments(Spec, Criterion):
 class CriterionChangesTrace(Spec, Criterion):
     def judge(self, trace, case):
         trace.truth.values[:] = 0.0
+        return [PASSING]
+
+
+@breaks_contract("a trace is not changed", "changes the trace")
+class CriterionUnwrapsHeadings(Spec, Criterion):
+    def judge(self, trace, case):
+        trace.truth.values[:, 2] = np.unwrap(trace.truth.values[:, 2])
+        return [PASSING]
+
+
+@breaks_contract("a trace is not changed", "changes the trace")
+class CriterionMovesStartToOrigin(Spec, Criterion):
+    def judge(self, trace, case):
+        trace.truth.values[:, :2] -= trace.truth.values[0, :2]
         return [PASSING]
 
 
