@@ -1,9 +1,8 @@
-"""The advanced stack and its builder: the reference stack with motion prediction and compensation of turn slip."""
+"""The advanced stack and its builder: motion prediction, compensation of turn slip, and its own clearing policy."""
 
 import math
 from typing import Any
 
-from simscen.advanced.costmap_clearing import ClearingBackoff
 from simscen.advanced.prediction.motion_prediction import MotionPrediction
 from simscen.advanced.replanning import AdvancedPlanManager
 from simscen.advanced.turn_slip import TurnSlipObserver
@@ -89,6 +88,33 @@ class AdvancedStack(ReferenceStack):
             self._commands.stop(tick)
         elif not self._commands.is_busy(tick):
             self._commands.request(tick, command, self._commands.periods(tick))
+
+
+FIRST_CLEARING_WAIT_S = 10.0
+"""Time after clearing the entire costmap until this may happen again; doubled each time."""
+CLEARING_PROGRESS_M = 1.0
+"""Decrease of the distance to the goal that resets the time between two clearings to FIRST_CLEARING_WAIT_S."""
+
+
+class ClearingBackoff(ClearingPolicy):
+    """Policy that clears the entire global costmap at increasing intervals, and otherwise only around the robot."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Prepare for a new goal."""
+        self._wait, self._due, self._nearest = FIRST_CLEARING_WAIT_S, 0.0, float("inf")
+
+    def clears_entirely(self, now: float, goal_distance: float) -> bool:
+        """Return whether to clear the entire costmap (see ClearingPolicy). Call it once per clearing."""
+        if goal_distance <= self._nearest - CLEARING_PROGRESS_M:
+            self._wait, self._due = FIRST_CLEARING_WAIT_S, now
+        if now < self._due:
+            return False
+        self._due, self._wait = now + self._wait, 2 * self._wait
+        self._nearest = min(self._nearest, goal_distance)
+        return True
 
 
 class AdvancedStackBuilder(StackBuilder):

@@ -72,8 +72,9 @@ class LockstepSynchronization:
 
         def late_server() -> List[str]:
             overdue = self._actions.overdue_command(now)
-            commanded = overdue is None or _last_command(self._graph.inbox[start:]) is not None
-            return [] if commanded or overdue is None else [overdue.node]
+            if overdue is None or _last_command(self._graph.inbox[start:]) is not None:
+                return []
+            return [overdue.node]
 
         if not self._barrier.step_time.wait_for(awaited=late_server, limit_s=self._actions.wait_s(self._limit)):
             overdue = self._actions.record_missing(now)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from simscen.advanced.costmap_clearing import ClearingBackoff
+from simscen.advanced.stack import ClearingBackoff
 from simscen.core.geometry import Pose2
 from simscen.core.messages.goals import Goal
 from simscen.model.localizers import GroundTruth
