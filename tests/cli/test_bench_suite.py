@@ -27,10 +27,10 @@ def test_a_suite_is_measured_and_its_results_are_compared(tmp_path: Path) -> Non
         (tmp_path / f"{name}.scenario.yaml").write_text(SCENARIO)
     done = bench("suite", str(tmp_path), "--most", "2", "-j", "1", "--format", "json")
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    assert (told["suite"]["runs"], told["suite"]["workers"], told["suite"]["unfinished"]) == (2, 1, [])
-    assert told["suite"]["simulated"] < 1.0
-    assert len(told["suite"]["memory"]) == 2
+    expected = json.loads(done.stdout)
+    assert (expected["suite"]["runs"], expected["suite"]["workers"], expected["suite"]["unfinished"]) == (2, 1, [])
+    assert expected["suite"]["simulated"] < 1.0
+    assert len(expected["suite"]["memory"]) == 2
     result = tmp_path / "result.json"
     result.write_text(done.stdout)
     compared = bench("compare", str(result), str(result))

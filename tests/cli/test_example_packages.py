@@ -94,8 +94,8 @@ def test_validation_does_not_import_component_implementations(call, tmp_path: Pa
     heavy = "{'ompl', 'scipy', 'pybullet', 'theta_star.planner', 'vfh_plus.stack', 'theta_star.spec', 'vfh_plus.spec'}"
     probe = f"import os, sys; os._exit = lambda code: print(code, *sorted({heavy} & set(sys.modules)));"
     done = call("-c", probe + SIMSCEN, "validate", ".", folder=tmp_path)
-    told = ["2 scenarios and 5 worlds are valid", "0 theta_star.spec vfh_plus.spec"]
-    assert done.stdout.splitlines() == told, done.stderr
+    expected = ["2 scenarios and 5 worlds are valid", "0 theta_star.spec vfh_plus.spec"]
+    assert done.stdout.splitlines() == expected, done.stderr
 
 
 BROKEN = """

@@ -124,7 +124,7 @@ class LanguageServer:
             self._told.put(json.loads(self._process.stdout.read(length)))
 
 
-def _diagnostic(told: dict[str, Any]) -> Diagnostic:
-    begin, end = told["range"]["start"], told["range"]["end"]
+def _diagnostic(expected: dict[str, Any]) -> Diagnostic:
+    begin, end = expected["range"]["start"], expected["range"]["end"]
     column = end["character"] if end["line"] == begin["line"] else -1
-    return Diagnostic(begin["line"], begin["character"], column, told["message"])
+    return Diagnostic(begin["line"], begin["character"], column, expected["message"])

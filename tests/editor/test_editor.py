@@ -71,7 +71,7 @@ class Page:
         """What is underlined; waited for only here, so that the server has several pages to read at once."""
         return self._server.diagnostics(self._uri)
 
-    def told(self, line: int) -> list[tuple[str, str]]:
+    def expected(self, line: int) -> list[tuple[str, str]]:
         """What is underlined in a line, and why."""
         return [(self.underlined(one), one.message) for one in self.found if one.line == line]
 
@@ -267,14 +267,14 @@ def test_editor_underlines_only_mistakes(
         strange = [(topic.name, {STRANGE: 1, **body_of(topic)}) for topic in mappings]
         text, lines = written(room, [*misspelled, *((topic.name, True) for topic in known), *strange])
         page = Page(server, room.kind, text)
-        told = iter([page.told(line) for line in lines])
+        expected = iter([page.expected(line) for line in lines])
         for topic in known:
-            assert next(told) == [(f"{topic.name}_x", f"Property {topic.name}_x is not allowed.")]
+            assert next(expected) == [(f"{topic.name}_x", f"Property {topic.name}_x is not allowed.")]
         for topic in known:
-            wrong = [(underlined, why.partition(".")[0]) for underlined, why in next(told)]
+            wrong = [(underlined, why.partition(".")[0]) for underlined, why in next(expected)]
             assert wrong == [("true", "Incorrect type")], topic.name
         for _ in mappings:
-            assert next(told) == [(f'"{STRANGE}"', f"Property {STRANGE} is not allowed.")]
+            assert next(expected) == [(f'"{STRANGE}"', f"Property {STRANGE} is not allowed.")]
         assert len(page.found) == len(lines)
 
 
@@ -285,8 +285,10 @@ def test_choice_requires_exactly_one_key(server: LanguageServer, group: str) -> 
     text, (line,) = written(room, [("WORD", 0)])
     both = f"{{{first.name}: {json.dumps(body_of(first))}, {second.name}: {json.dumps(body_of(second))}}}"
     none, two = (Page(server, room.kind, text.replace("\n      WORD: 0", f" {body}")) for body in ("{}", both))
-    assert [message for _, message in none.told(line - 1)] == [f"expected one of: {', '.join(room.choice.choices())}"]
-    assert ["only one" in message for _, message in two.told(line - 1)] == [True]
+    assert [message for _, message in none.expected(line - 1)] == [
+        f"expected one of: {', '.join(room.choice.choices())}"
+    ]
+    assert ["only one" in message for _, message in two.expected(line - 1)] == [True]
 
 
 def test_each_type_is_offered_behind_type(server: LanguageServer) -> None:
@@ -314,12 +316,15 @@ def test_every_key_has_completion_hover_text_and_error_checks(
         assert {field.key for field in keys} - empty.offered(len(empty.lines) - 1) == set(), topic.name
         line = len(full.lines) - len(keys) - 1
         for number, field in enumerate(keys, start=line):
-            told = [underlined for underlined, why in full.told(number) if not why.startswith("Missing")]
-            assert full.told(number) and {*told} <= {WRONG, STRANGE, WRONG_NAMES}, (field.key, full.told(number))
+            expected = [underlined for underlined, why in full.expected(number) if not why.startswith("Missing")]
+            assert full.expected(number) and {*expected} <= {WRONG, STRANGE, WRONG_NAMES}, (
+                field.key,
+                full.expected(number),
+            )
             shown = full.shown(number, field.key)
             known = [summary(field.text), *(mappings if "mapping" in field.kind else [])]
             assert any(text in shown for text in known), (topic.name, field, shown)
-        assert (STRANGE, f"Property {STRANGE} is not allowed.") in full.told(len(full.lines) - 1), topic.name
+        assert (STRANGE, f"Property {STRANGE} is not allowed.") in full.expected(len(full.lines) - 1), topic.name
 
 
 def test_shipped_files_have_no_editor_errors(server: LanguageServer) -> None:

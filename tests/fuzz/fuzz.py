@@ -192,7 +192,7 @@ def main() -> int:
     for name, count in counts.items():
         print(f"{name:9} {count.total():6} mutants  " + "  ".join(f"{n} {how}" for how, n in sorted(count.items())))
     for (name, how), found in findings.items():
-        print(f"\n{name}: {how}, {len(found)} times, e.g. --only {found[0]['mutant']}\n{found[0].get('told', '')}")
+        print(f"\n{name}: {how}, {len(found)} times, e.g. --only {found[0]['mutant']}\n{found[0].get('traceback', '')}")
     total, wrong = sum(count.total() for count in counts.values()), sum(map(len, findings.values()))
     print(f"{total} mutants in {time.monotonic() - start_s:.0f} s, {wrong} findings of {len(findings)} kinds")
     return int(bool(findings) or total < options.mutants)

@@ -37,12 +37,12 @@ def with_filters(nodes: dict[str, Any]) -> None:
 def test_costmap_filters_receive_the_zones_of_the_scenario(run, nav2: Nav2, tmp_path: Path, scenario: str) -> None:
     filtered = nav2.with_parameters(tmp_path / "filters.yaml", with_filters)
     ended = run(f"zones/{scenario}.scenario.yaml", launch=filtered.launch)
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
 
 
 def test_zones_that_no_node_receives_are_a_warning(run) -> None:
     ended = run("zones/closed_passage.scenario.yaml")
-    assert "no node subscribes to /keepout_filter_mask, so the stack does not know the keepout zones" in ended.said
+    assert "no node subscribes to /keepout_filter_mask, so the stack does not know the keepout zones" in ended.output
 
 
 def test_nav2_in_a_namespace(run, nav2: Nav2, tmp_path: Path) -> None:
@@ -54,7 +54,7 @@ def test_nav2_in_a_namespace(run, nav2: Nav2, tmp_path: Path) -> None:
     remaps = ["-r", "__ns:=/robot1", "-r", "/tf:=tf", "-r", "/tf_static:=tf_static"]
     launch = shlex.join([*shlex.split(nav2._replace(params=params).launch), *remaps])
     ended = run(GOAL, "--namespace", "robot1", launch=launch)
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
     assert "/robot1/controller_server" in ended.about["nodes"]
 
 
@@ -70,7 +70,7 @@ def test_nav2_with_remapped_topics(run, nav2: Nav2) -> None:
         ]
     )
     ended = run(GOAL, *(f"--remap={name}:={other}" for name, other in TOPICS.items()), launch=launch)
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
 
 
 def test_nav2_with_other_topics_in_its_parameters(run, nav2: Nav2, tmp_path: Path) -> None:
@@ -81,12 +81,12 @@ def test_nav2_with_other_topics_in_its_parameters(run, nav2: Nav2, tmp_path: Pat
     params.write_text(text)
     launch = f"{nav2._replace(params=params).launch} -r odom:={TOPICS['/odom']} -r cmd_vel:={TOPICS['/cmd_vel']}"
     ended = run(GOAL, *(f"--remap={name}:={other}" for name, other in TOPICS.items()), launch=launch)
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
 
 
 def test_commands_through_velocity_smoother_and_collision_monitor(run, nav2: Nav2) -> None:
     ended = run(GOAL, launch=f"SMOOTHED=1 {nav2.launch}")
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
     assert {"/velocity_smoother", "/collision_monitor"} <= set(ended.about["nodes"])
 
 
@@ -110,7 +110,7 @@ def test_transforms_of_the_users_robot_state_publisher(run, nav2: Nav2, tmp_path
     publisher = f"bash -c {shlex.quote(f'{start} --ros-args --params-file {tmp_path}/robot.yaml')}"
     frames = ["--without", "/robot_description", "--frame", "base_link:=base_footprint", "--frame", "lidar:=base_scan"]
     ended = run(GOAL, "--without", "/tf_static", *frames, launch=f"{publisher} & {nav2.launch}")
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
     assert "/robot_state_publisher" in ended.about["nodes"]
 
 
@@ -133,26 +133,26 @@ def test_two_robots_each_with_a_nav2(run, nav2: Nav2, tmp_path: Path) -> None:
         shutil.copy(nav2.params, tmp_path / f"{robot}.yaml")
     launch = nav2.launch.replace(str(nav2.params), f"{tmp_path}/$SIMSCEN_ROBOT.yaml")
     ended = run(tmp_path / "two.scenario.yaml", "--ready", "100", launch=launch)
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
     for robot in ("east", "west"):
         assert "/controller_server" in ended.about_of(robot)["nodes"]
 
 
 def test_nav2_composed_in_one_process(run, nav2: Nav2) -> None:
     ended = run(GOAL, launch=nav2.composed_launch)
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
 
 
 def test_a_launch_that_takes_half_a_minute(run, nav2: Nav2) -> None:
     ended = run(GOAL, "--ready", "100", launch=f"sleep 30; {nav2.launch}")
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
 
 
 def test_a_server_that_never_becomes_active_is_named(run, nav2: Nav2) -> None:
     managed = "MANAGED=controller_server,smoother_server,planner_server,bt_navigator,waypoint_follower"
     ended = run(GOAL, "--ready", "30", launch=f"{managed} {nav2.launch}")
     assert ended.code == 3
-    assert "the lifecycle node /behavior_server is unconfigured, not active" in ended.said
+    assert "the lifecycle node /behavior_server is unconfigured, not active" in ended.output
 
 
 def test_a_typo_in_the_name_of_a_plugin_is_reported_with_its_node(run, nav2: Nav2, tmp_path: Path) -> None:
@@ -161,8 +161,8 @@ def test_a_typo_in_the_name_of_a_plugin_is_reported_with_its_node(run, nav2: Nav
 
     ended = run(GOAL, "--ready", "30", launch=nav2.with_parameters(tmp_path / "typo.yaml", misspell).launch)
     assert ended.code == 3
-    assert "planner_server" in ended.said
-    assert "NavfnPlaner" in ended.said
+    assert "planner_server" in ended.output
+    assert "NavfnPlaner" in ended.output
 
 
 def test_the_map_of_the_users_map_server(run, nav2: Nav2, tmp_path: Path) -> None:
@@ -174,5 +174,5 @@ def test_the_map_of_the_users_map_server(run, nav2: Nav2, tmp_path: Path) -> Non
     both = f"({started}) & (source {shlex.quote(str(nav2.script))}; {managed}) & {nav2.launch}"
     ended = run("navigation/outdated_map.scenario.yaml", "--without", "/map", launch=f"bash -c {shlex.quote(both)}")
     # Nav2's localization error on this map is above the limit of the scenario.
-    assert ended.code in (0, 1), ended.said
+    assert ended.code in (0, 1), ended.output
     assert "/map_server" in ended.about["nodes"]

@@ -48,7 +48,7 @@ def processes(word: str) -> list[int]:
 
 def test_nav2_reaches_a_goal_in_lockstep(run, nav2) -> None:
     ended = run(GOAL)
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
     about = ended.about
     assert about["goals"] == "/navigate_to_pose"
     assert {"/amcl", "/bt_navigator", "/controller_server", "/planner_server"} <= set(about["nodes"])
@@ -61,7 +61,7 @@ def test_nav2_reaches_a_goal_in_lockstep(run, nav2) -> None:
 def test_the_log_contains_what_nav2_computed(run) -> None:
     """Costmaps, plans, particles, changes of the behavior tree, and the values of all parameters."""
     ended = run(GOAL)
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
     with next(ended.out.rglob("run.mcap")).open("rb") as file:
         summary = make_reader(file).get_summary()
     counts = {summary.channels[k].topic: n for k, n in summary.statistics.channel_message_counts.items()}
@@ -77,7 +77,7 @@ def test_the_log_contains_what_nav2_computed(run) -> None:
 
 def test_the_replay_page_has_the_behavior_tree_and_the_parameters(run) -> None:
     ended = run(GOAL)
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
     log, columns = read_run(next(ended.out.rglob("run.mcap")), with_sensors=True), PackedColumns()
     tree = behavior_tree_data(log, columns)
     assert tree is not None and {"NavigateRecovery", "ComputePathToPose", "FollowPath"} <= set(tree["nodes"])
@@ -89,13 +89,13 @@ def test_the_replay_page_has_the_behavior_tree_and_the_parameters(run) -> None:
 def test_nav2_becomes_active_although_scans_are_delayed(run) -> None:
     ended = run("faults/lidar_delay.scenario.yaml")
     # AMCL's error is close to the limit of the scenario.
-    assert verdicts_of(ended)["goals_reached"] == "pass", ended.said
+    assert verdicts_of(ended)["goals_reached"] == "pass", ended.output
 
 
 def test_recoveries_of_nav2_are_events(run) -> None:
     """The scenario expects at least one recovery before the goal fails."""
     ended = run("corner_cases/goal_blocked_for_good.scenario.yaml")
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
 
 
 @pytest.mark.parametrize("plugins", ["dwb", "mppi", "smac_2d"])
@@ -108,7 +108,7 @@ def test_other_plugins_of_nav2_reach_the_goal(run, nav2, tmp_path: Path, plugins
         nodes[server]["ros__parameters"][name] = values[plugins]
 
     ended = run(GOAL, launch=nav2.with_parameters(tmp_path / "plugins.yaml", change).launch)
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
 
 
 def test_waypoints_are_visited_by_the_waypoint_follower(run, nav2, tmp_path: Path) -> None:
@@ -119,7 +119,7 @@ def test_waypoints_are_visited_by_the_waypoint_follower(run, nav2, tmp_path: Pat
     ended = run("navigation/waypoints_with_waits.scenario.yaml", launch=launch)
     assert ended.about["goals"] == "/follow_waypoints"
     verdicts = verdicts_of(ended)
-    assert verdicts["goals_reached"] == verdicts["result"] == "pass", ended.said
+    assert verdicts["goals_reached"] == verdicts["result"] == "pass", ended.output
 
 
 def verdicts_of(ended: Any) -> dict[str, str]:
@@ -135,14 +135,14 @@ def test_a_wrong_frame_is_named_with_its_node(run, nav2, tmp_path: Path) -> None
     changed = nav2.with_parameters(tmp_path / "typo.yaml", misspell)
     ended = run(GOAL, "--ready", "10", launch=changed.launch)
     assert ended.code == 3
-    assert "amcl: base_frame_id is 'base_fotprint'" in ended.said
+    assert "amcl: base_frame_id is 'base_fotprint'" in ended.output
     assert processes(str(changed.params)) == []
 
 
 def test_a_scenario_without_a_map_is_named_as_the_cause(run) -> None:
     ended = run("corner_cases/u_trap.scenario.yaml", "--ready", "20")
     assert ended.code == 3
-    assert "waiting for /map, which no node publishes" in ended.said
+    assert "waiting for /map, which no node publishes" in ended.output
 
 
 def test_a_server_that_is_killed_during_the_run_is_named(run, nav2) -> None:
@@ -157,6 +157,6 @@ def test_a_server_that_is_killed_during_the_run_is_named(run, nav2) -> None:
 
     threading.Thread(target=kill, daemon=True).start()
     ended = run(GOAL)
-    assert ended.code == 3, ended.said
-    assert "planner_server" in ended.said
+    assert ended.code == 3, ended.output
+    assert "planner_server" in ended.output
     assert processes(params) == []

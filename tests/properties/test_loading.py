@@ -69,7 +69,7 @@ def _lie_inside(problems: list[Problem], raw: bytes) -> None:
         if problem.line:
             assert 1 <= problem.line <= len(lines)
             assert 1 <= problem.col <= len(lines[problem.line - 1]) + 1
-    assert escape_control(told := as_text(problems)) == told
+    assert escape_control(expected := as_text(problems)) == expected
 
 
 def test_the_scenario_that_is_varied_is_valid(load: Any) -> None:

@@ -79,7 +79,7 @@ class Ended(NamedTuple):
     """How `simscen run` ended: exit code, its output, the folder of the session."""
 
     code: int
-    said: str
+    output: str
     out: Path
 
     @property

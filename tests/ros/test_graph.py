@@ -31,7 +31,7 @@ STRENGTH = {"BEST_EFFORT": 0, "RELIABLE": 1, "VOLATILE": 0, "TRANSIENT_LOCAL": 1
 def test_topics_types_qos_and_frames_match_nav2(with_interfaces, run, tmp_path: Path) -> None:
     ros, file = with_interfaces, tmp_path / "probe.json"
     ended = run("--launch", f"{ros.node('navigator')} & {ros.node('probe', file=file)}")
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
     seen = json.loads(file.read_text())
     for topic, (kind, reliability, durability) in ASKED.items():
         offered = seen["offered"][topic]
@@ -48,7 +48,7 @@ def test_frames_have_the_names_of_the_users_graph(with_interfaces, run, tmp_path
     ros, file = with_interfaces, tmp_path / "probe.json"
     names = ["--frame", "lidar:=base_scan", "--frame", "base_link:=chassis", "--base-frame", "base_footprint"]
     ended = run(*names, "--launch", f"{ros.node('navigator')} & {ros.node('probe', file=file)}")
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
     seen = json.loads(file.read_text())
     links = {("odom", "chassis"), ("chassis", "base_scan"), ("chassis", "base_footprint")}
     assert set(map(tuple, seen["frames"])) >= links
@@ -59,7 +59,9 @@ def test_frames_have_the_names_of_the_users_graph(with_interfaces, run, tmp_path
 def test_a_sensor_without_a_frame_is_named_with_the_option(with_interfaces, run) -> None:
     ended = run("--ready", READY, "--without", "/tf_static", "--launch", with_interfaces.node("navigator"))
     assert ended.code == 3
-    assert "no node publishes the frame lidar, and /tf_static of simscen is left out: --frame lidar:=NAME" in ended.said
+    assert (
+        "no node publishes the frame lidar, and /tf_static of simscen is left out: --frame lidar:=NAME" in ended.output
+    )
 
 
 @pytest.mark.slow
@@ -100,7 +102,7 @@ def test_an_incomplete_graph_is_an_exact_error(ros, run, flaws: dict[str, str]) 
     ended = run("--ready", READY, "--launch", ros.node("flawed", flaws=list(flaws)))
     assert ended.code == 3
     for message in flaws.values():
-        assert message in ended.said
+        assert message in ended.output
 
 
 @pytest.mark.slow
@@ -108,21 +110,21 @@ def test_nodes_on_wall_time_and_inactive_lifecycle_nodes_are_named(ros, run) -> 
     awake = ros.node("flawed", "-r", "cmd_vel:=other", sim_time=False)
     ended = run("--ready", READY, "--launch", f"{awake} & {ros.node('sleeper')}")
     assert ended.code == 3
-    assert "/flawed uses wall time: start it with use_sim_time true" in ended.said
-    assert "the lifecycle node /sleeper is unconfigured, not active" in ended.said
+    assert "/flawed uses wall time: start it with use_sim_time true" in ended.output
+    assert "the lifecycle node /sleeper is unconfigured, not active" in ended.output
 
 
 @pytest.mark.slow
 def test_the_remapping_for_a_topic_with_another_name_is_suggested(ros, run) -> None:
     ended = run("--ready", READY, "--launch", ros.node("navigator", "-r", "scan:=front", "-r", "cmd_vel:=base/cmd_vel"))
     assert ended.code == 3
-    assert "--remap /cmd_vel:=/base/cmd_vel" in ended.said
-    assert "--remap /scan:=/front" in ended.said
+    assert "--remap /cmd_vel:=/base/cmd_vel" in ended.output
+    assert "--remap /scan:=/front" in ended.output
 
 
 @pytest.mark.slow
 def test_the_output_of_a_launch_command_that_exits_is_shown(ros, run) -> None:
     ended = run("--launch", "echo no such package: nav >&2; exit 7")
     assert ended.code == 3
-    assert "the launched command ended with exit code 7" in ended.said
-    assert "no such package: nav" in ended.said
+    assert "the launched command ended with exit code 7" in ended.output
+    assert "no such package: nav" in ended.output

@@ -35,13 +35,13 @@ def test_a_goal_is_reached_by_goal_pose_in_a_namespace_with_remappings(ros, run,
     names = ["-r", "__ns:=/robot1", "-r", "/tf:=tf", "-r", "/tf_static:=tf_static", "-r", "scan:=/front/scan"]
     words = ["--namespace", "robot1", "--remap", "/scan:=/front/scan"]
     ended = run(*words, "--launch", ros.node("navigator", *names, stamped=stamped))
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_the_navigator_passes_a_scenario_of_the_library(ros, run, name: str) -> None:
     ended = run("--launch", ros.node("navigator"), scenario=ROOT / "scenarios" / f"{name}.scenario.yaml")
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
 
 
 @pytest.mark.slow
@@ -59,9 +59,9 @@ def test_goals_are_sent_to_an_action_of_nav2(with_interfaces, run, tmp_path: Pat
     )
     launch = with_interfaces.node("navigator", action=action)
     ended = run("--goals", action, "--launch", launch, scenario="short.scenario.yaml")
-    assert ended.code == 0, ended.said
-    told = [event.kind.value for event in read_run(ended.logs[0]).trace.events if event.kind.value.startswith("goal.")]
-    assert told == ["goal.accepted", "goal.reached"] * 2
+    assert ended.code == 0, ended.output
+    text = [event.kind.value for event in read_run(ended.logs[0]).trace.events if event.kind.value.startswith("goal.")]
+    assert text == ["goal.accepted", "goal.reached"] * 2
 
 
 WAY = "goals: [{name: way, pose: {x: 1.8, y: 1}%s}, {name: end, pose: {x: 2.4, y: 1}}]"
@@ -76,12 +76,12 @@ def test_the_scenario_selects_the_action(with_interfaces, run, tmp_path: Path, m
     (tmp_path / "tour.scenario.yaml").write_text(head + tour)
     launch = with_interfaces.node("navigator", action=mode)
     ended = run("--launch", launch, scenario="tour.scenario.yaml")
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
     assert ended.about["goals"] == f"/{mode}"
     events = [event for event in read_run(ended.logs[0]).trace.events if event.kind.value.startswith("goal.")]
     way = "passed" if mode == "navigate_through_poses" else "reached"
-    told = [(event.kind.value, event.name) for event in events if event.kind.value != "goal.accepted"]
-    assert told == [
+    text = [(event.kind.value, event.name) for event in events if event.kind.value != "goal.accepted"]
+    assert text == [
         (f"goal.{kind}", name + loop) for loop in ("", "#2") for kind, name in ((way, "way"), ("reached", "end"))
     ]
 
@@ -94,20 +94,20 @@ def test_concurrent_lockstep_runs_have_equal_logs(ros, run, repeats: int) -> Non
         words = ["--settle", "0.2", "--launch", ros.node("navigator")]
         calls = [pool.submit(run, *words, scenario="short.scenario.yaml") for _ in range(repeats)]
         ended = [call.result() for call in calls]
-    assert [one.code for one in ended] == [0] * repeats, ended[0].said
+    assert [one.code for one in ended] == [0] * repeats, ended[0].output
     assert len({digest(one.logs[0]) for one in ended}) == 1
-    told = [one.about for one in ended]
-    assert all(one["sync"] == "lockstep" and one["late_commands"] == 0 for one in told)
-    assert told == [told[0]] * repeats
+    text = [one.about for one in ended]
+    assert all(one["sync"] == "lockstep" and one["late_commands"] == 0 for one in text)
+    assert text == [text[0]] * repeats
 
 
 @pytest.mark.slow
 def test_paced_runs_are_marked(ros, run) -> None:
     words = ["--sync", "paced", "--factor", "4", "--launch", ros.node("navigator")]
     ended = run(*words, scenario="short.scenario.yaml")
-    assert ended.code == 0, ended.said
-    told = ended.about
-    assert (told["sync"], told["factor"]) == ("paced", 4.0)
+    assert ended.code == 0, ended.output
+    text = ended.about
+    assert (text["sync"], text["factor"]) == ("paced", 4.0)
 
 
 @pytest.mark.slow
@@ -122,10 +122,10 @@ def test_killing_a_node_is_an_error_of_its_run_only(ros, run, alive, tmp_path: P
             time.sleep(0.05)
         os.kill(nodes[0], signal.SIGKILL)
         ended = call.result()
-    assert ended.code == 3, ended.said
+    assert ended.code == 3, ended.output
     results = json.loads((ended.out / "results.json").read_text())
     assert sorted(one["outcome"] for one in results["runs"]) == ["error", "passed"]
-    assert "the launched command ended by signal 9" in ended.said, ended.said
+    assert "the launched command ended by signal 9" in ended.output, ended.output
     assert alive(tag) == []
 
 
@@ -133,7 +133,7 @@ def test_killing_a_node_is_an_error_of_its_run_only(ros, run, alive, tmp_path: P
 def test_a_ros_without_tf2_msgs_can_drive_nodes_that_do_not_need_tf(ros, run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", str(NODES.with_name("without")))
     ended = run("--launch", ros.node("navigator"), scenario="short.scenario.yaml")
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
     assert ended.about["not_published"] == ["/tf (tf2_msgs/msg/TFMessage)", "/tf_static (tf2_msgs/msg/TFMessage)"]
 
 
@@ -145,8 +145,8 @@ def test_a_node_that_needs_tf_is_named_if_the_adapter_has_no_tf2_msgs(
     monkeypatch.setenv("PYTHONPATH", str(NODES.with_name("without")))
     ended = run("--launch", launch)
     assert ended.code == 3
-    assert "/navigator subscribes to /tf_static, which cannot be published: " in ended.said
-    assert "has no tf2_msgs; install it" in ended.said
+    assert "/navigator subscribes to /tf_static, which cannot be published: " in ended.output
+    assert "has no tf2_msgs; install it" in ended.output
 
 
 @pytest.mark.slow
@@ -155,7 +155,7 @@ def test_a_node_that_hangs_is_named_and_ended(ros, run, alive) -> None:
     launch = ros.node("navigator", "-p", f"tag:={tag}", hangs_at=1.0)
     ended = run("--answer", "2", "--launch", launch, scenario="short.scenario.yaml")
     assert ended.code == 3
-    assert "/navigator has not answered for 2 s: it hangs, or was killed" in ended.said
+    assert "/navigator has not answered for 2 s: it hangs, or was killed" in ended.output
     assert alive(tag) == []
 
 
@@ -183,7 +183,7 @@ def test_goals_are_preempted_and_canceled(with_interfaces, run, tmp_path: Path, 
     launch = with_interfaces.node("navigator", **({"action": action} if action else {}))
     words = ["--goals", action or "goal_pose", "--launch", launch]
     ended = run(*words, scenario="changes.scenario.yaml")
-    assert ended.code == 0, ended.said
+    assert ended.code == 0, ended.output
     kinds = [event.kind.value for event in read_run(ended.logs[0]).trace.events]
     goals = [kind for kind in kinds if kind.startswith(("goal.", "navigation."))]
     again = ["goal.accepted", "goal.canceled"]

@@ -52,5 +52,5 @@ def test_a_command_of_the_tutorial_works(ros, tmp_path: Path, command: str) -> N
 def test_the_errors_in_the_tutorial_are_real(ros, run, tmp_path: Path, change, message: str) -> None:
     (tmp_path / "drive.py").write_text(FILES["drive.py"].replace(*change))
     ended = run("--ready", "5", "--launch", f"{ros.python} drive.py --ros-args -p use_sim_time:=true")
-    assert message in ended.said
+    assert message in ended.output
     assert message in PAGE

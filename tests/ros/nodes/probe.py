@@ -38,8 +38,8 @@ class Probe(Node):
                 if end.node_name == "simscen":
                     profile = end.qos_profile
                     offered[name] = [end.topic_type, profile.reliability.name, profile.durability.name, profile.depth]
-        told = {"offered": offered, "frames": sorted(self.frames), "scans": sorted(self.scans)}
-        Path(self.file).write_text(json.dumps(told))
+        text = {"offered": offered, "frames": sorted(self.frames), "scans": sorted(self.scans)}
+        Path(self.file).write_text(json.dumps(text))
 
 
 rclpy.init()

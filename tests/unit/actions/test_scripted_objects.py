@@ -133,16 +133,16 @@ def test_push_without_a_movable_object_has_no_effect():
 
 
 @pytest.mark.parametrize(
-    ("told", "said"),
+    ("text", "given"),
     {
         "expected either impulse or force": {},
         "a force needs a duration `for`": {"force": [0, 1]},
         "an impulse has no duration `for`": {"impulse": [0, 1], "for": 1.0},
     }.items(),
 )
-def test_invalid_push_is_refused(told, said):
-    with pytest.raises(ValidationError, match=told):
-        AnyAction.model_validate({"push": said})
+def test_invalid_push_is_refused(text, given):
+    with pytest.raises(ValidationError, match=text):
+        AnyAction.model_validate({"push": given})
 
 
 def test_teleport_moves_an_object_and_reports_the_distance():

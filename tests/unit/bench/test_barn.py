@@ -19,7 +19,7 @@ def test_a_scenario_of_the_challenge_is_valid(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "given"),
     [
         ("world,length\n1,12\n", "no column 'ref_path_len'"),
         ("world,ref_path_len\n1,12\n2,far\n", "line 3: could not convert string to float: 'far'"),
@@ -28,12 +28,12 @@ def test_a_scenario_of_the_challenge_is_valid(tmp_path: Path) -> None:
         ("world,ref_path_len\n", "lists no worlds"),
     ],
 )
-def test_invalid_list_of_worlds_is_reported(tmp_path: Path, text: str, said: str) -> None:
+def test_invalid_list_of_worlds_is_reported(tmp_path: Path, text: str, given: str) -> None:
     (tmp_path / "scenarios.csv").write_text(text)
     with pytest.raises(UsageError) as raised:
         read_barn_worlds(tmp_path)
     assert f"{tmp_path / 'scenarios.csv'}" in str(raised.value)
-    assert said in str(raised.value)
+    assert given in str(raised.value)
 
 
 def test_list_of_worlds_from_a_spreadsheet_is_read(tmp_path: Path) -> None:

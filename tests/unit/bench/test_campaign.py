@@ -49,8 +49,8 @@ def test_generated_log_is_reproducible_collision_free_and_has_odometry_drift() -
     odometry = [one.pose for one in made.sensed.readings if isinstance(one, Odometry)]
     truth = made.sensed.truth
     driven = np.hypot(*np.diff(truth[:, :2], axis=0).T).sum()
-    told = sum(a.distance(b) for a, b in pairwise(odometry))
-    assert 0.002 < abs(told / driven - 1) < 0.3
+    text = sum(a.distance(b) for a, b in pairwise(odometry))
+    assert 0.002 < abs(text / driven - 1) < 0.3
 
 
 def test_half_map_is_unknown_right_of_the_center() -> None:

@@ -128,5 +128,5 @@ def test_reference_page_lists_every_fault() -> None:
     rows = {row.split("`")[1]: row for row in table.splitlines() if row.startswith("| `")}
     assert set(FAULTS) <= set(rows)
     for fault, (_, values) in FAULTS.items():
-        if "sector" not in fault:  # which is told by its width
+        if "sector" not in fault:  # which has a width
             assert all(f"| {value} " in rows[fault] for value in values)

@@ -39,7 +39,7 @@ def test_a_case_without_reference_has_no_score() -> None:
 
 
 def test_success_is_weighted_by_the_time_of_the_shortest_path_at_top_speed() -> None:
-    # 10 m at 2 m/s is 5 s; it took 8 s. Whoever fails has none of it, and nobody more than all.
+    # 10 m at 2 m/s is 5 s; it took 8 s. A failed drive scores 0, and the maximum is 1.
     assert summarize("BARN", [Trial(ARRIVED, top_speed=2.0), Trial(HIT, top_speed=2.0)]).sct == pytest.approx(5 / 8 / 2)
     assert summarize("BARN", [Trial(ARRIVED, top_speed=1.0)]).sct == 1.0
 

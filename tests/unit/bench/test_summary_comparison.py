@@ -43,31 +43,31 @@ def test_one_world_has_no_interval() -> None:
 def test_stacks_are_compared_on_drives_that_both_completed() -> None:
     before = [Trial(r, 10.0, f"{n}") for n, r in enumerate((ARRIVED, ARRIVED, HIT, HIT, ARRIVED, run(Outcome.ERROR)))]
     after = [Trial(r, 10.0, f"{n}") for n, r in enumerate((SLOW, SLOW, SLOW, HIT, HIT, ARRIVED))]
-    said = compare_experiment("fields", before, after)
-    assert (said.pairs, said.better, said.worse) == (5, 1, 1)
-    assert said.success.mean == 0.0
-    assert said.seconds is not None and said.seconds.mean == 4.0  # of the two drives in which both arrived
+    compared = compare_experiment("fields", before, after)
+    assert (compared.pairs, compared.better, compared.worse) == (5, 1, 1)
+    assert compared.success.mean == 0.0
+    assert compared.seconds is not None and compared.seconds.mean == 4.0  # of the two drives in which both arrived
     # 10 m at 2 m/s: 0.5 for 8 s, 5/12 for 12 s
-    assert said.score is not None and said.score.mean == pytest.approx((3 * 5 / 12 - 3 * 0.5) / 5)
+    assert compared.score is not None and compared.score.mean == pytest.approx((3 * 5 / 12 - 3 * 0.5) / 5)
 
 
 def test_the_interval_of_a_difference_is_that_of_the_binomial_distribution_by_hand() -> None:
     before = [Trial(r, 10.0, f"{n}") for n, r in enumerate((HIT, ARRIVED, ARRIVED, HIT, HIT))]
     after = [Trial(r, 10.0, f"{n}") for n, r in enumerate((ARRIVED, ARRIVED, ARRIVED, HIT, HIT))]
-    said = compare_experiment("fields", before, after).success
+    compared = compare_experiment("fields", before, after).success
     # The one world that differs is drawn k times of five, k ~ B(5, 1/5): P(k <= 2) = 0.942, P(k <= 3) = 0.993.
-    assert (said.mean, said.interval) == (pytest.approx(0.2), pytest.approx((0.0, 0.6)))
+    assert (compared.mean, compared.interval) == (pytest.approx(0.2), pytest.approx((0.0, 0.6)))
 
 
 def test_difference_equals_that_of_the_rates_in_the_table() -> None:
     worlds = ("a", "a", "a", "b", "c", "d", "e", "f")
     before = [Trial(ARRIVED, 10.0, world) for world in worlds]
     after = [Trial(HIT if world == "a" else SLOW, 10.0, world) for world in worlds]
-    said = compare_experiment("maps", before, after)
-    assert said.success.mean == pytest.approx(summarize("", after).success - summarize("", before).success)
+    compared = compare_experiment("maps", before, after)
+    assert compared.success.mean == pytest.approx(summarize("", after).success - summarize("", before).success)
     one, two = summarize("", before).score, summarize("", after).score
-    assert said.score is not None and one is not None and two is not None
-    assert said.score.mean == pytest.approx(two - one)
+    assert compared.score is not None and one is not None and two is not None
+    assert compared.score.mean == pytest.approx(two - one)
 
 
 @pytest.mark.parametrize("runs", [ARRIVED, HIT])

@@ -16,13 +16,13 @@ class Told:
 
 
 def test_frozen_class_is_created_like_a_dataclass() -> None:
-    told = Told("a", things={"b": 1})
-    assert (told.name, told.number, told.things) == ("a", 3, {"b": 1})
-    assert told == Told(name="a", things={"b": 1}) != Told("a")
+    text = Told("a", things={"b": 1})
+    assert (text.name, text.number, text.things) == ("a", 3, {"b": 1})
+    assert text == Told(name="a", things={"b": 1}) != Told("a")
     assert repr(Told("a", 4)) == "Told(name='a', number=4, things={})"
-    assert replace(told, number=5) == Told("a", 5, {"b": 1})
+    assert replace(text, number=5) == Told("a", 5, {"b": 1})
     assert [each.name for each in fields(Told)] == ["name", "number", "things"]
-    assert pickle.loads(pickle.dumps(told)) == told
+    assert pickle.loads(pickle.dumps(text)) == text
     with pytest.raises(TypeError):
         Told()  # type: ignore[call-arg]
 

@@ -9,7 +9,7 @@ from simscen.testing.synthetic_trace import synthetic_trace
 
 
 @pytest.mark.parametrize(
-    ("value", "limit", "measured", "told"),
+    ("value", "limit", "measured", "text"),
     [
         (0.5, 0.25, "0.50 m", "≤ 0.25 m"),
         (0.5, 0.5, "0.50 m", "≤ 0.50 m"),
@@ -24,9 +24,9 @@ from simscen.testing.synthetic_trace import synthetic_trace
         (0.5, math.inf, "0.50 m", "≤ inf m"),
     ],
 )
-def test_numbers_have_enough_digits_to_differ(value, limit, measured, told):
+def test_numbers_have_enough_digits_to_differ(value, limit, measured, text):
     finding = at_most("x", value, limit, "m")
-    assert (finding.measured, finding.limit) == (measured, told)
+    assert (finding.measured, finding.limit) == (measured, text)
 
 
 @pytest.mark.parametrize(("value", "detail"), [(0.4, ()), (0.5, ()), (0.6, ("why",))])

@@ -84,25 +84,25 @@ def test_motion_is_undecided_if_fault_and_time_limit_end_together():
 
 
 @pytest.mark.parametrize(
-    ("scan", "told"),
+    ("scan", "text"),
     [
         (2.0, "drove 0.00 m at 0.00 m/s"),
         (1.8, "drove 0.00 m at 0.00 m/s"),
         (1.775, "drove 0.00 m blind at 0.00 m/s; the newest scan was 0.2 s old"),
     ],
 )
-def test_a_scan_older_than_two_periods_is_reported(scan, told):
+def test_a_scan_older_than_two_periods_is_reported(scan, text):
     (finding,) = found([MOVING] * 20 + [STILL] * 5, (1.0, None), scans=[scan])
-    assert finding.detail[0] == told
+    assert finding.detail[0] == text
 
 
-@pytest.mark.parametrize(("peak", "told"), [(9, "0.50"), (10, "0.75"), (15, "0.75"), (20, "0.50"), (21, "0.50")])
-def test_finding_states_the_maximum_speed_in_the_given_duration(peak, told):
+@pytest.mark.parametrize(("peak", "text"), [(9, "0.50"), (10, "0.75"), (15, "0.75"), (20, "0.50"), (21, "0.50")])
+def test_finding_states_the_maximum_speed_in_the_given_duration(peak, text):
     speeds = [MOVING] * 20 + [STILL] * 5
     if peak < 20:
         speeds[peak] = 0.75
     (finding,) = found(speeds, (1.0, None))
-    assert finding.detail[1] == f"its top speed in that time was {told} m/s"
+    assert finding.detail[1] == f"its top speed in that time was {text} m/s"
 
 
 def test_maximum_speed_can_be_at_the_end():

@@ -1,4 +1,4 @@
-"""A file is saved as it was, but for what was edited, and never over what somebody else wrote."""
+"""Tests that a save changes only what was edited, and does not overwrite changes by other programs."""
 
 import stat
 from pathlib import Path

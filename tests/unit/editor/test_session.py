@@ -1,4 +1,4 @@
-"""What the page is told about a text: things on the map, problems, forms, paths."""
+"""Tests of the data that the editor page gets about a text: objects on the map, problems, forms, and paths."""
 
 from collections.abc import Iterator
 from pathlib import Path

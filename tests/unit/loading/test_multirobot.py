@@ -34,7 +34,7 @@ def load(tmp_path):
     return load
 
 
-def told(problems):
+def output(problems):
     assert isinstance(problems, list), "the file is valid"
     return [(problem.line, problem.code, problem.message) for problem in problems]
 
@@ -117,18 +117,18 @@ WRONG = {
 @pytest.mark.parametrize("case", WRONG)
 def test_mistakes_are_reported_at_their_positions(load, case):
     text, expected = WRONG[case]
-    assert expected in told(load(text))
+    assert expected in output(load(text))
 
 
 def test_robot_used_as_object_is_reported_once(load):
     text = f"robots: {{{A}, {B}}}\nevents: [{{when: {{time: 1}}, do: {{remove: {{name: b}}}}}}]\n"
-    assert told(load(text + PASS)) == [(8, "SC035", "`b` is one of the robots, which cannot be moved or followed")]
+    assert output(load(text + PASS)) == [(8, "SC035", "`b` is one of the robots, which cannot be moved or followed")]
 
 
 def test_each_robot_may_be_sent_a_goal_of_the_same_name(load):
     sent = [f"{{new_goal: {{name: charger, pose: {{x: 2, y: 4}}}}, robot: {name}}}" for name in "ab"]
     loaded = load(f"robots: {{{A}, {B}}}\nevents: [{{when: {{time: 1}}, do: [{', '.join(sent)}]}}]\n" + PASS)
-    assert not isinstance(loaded, list), told(loaded)
+    assert not isinstance(loaded, list), output(loaded)
 
 
 @pytest.mark.parametrize("pose", ["{x: 1.2, y: 1.1}", "here", "{x: 1, y: 1, yaw: 90 deg}"])

@@ -31,7 +31,7 @@ def load(write: Write, tmp_path: Path) -> Callable[[str], LoadedScenario]:
 
 
 @pytest.fixture
-def told(write: Write, tmp_path: Path) -> Callable[[str], list[str]]:
+def expected(write: Write, tmp_path: Path) -> Callable[[str], list[str]]:
     def problems(text: str) -> list[str]:
         found = try_scenario(write("a.scenario.yaml", text), tmp_path)
         return (
@@ -63,9 +63,9 @@ def test_a_goal_after_a_place_takes_no_name_that_another_has(load, scenario: str
 
 
 def test_initial_estimate_can_be_a_place_or_unknown(load, scenario: str) -> None:
-    told = load(scenario.replace("pose: start", "pose: start, initial_estimate: desk")).spec.robot.initial_estimate
-    assert told.pose == (5, 3, 0)
-    assert told.std == (0.5, 0.5, 0.2618)
+    expected = load(scenario.replace("pose: start", "pose: start, initial_estimate: desk")).spec.robot.initial_estimate
+    assert expected.pose == (5, 3, 0)
+    assert expected.std == (0.5, 0.5, 0.2618)
     unknown = load(scenario.replace("pose: start", "pose: start, initial_estimate: unknown")).spec
     assert unknown.robot.initial_estimate == "unknown"
 
@@ -80,8 +80,8 @@ def test_initial_estimate_can_be_a_place_or_unknown(load, scenario: str) -> None
         ("goals: [desk]\nevents: [{when: {time: 1}, do: {move: {name: cart, through: [disk], speed: 1}}}]", "5:62"),
     ],
 )
-def test_unknown_place_is_reported_with_a_suggestion(told, scenario: str, text: str, place: str) -> None:
-    assert told(scenario.replace("goals: [{pose: desk}]", text)) == [f"{place} SC030 did you mean `desk`?"]
+def test_unknown_place_is_reported_with_a_suggestion(expected, scenario: str, text: str, place: str) -> None:
+    assert expected(scenario.replace("goals: [{pose: desk}]", text)) == [f"{place} SC030 did you mean `desk`?"]
 
 
 def test_objects_of_a_world_can_be_at_its_places(write: Write, tmp_path: Path) -> None:
@@ -100,10 +100,10 @@ places: {west: {x: 0, y: 2, yaw: 1}, east: {x: 4, y: 2}}
     assert spec.doors[0].points == [[0, 2], [0, 1]]
 
 
-def test_unknown_place_in_a_world_is_reported_in_the_world_file(told, write: Write, scenario: str) -> None:
+def test_unknown_place_in_a_world_is_reported_in_the_world_file(expected, write: Write, scenario: str) -> None:
     world = (write("x", "").parent / "room.world.yaml").read_text()
     write("room.world.yaml", world.replace("pose: {x: 3, y: 2}", "pose: dusk"))
-    assert told(scenario) == ["5:44 SC030 did you mean `desk`?"]
+    assert expected(scenario) == ["5:44 SC030 did you mean `desk`?"]
 
 
 def test_a_resolved_scenario_can_be_loaded_again_and_judges_without_its_world(load, scenario: str) -> None:

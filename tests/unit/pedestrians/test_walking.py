@@ -97,7 +97,7 @@ def test_lanes_form_where_two_crowds_walk_through_each_other():
 
 
 def test_group_members_walk_side_by_side():
-    """Within the (N - 1)/2 meters of their middle and its surroundings, where those who know nobody drift apart."""
+    """Members stay within (N - 1)/2 m of the center of the group; pedestrians without a group drift apart."""
 
     def spread(group: str | None) -> np.ndarray:
         goal = (40.0, 0.0)

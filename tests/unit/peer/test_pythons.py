@@ -46,8 +46,8 @@ while True:
     kind, body = engine.receive()
     kinds.append(wire.KIND_NAMES[kind])
     if kind == wire.ANSWER:
-        tick, said = wire.from_answer(body)
-        kinds.append([number for number, _ in said])
+        tick, messages = wire.from_answer(body)
+        kinds.append([number for number, _ in messages])
     if kind == wire.BYE:
         break
 print(kinds)

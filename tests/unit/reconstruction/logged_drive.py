@@ -32,10 +32,10 @@ def messages(with_map=True, with_goal=True, idle=0.0, with_person=False):
     times = np.arange(0.0, drives.DURATION_S, 0.05)
     at = drives.poses(times)
     rng = np.random.default_rng(7)
-    said = []
+    recorded = []
 
     def add(topic, time, message):
-        said.append(logs.Message(topic, logs.BEGIN + round((time + idle) * logs.SECOND) + 5_000_000, message))
+        recorded.append(logs.Message(topic, logs.BEGIN + round((time + idle) * logs.SECOND) + 5_000_000, message))
 
     def stamp(time):
         return logs.BEGIN + round((time + idle) * logs.SECOND)
@@ -53,7 +53,7 @@ def messages(with_map=True, with_goal=True, idle=0.0, with_person=False):
     for time, ranges in zip(measured.times.tolist(), measured.ranges, strict=True):
         if not LIDAR_SILENT[0] <= time < LIDAR_SILENT[1]:
             add("/scan", time, scan(stamp(time), ranges))
-    return sorted(said, key=lambda one: one.time)
+    return sorted(recorded, key=lambda one: one.time)
 
 
 def occupancy_grid(time):

@@ -63,9 +63,9 @@ def test_a_robot_that_stays_in_place_with_a_goal_is_stuck():
 def test_a_parked_robot_whose_goal_is_where_it_stopped_is_not_stuck(speed, expected):
     times = np.arange(0.0, 30.0, 0.1)
     stands = np.tile([1.0, 3.0, 0.0], (len(times), 1))
-    told = drives.signal(times, np.column_stack((np.full(len(times), speed), np.zeros((len(times), 2)))))
+    text = drives.signal(times, np.column_stack((np.full(len(times), speed), np.zeros((len(times), 2)))))
     goal = replace(REACHED, ended=30.0, source=STOP_SOURCE)
-    one = replace(drives.drive(), duration=30.0, poses=drives.signal(times, stands), goals=(goal,), commands=told)
+    one = replace(drives.drive(), duration=30.0, poses=drives.signal(times, stands), goals=(goal,), commands=text)
     assert [kind for kind in kinds(one) if kind == "stuck"] == expected
 
 

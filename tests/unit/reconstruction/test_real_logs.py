@@ -75,17 +75,17 @@ def test_without_a_map_the_walls_are_built_from_the_scans(tmp_path):
 def test_the_footprint_is_read_far_from_the_origin(frame, tmp_path):
     """The local costmap of Nav2 publishes it in its global frame, which is the odometry by default."""
     corners, (x, y, yaw) = [(0.4, 0.3), (-0.4, 0.3), (-0.4, -0.3), (0.4, -0.3)], (40.0, -30.0, 2.0)
-    T, said = logs.T, []
+    T, recorded = logs.T, []
     for time in range(logs.BEGIN, logs.BEGIN + 5 * logs.SECOND, logs.SECOND):
-        said.append(logs.Message("/odom", time, odometry(time, x, y, yaw)))
-        said.append(logs.Message("/tf", time, logs.link(time, "map", "base_link", 7.0, 8.0, 1.0)))
+        recorded.append(logs.Message("/odom", time, odometry(time, x, y, yaw)))
+        recorded.append(logs.Message("/tf", time, logs.link(time, "map", "base_link", 7.0, 8.0, 1.0)))
     at = {"odom": (x, y, yaw), "base_link": (0.0, 0.0, 0.0)}.get(frame, (7.0, 8.0, 1.0))
     points = [T["geometry_msgs/msg/Point32"](a, b, 0.0) for a, b in drives.Pose2(*at).apply(np.array(corners))]
     polygon = T["geometry_msgs/msg/PolygonStamped"](
         header=logs.header(logs.BEGIN, frame), polygon=T["geometry_msgs/msg/Polygon"](points=points)
     )
-    said.append(logs.Message("/local_costmap/published_footprint", logs.BEGIN, polygon))
-    found = read_drive(logs.write_bag(tmp_path / "bag", said)).footprint
+    recorded.append(logs.Message("/local_costmap/published_footprint", logs.BEGIN, polygon))
+    found = read_drive(logs.write_bag(tmp_path / "bag", recorded)).footprint
     assert np.allclose(found, corners, atol=0.001)
 
 
@@ -101,26 +101,26 @@ def test_the_user_can_give_the_map(tmp_path):
 @pytest.mark.parametrize("frame", ["odom", "base_link"])
 def test_a_goal_can_be_in_another_frame_than_the_map(frame, tmp_path):
     """At the time of the goal, the robot is at the origin of the odometry, at (1, 3) on the map."""
-    said = messages()
-    for one in said:
+    recorded = messages()
+    for one in recorded:
         if one.topic == "/goal_pose":
             one.message.header.frame_id, one.message.pose = frame, logs.pose(GOAL[0] - 1.0, GOAL[1] - 3.0)
-    (only,) = read_drive(logs.write_bag(tmp_path / "bag", said)).goals
+    (only,) = read_drive(logs.write_bag(tmp_path / "bag", recorded)).goals
     assert math.dist(only.pose[:2], GOAL) < 0.1
 
 
 @pytest.mark.parametrize("as_tf", [False, True])
 def test_without_a_pose_in_the_map_frame_map_and_goal_in_this_frame_are_not_used(as_tf, tmp_path):
     """The odometry begins at (0, 0), the robot at (1, 3) on the map."""
-    said = [one for one in messages() if one.topic != "/amcl_pose"]
+    recorded = [one for one in messages() if one.topic != "/amcl_pose"]
     if as_tf:
-        for number, one in enumerate(said):
+        for number, one in enumerate(recorded):
             if one.topic == "/odom":
                 x, y = one.message.pose.pose.position.x, one.message.pose.pose.position.y
                 turn = one.message.pose.pose.orientation
                 transform = logs.link(one.time - 5_000_000, "odom", "base_link", x, y, 2 * math.atan2(turn.z, turn.w))
-                said[number] = replace(one, topic="/tf", message=transform)
-    bag = logs.write_bag(tmp_path / "bag", said)
+                recorded[number] = replace(one, topic="/tf", message=transform)
+    bag = logs.write_bag(tmp_path / "bag", recorded)
     made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
     assert made.drive.map is None and made.contents.estimated.objects == []
     (only,) = made.contents.goals
@@ -130,10 +130,10 @@ def test_without_a_pose_in_the_map_frame_map_and_goal_in_this_frame_are_not_used
 
 
 def test_a_robot_that_stands_still_has_no_goal(tmp_path):
-    said = [
+    recorded = [
         replace(one, message=logs.odometry(one.time, "odom", 0.0, 0.0)) for one in messages() if "odom" in one.topic
     ]
-    drive = read_drive(logs.write_bag(tmp_path / "bag", said))
+    drive = read_drive(logs.write_bag(tmp_path / "bag", recorded))
     assert not drive.goals
     assert "a goal, because the robot got none and did not drive anywhere" in drive.notes
 
@@ -156,40 +156,40 @@ def test_a_drive_without_stops_has_goals_where_its_path_bends():
 
 
 def test_the_mount_of_the_lidar_can_be_on_tf(tmp_path):
-    moved = [replace(said, topic="/tf") if said.topic == "/tf_static" else said for said in messages()]
+    moved = [replace(recorded, topic="/tf") if recorded.topic == "/tf_static" else recorded for recorded in messages()]
     drive = read_drive(logs.write_bag(tmp_path / "bag", moved))
     assert not any("mount" in note for note in drive.notes)
 
 
 def test_scans_of_another_topic_are_used_with_a_note(tmp_path):
-    said = [replace(one, topic="/front/scan") if one.topic == "/scan" else one for one in messages()]
-    drive = read_drive(logs.write_bag(tmp_path / "bag", said))
+    recorded = [replace(one, topic="/front/scan") if one.topic == "/scan" else one for one in messages()]
+    drive = read_drive(logs.write_bag(tmp_path / "bag", recorded))
     assert len(drive.scans) > 50
     assert "scans on /scan; those on /front/scan are used, see --topic scan=/TOPIC" in drive.notes
 
 
-def upside_down(said):
-    if said.topic == "/tf_static":
-        said.message.transforms[0].transform.rotation = logs.T["geometry_msgs/msg/Quaternion"](
+def upside_down(recorded):
+    if recorded.topic == "/tf_static":
+        recorded.message.transforms[0].transform.rotation = logs.T["geometry_msgs/msg/Quaternion"](
             x=1.0, y=0.0, z=0.0, w=0.0
         )
-    if said.topic == "/scan":
-        said.message.ranges = np.roll(
-            said.message.ranges[::-1], 1
+    if recorded.topic == "/scan":
+        recorded.message.ranges = np.roll(
+            recorded.message.ranges[::-1], 1
         )  # the first beam points backward and has no mirror image
 
 
-def clockwise(said):
-    if said.topic == "/scan":
-        said.message.angle_min, said.message.angle_increment = math.pi, -said.message.angle_increment
-        said.message.ranges = np.roll(said.message.ranges[::-1], 1)
+def clockwise(recorded):
+    if recorded.topic == "/scan":
+        recorded.message.angle_min, recorded.message.angle_increment = math.pi, -recorded.message.angle_increment
+        recorded.message.ranges = np.roll(recorded.message.ranges[::-1], 1)
 
 
 @pytest.mark.parametrize("change", [upside_down, clockwise])
 def test_scans_of_a_lidar_that_turns_clockwise_hit_the_walls(change, tmp_path):
     changed = messages()
-    for said in changed:
-        change(said)
+    for recorded in changed:
+        change(recorded)
     drive = read_drive(logs.write_bag(tmp_path / "bag", changed))
     ends = beam_ends(lidar_poses(drive, drive.scans), drive.scans.angles, drive.scans.ranges)[drive.scans.is_hit()]
     assert np.median(drives.room().distance_to_walls(ends)) < 0.1
@@ -256,11 +256,11 @@ def test_the_lidar_of_the_robot_file_has_the_directions_of_the_log(count, step, 
 
 
 def test_velocities_of_odometry_without_twists_are_computed_from_its_poses(tmp_path):
-    said = messages()
-    for one in said:
+    recorded = messages()
+    for one in recorded:
         if one.topic == "/odom":
             one.message.twist.twist = logs.twist(0.0)
-    drive = read_drive(logs.write_bag(tmp_path / "bag", said))
+    drive = read_drive(logs.write_bag(tmp_path / "bag", recorded))
     assert float(np.median(drive.odometry.values[:, 3])) == pytest.approx(drives.SPEED_M_S, abs=0.01)
     assert any("velocities in the odometry" in note for note in drive.notes)
     assert observed_limits(drive)[0] == pytest.approx(1.05 * drives.SPEED_M_S, abs=0.03)
@@ -277,9 +277,9 @@ def plan_and_statuses(begin: float, end: float) -> list[logs.Message]:
 
 
 def test_goals_come_from_the_ends_of_plans_and_the_status_of_the_action(tmp_path):
-    said = messages(with_goal=False)
-    said += plan_and_statuses(0.1, 11.0)
-    drive = read_drive(logs.write_bag(tmp_path / "bag", sorted(said, key=lambda one: one.time)))
+    recorded = messages(with_goal=False)
+    recorded += plan_and_statuses(0.1, 11.0)
+    drive = read_drive(logs.write_bag(tmp_path / "bag", sorted(recorded, key=lambda one: one.time)))
     (only,) = drive.goals
     assert math.dist(only.pose[:2], GOAL) < 0.01
     assert (only.status, only.ended) == ("reached", pytest.approx(11.0, abs=0.2))
@@ -287,9 +287,9 @@ def test_goals_come_from_the_ends_of_plans_and_the_status_of_the_action(tmp_path
 
 def test_a_drive_starts_when_its_first_plan_does_even_if_the_robot_is_stuck(tmp_path):
     """The robot has the goal 10 s before it moves."""
-    said = messages(with_goal=False, idle=10.0)
-    said += plan_and_statuses(0.01, 21.0)
-    drive = read_drive(logs.write_bag(tmp_path / "bag", sorted(said, key=lambda one: one.time)))
+    recorded = messages(with_goal=False, idle=10.0)
+    recorded += plan_and_statuses(0.01, 21.0)
+    drive = read_drive(logs.write_bag(tmp_path / "bag", sorted(recorded, key=lambda one: one.time)))
     assert drive.begin == 0.0
     assert drive.duration == pytest.approx(10.0 + drives.DURATION_S, abs=0.2)
 
@@ -309,10 +309,10 @@ def test_the_topic_of_the_ground_truth_can_have_another_role(bag):
 
 def test_stamps_of_a_simulator_in_slow_motion_are_no_delays(tmp_path):
     """The log times are of the wall clock. Five seconds of the wall clock are one second of simulated time."""
-    said = messages(with_goal=False)
+    recorded = messages(with_goal=False)
     slow = [
         replace(one, time=10**18 + 5 * (one.time - logs.BEGIN))
-        for one in [*said, *(replace(one, topic="/cmd_vel", message=logs.twist(0.5)) for one in said[::10])]
+        for one in [*recorded, *(replace(one, topic="/cmd_vel", message=logs.twist(0.5)) for one in recorded[::10])]
     ]
     made = scenario_from_log(
         logs.write_bag(tmp_path / "bag", sorted(slow, key=lambda one: one.time)),
@@ -327,14 +327,14 @@ def test_stamps_of_a_simulator_in_slow_motion_are_no_delays(tmp_path):
 
 def test_the_base_can_have_another_name(tmp_path):
     """The poses of a mapper such as slam_toolbox are only on /tf, between frames that the odometry names."""
-    said = []
+    recorded = []
     for one in messages():
         if one.topic == "/odom":
             at = one.message.pose.pose.position
             one.message.header.frame_id, one.message.child_frame_id = "r1/odom", "r1/chassis"
-            said.append(replace(one, topic="/tf", message=logs.link(one.time, "r1/odom", "r1/chassis", at.x, at.y)))
-            said.append(replace(one, topic="/tf", message=logs.link(one.time, "map", "r1/odom", 1.0, 3.0)))
-        said.append(one)
-    drive = read_drive(logs.write_bag(tmp_path / "bag", [one for one in said if one.topic != "/amcl_pose"]))
+            recorded.append(replace(one, topic="/tf", message=logs.link(one.time, "r1/odom", "r1/chassis", at.x, at.y)))
+            recorded.append(replace(one, topic="/tf", message=logs.link(one.time, "map", "r1/odom", 1.0, 3.0)))
+        recorded.append(one)
+    drive = read_drive(logs.write_bag(tmp_path / "bag", [one for one in recorded if one.topic != "/amcl_pose"]))
     assert drive.pose_source == "transform from map to r1/chassis"
     assert len(drive.corrections) > 100

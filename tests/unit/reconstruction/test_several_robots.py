@@ -75,8 +75,8 @@ def test_a_robot_without_a_lidar_does_not_get_the_scans_of_another_one(log):
 
 @pytest.mark.parametrize("robot", ["a", "s", "robot"])
 def test_topics_are_those_of_the_robot_whatever_its_name(robot, tmp_path):
-    said = [replace(one, topic=f"/{robot}{one.topic}") for one in logs.drive(2.0)]
-    read = collect_messages(logs.write_mcap(tmp_path / "log.mcap", said), {"truth": "/mocap"}, robot=robot)
+    recorded = [replace(one, topic=f"/{robot}{one.topic}") for one in logs.drive(2.0)]
+    read = collect_messages(logs.write_mcap(tmp_path / "log.mcap", recorded), {"truth": "/mocap"}, robot=robot)
     assert {role for role in ("odom", "amcl_pose", "scan", "cmd_vel", "truth") if not read.of(role)} == set()
     topics = {"odom": f"/{robot}/odom", "truth": f"/{robot}/mocap"}
     named = collect_messages(tmp_path / "log.mcap", topics, robot=robot)

@@ -28,29 +28,29 @@ def bag(tmp_path_factory):
 
 
 def test_poses_with_an_invalid_orientation_are_named(tmp_path):
-    said = logs.drive()
-    turned = [one.message.pose.orientation for one in said if one.topic == "/mocap"][3:5]
+    recorded = logs.drive()
+    turned = [one.message.pose.orientation for one in recorded if one.topic == "/mocap"][3:5]
     for orientation in turned:
         orientation.w = 0.0
-    drive = read_drive(logs.write_mcap(tmp_path / "a.mcap", said), "/mocap")
+    drive = read_drive(logs.write_mcap(tmp_path / "a.mcap", recorded), "/mocap")
     assert "2 poses on /mocap, whose orientation is invalid" in drive.notes
     assert len(drive.poses.times) > 190
-    for one in said:
+    for one in recorded:
         if one.topic == "/mocap":
             one.message.pose.orientation.w = 0.0
     with pytest.raises(InvalidInput, match="all messages of /mocap have an invalid orientation"):
-        read_drive(logs.write_mcap(tmp_path / "b.mcap", said), "/mocap")
+        read_drive(logs.write_mcap(tmp_path / "b.mcap", recorded), "/mocap")
 
 
 def test_a_log_without_poses_is_refused_with_a_hint(tmp_path):
-    only_scans = [said for said in messages() if said.topic == "/scan"]
+    only_scans = [recorded for recorded in messages() if recorded.topic == "/scan"]
     with pytest.raises(InvalidInput, match="no poses of the robot") as error:
         read_drive(logs.write_bag(tmp_path / "bag", only_scans))
     assert "--topic" in error.value.problems[0].hint
 
 
 def test_log_without_scans_lists_what_could_not_be_reconstructed(tmp_path):
-    without = [said for said in messages() if said.topic != "/scan"]
+    without = [recorded for recorded in messages() if recorded.topic != "/scan"]
     bag = logs.write_bag(tmp_path / "bag", without)
     made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
     assert made.contents.estimated.objects == []
@@ -74,12 +74,12 @@ def test_topics_that_the_user_names_must_have_usable_messages(truth, topics, tex
 
 def test_a_ground_truth_far_from_the_origin_is_refused(tmp_path):
     """UTM coordinates are up to 10,000 km."""
-    said = messages()
-    for one in said:
+    recorded = messages()
+    for one in recorded:
         if one.topic == "/odom":
             one.message.pose.pose.position.y += 3e6
     with pytest.raises(InvalidInput, match="no pose with valid coordinates"):
-        read_drive(logs.write_bag(tmp_path / "bag", said), "/odom")
+        read_drive(logs.write_bag(tmp_path / "bag", recorded), "/odom")
 
 
 @pytest.mark.parametrize(("name", "content"), [
@@ -97,32 +97,32 @@ def test_an_unusable_log_ends_with_exit_code_2_and_leaves_no_file(name, content,
     assert not target.exists()
 
 
-def with_nan(said):
-    said.message.pose.pose.position.x = math.nan
+def with_nan(recorded):
+    recorded.message.pose.pose.position.x = math.nan
 
 
-def without_stamp(said):
-    said.message.header.stamp = logs.stamp_of(0)
+def without_stamp(recorded):
+    recorded.message.header.stamp = logs.stamp_of(0)
 
 
-def without_beams(said):
-    said.message.ranges = np.zeros(0, dtype=np.float32)
+def without_beams(recorded):
+    recorded.message.ranges = np.zeros(0, dtype=np.float32)
 
 
-def with_one_direction(said):
-    said.message.angle_increment = 0.0
+def with_one_direction(recorded):
+    recorded.message.angle_increment = 0.0
 
 
-def with_nan_angles(said):
-    said.message.angle_min = math.nan
+def with_nan_angles(recorded):
+    recorded.message.angle_min = math.nan
 
 
-def with_nan_limit(said):
-    said.message.range_max = math.nan
+def with_nan_limit(recorded):
+    recorded.message.range_max = math.nan
 
 
-def without_resolution(said):
-    said.message.info.resolution = 0.0
+def without_resolution(recorded):
+    recorded.message.info.resolution = 0.0
 
 
 @pytest.mark.parametrize(
@@ -139,11 +139,11 @@ def without_resolution(said):
     ],
 )
 def test_a_log_with_invalid_messages_gives_a_valid_scenario(topic, change, changes_all, text, tmp_path):
-    said = messages()
-    chosen = [one for one in said if one.topic == topic]
+    recorded = messages()
+    chosen = [one for one in recorded if one.topic == topic]
     for one in chosen if changes_all else chosen[30:31]:
         change(one)
-    bag = logs.write_bag(tmp_path / "bag", said)
+    bag = logs.write_bag(tmp_path / "bag", recorded)
     made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
     load_scenario(made.file, tmp_path)
     assert any(text in unknown for unknown in made.contents.unknowns)
@@ -152,11 +152,11 @@ def test_a_log_with_invalid_messages_gives_a_valid_scenario(topic, change, chang
 
 
 def test_a_clock_that_jumps_by_more_than_the_drive_is_refused(tmp_path):
-    said = messages()
-    odometry_messages = [one for one in said if one.topic == "/odom"]
+    recorded = messages()
+    odometry_messages = [one for one in recorded if one.topic == "/odom"]
     odometry_messages[30].message.header.stamp = logs.stamp_of(logs.BEGIN + 10**8 * logs.SECOND)
     with pytest.raises(InvalidInput, match="the stamps of the topic for `odom` jump by 99999998"):
-        read_drive(logs.write_bag(tmp_path / "bag", said))
+        read_drive(logs.write_bag(tmp_path / "bag", recorded))
 
 
 def test_a_drive_across_a_country_needs_a_map(tmp_path):

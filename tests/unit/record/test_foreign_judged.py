@@ -55,8 +55,8 @@ def simscen(
         monkeypatch.setattr(sys, "argv", ["simscen", "judge", *arguments])
         with pytest.raises(SystemExit) as end:
             main()
-        told = capsys.readouterr()
-        return Ended(int(end.value.code or 0), told.out, told.err)
+        expected = capsys.readouterr()
+        return Ended(int(end.value.code or 0), expected.out, expected.err)
 
     return call
 

@@ -1,4 +1,4 @@
-"""A session with one run of each kind, told with text that tries to break out."""
+"""Fixtures: a session with one run of each outcome, whose texts contain markup and control characters."""
 
 from dataclasses import replace
 

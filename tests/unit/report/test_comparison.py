@@ -62,10 +62,10 @@ def test_console_output_snapshot(comparison) -> None:
 def test_tables_fit_into_the_columns_of_a_terminal_and_use_a_wider_one(comparison) -> None:
     long = {"a" * 90 + "/one": comparison.outcomes["navigation/goal"]}
     for columns in (80, 200):
-        told = lines(Comparison(comparison.stacks, long, comparison.against), columns)
-        tables = [line for line in told if "worse " not in line]
+        text = lines(Comparison(comparison.stacks, long, comparison.against), columns)
+        tables = [line for line in text if "worse " not in line]
         assert max(map(len, tables)) <= columns
-        assert (next(iter(long)) in "\n".join(told)) == (columns == 200)
+        assert (next(iter(long)) in "\n".join(text)) == (columns == 200)
 
 
 def test_long_name_is_shortened_in_the_middle() -> None:
@@ -75,9 +75,9 @@ def test_long_name_is_shortened_in_the_middle() -> None:
 
 def test_first_changed_outcomes_are_listed_and_the_rest_counted(comparison) -> None:
     many = BaselineComparison("mine", 30, 0, 0, 0, (FLIP,) * 25, 0.0, ())
-    told = lines(Comparison(comparison.stacks, comparison.outcomes, (many,)))
-    assert sum("worse " in line for line in told) == 11  # ten, and the heading
-    assert "    and 15 more, in the JSON results" in told
+    text = lines(Comparison(comparison.stacks, comparison.outcomes, (many,)))
+    assert sum("worse " in line for line in text) == 11  # ten, and the heading
+    assert "    and 15 more, in the JSON results" in text
 
 
 def test_comparison_is_before_the_last_line_of_piped_output(comparison) -> None:
@@ -86,10 +86,10 @@ def test_comparison_is_before_the_last_line_of_piped_output(comparison) -> None:
         listen(SessionStarted("0.1.0", 20, 2, 1, ids=("a/b", "a/c"), stacks=("ref=reference", "mine=./nav")))
         listen(SessionFinished(1, 0, 0, 10.0, 1.0, comparison=comparison))
     out.seek(0)
-    told = out.read()
-    assert told.startswith("simscen 0.1.0 - 2 scenarios - 2 stacks - 20 runs - 1 worker\n")
-    assert "+0.78 ... +4.95" in told
-    assert told.splitlines()[-1].startswith("1 passed")
+    text = out.read()
+    assert text.startswith("simscen 0.1.0 - 2 scenarios - 2 stacks - 20 runs - 1 worker\n")
+    assert "+0.78 ... +4.95" in text
+    assert text.splitlines()[-1].startswith("1 passed")
 
 
 def test_comparison_on_the_page_is_escaped(comparison, passed) -> None:
@@ -104,10 +104,10 @@ def test_comparison_on_the_page_is_escaped(comparison, passed) -> None:
 
 def test_comparison_is_in_the_github_summary(comparison, passed) -> None:
     session = SessionFinished(1, 0, 0, 1.0, 1.0, comparison=comparison)
-    told = summary_markdown([passed], session)
-    assert "| navigation/goal | 10/10 | 6/9 |" in told
-    assert "- navigation/goal, seed 3: passed with ref, failed with mine: clearance" in told.replace("&#95;", "_")
-    rows = [line for line in told.splitlines() if "time" in line and "28.23" in line]
+    text = summary_markdown([passed], session)
+    assert "| navigation/goal | 10/10 | 6/9 |" in text
+    assert "- navigation/goal, seed 3: passed with ref, failed with mine: clearance" in text.replace("&#95;", "_")
+    rows = [line for line in text.splitlines() if "time" in line and "28.23" in line]
     assert rows[0].count("|") == 9
 
 

@@ -58,11 +58,11 @@ def test_common_folder_of_the_ids_is_omitted(passed):
     out = io.StringIO()
     one, other = (of(passed, key=RunKey(f"scenarios/{name}", 1)) for name in ("faults/a", "fancy/long"))
     ids = ("scenarios/fancy/long", "scenarios/faults/a")
-    told(text_reporter(utf8(out)), [SessionStarted("0.1.0", 2, 2, 1, ids=ids), one, other])
+    expected(text_reporter(utf8(out)), [SessionStarted("0.1.0", 2, 2, 1, ids=ids), one, other])
     assert re.findall(r"✓ (\S+ *) ", out.getvalue()) == ["faults/a    ", "fancy/long  "]
 
 
-def told(reporter, session):
+def expected(reporter, session):
     with reporter as listen:
         for event in session:
             listen(event)
@@ -70,7 +70,7 @@ def told(reporter, session):
 
 def test_piped_output_snapshot(session):
     out = io.StringIO()
-    told(text_reporter(utf8(out)), session)
+    expected(text_reporter(utf8(out)), session)
     assert out.getvalue() == EXPECTED
 
 
@@ -95,7 +95,7 @@ class utf8:
 def test_ascii_stream_gets_ascii_symbols(session):
     raw = io.BytesIO()
     out = io.TextIOWrapper(raw, encoding="ascii")
-    told(text_reporter(out), session)
+    expected(text_reporter(out), session)
     out.flush()
     text = raw.getvalue().decode("ascii")
     assert "  + navigation/goal" in text
@@ -109,14 +109,14 @@ def test_ascii_terminal_gets_plain_lines(session):
 
     raw = io.BytesIO()
     out = Terminal(raw, encoding="ascii")
-    told(text_reporter(out), session)
+    expected(text_reporter(out), session)
     out.flush()
     assert b"\x1b" not in raw.getvalue()
 
 
 def test_terminal_output_is_colored_and_user_text_is_not_markup(session):
     out = io.StringIO()
-    told(text_reporter(out, live=True), session)
+    expected(text_reporter(out, live=True), session)
     plain = re.sub(r"\x1b(\[[0-9;?]*[a-zA-Z]|\]8;.*?\x1b\\)", "", out.getvalue())
     for line in EXPECTED.splitlines():
         if "##" not in line:
@@ -126,7 +126,7 @@ def test_terminal_output_is_colored_and_user_text_is_not_markup(session):
 def test_runs_of_one_scenario_show_their_seeds(passed):
     out = io.StringIO()
     other = of(passed, key=RunKey("navigation/goal", 2))
-    told(text_reporter(utf8(out)), [SessionStarted("0.1.0", 2, 1, 1, seeds=2), passed, other])
+    expected(text_reporter(utf8(out)), [SessionStarted("0.1.0", 2, 1, 1, seeds=2), passed, other])
     assert "1 scenario · 2 runs · 1 worker\n" in out.getvalue()
     assert "navigation/goal (seed 1) " in out.getvalue()
     assert "navigation/goal (seed 2) " in out.getvalue()
@@ -137,7 +137,7 @@ def test_plain_output_contains_no_ci_commands(session, failed):
     named = replace(failed.result.verdicts[0], id="::error::y", criterion="::error::y")
     sly = of(sly, verdicts=(named,), lines=(1,))
     out = io.StringIO()
-    told(text_reporter(utf8(out)), [*session, sly])
+    expected(text_reporter(utf8(out)), [*session, sly])
     assert not re.search(r"^\s*::|##\[", out.getvalue(), re.MULTILINE)
 
 
@@ -199,8 +199,8 @@ def test_in_the_summary_every_criterion_has_its_own_line(session, failed):
 
 def test_summary_shows_pictures_of_failures_that_have_a_url(session, passed, failed):
     here = replace(failed, artifacts=replace(failed.artifacts, picture="out/runs/a b)/seed-7/map.png"))
-    told = summary_markdown([passed, here], session[-1], "https://example.org/raw/pictures/1/")
-    assert told.endswith(
+    expected = summary_markdown([passed, here], session[-1], "https://example.org/raw/pictures/1/")
+    assert expected.endswith(
         "**faults/lidar&#95;off (seed 7)**\n\n"
         "![map of the run](https://example.org/raw/pictures/1/runs/a%20b%29/seed-7/map.png)\n\n"
     )
@@ -209,7 +209,7 @@ def test_summary_shows_pictures_of_failures_that_have_a_url(session, passed, fai
 
 def test_github_output_contains_the_plain_lines(session):
     out, summary = io.StringIO(), io.StringIO()
-    told(GitHubReporter(utf8(out), summary), session)
+    expected(GitHubReporter(utf8(out), summary), session)
     lines = [line for line in out.getvalue().splitlines() if not line.startswith("::")]
     assert "\n".join(lines) + "\n" == EXPECTED
     assert summary.getvalue().startswith("### simscen: 1 passed, 1 failed, 1 error\n")
@@ -217,7 +217,7 @@ def test_github_output_contains_the_plain_lines(session):
 
 def test_json_format_is_the_results_file(session, passed, failed, crashed):
     out = io.StringIO()
-    told(JsonReporter(out), session)
+    expected(JsonReporter(out), session)
     assert json.loads(out.getvalue()) == json.loads("".join(json_parts([passed, failed, crashed], "out")))
     assert "##[" not in out.getvalue()
 
@@ -236,7 +236,7 @@ def test_aborted_session_restores_the_terminal(session, live):
 def test_repeat_command_is_one_quoted_shell_line(failed):
     words = ["simscen", "run", "a.yaml", "--stack", "x=sh -c 'echo  two;\n\techo \"it'\"'\"'s\"'"]
     out = io.StringIO()
-    told(text_reporter(utf8(out)), [replace(failed, again=shlex.join(words))])
+    expected(text_reporter(utf8(out)), [replace(failed, again=shlex.join(words))])
     (line,) = [line for line in out.getvalue().splitlines() if line.startswith("      again")]
     shell = ["bash", "-c", f"printf '%s\\0' {line.removeprefix('      again     ')}"]
     assert subprocess.run(shell, capture_output=True, text=True, check=True).stdout.split("\0")[:-1] == words

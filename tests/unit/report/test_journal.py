@@ -148,7 +148,7 @@ def test_lines_that_are_written_in_several_parts_are_complete(tmp_path, runs, mo
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "text"),
     [
         (None, "the folder has no events.jsonl"),
         (b"", "ended before it listed its runs"),
@@ -158,10 +158,10 @@ def test_lines_that_are_written_in_several_parts_are_complete(tmp_path, runs, mo
         (b'{"event": "planned", "format": 2, "runs": ["a"], "version": "", "workers": 1, "at": 0}\n', "damaged"),
     ],
 )
-def test_other_files_are_refused_as_journals(tmp_path, content, told):
+def test_other_files_are_refused_as_journals(tmp_path, content, text):
     if content is not None:
         (tmp_path / JOURNAL_FILE).write_bytes(content)
-    with pytest.raises(InvalidInput, match=told):
+    with pytest.raises(InvalidInput, match=text):
         read_journal(tmp_path)
 
 

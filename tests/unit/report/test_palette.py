@@ -26,7 +26,7 @@ def rgb(text):
 
 
 def deuteranope(color):
-    """What somebody sees who lacks the green cones (Viénot, Brettel and Mollon 1999, in linear light)."""
+    """Return a color as seen with deuteranopia (Viénot, Brettel and Mollon 1999, in linear light)."""
     r, g, b = ((part / 255) ** 2.2 for part in color)
     seen = (0.2928 * r + 0.7072 * g, 0.2928 * r + 0.7072 * g, -0.0223 * r + 0.0223 * g + b)
     return [max(0.0, part) ** (1 / 2.2) * 255 for part in seen]

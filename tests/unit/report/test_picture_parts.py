@@ -95,7 +95,7 @@ def drawn_parts(scene):
     return map_picture.draw_map_canvas(scene).parts
 
 
-def told(scene):
+def output(scene):
     """The parts, one a line: what, then where in meters."""
     lines = []
     for what, points in drawn_parts(scene):
@@ -110,7 +110,7 @@ def of(scene, what):
 
 
 def test_picture_has_all_parts_at_their_positions():
-    assert told(everything()) == GOLDEN.read_text(encoding="utf-8").splitlines()
+    assert output(everything()) == GOLDEN.read_text(encoding="utf-8").splitlines()
 
 
 def test_closed_door_is_drawn_from_hinge_to_post():
@@ -286,7 +286,7 @@ def test_picture_from_the_log_has_the_parts_of_that_of_the_run(tmp_path):
     found = scenery_from_header(log.header)
     assert found.map is not None
     again = Scene(log.trace, log.header.case, found.map.grid, run.result, found)
-    assert told(again) == told(scene)
+    assert output(again) == output(scene)
     (gate,), (slide,) = of(again, "door gate"), of(again, "door slide")
     assert (gate[:, 1].min(), gate[:, 1].max()) == pytest.approx((1.0, 2.0))
     assert (slide[:, 1].min(), slide[:, 1].max()) == pytest.approx((0.0, 1.0))

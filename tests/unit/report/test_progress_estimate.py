@@ -20,7 +20,7 @@ class Clock:
 def session(passed):
     """Runs of a session of ten, a second each; `kept` of them were there before."""
 
-    def told(done, kept=0):
+    def expected(done, kept=0):
         clock = Clock()
         remaining = ProgressEstimate(clock)
         remaining(SessionStarted("0.1.0", 10, 10, 1))
@@ -32,7 +32,7 @@ def session(passed):
             remaining(run)
         return remaining
 
-    return told
+    return expected
 
 
 def test_remaining_time_is_extrapolated(session):
@@ -55,7 +55,8 @@ def test_single_run_has_no_progress_text():
 
 
 @pytest.mark.parametrize(
-    ("seconds", "told"), [(0.4, "5 s"), (42, "40 s"), (89, "90 s"), (100, "2 min"), (5000, "83 min"), (9000, "2.5 h")]
+    ("seconds", "expected"),
+    [(0.4, "5 s"), (42, "40 s"), (89, "90 s"), (100, "2 min"), (5000, "83 min"), (9000, "2.5 h")],
 )
-def test_times_are_rounded(seconds, told):
-    assert _round_duration(seconds) == told
+def test_times_are_rounded(seconds, expected):
+    assert _round_duration(seconds) == expected

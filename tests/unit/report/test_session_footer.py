@@ -20,7 +20,7 @@ def of(run, **changes):
     return replace(run, result=replace(run.result, **changes))
 
 
-def told(events, slow=None, columns=None):
+def output(events, slow=None, columns=None):
     telling = SessionFormatter(slow, lambda: columns)
     return [plain_text(line) for event in events for line in telling(event)]
 
@@ -76,26 +76,26 @@ page: out/report.html
 
 @pytest.mark.parametrize(("columns", "expected"), [(80, AT_80), (40, AT_40)])
 def test_words_are_not_broken_in_a_narrow_terminal(session, passed, failed, columns, expected):
-    lines = told([session[0], passed, failed], columns=columns) + told([session[-1]], columns=columns)
+    lines = output([session[0], passed, failed], columns=columns) + output([session[-1]], columns=columns)
     assert "\n".join(lines) + "\n" == expected
 
 
 def test_lines_in_a_wide_terminal_equal_piped_lines(session):
-    assert told(session, columns=200) == told(session)
+    assert output(session, columns=200) == output(session)
 
 
 def test_every_criterion_that_failed_has_its_own_line(failed):
     first, second = failed.result.verdicts
     more = Verdict("speed", "slow", "fail", (*second.findings, *second.findings))
     run = of(failed, verdicts=(first, more), lines=(27, 28))
-    lines = told([run])
+    lines = output([run])
     assert sum(line.startswith("      ") and " > " in line for line in lines) == 3
 
 
 def test_recap_has_the_first_cause_and_the_number_of_others(session, passed, failed):
     first, second = failed.result.verdicts
     run = of(failed, verdicts=(replace(second, severity="fail"), first), lines=(28, 27))
-    lines = told([passed, run, session[-1]])
+    lines = output([passed, run, session[-1]])
     recap = lines[lines.index("did not pass:") :]
     assert recap[1:3] == [
         "  ✗ faults/lidar_off (seed 7)".removesuffix(" (seed 7)"),
@@ -104,51 +104,51 @@ def test_recap_has_the_first_cause_and_the_number_of_others(session, passed, fai
 
 
 def test_single_run_has_no_recap(session, failed):
-    assert "did not pass:" not in told([failed, session[-1]])
-    assert "did not pass:" not in told([failed, keyed(failed, 7, again=True), session[-1]])
+    assert "did not pass:" not in output([failed, session[-1]])
+    assert "did not pass:" not in output([failed, keyed(failed, 7, again=True), session[-1]])
 
 
 def test_no_recap_if_all_runs_passed(session, passed):
-    assert "did not pass:" not in told([passed, keyed(passed, 2), session[-1]])
+    assert "did not pass:" not in output([passed, keyed(passed, 2), session[-1]])
 
 
 def test_only_the_first_of_many_failures_have_details(session, failed):
-    lines = told([*(keyed(failed, number) for number in range(1, 31)), session[-1]])
+    lines = output([*(keyed(failed, number) for number in range(1, 31)), session[-1]])
     recap = lines[lines.index("did not pass:") :]
     assert sum("✗" in line for line in recap) == 30
     assert sum(line.startswith("      again ") for line in recap) == 20
 
 
 def test_the_slowest_are_listed_by_wall_time(session, passed, failed, crashed):
-    lines = told([passed, failed, crashed, session[-1]], slow=2)
+    lines = output([passed, failed, crashed, session[-1]], slow=2)
     at = lines.index("slowest:")
     assert lines[at + 1 : at + 4] == [
         "    1.25 s  evil/[red]::error::x   0.0 s simulated",
         "    0.35 s  faults/lidar_off   31.0 s simulated",
         "",
     ]
-    everything = told([passed, failed, crashed, session[-1]], slow=0)
+    everything = output([passed, failed, crashed, session[-1]], slow=0)
     assert sum("s simulated" in line and line.startswith("    ") for line in everything) == 3
 
 
 def test_determinism_runs_are_in_the_same_column(passed):
     pair = [keyed(passed, 1, "navigation/goal"), keyed(passed, 1, "navigation/goal", again=True)]
     key = pair[0].key
-    _, first, second = told([session_started("0.1.0", [key, key.repetition], 1, Path("out"), ()), *pair])
+    _, first, second = output([session_started("0.1.0", [key, key.repetition], 1, Path("out"), ()), *pair])
     assert first.index("18.2 s") == second.index("18.2 s")
 
 
 def test_determinism_runs_of_one_seed_have_no_seed_in_their_names(passed):
     pair = [keyed(passed, 1, "navigation/goal"), keyed(passed, 1, "navigation/goal", again=True)]
     keys = [*(run.key for run in pair), keyed(passed, 1, "navigation/skipped").key]  # a skipped run has no repetition
-    names = [line.split("  ")[1] for line in told([session_started("0.1.0", keys, 1, Path("out"), ()), *pair])[1:]]
+    names = [line.split("  ")[1] for line in output([session_started("0.1.0", keys, 1, Path("out"), ()), *pair])[1:]]
     assert names == ["✓ goal", "✓ goal (again)"]
 
 
 def test_equal_logs_are_reported_as_equal(session, failed, passed):
     pair = [failed, keyed(failed, 7, again=True)]
-    assert "logs equal: 1 pair of runs, byte for byte" in told([*pair, session[-1]])
-    assert not any(line.startswith("logs") for line in told([passed, session[-1]]))
+    assert "logs equal: 1 pair of runs, byte for byte" in output([*pair, session[-1]])
+    assert not any(line.startswith("logs") for line in output([passed, session[-1]]))
 
 
 def test_different_logs_are_never_reported_as_equal(session, failed):
@@ -157,7 +157,7 @@ def test_different_logs_are_never_reported_as_equal(session, failed):
         outcome=Outcome.ERROR,
         error=RunFailure("nondeterministic", "two runs with the same seed differ: truth at t = 1 s"),
     )
-    lines = told([failed, other, keyed(failed, 8), keyed(failed, 8, again=True), session[-1]])
+    lines = output([failed, other, keyed(failed, 8), keyed(failed, 8, again=True), session[-1]])
     at = lines.index("logs differ: in 1 of 2 pairs of runs, byte for byte")
     assert lines[at + 1] == "  verdicts equal in 2 of 2"
     assert not any(line.startswith("logs equal") for line in lines)
@@ -170,14 +170,14 @@ def test_spread_of_different_runs_is_reported(session, failed):
         pairs += [of(keyed(failed, seed), metrics={"time_to_goal": 32.0, "path_length": 9.0}), second]
     pairs[3] = of(pairs[3], outcome=Outcome.ERROR, error=RunFailure("nondeterministic", "x"))
     pairs[1] = of(pairs[1], verdicts=(), lines=())
-    lines = told([*pairs, session[-1]])
+    lines = output([*pairs, session[-1]])
     assert "  verdicts equal in 1 of 2, time to goal differs by up to 0.50 s" in lines
 
 
 def test_run_without_a_log_does_not_count_as_equal(session, failed):
     bare = replace(failed.artifacts, mcap="")
     pair = [failed, replace(keyed(failed, 7, again=True), artifacts=bare)]
-    assert not any(line.startswith("logs") for line in told([*pair, session[-1]]))
+    assert not any(line.startswith("logs") for line in output([*pair, session[-1]]))
 
 
 def undone(run, number, kind):
@@ -187,7 +187,7 @@ def undone(run, number, kind):
 def test_an_interrupted_session_ends_with_two_lines(session, passed, crashed):
     gone = [undone(crashed, 2, "interrupted"), undone(crashed, 3, "not-run"), undone(crashed, 4, "not-run")]
     end = replace(session[-1], passed=1, failed=0, errors=4, interrupted=True)
-    lines = told([passed, crashed, *gone, end])
+    lines = output([passed, crashed, *gone, end])
     assert lines[-2:] == [
         "interrupted: 1 passed, 1 error, 1 unfinished, 2 not started",
         "page: out/report.html   resume with --resume out",
@@ -197,7 +197,7 @@ def test_an_interrupted_session_ends_with_two_lines(session, passed, crashed):
 
 def test_runs_skipped_by_fail_fast_are_only_counted(session, failed, crashed):
     end = replace(session[-1], passed=0, failed=1, errors=2)
-    lines = told([failed, undone(crashed, 2, "not-run"), undone(crashed, 3, "not-run"), end])
+    lines = output([failed, undone(crashed, 2, "not-run"), undone(crashed, 3, "not-run"), end])
     assert lines[-2].startswith("0 passed, 1 failed, 2 not run · ")
     assert not any("not-run!" in line for line in lines)
 
@@ -225,7 +225,7 @@ def test_lines_that_ci_could_interpret_have_no_colors(session):
 
 @pytest.fixture(autouse=True)
 def a_terminal_that_can(monkeypatch):
-    """Rich asks TERM whether a terminal can move its cursor; whoever runs these tests may have a dumb one."""
+    """Set TERM, by which rich decides whether the terminal can move its cursor."""
     monkeypatch.setenv("TERM", "xterm")
 
 
@@ -271,5 +271,5 @@ def test_a_forced_color_reaches_a_pipe(monkeypatch):
 
 def test_vacuous_finding_is_in_the_recap(session, passed, failed):
     nothing = Verdict("own", "own", "fail", (Finding(Status.INCONCLUSIVE, "own", "too short", ""),))
-    lines = told([passed, of(failed, verdicts=(nothing,), lines=(3,)), session[-1]])
+    lines = output([passed, of(failed, verdicts=(nothing,), lines=(3,)), session[-1]])
     assert "      own: inconclusive: too short" in lines[lines.index("did not pass:") :]

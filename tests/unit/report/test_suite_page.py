@@ -80,9 +80,9 @@ def test_each_violated_criterion_has_a_line_with_its_reason_and_where_it_is_writ
 
 def test_console_text_of_a_failure_can_be_copied(passed, failed):
     assert "console output" not in to_html(SessionReport([passed]))
-    said = to_html(SessionReport([failed])).partition("console output")[2].partition("</pre>")[0]
-    assert "stopped_within: 0.84 s &gt; 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)\n" in said
-    assert "again     simscen run" in said
+    given = to_html(SessionReport([failed])).partition("console output")[2].partition("</pre>")[0]
+    assert "stopped_within: 0.84 s &gt; 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)\n" in given
+    assert "again     simscen run" in given
 
 
 def test_external_text_is_escaped_in_tags_attributes_and_links(passed, crashed):
@@ -157,7 +157,7 @@ def test_every_run_has_an_anchor_of_its_own(passed):
 def test_links_point_to_existing_files_of_the_run(failed, tmp_path):
     folder = tmp_path / "out"
     (folder / "runs/a b").mkdir(parents=True)
-    (folder / "runs/a b/worker.log").write_text("said")
+    (folder / "runs/a b/worker.log").write_text("given")
     (folder / "runs/a b/stack.log").write_text("")
     run = replace(failed, artifacts=Artifacts(str(folder / "runs/a b"), str(folder / "runs/a b/run.mcap")))
     links = [a["href"] for tag, a in parsed(to_html(SessionReport([run], folder=str(folder)))) if tag == "a"]

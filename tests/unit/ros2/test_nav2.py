@@ -141,9 +141,9 @@ def test_a_topic_that_a_running_node_has_remapped_is_not_wrong(
 
 
 def test_a_correct_file_passes(tmp_path: Path) -> None:
-    code, said = called(tmp_path, FITS)
+    code, output = called(tmp_path, FITS)
     assert code == 0
-    assert "Nav2 can work with" in said
+    assert "Nav2 can work with" in output
 
 
 def test_wrong_parameters_of_a_file_are_reported_with_their_lines(tmp_path: Path) -> None:
@@ -151,12 +151,12 @@ def test_wrong_parameters_of_a_file_are_reported_with_their_lines(tmp_path: Path
         "base_frame_id: base_link\n    odom_frame_id: odom\n    global", "base_frame_id: base\n    global"
     )
     text = text.replace("topic: /scan", "topic: /front")
-    code, said = called(tmp_path, text)
+    code, output = called(tmp_path, text)
     assert code == 2
     lines = text.split("\n")
     places = [next(i for i, line in enumerate(lines, 1) if key in line) for key in ("base_frame_id: base", "/front")]
-    assert [int(line.partition(":")[0]) for line in said.split("\n")] == places
-    assert all("SC340" in line for line in said.split("\n"))
+    assert [int(line.partition(":")[0]) for line in output.split("\n")] == places
+    assert all("SC340" in line for line in output.split("\n"))
 
 
 def test_a_second_name_of_the_base_frame_is_accepted(tmp_path: Path) -> None:
@@ -195,9 +195,9 @@ def test_a_frame_that_cannot_be_renamed_is_a_usage_error(tmp_path: Path, rename:
 
 
 def test_a_file_without_parameters_of_nodes_is_refused(tmp_path: Path) -> None:
-    code, said = called(tmp_path, "amcl: {alpha1: 0.2}\n")
+    code, output = called(tmp_path, "amcl: {alpha1: 0.2}\n")
     assert code == 2
-    assert "it has no key ros__parameters" in said
+    assert "it has no key ros__parameters" in output
 
 
 def test_a_call_outside_a_run_is_a_usage_error() -> None:
@@ -221,8 +221,8 @@ local_costmap:
         scan:
           topic: /front/scan
 """
-    _, said = called(tmp_path, text)
-    for line in said.split("\n"):
+    _, output = called(tmp_path, text)
+    for line in output.split("\n"):
         place, code, message = line.split(" ", 2)
         assert f"nav2_params.yaml:{place}: error[{code}] {message}\n" in page
 

@@ -97,10 +97,10 @@ def test_the_lock_of_a_domain_ends_with_its_process(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("distro", "old"), [("humble", "1"), ("jazzy", None), ("", None)])
 def test_discovery_is_restricted_to_this_machine_in_every_distribution(distro: str, old: str | None) -> None:
-    told = ros_environment(5, "/tmp/logs", {"ROS_DISTRO": distro, "ROS_LOCALHOST_ONLY": "0"})
-    assert told["ROS_DOMAIN_ID"] == "5"
-    assert told["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
-    assert told.get("ROS_LOCALHOST_ONLY") == old
+    expected = ros_environment(5, "/tmp/logs", {"ROS_DISTRO": distro, "ROS_LOCALHOST_ONLY": "0"})
+    assert expected["ROS_DOMAIN_ID"] == "5"
+    assert expected["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
+    assert expected.get("ROS_LOCALHOST_ONLY") == old
 
 
 def test_a_stamped_twist_is_read_for_any_length_of_its_frame() -> None:

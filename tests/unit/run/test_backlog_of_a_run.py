@@ -24,7 +24,7 @@ pass: [collisions: {max: 0}]
 
 
 class Lag:
-    """How many moments the trace is behind at most, when a listener is told of one."""
+    """Return the maximum number of moments that the trace lacks when a listener gets a moment."""
 
     def __init__(self) -> None:
         self.most = self.written = 0

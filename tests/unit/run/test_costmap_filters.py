@@ -20,8 +20,8 @@ def filters(masks=None, **stack):
 
 
 def order(filters, what, enabled, region=None, limit=None):
-    told = ZoneSwitch(what, enabled, region, limit)
-    return filters.rejection_reason(told) or filters.switch(told)
+    text = ZoneSwitch(what, enabled, region, limit)
+    return filters.rejection_reason(text) or filters.switch(text)
 
 
 def test_zones_keep_their_order_when_they_are_switched():
@@ -57,7 +57,7 @@ def test_switching_a_whole_filter_includes_its_mask_and_restores_its_zones():
 
 
 @pytest.mark.parametrize(
-    ("told", "what", "enabled", "region", "limit"),
+    ("text", "what", "enabled", "region", "limit"),
     [
         ("`wet` was on already", "keepout", True, "wet", None),
         ("`dry` was off already", "keepout", False, "dry", None),
@@ -66,8 +66,8 @@ def test_switching_a_whole_filter_includes_its_mask_and_restores_its_zones():
         ("the stack's keepout filter was on already", "keepout", True, None, None),
     ],
 )
-def test_switch_without_effect_returns_the_reason(told, what, enabled, region, limit):
-    assert order(filters(**STACK), what, enabled, region, limit) == told
+def test_switch_without_effect_returns_the_reason(text, what, enabled, region, limit):
+    assert order(filters(**STACK), what, enabled, region, limit) == text
 
 
 def test_empty_filter_and_zones_of_a_disabled_filter_cannot_be_switched():

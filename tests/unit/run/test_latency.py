@@ -78,9 +78,9 @@ def test_latencies_of_the_robot_apply_if_the_scenario_requests_them(tmp_path: Pa
     assert next(moment.tick for moment in unasked if moment.decision.command.vx > 0) == 12
 
 
-@pytest.mark.parametrize("said", [", latency: {}", ", latency: robot", ", latency: {planner: 0 s, controller: 1 ms}"])
-def test_zero_latency_is_bit_identical_to_no_latency(tmp_path: Path, said: str) -> None:
-    plain, zero = moments(tmp_path, 80), moments(tmp_path, 80, said, ", latency: 0 s")
+@pytest.mark.parametrize("given", [", latency: {}", ", latency: robot", ", latency: {planner: 0 s, controller: 1 ms}"])
+def test_zero_latency_is_bit_identical_to_no_latency(tmp_path: Path, given: str) -> None:
+    plain, zero = moments(tmp_path, 80), moments(tmp_path, 80, given, ", latency: 0 s")
     for one, other in zip(plain, zero, strict=True):
         assert (one.tick, one.truth, one.decision.command) == (other.tick, other.truth, other.decision.command)
         assert one.decision.events == other.decision.events

@@ -38,10 +38,10 @@ print("late:", *sorted(name for name in set(sys.modules) - before if name.split(
 
 def test_run_after_the_warm_up_imports_no_modules_and_computes_no_walls(tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
-    told = subprocess.run(
+    expected = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(tmp_path)], capture_output=True, text=True, check=True, timeout=120
     )
-    assert "late:\n" in told.stdout
+    assert "late:\n" in expected.stdout
 
 
 def test_components_of_plugins_are_not_preloaded() -> None:

@@ -110,7 +110,7 @@ def test_durations_apply_inside_combined_conditions(where):
     fast, hall = fast[:length], hall[:length]
     watch = ConditionState(Trigger.model_validate(words))
     square = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
-    said = [
+    given = [
         watch.holds(
             FakeStage(
                 tick=24 * k,
@@ -121,8 +121,8 @@ def test_durations_apply_inside_combined_conditions(where):
         )
         for k in range(length)
     ]
-    assert said == truth(fast, hall).tolist()
-    assert 0 < sum(said) < length
+    assert given == truth(fast, hall).tolist()
+    assert 0 < sum(given) < length
 
 
 def test_each_edge_fires_after_its_own_delay():

@@ -46,7 +46,7 @@ def expected(trace, name):
     """Where it must fire by the trace."""
     truth, ticks = trace.truth.values, trace.truth.ticks
     speed = np.hypot(trace.velocity.values[:, 0], trace.velocity.values[:, 1])
-    belief = trace.belief.at(ticks - 1)[:, :3]  # what it had said before the beat
+    belief = trace.belief.at(ticks - 1)[:, :3]  # the belief before the beat
     goal = np.array([6.5, 2.0])
     match name:
         case "turns":

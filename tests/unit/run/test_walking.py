@@ -34,7 +34,7 @@ def events(*lines: str) -> str:
     return "events:\n" + "".join(f"  - {line}\n" for line in lines)
 
 
-def told(trace, *kinds: EventKind) -> list[tuple[str, str]]:
+def text(trace, *kinds: EventKind) -> list[tuple[str, str]]:
     return [(event.kind.value, event.name) for event in trace.of_kind(*kinds)]
 
 
@@ -42,7 +42,7 @@ def test_pedestrian_is_a_moving_object_of_type_person(play):
     trace = play(events(f"{{when: {{time: 0}}, do: {ANNA}}}"), **STANDING)
     spawned = trace.of_kind(EventKind.OBJECT_SPAWNED)[-1]
     assert spawned.data["person"] and spawned.data["behavior"] == "regular" and spawned.data["size"] == [0.25, 1.7]
-    assert told(trace, EventKind.PEDESTRIAN_REACHED)[0] == ("pedestrian.reached", "anna")
+    assert text(trace, EventKind.PEDESTRIAN_REACHED)[0] == ("pedestrian.reached", "anna")
     way = trace.objects["anna"].values
     assert way[:, 0].max() > 6.7 and np.ptp(way[:, 1]) < 0.01
 
@@ -77,7 +77,7 @@ def test_events_can_move_or_remove_a_pedestrian(play):
     trace = play(lines, **STANDING)
     anna = trace.objects["anna"]
     assert np.allclose(anna.values[anna.ticks >= 4 * 240, :2][0], (3.5, 1.5))
-    assert told(trace, EventKind.OBJECT_REMOVED) == [("object.removed", "anna")]
+    assert text(trace, EventKind.OBJECT_REMOVED) == [("object.removed", "anna")]
     assert anna.ticks.max() <= 5 * 240
 
 
@@ -126,7 +126,7 @@ def test_only_blind_pedestrians_touch_the_robot(play):
     def touched(more: str) -> list[tuple[str, str]]:
         anna = f"{{pedestrian: {{name: anna, pose: {{x: 4, y: 1}}, goals: [[0.5, 1]]{more}}}}}"
         trace = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), **{**STANDING, "robot": "{pose: {x: 2, y: 1}}"})
-        return told(trace, EventKind.COLLISION_STARTED)
+        return text(trace, EventKind.COLLISION_STARTED)
 
     assert touched("") == touched(", behavior: impassive") == []
     assert touched(", blind_to: [robots]")[0] == ("collision.started", "anna")

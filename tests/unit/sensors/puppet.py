@@ -1,4 +1,4 @@
-"""A robot that stands or moves as told, and walls to look at, for tests of sensors."""
+"""Robot with a given motion, and walls around it, for tests of sensors."""
 
 import math
 from dataclasses import dataclass

@@ -13,8 +13,8 @@ from simscen.spec.motions import Motion
 HERE = Pose2(0.0, 0.0, 1.0)
 
 
-def path(here=HERE, **said):
-    return Motion.model_validate(said).path(here)
+def path(here=HERE, **given):
+    return Motion.model_validate(given).path(here)
 
 
 def test_waypoints_are_passed_at_the_given_speed():
@@ -89,7 +89,7 @@ SLIPS = {
 }
 
 
-@pytest.mark.parametrize(("expected_text", "said"), SLIPS.items(), ids=str)
-def test_invalid_motions_are_rejected(expected_text, said):
+@pytest.mark.parametrize(("expected_text", "given"), SLIPS.items(), ids=str)
+def test_invalid_motions_are_rejected(expected_text, given):
     with pytest.raises(ValidationError, match=expected_text):
-        Motion.model_validate(said)
+        Motion.model_validate(given)

@@ -173,12 +173,12 @@ def test_ended_task_has_the_code_of_the_last_failure() -> None:
     task = Task(False)
     task.start((Goal("a", Pose2(0, 0)), Goal("b", Pose2(1, 0))))
     failed = *task.accept_next(1), *task.record_failed(5, ErrorCode.GOAL_OCCUPIED, "in a wall")
-    told = *failed, *task.accept_next(6), *task.record_reached(9)
-    assert [(e.tick, e.kind, e.name) for e in told] == [
+    text = *failed, *task.accept_next(6), *task.record_reached(9)
+    assert [(e.tick, e.kind, e.name) for e in text] == [
         (1, "goal.accepted", "a"),
         (5, "goal.failed", "a"),
         (6, "goal.accepted", "b"),
         (9, "goal.reached", "b"),
         (9, "navigation.ended", "FAILED"),
     ]
-    assert told[-1].data == {"error_code": 206, "error_name": "GOAL_OCCUPIED"}
+    assert text[-1].data == {"error_code": 206, "error_name": "GOAL_OCCUPIED"}

@@ -163,16 +163,16 @@ def dense(corners: tuple[tuple[float, float], ...]) -> Path:
 def answers(spec: ControllerSpec, probe: Probe) -> list[Any]:
     """The commands, or how they failed."""
     controller = spec.implementation()(spec, setting(probe.robot))
-    said: list[Any] = []
+    results: list[Any] = []
     for step in probe.steps:
         if step.path:
             controller.set_path(dense(step.path))
         try:
             view, goal = view_of(probe.robot, probe.boxes), Goal("g", probe.goal)
-            said.append(controller.command(step.pose, step.twist, view, goal))
+            results.append(controller.command(step.pose, step.twist, view, goal))
         except NavigationFailure as failure:
-            said.append((failure.code, str(failure)))
-    return said
+            results.append((failure.code, str(failure)))
+    return results
 
 
 class Other(NamedTuple):
@@ -183,8 +183,8 @@ class Other(NamedTuple):
     values: list[Any]
 
     def __str__(self) -> str:
-        told = f"={self.values[0]}" if len(self.values) == 1 else ""
-        return f"{self.spec.__name__}.{'.'.join(self.keys)}{told}"
+        text = f"={self.values[0]}" if len(self.values) == 1 else ""
+        return f"{self.spec.__name__}.{'.'.join(self.keys)}{text}"
 
 
 def fields(spec: type[ControllerSpec], model: type[BaseModel], way: tuple[str, ...] = ()) -> Iterator[Other]:

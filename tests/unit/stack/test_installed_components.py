@@ -68,7 +68,7 @@ def test_a_planner_of_a_package_is_chosen_by_its_type_and_drives(odd) -> None:
 
 
 @pytest.mark.parametrize(
-    ("stack", "told"),
+    ("stack", "expected"),
     [
         ("{planner: {type: strait}}", "`strait` is not one of the choices"),
         ("{planner: {type: straight, spacin: 1}}", "unknown key `spacin` in `stack.planner`"),
@@ -81,18 +81,18 @@ def test_a_planner_of_a_package_is_chosen_by_its_type_and_drives(odd) -> None:
         ("{type: still, patiance: 1}", "unknown key `patiance` in `stack`"),
     ],
 )
-def test_a_mistake_is_reported_at_its_position(odd, tmp_path: Path, stack: str, told: str) -> None:
+def test_a_mistake_is_reported_at_its_position(odd, tmp_path: Path, stack: str, expected: str) -> None:
     with pytest.raises(InvalidInput) as wrong:
         load_scenario(scenario(tmp_path, stack), tmp_path)
     (problem,) = wrong.value.problems
-    assert told in problem.message
+    assert expected in problem.message
     assert problem.line == 6
-    if told.startswith("`"):
+    if expected.startswith("`"):
         assert problem.hint.startswith("did you mean"), problem.hint
 
 
 @pytest.mark.parametrize(
-    ("does", "kind", "told"),
+    ("does", "kind", "expected"),
     [
         ("raise", "crashed", "KeyError: 'no such key' (odd.py:40)"),
         ("raise deep", "crashed", "LinAlgError: Singular matrix (odd.py:42)"),
@@ -104,12 +104,12 @@ def test_a_mistake_is_reported_at_its_position(odd, tmp_path: Path, stack: str, 
         ("elsewhere", "broken-component", "from (1.50, 1.50) instead of the start (1.00, 1.00)"),
     ],
 )
-def test_exception_in_a_planner_is_an_error_with_its_name(odd, does: str, kind: str, told: str) -> None:
+def test_exception_in_a_planner_is_an_error_with_its_name(odd, does: str, kind: str, expected: str) -> None:
     with pytest.raises(RunError) as broken:
         driven(planner={"type": "straight", "does": does}).run(1)
     assert broken.value.kind == kind
     assert str(broken.value).startswith("planner `straight` (odd:StraightPlanner)")
-    assert told in str(broken.value)
+    assert expected in str(broken.value)
 
 
 def test_a_path_through_a_wall_ends_the_run(odd) -> None:
@@ -118,7 +118,7 @@ def test_a_path_through_a_wall_ends_the_run(odd) -> None:
 
 
 @pytest.mark.parametrize(
-    ("stack", "told"),
+    ("stack", "expected"),
     [
         ({"controller": {"type": "wild"}}, "controller `wild` (odd:WildController) commanded (inf, 0.0, 0.0)"),
         ({"localizer": {"type": "lost"}}, "localizer `lost` (odd:LostLocalizer) returned a Belief whose covariance"),
@@ -126,11 +126,11 @@ def test_a_path_through_a_wall_ends_the_run(odd) -> None:
         ({"goal_checker": {"type": "unsure"}}, "goal_checker `unsure` (odd:UnsureChecker) returned 'perhaps'"),
     ],
 )
-def test_error_names_the_role_of_the_component(odd, stack: dict, told: str) -> None:
+def test_error_names_the_role_of_the_component(odd, stack: dict, expected: str) -> None:
     with pytest.raises(RunError) as broken:
         driven(**stack).run(1)
     assert broken.value.kind == "broken-component"
-    assert told in str(broken.value)
+    assert expected in str(broken.value)
 
 
 @pytest.mark.parametrize(
@@ -152,19 +152,19 @@ def test_result_of_another_type_is_an_error_of_the_component(
 
 
 @pytest.mark.parametrize(
-    ("command", "kind", "told"),
+    ("command", "kind", "expected"),
     [
         (lambda *asked: Twist(math.nan), "broken-component", "which is not a finite velocity"),
         (lambda *asked: 1 / 0, "crashed", "ZeroDivisionError: division by zero (navigator.py:"),
     ],
 )
-def test_decision_of_shipped_components_is_validated(monkeypatch, command, kind: str, told: str) -> None:
+def test_decision_of_shipped_components_is_validated(monkeypatch, command, kind: str, expected: str) -> None:
     monkeypatch.setattr(RegulatedPurePursuit, "command", command)
     with pytest.raises(RunError) as broken:
         driven().run(1)
     assert broken.value.kind == kind
     assert str(broken.value).startswith("stack `reference` (simscen.stack.build:configured_stack)")
-    assert told in str(broken.value)
+    assert expected in str(broken.value)
 
 
 def test_navigation_failure_is_not_an_error_of_the_run(odd) -> None:

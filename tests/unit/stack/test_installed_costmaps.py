@@ -43,7 +43,7 @@ def test_costmaps_are_passed_unchanged() -> None:
 
 
 @pytest.mark.parametrize(
-    ("costmap", "told"),
+    ("costmap", "text"),
     [
         (GRID, "published OccupancyGrid instead of a CostGrid"),
         (CostGrid("local", "odom", None), "instead of a CostGrid"),  # type: ignore[arg-type]
@@ -53,6 +53,6 @@ def test_costmaps_are_passed_unchanged() -> None:
         (CostGrid("global", "map", FLAT), "a global costmap whose cells are no"),
     ],
 )
-def test_invalid_costmap_is_named(costmap: Any, told: str) -> None:
-    with pytest.raises(RunError, match=told):
+def test_invalid_costmap_is_named(costmap: Any, text: str) -> None:
+    with pytest.raises(RunError, match=text):
         decided(costmap)

@@ -46,15 +46,15 @@ def start(world: Flatland | None = None, seed: int = 1, mapped: bool = True, **l
 def test_zero_latency_is_bit_identical_to_unset_latency(seed: int, zero: dict[str, float]) -> None:
     """Less than half a tick is none."""
     world = Flatland(discs=[(4.0 + 0.3 * seed, 1.0, 0.3), (6.5, 1.2, 0.2)])
-    said, unsaid = start(world, seed, **zero).run(12), start(world, seed)
+    given, unsaid = start(world, seed, **zero).run(12), start(world, seed)
     unsaid.stack = drive(
         unsaid.world, START, FAR, grid=Flatland().room(10, 3).grid((-0.5, -0.5, 10.5, 3.5)), seed=seed
     ).stack  # of a specification that does not speak of it
     unsaid.run(12)
-    assert said.log == unsaid.log
-    assert said.commands == unsaid.commands
-    assert said.track == unsaid.track
-    assert len(said.events_of_kind("plan.made")) > 1
+    assert given.log == unsaid.log
+    assert given.commands == unsaid.commands
+    assert given.track == unsaid.track
+    assert len(given.events_of_kind("plan.made")) > 1
 
 
 def test_robot_waits_until_the_plan_is_computed() -> None:

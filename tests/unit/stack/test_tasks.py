@@ -37,7 +37,7 @@ def task(*goals: Goal, stop: bool = True, mode="navigate_to_pose") -> tuple[Clie
     return client, client.journal
 
 
-def told(journal: list[Event]) -> list[tuple[int, str, str]]:
+def text(journal: list[Event]) -> list[tuple[int, str, str]]:
     return [(event.tick, event.kind.value, event.name) for event in journal]
 
 
@@ -51,7 +51,7 @@ def test_via_poses_are_passed_before_the_goal_is_reached():
     assert drive.accept_next(3) is C
     assert drive.remaining_in_action == ()
     drive.record_reached(9)
-    assert told(journal)[-3:] == [
+    assert text(journal)[-3:] == [
         (3, "goal.accepted", "c"),
         (9, "goal.reached", "c"),
         (9, "navigation.ended", "SUCCEEDED"),
@@ -67,7 +67,7 @@ def test_failed_drive_fails_all_its_poses_and_the_next_drive_starts():
     drive.record_failed(5, ErrorCode.NO_VALID_PATH, "no way")
     assert drive.accept_next(6) is D
     drive.record_reached(7)
-    assert told(journal)[3:] == [
+    assert text(journal)[3:] == [
         (5, "goal.failed", "b"),
         (5, "goal.failed", "c"),
         (6, "goal.accepted", "d"),
@@ -82,7 +82,7 @@ def test_end_of_a_drive_ends_all_its_goals(how):
     drive, journal = task(A, B, C, D)
     drive.accept_next(1)
     drive.preempt(2, Goal("x", Pose2(5, 5))) if how == "preempt" else drive.cancel(2)
-    assert [(kind, name) for _, kind, name in told(journal)[1:4]] == [("goal.canceled", each) for each in "abc"]
+    assert [(kind, name) for _, kind, name in text(journal)[1:4]] == [("goal.canceled", each) for each in "abc"]
     if how == "preempt":
         assert {event.data["preempted_by"] for event in journal[1:4]} == {"x"}
         goal = drive.accept_next(3)
@@ -91,7 +91,7 @@ def test_end_of_a_drive_ends_all_its_goals(how):
         drive.record_reached(4)
         assert drive.accept_next(5) is D
     else:
-        assert told(journal)[-1] == (2, "navigation.ended", "CANCELED")
+        assert text(journal)[-1] == (2, "navigation.ended", "CANCELED")
 
 
 def test_robot_waits_for_the_duration_at_each_goal():
@@ -104,9 +104,9 @@ def test_robot_waits_for_the_duration_at_each_goal():
     assert tour.accept_next(60) is waits[1]
     tour.record_reached(70)
     assert tour.accept_next(89) is None
-    assert told(journal)[-1] == (70, "goal.reached", "b")
+    assert text(journal)[-1] == (70, "goal.reached", "b")
     assert tour.accept_next(90) is None
-    assert told(journal)[-1] == (90, "navigation.ended", "SUCCEEDED")
+    assert text(journal)[-1] == (90, "navigation.ended", "SUCCEEDED")
     assert tour.accept_next(91) is None
     assert len(journal) == 5
 
@@ -117,7 +117,7 @@ def test_a_wait_ends_when_the_task_is_canceled_or_another_goal_comes():
     canceled.accept_next(1)
     canceled.record_reached(2)
     canceled.cancel(3)
-    assert told(journal)[-1] == (3, "navigation.ended", "CANCELED")
+    assert text(journal)[-1] == (3, "navigation.ended", "CANCELED")
     assert canceled.accept_next(1000) is None
     preempted, journal = task(stays, D)
     preempted.accept_next(1)
@@ -131,13 +131,13 @@ def test_a_wait_ends_when_the_task_is_canceled_or_another_goal_comes():
 def test_cancel_ends_a_task_whose_next_goal_is_not_accepted_yet():
     begun, journal = task(C, D)
     begun.cancel(1)
-    assert told(journal) == [(1, "navigation.ended", "CANCELED")]
+    assert text(journal) == [(1, "navigation.ended", "CANCELED")]
     assert begun.accept_next(1) is None
     preempted, journal = task(C)
     preempted.accept_next(1)
     preempted.preempt(2, D)
     preempted.cancel(2)
-    assert told(journal)[-1] == (2, "navigation.ended", "CANCELED")
+    assert text(journal)[-1] == (2, "navigation.ended", "CANCELED")
     assert preempted.accept_next(2) is None
 
 
@@ -147,7 +147,7 @@ def test_canceled_task_ends_as_canceled_after_an_earlier_failure():
     tour.record_failed(2, ErrorCode.NO_VALID_PATH, "no way")
     tour.accept_next(3)
     tour.cancel(4)
-    assert told(journal)[-1] == (4, "navigation.ended", "CANCELED")
+    assert text(journal)[-1] == (4, "navigation.ended", "CANCELED")
     assert journal[-1].data["error_name"] == "NONE"
 
 

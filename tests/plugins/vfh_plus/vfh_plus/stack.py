@@ -37,7 +37,7 @@ LOOK_AGAIN = 0.5
 
 
 class VfhPlusStack:
-    """Dead reckoning from where it was told it starts; it never corrects itself by the map."""
+    """Dead reckoning from the initial pose, without corrections by the map."""
 
     def __init__(self, spec: VfhPlus, setting: Setting) -> None:
         self._spec, self._robot, self._surroundings = spec, setting.robot, setting.surroundings

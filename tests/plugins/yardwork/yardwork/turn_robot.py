@@ -4,7 +4,7 @@ from simscen.plugin import Action, Angle, Effect, Pose2, Spec, Stage
 
 
 class TurnRobot(Spec, Action):
-    """Turn the robot on the spot; its stack is not told, and its wheels do not notice.
+    """Turn the robot on the spot; neither its stack nor its odometry gets to know it.
 
     Example: `do: {turn_robot: {by: 90 deg}}`
     """

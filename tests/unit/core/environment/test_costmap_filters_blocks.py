@@ -15,13 +15,13 @@ CELLS = arrays(
 @given(CELLS)
 def test_blocks_of_a_mask_contain_each_marked_cell_once(cells):
     mask = mask_blocks(OccupancyGrid(cells, 0.1, Pose2(1.0, 2.0, 0.3)))
-    said = np.where(cells > 0, cells, 0)
+    given_value = np.where(cells > 0, cells, 0)
     again = mask.grid
     rows, columns = again.shape
     whole = np.zeros_like(cells)
     whole[:rows, :columns] = again.cells
-    np.testing.assert_array_equal(whole, said)
-    assert sum(width * height for _, _, width, height, _ in mask.blocks) == np.count_nonzero(said)
+    np.testing.assert_array_equal(whole, given_value)
+    assert sum(width * height for _, _, width, height, _ in mask.blocks) == np.count_nonzero(given_value)
     assert (mask.resolution, mask.origin) == (0.1, Pose2(1.0, 2.0, 0.3))
 
 

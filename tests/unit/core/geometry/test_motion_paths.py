@@ -58,7 +58,7 @@ UNEVEN = (0.0, 1.0, 3.0, 3.5, 5.0)
 
 
 def hermite(path, closed):
-    """The same curve, by somebody else."""
+    """Return the same curve, computed with another library."""
     values = np.array(path.poses)
     values[:, 2] = np.unwrap(values[:, 2])
     slopes = np.zeros_like(values)

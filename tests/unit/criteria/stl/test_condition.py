@@ -99,8 +99,8 @@ def test_bound_at_the_limit_of_the_range_is_valid(signal, op, value):
 
 
 def test_bound_has_the_dimension_of_its_signal():
-    told = Condition.model_validate({"signal": "speed", "op": ">", "value": "50 cm/s", "scale": "10 cm/s"})
-    assert (told.value, told.scale) == (0.5, 0.1)
+    text = Condition.model_validate({"signal": "speed", "op": ">", "value": "50 cm/s", "scale": "10 cm/s"})
+    assert (text.value, text.scale) == (0.5, 0.1)
     assert Condition.model_validate({"signal": "nees", "op": ">", "value": 3}).value == 3.0
 
 
@@ -113,10 +113,10 @@ def test_misspelled_signal_is_a_single_problem():
 
 def test_comparisons_of_a_condition_are_in_written_order():
     hurt = {"signal": "in_collision"}
-    told = Condition.model_validate(
+    text = Condition.model_validate(
         {"any": [{"all": [NEAR, LOST]}, {"until": {"hold": hurt, "release": NEAR}}, {"whenever": LOST, "then": hurt}]}
     )
-    names = [one.signal for one in told.comparisons()]
+    names = [one.signal for one in text.comparisons()]
     assert names == ["clearance", "localized", "in_collision", "clearance", "localized", "in_collision"]
     assert [one.signal for one in Condition.model_validate({"always": NEAR}).comparisons()] == ["clearance"]
     assert [one.signal for one in Condition.model_validate({"eventually": NEAR}).comparisons()] == ["clearance"]

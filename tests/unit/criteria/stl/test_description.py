@@ -14,7 +14,7 @@ LOST = {"not": {"signal": "localized"}}
 
 
 @pytest.mark.parametrize(
-    ("condition", "told"),
+    ("condition", "text"),
     [
         (NEAR, "clearance < 0.5 m"),
         ({"signal": "nees", "op": ">", "value": 3}, "nees > 3"),
@@ -35,12 +35,12 @@ LOST = {"not": {"signal": "localized"}}
         ({"whenever": NEAR, "then": LOST}, "whenever clearance < 0.5 m, then not localized"),
     ],
 )
-def test_condition_description_is_readable(condition, told):
-    assert describe(Condition.model_validate(condition)) == told
+def test_condition_description_is_readable(condition, text):
+    assert describe(Condition.model_validate(condition)) == text
 
 
 @pytest.mark.parametrize(
-    ("condition", "value", "negated", "told"),
+    ("condition", "value", "negated", "text"),
     [
         (NEAR, 0.25, False, ("0.25 m", "< 0.50 m")),
         (NEAR, 0.25, True, ("0.25 m", "≥ 0.50 m")),
@@ -56,6 +56,6 @@ def test_condition_description_is_readable(condition, told):
         ({"signal": "localized", "op": ">=", "value": 1}, 1.0, False, ("yes", "yes")),
     ],
 )
-def test_witness_has_value_and_bound(condition, value, negated, told):
+def test_witness_has_value_and_bound(condition, value, negated, text):
     witness = Witness(Condition.model_validate(condition), 0, value, negated)
-    assert (describe_value(witness), describe_limit(witness)) == told
+    assert (describe_value(witness), describe_limit(witness)) == text

@@ -12,7 +12,7 @@ stack: {controller: {desired_linear_vel: 0.3}}
 """
 
 
-def told(write, text: str, name: str = "a.base.yaml") -> list[str]:
+def expected(write, text: str, name: str = "a.base.yaml") -> list[str]:
     file = write(name, text)
     assert file_kind(file, file.parent) == "base"
     return [f"{found.line}:{found.col} {found.message}" for found in check_file("base", file, file.parent)]
@@ -20,11 +20,11 @@ def told(write, text: str, name: str = "a.base.yaml") -> list[str]:
 
 @pytest.mark.parametrize("name", ["a.base.yaml", "a.base.yml", "defaults.yaml", "deep/defaults.yaml"])
 def test_base_can_omit_required_keys(write, name: str) -> None:
-    assert told(write, "tags: [smoke]\n", name) == []
+    assert expected(write, "tags: [smoke]\n", name) == []
 
 
 def test_a_base_may_say_a_part_of_a_mapping(write) -> None:
-    assert told(write, BASE) == []
+    assert expected(write, BASE) == []
 
 
 @pytest.mark.parametrize(
@@ -51,17 +51,17 @@ def test_a_base_may_say_a_part_of_a_mapping(write) -> None:
     ],
 )
 def test_content_of_a_base_is_checked(write, text: str, problem: str) -> None:
-    found = told(write, text)
+    found = expected(write, text)
     assert [one for one in found if problem in one], found
 
 
 def test_list_additions_of_a_base_are_checked(write) -> None:
-    assert told(write, "pass+: [{collisions: {max: 0}}]\n") == []
-    assert told(write, "pass+: [{colisions: {max: 0}}]\n")[0].startswith("1:10 unknown key `colisions`")
+    assert expected(write, "pass+: [{collisions: {max: 0}}]\n") == []
+    assert expected(write, "pass+: [{colisions: {max: 0}}]\n")[0].startswith("1:10 unknown key `colisions`")
 
 
 def test_a_base_may_extend_another(write) -> None:
     write("b.base.yaml", "linger: 1\n")
-    assert told(write, "extends: b.base.yaml\n") == []
+    assert expected(write, "extends: b.base.yaml\n") == []
     write("b.base.yaml", "linger: no\n")
-    assert told(write, "extends: b.base.yaml\n") == ["1:9 expected a duration, got the text `no`"]
+    assert expected(write, "extends: b.base.yaml\n") == ["1:9 expected a duration, got the text `no`"]

@@ -64,8 +64,8 @@ PARAMETERS = "amcl:\n  ros__parameters: {alpha1: 0.1, beta: 2}\ndocking_server:\
 
 
 def test_ignored_and_wrong_nav2_parameters_are_reported(write: Write, tmp_path: Path) -> None:
-    told = _problems(write("nav2.yaml", PARAMETERS), tmp_path)
-    assert [(p.place, p.code, p.severity) for p in told] == [
+    expected = _problems(write("nav2.yaml", PARAMETERS), tmp_path)
+    assert [(p.place, p.code, p.severity) for p in expected] == [
         ("nav2.yaml:2:40", "SC341", "warning"),
         ("nav2.yaml:4:24", "SC341", "warning"),
     ]
@@ -89,8 +89,8 @@ def test_file_of_another_kind_is_no_scenario_and_gets_a_hint(
     write: Write, tmp_path: Path, text: str, kind: str, hint: str
 ) -> None:
     (problem,) = check_file("scenario", write("mine.yaml", text), tmp_path)
-    told = f"this is {kind}, not a scenario"
-    assert (problem.place, problem.code, problem.message) == ("mine.yaml", "SC025", told)
+    expected = f"this is {kind}, not a scenario"
+    assert (problem.place, problem.code, problem.message) == ("mine.yaml", "SC025", expected)
     assert problem.hint.startswith(hint)
 
 

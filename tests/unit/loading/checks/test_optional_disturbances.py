@@ -22,7 +22,7 @@ stack: {localizer: {type: ground_truth}}
 """
 
 
-def told(tmp_path: Path, more: str, code: str) -> list[Problem]:
+def text(tmp_path: Path, more: str, code: str) -> list[Problem]:
     file = tmp_path / "a.scenario.yaml"
     file.write_text(SCENARIO + more)
     found = try_scenario(file, tmp_path)
@@ -43,7 +43,7 @@ def told(tmp_path: Path, more: str, code: str) -> list[Problem]:
 def test_an_impossible_event_is_an_error_only_if_it_is_required(
     tmp_path: Path, event: str, required: str, severity: str
 ) -> None:
-    problems = told(tmp_path, f"events: [{event}, required: {required}}}]\n", "SC050")
+    problems = text(tmp_path, f"events: [{event}, required: {required}}}]\n", "SC050")
     assert [problem.severity for problem in problems] == [severity]
 
 
@@ -56,16 +56,16 @@ def test_an_impossible_event_is_an_error_only_if_it_is_required(
 )
 def test_a_displaced_robot_or_estimate_has_an_error_with_the_true_pose_too(tmp_path: Path, more: str) -> None:
     event = "when: {localization_error: 1 m}, do: {mark: {name: lost}}"
-    assert told(tmp_path, f"events: [{{{event}}}]\n", "SC050")
-    assert not told(tmp_path, more.replace("EVENT", event), "SC050")
+    assert text(tmp_path, f"events: [{{{event}}}]\n", "SC050")
+    assert not text(tmp_path, more.replace("EVENT", event), "SC050")
 
 
 @pytest.mark.parametrize("condition", ["speed_above: 5 m/s", "turning_above: 20 rad/s", "travelled: 1 km"])
 def test_an_object_that_appears_can_push_the_robot_beyond_its_limits(tmp_path: Path, condition: str) -> None:
     event = f"{{when: {{{condition}}}, do: {{mark: {{name: fast}}}}}}"
     spawn = "{when: {time: 1}, do: {spawn: {name: box, box: [1, 1, 1], pose: {x: 2.4, y: 3}}}}"
-    assert told(tmp_path, f"events: [{event}]\n", "SC050")
-    assert not told(tmp_path, f"events: [{spawn}, {event}]\n", "SC050")
+    assert text(tmp_path, f"events: [{event}]\n", "SC050")
+    assert not text(tmp_path, f"events: [{spawn}, {event}]\n", "SC050")
 
 
 @pytest.mark.parametrize(
@@ -84,4 +84,4 @@ def test_a_door_that_is_open_from_the_start_can_be_opened_after_it_was_moved(
     events = (
         f"events: [{{when: {{time: 1}}, do: {{{earlier}}}}}, {{when: {{time: 9}}, do: {{open: {{name: gate}}}}}}]\n"
     )
-    assert len(told(tmp_path, events, "SC055")) == count
+    assert len(text(tmp_path, events, "SC055")) == count

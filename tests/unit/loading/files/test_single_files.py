@@ -55,7 +55,7 @@ def test_unsaved_text_decides_whether_a_world_is_xml(tmp_path: Path, is_xml: boo
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "text"),
     [
         ("nowhere.world.yaml", "no such file or directory"),
         (".", "not a regular file"),
@@ -64,12 +64,12 @@ def test_unsaved_text_decides_whether_a_world_is_xml(tmp_path: Path, is_xml: boo
         ("hall.model", "this is an XML file"),
     ],
 )
-def test_invalid_world_is_reported(tmp_path: Path, name: str, told: str) -> None:
+def test_invalid_world_is_reported(tmp_path: Path, name: str, text: str) -> None:
     (tmp_path / "root").mkdir()
     (tmp_path / "outside.world.yaml").write_text("simscen: 1\n")
     (tmp_path / "root/bad.world.yaml").write_text("simscen: 1\nwals: []\n")
     (tmp_path / "root/hall.model").write_text("\n<?xml version='1.0'?><sdf version='1.6'/>")
-    with pytest.raises(InvalidInput, match=told):
+    with pytest.raises(InvalidInput, match=text):
         load_world_file(tmp_path / "root" / name, tmp_path / "root")
 
 

@@ -58,18 +58,18 @@ def test_a_valid_scenario_becomes_its_model() -> None:
     ("value", "bound"), [("600 mm/h", "500 mm/h"), ("1 m/h", "0.5 m/h"), ("0.1", "0.0001388888888888889")]
 )
 def test_a_bound_has_the_unit_of_the_value_and_is_not_rounded(value: str, bound: str) -> None:
-    told = _told(ScenarioSpec, SCENARIO + f"faults: [{{sensor: lidar, rain: {{rate: {value}}}}}]\n")
-    assert told == [(5, 39, f"must be at most {bound}, got `{value}`")]
+    expected = _told(ScenarioSpec, SCENARIO + f"faults: [{{sensor: lidar, rain: {{rate: {value}}}}}]\n")
+    assert expected == [(5, 39, f"must be at most {bound}, got `{value}`")]
 
 
 def test_a_bound_of_a_ratio_in_percent_is_in_percent() -> None:
-    told = _told(ScenarioSpec, SCENARIO + "faults: [{sensor: lidar, rain: {rate: 1 mm/h, reflectivity: 150 %}}]\n")
-    assert told == [(5, 61, "must be at most 100 %, got `150 %`")]
+    expected = _told(ScenarioSpec, SCENARIO + "faults: [{sensor: lidar, rain: {rate: 1 mm/h, reflectivity: 150 %}}]\n")
+    assert expected == [(5, 61, "must be at most 100 %, got `150 %`")]
 
 
 def test_names_of_fields_in_python_are_no_keys() -> None:
-    told = _told(ScenarioSpec, SCENARIO + "faults: [{sensor: lidar, off: {}, for_: 3 s}]\n")
-    assert told == [(5, 35, "unknown key `for_` in `faults[0]`")]
+    expected = _told(ScenarioSpec, SCENARIO + "faults: [{sensor: lidar, off: {}, for_: 3 s}]\n")
+    assert expected == [(5, 35, "unknown key `for_` in `faults[0]`")]
 
 
 def test_mistake_in_a_union_member_is_reported_for_that_member() -> None:
@@ -79,8 +79,8 @@ def test_mistake_in_a_union_member_is_reported_for_that_member() -> None:
 
 def test_type_is_optional_if_there_is_a_default() -> None:
     assert _told(ScenarioSpec, SCENARIO + "stack: {controller: {lookahead_dist: 1}}\n") == []
-    told = _told(ScenarioSpec, SCENARIO + "stack: {controller: {sim_time: 1}}\n")
-    assert told == [(5, 22, "unknown key `sim_time` in `stack.controller`")]
+    expected = _told(ScenarioSpec, SCENARIO + "stack: {controller: {sim_time: 1}}\n")
+    assert expected == [(5, 22, "unknown key `sim_time` in `stack.controller`")]
 
 
 def test_a_key_of_another_type_names_that_type() -> None:
@@ -99,26 +99,32 @@ def test_a_missing_type_lists_the_types() -> None:
 
 
 def test_a_mapping_may_be_expected_where_a_type_would_tell_which() -> None:
-    told = _told(ScenarioSpec, SCENARIO + "stack: {localizer: amcl}\n")
-    assert told == [(5, 20, "expected a mapping, got the text `amcl`")]
+    expected = _told(ScenarioSpec, SCENARIO + "stack: {localizer: amcl}\n")
+    assert expected == [(5, 20, "expected a mapping, got the text `amcl`")]
 
 
 def test_keys_of_names_are_checked_at_the_key() -> None:
-    told = _told(WorldSpec, "simscen: 1\nplaces:\n  ok: {x: 1, y: 2}\n  no/t: {x: 1, y: 2}\n")
-    assert told == [(4, 3, "`no/t` is not a valid name")]
+    expected = _told(WorldSpec, "simscen: 1\nplaces:\n  ok: {x: 1, y: 2}\n  no/t: {x: 1, y: 2}\n")
+    assert expected == [(4, 3, "`no/t` is not a valid name")]
 
 
 def test_a_member_of_a_plain_union_is_reported_once() -> None:
-    told = _told(RosMapSpec, "image: a\nresolution: 1\norigin: [0, 0, 0]\nnegate: maybe\n")
-    assert len(told) == 1
-    assert told[0][:2] == (4, 9)
+    expected = _told(RosMapSpec, "image: a\nresolution: 1\norigin: [0, 0, 0]\nnegate: maybe\n")
+    assert len(expected) == 1
+    assert expected[0][:2] == (4, 9)
 
 
 def test_null_values_are_refused() -> None:
     text = SCENARIO + "name: ~\nmap: null\ngoals:\nfaults: [{sensor: lidar, off: }]\ntags: [a, ~]\n"
-    told = _problems(ScenarioSpec, text)
-    assert [(p.line, p.code) for p in told] == [(5, "SC018"), (6, "SC018"), (7, "SC018"), (8, "SC018"), (9, "SC018")]
-    assert told[3].hint == "write `off: {}`"
+    expected = _problems(ScenarioSpec, text)
+    assert [(p.line, p.code) for p in expected] == [
+        (5, "SC018"),
+        (6, "SC018"),
+        (7, "SC018"),
+        (8, "SC018"),
+        (9, "SC018"),
+    ]
+    assert expected[3].hint == "write `off: {}`"
 
 
 def test_unsupported_version_is_the_only_reported_problem() -> None:
@@ -139,8 +145,8 @@ def test_a_tuple_is_called_a_list() -> None:
 
 
 def test_control_characters_by_escape_are_refused_in_names() -> None:
-    told = _told(ScenarioSpec, SCENARIO + 'name: "\\x1b[31mred"\n')
-    assert told == [(5, 7, "control character U+001B in `\\x1b[31mred`")]
+    expected = _told(ScenarioSpec, SCENARIO + 'name: "\\x1b[31mred"\n')
+    assert expected == [(5, 7, "control character U+001B in `\\x1b[31mred`")]
 
 
 def test_a_choice_without_a_key_lists_the_keys() -> None:

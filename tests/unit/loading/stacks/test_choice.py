@@ -50,9 +50,9 @@ def test_the_reference_stack_keeps_the_parameters_that_the_scenario_gives_it(wri
 
 
 def test_a_mistake_in_a_stack_file_is_reported_at_its_position(chosen, tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput) as told:
+    with pytest.raises(InvalidInput) as expected:
         chosen("", "simscen: 1\nstack:\n  controler: {type: dwb}\n  keepout: [hall]\n")
-    found = [(p.path, p.line, p.col, p.code, p.source) for p in told.value.problems]
+    found = [(p.path, p.line, p.col, p.code, p.source) for p in expected.value.problems]
     assert found == [
         ("mine.stack.yaml", 3, 3, "SC012", "  controler: {type: dwb}"),
         ("mine.stack.yaml", 4, 3, "SC016", "  keepout: [hall]"),
@@ -61,9 +61,9 @@ def test_a_mistake_in_a_stack_file_is_reported_at_its_position(chosen, tmp_path:
 
 def test_scenario_dependent_mistake_is_reported_in_the_stack_file(chosen) -> None:
     """240 Hz of physics is not 7 times anything."""
-    with pytest.raises(InvalidInput) as told:
+    with pytest.raises(InvalidInput) as expected:
         chosen("", "simscen: 1\nstack:\n  controller_frequency: 7 Hz\n")
-    (problem,) = told.value.problems
+    (problem,) = expected.value.problems
     assert (problem.path, problem.line, problem.code) == ("mine.stack.yaml", 3, "SC034")
     assert problem.source == "  controller_frequency: 7 Hz"
 

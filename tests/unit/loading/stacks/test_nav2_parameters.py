@@ -87,10 +87,10 @@ def test_nav2_file_overrides_nav2_defaults(tmp_path: Path) -> None:
 
 
 def test_scenario_values_override_the_nav2_file(tmp_path: Path) -> None:
-    said = (
+    given = (
         "stack: {nav2_params: nav2.yaml, profile: simscen, controller: {lookahead_dist: 0.5}, failure_tolerance: 1 s}"
     )
-    stack = loaded(tmp_path, said).spec.stack
+    stack = loaded(tmp_path, given).spec.stack
     assert (stack.controller.desired_linear_vel, stack.controller.lookahead_dist) == (0.4, 0.5)
     assert stack.failure_tolerance == 1.0
     assert stack.collision_monitor.source_timeout != 1.0  # of our own profile
@@ -103,9 +103,9 @@ NOT_OURS = "precise.path_length_tolerance (12), FollowPath.min_distance_to_obsta
 
 def test_parameter_without_counterpart_is_reported_at_its_line(tmp_path: Path) -> None:
     notes = [str(note) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}").notes]
-    told = [(note.line, note.message) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}").notes]
+    output = [(note.line, note.message) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}").notes]
     assert all("SC341" in note for note in notes)
-    assert told == [
+    assert output == [
         (12, f"controller_server: simscen has no {NOT_OURS}"),
         (36, "collision_monitor: `polygons`: action_type stop of Stop is not supported"),
         (40, "behavior_server: simscen has no cycle_frequency (40)"),
@@ -227,8 +227,8 @@ def test_humble_file_is_read_with_its_meaning(tmp_path: Path) -> None:
 
 
 def test_every_parameter_that_changes_nothing_here_is_named_with_its_line(tmp_path: Path) -> None:
-    told = [(note.line, note.message) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", HUMBLE).notes]
-    assert told == [
+    output = [(note.line, note.message) for note in loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", HUMBLE).notes]
+    assert output == [
         (4, "amcl: `set_initial_pose`: the scenario defines the initial pose"),
         (4, "duplicate key `max_beams` (first at 4:79)"),
         (8, "controller_server: `goal_checker_plugins`: only the first goal_checker is used: general_goal_checker,"

@@ -122,7 +122,7 @@ def test_derived_names_are_readable_unique_and_safe_as_folders(variations: str, 
 
 
 @pytest.mark.parametrize(
-    ("variations", "told"),
+    ("variations", "text"),
     [
         ("  {}", "a key is missing here"),
         ("  grid: {robot.pose.x: [1, 1.0]}", "this value is listed twice"),
@@ -145,8 +145,8 @@ def test_derived_names_are_readable_unique_and_safe_as_folders(variations: str, 
         ("  sampled: {count: 1001, values: {seed: {integer: [1, 2]}}}", "the scenario has 1001 variations"),
     ],
 )  # fmt: skip
-def test_mistakes_in_variations_are_reported_at_their_positions(variations: str, told: str) -> None:
-    assert any(told in found for found in wrong(variations)), wrong(variations)
+def test_mistakes_in_variations_are_reported_at_their_positions(variations: str, text: str) -> None:
+    assert any(text in found for found in wrong(variations)), wrong(variations)
 
 
 def test_a_thousand_million_combinations_are_refused_without_being_made() -> None:
@@ -157,9 +157,9 @@ def test_a_thousand_million_combinations_are_refused_without_being_made() -> Non
 def test_many_variations_of_a_large_value_are_refused_without_being_made() -> None:
     seeds = ", ".join(map(str, range(1, 1000)))
     goals = ", ".join("{pose: desk}" for _ in range(3000))
-    (told,) = wrong(f"  grid: {{seed: [{seeds}], goals: [[{goals}]]}}")
-    assert "999 variations of up to 9" in told
-    assert told.endswith("values exceed the limit of 5000000 values in total")
+    (text,) = wrong(f"  grid: {{seed: [{seeds}], goals: [[{goals}]]}}")
+    assert "999 variations of up to 9" in text
+    assert text.endswith("values exceed the limit of 5000000 values in total")
 
 
 def test_each_variation_is_a_whole_scenario_with_its_values(write, scenario: str) -> None:

@@ -62,7 +62,7 @@ def test_position_of_a_missing_value_is_that_of_the_path(tree: MappingNode) -> N
 
 
 @pytest.mark.parametrize(
-    ("path", "told", "hint"),
+    ("path", "text", "hint"),
     [
         ("", "`` is not a valid path", "join keys with dots"),
         (".x", "`.x` is not a valid path", "join keys with dots"),
@@ -80,10 +80,10 @@ def test_position_of_a_missing_value_is_that_of_the_path(tree: MappingNode) -> N
         ("variations.grid", "a variation cannot change `variations`", "cannot be nested"),
     ],
 )
-def test_unknown_path_is_reported_with_the_existing_keys(tree: MappingNode, path: str, told: str, hint: str) -> None:
+def test_unknown_path_is_reported_with_the_existing_keys(tree: MappingNode, path: str, text: str, hint: str) -> None:
     with pytest.raises(PathError) as raised:
         resolve_path(path, HERE, tree)
-    assert told in str(raised.value)
+    assert text in str(raised.value)
     assert hint in raised.value.hint
     assert bool(hint) == bool(raised.value.hint)
 

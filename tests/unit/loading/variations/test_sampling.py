@@ -78,7 +78,7 @@ def test_a_value_has_the_unit_of_its_range_and_is_in_si_where_there_are_several(
 
 
 @pytest.mark.parametrize(
-    ("draw", "told"),
+    ("draw", "text"),
     [
         ({"uniform": [2, 1]}, "the range is empty: 2 is greater than 1"),
         ({"uniform": ["1 m", "2 s"]}, "`m` and `s` are units of different dimensions"),
@@ -89,6 +89,6 @@ def test_a_value_has_the_unit_of_its_range_and_is_in_si_where_there_are_several(
         ({"normal": {"mean": 0, "std": 1, "min": 20}}, "too many `std` away"),
     ],
 )
-def test_invalid_range_is_refused(draw: dict[str, Any], told: str) -> None:
-    with pytest.raises(ValueError, match=told):
+def test_invalid_range_is_refused(draw: dict[str, Any], text: str) -> None:
+    with pytest.raises(ValueError, match=text):
         sampled(draw)

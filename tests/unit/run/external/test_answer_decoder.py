@@ -38,8 +38,8 @@ EXAMPLES = {
 }
 
 
-def understand(**said: bytes) -> Answer:
-    return decode_answer({name: [data] for name, data in said.items()}, 240, TIME, None, Pose2(0, 0, 0))
+def understand(**answer: bytes) -> Answer:
+    return decode_answer({name: [data] for name, data in answer.items()}, 240, TIME, None, Pose2(0, 0, 0))
 
 
 def test_there_is_an_example_of_each_topic() -> None:
@@ -99,9 +99,9 @@ def test_costmap_is_recorded_unchanged() -> None:
     ],
 )
 def test_an_invalid_costmap_is_refused(frame: str, resolution: float, width: int, origin) -> None:
-    said = messages.occupancy_grid((1, 0), frame, resolution, width, origin, [0, 100, -1, 50])
+    answer = messages.occupancy_grid((1, 0), frame, resolution, width, origin, [0, 100, -1, 50])
     with pytest.raises(ProtocolViolation, match="local costmap"):
-        understand(**{"/local_costmap/costmap": said})
+        understand(**{"/local_costmap/costmap": answer})
 
 
 json_values = st.recursive(
@@ -117,13 +117,13 @@ events = st.fixed_dictionaries(
 
 
 @given(events)
-def test_any_event_is_accepted_or_refused_and_can_be_logged(said) -> None:
+def test_any_event_is_accepted_or_refused_and_can_be_logged(answer) -> None:
     from simscen.peer.messages import log, string
     from simscen.record.messages.event_text import sentence, to_json
 
     goals = GoalTracker(True, 240)
     with suppress(ProtocolViolation):
-        for event in understand(**{"/simscen/events": messages.string(json.dumps(said))}).events:
+        for event in understand(**{"/simscen/events": messages.string(json.dumps(answer))}).events:
             goals.process(240, event)
     for event in goals.take_events():
         string(to_json(event))
@@ -132,10 +132,10 @@ def test_any_event_is_accepted_or_refused_and_can_be_logged(said) -> None:
 
 
 @given(st.dictionaries(st.sampled_from(["protocol", "name", "version", "topics", "step", "about"]), json_values))
-def test_any_welcome_is_accepted_or_refused_and_can_be_logged(told) -> None:
-    told.setdefault("protocol", 1)
+def test_any_welcome_is_accepted_or_refused_and_can_be_logged(expected) -> None:
+    expected.setdefault("protocol", 1)
     with suppress(ProtocolViolation, wire.Malformed):
-        welcome = Welcome.parse(wire.WELCOME, json.dumps(told).encode(), ())
+        welcome = Welcome.parse(wire.WELCOME, json.dumps(expected).encode(), ())
         assert all(text.encode() is not None for text in welcome.facts.values())
 
 
@@ -150,7 +150,7 @@ def test_any_answer_is_decoded_or_malformed(body: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    "said",
+    "answer",
     [
         '{"kind": "plan.made", "data": {"length": NaN}}',
         '{"kind": "plan.made", "data": {"length": [-Infinity]}}',
@@ -160,16 +160,16 @@ def test_any_answer_is_decoded_or_malformed(body: bytes) -> None:
         '{"kind": "plan.made", "data": {"x": "' + 5000 * "x" + '"}}',
     ],
 )
-def test_an_event_that_cannot_be_logged_is_refused(said: str) -> None:
+def test_an_event_that_cannot_be_logged_is_refused(answer: str) -> None:
     with pytest.raises(ProtocolViolation):
-        for event in understand(**{"/simscen/events": messages.string(said)}).events:
+        for event in understand(**{"/simscen/events": messages.string(answer)}).events:
             GoalTracker(True, 240).process(240, event)
 
 
-@pytest.mark.parametrize("told", ['{"protocol": 1, "name": "\\ud800"}', '{"protocol": 1, "about": {"x": NaN}}'])
-def test_a_welcome_that_cannot_be_logged_is_refused(told: str) -> None:
+@pytest.mark.parametrize("expected", ['{"protocol": 1, "name": "\\ud800"}', '{"protocol": 1, "about": {"x": NaN}}'])
+def test_a_welcome_that_cannot_be_logged_is_refused(expected: str) -> None:
     with pytest.raises((ProtocolViolation, wire.Malformed)):
-        Welcome.parse(wire.WELCOME, told.encode(), ())
+        Welcome.parse(wire.WELCOME, expected.encode(), ())
 
 
 @pytest.mark.parametrize("topic", ["/particle_cloud", "/particle_cloud/exact"])

@@ -21,9 +21,9 @@ FOREVER = "while True: time.sleep(60)\n"
 
 
 def failed(play, text: str, **limits: float) -> RunError:
-    with pytest.raises(RunError) as told:
+    with pytest.raises(RunError) as expected:
         play(text, **limits)
-    return told.value
+    return expected.value
 
 
 @pytest.mark.sample(2)
@@ -179,9 +179,9 @@ def test_a_program_that_cannot_be_started_is_reported(load, argv: tuple[str, ...
 
     loaded = load("")
     assert loaded.external_command is not None
-    with pytest.raises(RunError, match=r"its process cannot be started: (No such file|Permission denied)") as told:
+    with pytest.raises(RunError, match=r"its process cannot be started: (No such file|Permission denied)") as expected:
         simulate(prepare(replace(loaded, external_command=replace(loaded.external_command, argv=argv))))
-    assert told.value.kind == "stack-crashed"
+    assert expected.value.kind == "stack-crashed"
 
 
 def test_all_processes_of_a_stack_are_killed_after_the_run(play, tmp_path: Path) -> None:

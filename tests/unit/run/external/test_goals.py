@@ -11,7 +11,7 @@ STAND = "    step.drive(0.0, 0.0)\n"
 THREE = "[{name: a, pose: {x: 2, y: 1}}, {name: b, pose: {x: 3, y: 1}}, {name: c, pose: {x: 4, y: 1}}]"
 
 
-def told(run) -> list[tuple[str, str]]:
+def expected(run) -> list[tuple[str, str]]:
     return [
         (str(event.kind), event.name)
         for event in run.trace.events
@@ -22,7 +22,7 @@ def told(run) -> list[tuple[str, str]]:
 def test_a_stack_that_reaches_and_reports_its_goal_passes(play) -> None:
     run = play(HELLO + DRIVE)
     assert run.result.outcome is Outcome.PASSED
-    assert told(run) == [("goal.accepted", "desk"), ("goal.reached", "desk"), ("navigation.ended", "SUCCEEDED")]
+    assert expected(run) == [("goal.accepted", "desk"), ("goal.reached", "desk"), ("navigation.ended", "SUCCEEDED")]
     assert run.result.ended == "navigation ended"
     accepted = next(event for event in run.trace.events if event.kind == "goal.accepted")
     assert accepted.data == {"x": 2.0, "y": 1.0, "yaw": 0.0, "index": 0}
@@ -30,7 +30,7 @@ def test_a_stack_that_reaches_and_reports_its_goal_passes(play) -> None:
 
 def test_a_stack_that_falsely_reports_its_goal_as_reached_fails(play) -> None:
     run = play(HELLO + "for step in peer:\n    if peer.goals.accept(): peer.goals.reached()\n" + STAND)
-    assert told(run)[-1] == ("navigation.ended", "SUCCEEDED")
+    assert expected(run)[-1] == ("navigation.ended", "SUCCEEDED")
     assert run.result.outcome is Outcome.FAILED
     run = play(
         HELLO + "for step in peer:\n    if peer.goals.accept(): peer.goals.reached()\n" + STAND,
@@ -42,7 +42,7 @@ def test_a_stack_that_falsely_reports_its_goal_as_reached_fails(play) -> None:
 def test_a_goal_that_the_stack_does_not_report_is_not_reached(play) -> None:
     silent = DRIVE.replace("peer.goals.accept()", "True").replace("peer.goals.reached()", "pass")
     run = play(HELLO + silent)
-    assert told(run) == []
+    assert expected(run) == []
     assert (run.result.outcome, run.result.ended) == (Outcome.FAILED, "time limit")
     run = play(
         HELLO + silent,
@@ -52,7 +52,7 @@ def test_a_goal_that_the_stack_does_not_report_is_not_reached(play) -> None:
 
 
 @pytest.mark.parametrize(
-    ("said", "name", "number"),
+    ("given", "name", "number"),
     [
         ("'NO_VALID_PATH', 'walled in'", "NO_VALID_PATH", 208),
         ("208", "NO_VALID_PATH", 208),
@@ -61,8 +61,8 @@ def test_a_goal_that_the_stack_does_not_report_is_not_reached(play) -> None:
         ("None", "NAVIGATE_UNKNOWN", 9000),
     ],
 )
-def test_a_failure_has_one_of_nav2s_codes(play, said: str, name: str, number: int) -> None:
-    run = play(HELLO + f"for step in peer:\n    if peer.goals.accept(): peer.goals.failed({said})\n" + STAND)
+def test_a_failure_has_one_of_nav2s_codes(play, given: str, name: str, number: int) -> None:
+    run = play(HELLO + f"for step in peer:\n    if peer.goals.accept(): peer.goals.failed({given})\n" + STAND)
     failed = next(event for event in run.trace.events if event.kind == "goal.failed")
     assert (failed.data["error_name"], failed.data["error_code"]) == (name, number)
     ended = next(event for event in run.trace.events if event.kind == "navigation.ended")
@@ -71,10 +71,10 @@ def test_a_failure_has_one_of_nav2s_codes(play, said: str, name: str, number: in
 
 def test_on_goal_failure_determines_whether_the_other_goals_follow(play) -> None:
     text = HELLO + "for step in peer:\n    if peer.goals.accept(): peer.goals.failed(208, go_on={})\n" + STAND
-    assert told(play(text.format(False), goals=THREE))[-1] == ("navigation.ended", "FAILED")
-    assert len(told(play(text.format(False), goals=THREE))) == 3
+    assert expected(play(text.format(False), goals=THREE))[-1] == ("navigation.ended", "FAILED")
+    assert len(expected(play(text.format(False), goals=THREE))) == 3
     run = play(text.format(True), goals=THREE, on_goal_failure="continue")
-    assert [name for kind, name in told(run) if kind == "goal.failed"] == ["a", "b", "c"]
+    assert [name for kind, name in expected(run) if kind == "goal.failed"] == ["a", "b", "c"]
 
 
 @pytest.mark.sample(3)
@@ -90,9 +90,9 @@ def test_on_goal_failure_determines_whether_the_other_goals_follow(play) -> None
     ],
 )
 def test_impossible_goal_event_is_an_error(play, events: list[tuple[str, str]], says: str) -> None:
-    said = "".join(f"    peer.goals.report({kind!r}, {name!r})\n" for kind, name in events)
+    given = "".join(f"    peer.goals.report({kind!r}, {name!r})\n" for kind, name in events)
     with pytest.raises(RunError) as error:
-        play(HELLO + "for step in peer:\n" + said + STAND)
+        play(HELLO + "for step in peer:\n" + given + STAND)
     assert error.value.kind == "stack-protocol"
     assert says in str(error.value)
 
@@ -101,7 +101,7 @@ def test_a_stack_cannot_claim_that_a_goal_was_preempted(play) -> None:
     """A goal that another preempted need not be reached: that it was is the engine's to say."""
     claim = "    if peer.goals.accept(): peer.goals._end('goal.canceled', preempted_by='desk')\n"
     run = play(HELLO + "for step in peer:\n" + claim + STAND)
-    assert told(run)[-1] == ("navigation.ended", "CANCELED")
+    assert expected(run)[-1] == ("navigation.ended", "CANCELED")
     assert run.result.outcome is Outcome.FAILED
 
 
@@ -111,7 +111,7 @@ def test_a_goal_sent_by_an_event_precedes_the_waiting_goals(play) -> None:
         "for step in peer:\n    goal = peer.goals.accept()\n    if goal and step.seconds > 1: peer.goals.reached()\n"
     )
     run = play(HELLO + accept + STAND, goals=THREE, events=events)
-    assert told(run)[:4] == [
+    assert expected(run)[:4] == [
         ("goal.accepted", "a"),
         ("goal.canceled", "a"),
         ("goal.accepted", "detour"),
@@ -120,13 +120,13 @@ def test_a_goal_sent_by_an_event_precedes_the_waiting_goals(play) -> None:
     canceled = run.trace.events[next(k for k, e in enumerate(run.trace.events) if e.kind == "goal.canceled")]
     assert canceled.data["preempted_by"] == "detour"
     assert canceled.tick == 120
-    assert [name for kind, name in told(run) if kind == "goal.reached"] == ["detour", "b", "c"]
+    assert [name for kind, name in expected(run) if kind == "goal.reached"] == ["detour", "b", "c"]
 
 
 def test_cancel_is_reported_at_once(play) -> None:
     events = "[{when: {time: 0.5}, do: {cancel_goal: {}}}]"
     run = play(HELLO + "for step in peer:\n    peer.goals.accept()\n" + STAND, goals=THREE, events=events)
-    assert told(run) == [("goal.accepted", "a"), ("goal.canceled", "a"), ("navigation.ended", "CANCELED")]
+    assert expected(run) == [("goal.accepted", "a"), ("goal.canceled", "a"), ("navigation.ended", "CANCELED")]
     assert run.trace.events[-2].tick == 120 or run.trace.events[-3].tick == 120
 
 
@@ -136,19 +136,19 @@ def test_the_timeout_of_a_goal_is_enforced_if_the_stack_ignores_it(play) -> None
     run = play(text, goals=goals)
     failed = next(event for event in run.trace.events if event.kind == "goal.failed")
     assert (failed.name, failed.data["error_name"]) == ("a", "NAVIGATE_TIMEOUT")
-    assert told(run)[-1] == ("navigation.ended", "FAILED")
+    assert expected(run)[-1] == ("navigation.ended", "FAILED")
     run = play(text, goals=goals, on_goal_failure="continue")
-    assert told(run) == [("goal.accepted", "a"), ("goal.failed", "a"), ("goal.accepted", "b")]
+    assert expected(run) == [("goal.accepted", "a"), ("goal.failed", "a"), ("goal.accepted", "b")]
 
 
 def test_replans_and_recoveries_that_a_stack_reports_are_counted(play) -> None:
-    said = (
+    given = (
         "    if step.tick == 12:\n"
         "        peer.goals.report('plan.made', 'desk', reason='blocked', length=1.5)\n"
         "        peer.goals.report('recovery.started', 'spin', error_code=208)\n"
         "        peer.goals.report('recovery.ended', 'spin', outcome='done')\n"
     )
-    text = HELLO + "for step in peer:\n    peer.goals.accept()\n" + said + STAND
+    text = HELLO + "for step in peer:\n    peer.goals.accept()\n" + given + STAND
     run = play(text, **{"pass": "[{replans: {min: 1, max: 1}}, {recoveries: {min: 1, max: 1, name: spin}}]"})
     assert run.result.outcome is Outcome.PASSED, run.result.verdicts
 

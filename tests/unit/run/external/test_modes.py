@@ -13,7 +13,7 @@ THREE = "[{name: a, pose: {x: 2, y: 1}}, {name: b, pose: {x: 3, y: 1}}, {name: c
 THROUGH = {"navigation": "{mode: navigate_through_poses, loops: 2}", "goals": THREE}
 
 
-def told(run) -> list[tuple[int, str, str]]:
+def expected(run) -> list[tuple[int, str, str]]:
     return [
         (event.tick, str(event.kind), event.name)
         for event in run.trace.events
@@ -22,7 +22,7 @@ def told(run) -> list[tuple[int, str, str]]:
 
 
 def kinds(run) -> list[tuple[str, str]]:
-    return [(kind, name) for _, kind, name in told(run) if kind != "goal.accepted"]
+    return [(kind, name) for _, kind, name in expected(run) if kind != "goal.accepted"]
 
 
 @pytest.mark.parametrize("mode", ["navigate_through_poses", "follow_waypoints"])
@@ -39,8 +39,8 @@ def test_a_stack_without_modes_gets_goals_one_after_the_other(play) -> None:
         "class Older(Peer):\n"
         "    pass\n"
         "send = Connection.send_json\n"
-        "Connection.send_json = lambda self, kind, told: send(\n"
-        "    self, kind, {key: value for key, value in told.items() if key != 'modes'})\n"
+        "Connection.send_json = lambda self, kind, data: send(\n"
+        "    self, kind, {key: value for key, value in data.items() if key != 'modes'})\n"
         "peer =",
     )
     assert play(older + DRIVE).result.outcome is Outcome.PASSED
@@ -82,7 +82,7 @@ def test_peer_and_engine_wait_after_a_goal_for_its_wait_time(play) -> None:
         "[{name: a, pose: {x: 1, y: 1}, on_reached: {wait: 0.5}}, {name: b, pose: {x: 1, y: 1}, on_reached: {wait: 1}}]"
     )
     run = play(KNOWS + AT_ONCE, goals=goals, navigation="{mode: follow_waypoints}")
-    assert told(run) == [
+    assert expected(run) == [
         (0, "goal.accepted", "a"),
         (0, "goal.reached", "a"),
         (120, "goal.accepted", "b"),
@@ -93,15 +93,15 @@ def test_peer_and_engine_wait_after_a_goal_for_its_wait_time(play) -> None:
 
 
 @pytest.mark.parametrize(
-    ("said", "says"),
+    ("given", "says"),
     [
         ([("goal.accepted", "a"), ("goal.reached", "a"), ("goal.accepted", "b")], "must still wait at its last goal"),
         ([("goal.accepted", "a"), ("goal.passed", "a")], "which is a goal without `via`"),
         ([("goal.passed", "a")], "no goal is active"),
     ],
 )
-def test_impossible_event_is_an_error(play, said, says: str) -> None:
-    lines = "".join(f"    peer.goals.report({kind!r}, {name!r})\n" for kind, name in said)
+def test_impossible_event_is_an_error(play, given, says: str) -> None:
+    lines = "".join(f"    peer.goals.report({kind!r}, {name!r})\n" for kind, name in given)
     goals = "[{name: a, pose: {x: 1, y: 1}, on_reached: {wait: 0.5}}, {name: b, pose: {x: 2, y: 1}}]"
     with pytest.raises(RunError, match=says) as error:
         play(KNOWS + "for step in peer:\n" + lines + "    step.drive(0.0, 0.0)\n", goals=goals)

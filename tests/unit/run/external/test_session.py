@@ -60,14 +60,14 @@ def test_a_faulty_stack_does_not_change_the_log_of_another_run(session) -> None:
     assert {name: answer.result.error.kind for name, answer in answers.items() if answer.result.error} == KINDS
     assert (answers["fine"].outcome, alone.outcome) == (Outcome.PASSED, Outcome.PASSED)
     assert log_of(answers["fine"]) == log_of(alone)
-    said = json.loads(Path(alone.artifacts.folder, "stack.json").read_text())
-    assert said == {"external": "mine", "name": "mine", "version": "", "protocol": "1", "about": {}}
+    given = json.loads(Path(alone.artifacts.folder, "stack.json").read_text())
+    assert given == {"external": "mine", "name": "mine", "version": "", "protocol": "1", "about": {}}
     cases = {
         case.get("classname"): case
         for case in ET.fromstring(b"".join(xml_parts(list(answers.values())))).iter("testcase")
     }
-    told = {name: [error.get("type") for error in cases[name].findall("error")] for name in BROKEN}
-    assert told == {**{name: [kind] for name, kind in KINDS.items()}, "fine": []}
+    expected = {name: [error.get("type") for error in cases[name].findall("error")] for name in BROKEN}
+    assert expected == {**{name: [kind] for name, kind in KINDS.items()}, "fine": []}
     printed = Path(answers["flood"].artifacts.folder, "stack.log")
     assert 100_000 < printed.stat().st_size < 2_000_000
 

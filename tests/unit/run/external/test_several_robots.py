@@ -76,7 +76,7 @@ def test_each_stack_gets_its_robot_name_and_has_its_own_output(fleet, tmp_path: 
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize(
-    ("does", "kind", "told"),
+    ("does", "kind", "expected"),
     [
         ("os._exit(3)", "stack-crashed", "stack mine of robot `right`: its process exited 3"),
         ("time.sleep(60)", "stack-timeout", "stack mine of robot `right`: no answer to the step of t = 0.050 s"),
@@ -84,11 +84,11 @@ def test_each_stack_gets_its_robot_name_and_has_its_own_output(fleet, tmp_path: 
         ("peer.give_up('no map')", "stack-failed", "stack mine of robot `right`: no map"),
     ],
 )
-def test_an_error_names_the_robot_and_ends_all_stacks(fleet, tmp_path, does, kind, told) -> None:
+def test_an_error_names_the_robot_and_ends_all_stacks(fleet, tmp_path, does, kind, expected) -> None:
     steps = "for step in peer:\n    step.drive(0, 0)\n    if step.tick and peer.robot_name == 'right': "
     with pytest.raises(RunError) as raised:
         simulate(fleet(HELLO + steps + does, answer_limit=2.0), stack_log=tmp_path / "stack.log")
-    assert (raised.value.kind, told in str(raised.value)) == (kind, True), str(raised.value)
+    assert (raised.value.kind, expected in str(raised.value)) == (kind, True), str(raised.value)
     assert_gone(tmp_path)
 
 
@@ -101,7 +101,7 @@ def test_stack_without_welcome_is_reported_and_the_other_is_ended(fleet, tmp_pat
 
 
 def test_both_stacks_get_end_before_waiting(fleet, tmp_path: Path) -> None:
-    """Each says goodbye only when the other was told, too."""
+    """Each peer ends only after the other one has been notified as well."""
     meets = (
         "say = peer._connection.send_json\n"
         "def meet(kind, content):\n"
@@ -119,9 +119,9 @@ def test_both_stacks_get_end_before_waiting(fleet, tmp_path: Path) -> None:
 def test_killing_a_worker_ends_the_stacks_of_all_robots(load_fleet, tmp_path: Path) -> None:
     """The keeper is the parent of a stack, the worker the parent of the keeper."""
     kill = "os.kill(int(open(f'/proc/{os.getppid()}/stat').read().rsplit(')', 1)[1].split()[1]), signal.SIGKILL)\n"
-    told = f"{HELLO}for step in peer:\n    if peer.robot_name == 'right': {kill}    step.drive(0, 0)\n"
+    expected = f"{HELLO}for step in peer:\n    if peer.robot_name == 'right': {kill}    step.drive(0, 0)\n"
     options = SessionOptions(wall_limit=60.0)
-    jobs = plan_jobs([load_fleet(told, answer_limit=30.0)], options, tmp_path / "out")
+    jobs = plan_jobs([load_fleet(expected, answer_limit=30.0)], options, tmp_path / "out")
     with backend_of(options) as backend:
         ((answer,), _) = run_session(jobs, options, backend, lambda event: None)
     assert answer.result.error is not None
@@ -137,7 +137,7 @@ def assert_gone(folder: Path) -> None:
 def test_a_single_robot_has_no_name(load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the environment of simscen itself says."""
     monkeypatch.setenv("SIMSCEN_ROBOT", "somebody")
-    told = "print(repr(peer.robot_name), 'SIMSCEN_ROBOT' in os.environ)\n"
-    loaded = load('peer = Peer("mine", topics=["/odom"])\n' + told + DRIVE)
+    expected = "print(repr(peer.robot_name), 'SIMSCEN_ROBOT' in os.environ)\n"
+    loaded = load('peer = Peer("mine", topics=["/odom"])\n' + expected + DRIVE)
     simulate(prepare(loaded), stack_log=tmp_path / "stack.log")
     assert (tmp_path / "stack.log").read_text().split() == ["''", "False"]

@@ -63,7 +63,7 @@ def test_successful_run_returns_its_result(session):
 
 @pytest.mark.sample(7)
 @pytest.mark.parametrize(
-    ("fault", "kind", "told"),
+    ("fault", "kind", "expected"),
     [
         ("segfault", "crashed", "crashed: SIGSEGV"),
         ("kill", "crashed", "killed (SIGKILL; possibly out of memory; peak memory"),
@@ -80,11 +80,11 @@ def test_successful_run_returns_its_result(session):
         ("prepare-memory", "out-of-memory", "exceeded its memory limit"),
     ],
 )
-def test_a_faulty_run_is_an_error_with_its_cause_and_the_other_run_passes(session, fault, kind, told):
+def test_a_faulty_run_is_an_error_with_its_cause_and_the_other_run_passes(session, fault, kind, expected):
     answers, _ = session(fault, "fine", workers=2)
     assert answers[fault].outcome is Outcome.ERROR
     assert answers[fault].result.error.kind == kind
-    assert told in answers[fault].result.error.message
+    assert expected in answers[fault].result.error.message
     assert answers["fine"].outcome is Outcome.PASSED
     assert not daemons()
 
@@ -140,8 +140,8 @@ def test_crash_while_preparing_a_world_affects_only_its_run(session):
     answers, _ = session("long", "prepare-segfault", "fine", workers=2, events=events)
     assert [name for name, answer in answers.items() if answer.outcome is Outcome.PASSED] == ["fine", "long"]
     for kind in (RunStarted, RunFinished):
-        told = [event.key for event in events if isinstance(event, kind)]
-        assert len(told) == len(set(told)) == 3
+        expected = [event.key for event in events if isinstance(event, kind)]
+        assert len(expected) == len(set(expected)) == 3
 
 
 def test_a_preparation_that_hangs_in_c_is_a_timeout_with_its_stack(session, monkeypatch):

@@ -14,7 +14,7 @@ PERIOD = 0.05
 
 
 def turned(angle: float, seconds: float, late: int) -> tuple[list[float], list[float]]:
-    """Angles that are left and turn rates of a base that does what it was told so many periods ago."""
+    """Return the remaining angles and the turn rates of a base that executes commands after a number of periods."""
     pose = GoalRotation(round_robot(), 1.9, 3.2, PERIOD, 0.45)
     under_way, rate = deque([0.0] * late), 0.0
     left, rates = [angle], [0.0]

@@ -65,11 +65,11 @@ def test_vectorized_mppi_equals_a_version_with_loops(case: dict[str, Any]) -> No
     parts = {name: {"cost_power": given.get("power", 1), **own.get(name, {})} for name in names}
     total = np.zeros(3)
     for name in names:
-        said, _ = CriticManager(Mppi.model_validate({"type": "mppi", "critics": [name], **parts}), axes == 3).costs(
+        cost, _ = CriticManager(Mppi.model_validate({"type": "mppi", "critics": [name], **parts}), axes == 3).costs(
             seen
         )
-        assert said == pytest.approx(np.array(case["costs"].get(name, [0.0] * 3)), rel=2e-4, abs=2e-5), name
-        total += said
+        assert cost == pytest.approx(np.array(case["costs"].get(name, [0.0] * 3)), rel=2e-4, abs=2e-5), name
+        total += cost
     mean = sampled.mean(axis=2)
     mean[:, 0] = NOW[:axes]
     noise = sampled - mean[:, :, None]

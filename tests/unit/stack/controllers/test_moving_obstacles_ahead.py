@@ -111,8 +111,8 @@ def test_mppi_compares_each_step_with_predictions_for_that_step() -> None:
         soon = np.exp(-times / COLLISION_DECAY_S)[:, None]
         near = (np.clip(1.0 - gap / MOVING_CLEARANCE_M, 0.0, 2.0) ** 2 * soon).mean(axis=0)
         hit = ((gap < 0.03) * soon).max(axis=0)
-        said, stuck = critics.cost_critic(model.MppiCostCritic(), seen)
-        assert said == pytest.approx(3.81 / 254 * (300.0 * near + 1e6 * hit), rel=1e-4, abs=1e-4)
+        cost, stuck = critics.cost_critic(model.MppiCostCritic(), seen)
+        assert cost == pytest.approx(3.81 / 254 * (300.0 * near + 1e6 * hit), rel=1e-4, abs=1e-4)
         assert bool(hit[1]) is (disc is COMES) and not hit[0]
         assert not stuck.any()  # who meets all has still somewhere to go
 

@@ -165,8 +165,8 @@ def scene(velocities: np.ndarray, view: CostmapView | None = None, length: float
     robot = round_robot()
     plan = UpcomingPath(straight(length), 0.05, length)
     rolled = integrate_velocities(velocities.astype(np.float32), 0.0, 0.1)
-    told = {"pose": Pose2(0.0, 0.0), "goal_yaw": 0.0, "limits": LIMITS, "dt": 0.1, "tolerance": 0.25, **more}
-    return CriticData(rolled, plan, costmap=view or view_of(), footprint=Footprint(robot, 0.05), **told)
+    text = {"pose": Pose2(0.0, 0.0), "goal_yaw": 0.0, "limits": LIMITS, "dt": 0.1, "tolerance": 0.25, **more}
+    return CriticData(rolled, plan, costmap=view or view_of(), footprint=Footprint(robot, 0.05), **text)
 
 
 def along(*speeds: float, steps: int = 10, turn: float = 0.0) -> np.ndarray:
@@ -176,33 +176,33 @@ def along(*speeds: float, steps: int = 10, turn: float = 0.0) -> np.ndarray:
 
 
 def test_constraint_critic_penalizes_excess_speed() -> None:
-    said = critics.constraint_critic(model.MppiConstraintCritic(), scene(along(0.5, 0.8, -0.45)))
-    assert said == pytest.approx([0.0, 4.0 * 0.3, 4.0 * 0.1], abs=1e-5)
+    cost = critics.constraint_critic(model.MppiConstraintCritic(), scene(along(0.5, 0.8, -0.45)))
+    assert cost == pytest.approx([0.0, 4.0 * 0.3, 4.0 * 0.1], abs=1e-5)
 
 
 def test_constraint_critic_penalizes_turns_tighter_than_the_turning_radius() -> None:
     car = replace(LIMITS, turning_radius=1.0)
-    said = critics.constraint_critic(model.MppiConstraintCritic(), scene(along(0.4, turn=0.8), limits=car))
-    assert said == pytest.approx([4.0 * 0.5 * 1.0], abs=1e-5)
+    cost = critics.constraint_critic(model.MppiConstraintCritic(), scene(along(0.4, turn=0.8), limits=car))
+    assert cost == pytest.approx([4.0 * 0.5 * 1.0], abs=1e-5)
 
 
 def test_cost_critic_is_the_mean_cost_over_254_and_a_collision_costs_a_million() -> None:
     view = view_of((1.0, -3.0, 1.2, 3.0))
     spec = model.MppiCostCritic(near_goal_distance=0.0, trajectory_point_step=1)
     seen = scene(along(0.0, 0.5, 1.5), view)
-    said, hit = critics.cost_critic(spec, seen)
+    cost, hit = critics.cost_critic(spec, seen)
     costs = seen.costs(seen.lookup(seen.rollouts.x, seen.rollouts.y))
     assert hit.tolist() == [False, False, True]
-    assert said[1] == pytest.approx(3.81 / 254 * costs[:, 1].mean(), rel=1e-5)
-    assert said[2] == pytest.approx(3.81 / 254 / 10 * 1e6, rel=1e-5)
+    assert cost[1] == pytest.approx(3.81 / 254 * costs[:, 1].mean(), rel=1e-5)
+    assert cost[2] == pytest.approx(3.81 / 254 / 10 * 1e6, rel=1e-5)
 
 
 def test_cost_critic_near_the_goal_penalizes_only_near_collisions() -> None:
     view = view_of((1.0, -3.0, 1.2, 3.0))
-    said, _ = critics.cost_critic(model.MppiCostCritic(), scene(along(0.5), view, length=0.9))
-    assert said == pytest.approx([0.0])
-    said, _ = critics.cost_critic(model.MppiCostCritic(near_collision_cost=20), scene(along(0.5), view, length=0.9))
-    assert said[0] > 1.0
+    cost, _ = critics.cost_critic(model.MppiCostCritic(), scene(along(0.5), view, length=0.9))
+    assert cost == pytest.approx([0.0])
+    cost, _ = critics.cost_critic(model.MppiCostCritic(near_collision_cost=20), scene(along(0.5), view, length=0.9))
+    assert cost[0] > 1.0
 
 
 def test_obstacles_critic_penalizes_distances_below_its_margin() -> None:
@@ -210,9 +210,9 @@ def test_obstacles_critic_penalizes_distances_below_its_margin() -> None:
     seen = scene(along(0.7), view)
     cells = seen.lookup(seen.rollouts.x, seen.rollouts.y)
     gap = seen.clearance(cells, seen.rollouts.yaw, consider_footprint=True)[:, 0]
-    said, hit = critics.obstacles_critic(model.MppiObstaclesCritic(repulsion_weight=0.0), seen)
+    cost, hit = critics.obstacles_critic(model.MppiObstaclesCritic(repulsion_weight=0.0), seen)
     assert not hit.any()
-    assert said[0] == pytest.approx(20.0 * np.clip(0.1 - gap, 0, None).sum(), rel=1e-4)
+    assert cost[0] == pytest.approx(20.0 * np.clip(0.1 - gap, 0, None).sum(), rel=1e-4)
 
 
 def test_robot_in_collision_may_leave_but_not_penetrate_further() -> None:
@@ -233,8 +233,8 @@ def test_robot_whose_discs_touch_an_obstacle_may_drive_along_it() -> None:
 
 
 def test_goal_critic_is_the_mean_distance_to_the_end_of_the_plan() -> None:
-    said = critics.goal_critic(model.MppiGoalCritic(), scene(along(0.5), length=1.0))
-    assert said == pytest.approx([5.0 * np.mean(1.0 - 0.05 * np.arange(1, 11))], rel=1e-5)
+    cost = critics.goal_critic(model.MppiGoalCritic(), scene(along(0.5), length=1.0))
+    assert cost == pytest.approx([5.0 * np.mean(1.0 - 0.05 * np.arange(1, 11))], rel=1e-5)
 
 
 def test_goal_angle_critic_is_the_mean_angle_also_for_symmetric_robots() -> None:
@@ -255,11 +255,11 @@ def test_path_align_critic_compares_at_equal_driven_distance() -> None:
         Rollouts(seen.rollouts.x, seen.rollouts.y + np.float32(0.3), seen.rollouts.yaw, seen.rollouts.velocities),
         *(getattr(seen, name) for name in ("plan", "pose", "goal_yaw", "costmap", "footprint", "limits", "dt")), 0.25,
     )  # fmt: skip
-    said = critics.path_align_critic(model.MppiPathAlignCritic(), offset)
+    cost = critics.path_align_critic(model.MppiPathAlignCritic(), offset)
     # Meters are counted from the first pose looked at, 0.1 m from the plan's first point: so it is 0.1 m ahead, too;
     # the last is compared with the point before the furthest.
     mean = (3 * math.hypot(0.3, 0.1) + math.hypot(0.3, 0.15)) / 4
-    assert said == pytest.approx([14.0 * mean], rel=1e-3)
+    assert cost == pytest.approx([14.0 * mean], rel=1e-3)
 
 
 def test_path_align_critic_is_inactive_at_the_start_and_where_the_plan_is_blocked() -> None:
@@ -269,8 +269,8 @@ def test_path_align_critic_is_inactive_at_the_start_and_where_the_plan_is_blocke
 
 
 def test_path_follow_critic_is_the_distance_to_a_free_point_beyond_the_furthest() -> None:
-    said = critics.path_follow_critic(model.MppiPathFollowCritic(), scene(along(0.5, 0.2)))
-    assert said == pytest.approx([5.0 * (0.45 + 0.25 - 0.5), 5.0 * (0.70 - 0.2)], rel=1e-3)
+    cost = critics.path_follow_critic(model.MppiPathFollowCritic(), scene(along(0.5, 0.2)))
+    assert cost == pytest.approx([5.0 * (0.45 + 0.25 - 0.5), 5.0 * (0.70 - 0.2)], rel=1e-3)
 
 
 @pytest.mark.parametrize(("mode", "weighed"), [(0, math.pi), (1, None), (2, math.pi)])
@@ -278,19 +278,19 @@ def test_path_angle_critic_allows_reversing_robots_to_face_backward(mode: int, w
     turned = scene(along(0.0), pose=Pose2(0.0, 0.0, math.pi))
     back = integrate_velocities(along(0.0).astype(np.float32), math.pi, 0.1)
     turned = replace(turned, rollouts=back)
-    said = critics.path_angle_critic(model.MppiPathAngleCritic(mode=mode), turned)
-    assert said is None if weighed is None else said == pytest.approx([2.0 * weighed], rel=1e-5)
+    cost = critics.path_angle_critic(model.MppiPathAngleCritic(mode=mode), turned)
+    assert cost is None if weighed is None else cost == pytest.approx([2.0 * weighed], rel=1e-5)
 
 
 def test_prefer_forward_critic_penalizes_distance_driven_backward() -> None:
-    said = critics.prefer_forward_critic(model.MppiPreferForwardCritic(), scene(along(0.3, -0.2)))
-    assert said == pytest.approx([0.0, 5.0 * 0.2], abs=1e-6)
+    cost = critics.prefer_forward_critic(model.MppiPreferForwardCritic(), scene(along(0.3, -0.2)))
+    assert cost == pytest.approx([0.0, 5.0 * 0.2], abs=1e-6)
 
 
 def test_velocity_deadband_critic_penalizes_velocities_below_the_deadband() -> None:
     spec = model.MppiVelocityDeadbandCritic(deadband_velocities=(0.2, 0.3, 0.4))
-    said = critics.velocity_deadband_critic(spec, scene(along(0.05, -0.25, turn=-0.1)))
-    assert said == pytest.approx([35.0 * (0.15 + 0.3), 35.0 * 0.3], rel=1e-5)
+    cost = critics.velocity_deadband_critic(spec, scene(along(0.05, -0.25, turn=-0.1)))
+    assert cost == pytest.approx([35.0 * (0.15 + 0.3), 35.0 * 0.3], rel=1e-5)
     strafing = np.concatenate((along(0.05, turn=-0.1), np.full((1, 10, 1), 0.1)))
     assert critics.velocity_deadband_critic(spec, scene(strafing)) == pytest.approx(
         [35.0 * (0.15 + 0.3 + 0.2)], rel=1e-5

@@ -40,7 +40,7 @@ def bent(radius: float, straight: float = 3.0) -> np.ndarray:
 
 
 def speeds(view: CostmapView, path: np.ndarray, end: float, **options: object) -> list[tuple[float, float]]:
-    """(x, speed) of a robot that drives along x at 2 m/s and does as it is told, as far as its brakes let it."""
+    """Return pairs (x, speed) of a robot that starts with 2 m/s and executes the commands as fast as it can brake."""
     controller = RegulatedPurePursuit(Spec(desired_linear_vel=2.0, **options), setting(ROBOT))
     controller.set_path(Path(path))
     x, speed, came = 0.0, 2.0, list[tuple[float, float]]()

@@ -85,7 +85,7 @@ def test_incrementally_updated_distances_equal_a_full_computation() -> None:
 @pytest.mark.parametrize("group", [1, 3])
 def test_distances_far_from_changes_are_unchanged(group: int) -> None:
     world, spec = Flatland().room(8, 6), Spec(denoise_layer={"enabled": group > 1, "minimal_group_size": group})
-    map_, told, rng = costmap(world, spec), [], np.random.default_rng(5)
+    map_, text, rng = costmap(world, spec), [], np.random.default_rng(5)
     places = rng.uniform((0.5, 0.5), (7.5, 5.5), (60, 2)) @ (1, 1j)
     for _ in range(12):
         revision, before = map_.revision, [at(map_, each.real, each.imag)[1] for each in places]
@@ -94,9 +94,9 @@ def test_distances_far_from_changes_are_unchanged(group: int) -> None:
             seen = Flatland(world.boxes, [(x + 0.7, y, 0.02), (x, y - 1.1, 0.05)])
             map_.update(Pose2(x, y), scan_of(seen, Pose2(x, y), noise=0.03))
         for place, distance in zip(places, before, strict=True):
-            told.append(map_.changed_near(revision, np.array([place]), 0.4))
-            assert told[-1] or min(distance, 0.4) == min(at(map_, place.real, place.imag)[1], 0.4)
-    assert 0.02 < np.mean(told) < 0.5
+            text.append(map_.changed_near(revision, np.array([place]), 0.4))
+            assert text[-1] or min(distance, 0.4) == min(at(map_, place.real, place.imag)[1], 0.4)
+    assert 0.02 < np.mean(text) < 0.5
     assert map_.changed_near(map_.revision - 100, places, 0.4)
     assert not map_.changed_near(map_.revision, places, 0.4)
 
@@ -192,7 +192,7 @@ def test_unknown_space_is_free_where_it_is_not_tracked() -> None:
     assert at(costmap(None, Spec(track_unknown_space=False)), 5.0, 5.0)[0] == 0
 
 
-@pytest.mark.parametrize("inflation_radius", [0.7, 1.0])  # the second is as far as distances are told
+@pytest.mark.parametrize("inflation_radius", [0.7, 1.0])  # 1.0 m is the maximum distance
 def test_beam_through_unknown_space_makes_it_known(inflation_radius: float) -> None:
     world = Flatland().room(8, 6)
     spec = Spec(inflation_radius=inflation_radius)

@@ -27,7 +27,7 @@ START, GOAL = Pose2(1.0, 0.8), Goal("g", Pose2(12.0, 0.8), timeout=60.0)
 
 
 class Corrected:
-    """Between the sensors and a stack: what its localizer is told jumps at `at`, what its wheels say never does."""
+    """Adds a jump to the true pose that a stack receives from `at` s on, but not to its odometry."""
 
     def __init__(self, drive: Drive, at: float, jump: Pose2) -> None:
         self.stack, self._at, self._jump = drive.stack, at * TICK_RATE_HZ, jump

@@ -212,8 +212,8 @@ def test_rotated_map_gives_the_same_result() -> None:
 def test_unset_maximum_range_is_that_of_the_lidar(kind: str, farthest: float) -> None:
     """As in nav2_amcl, where only what is above zero cuts ranges."""
     usual, subject = (
-        started(Amcl.model_validate({"laser_model_type": kind, "max_particles": 100, "min_particles": 20, **said}))
-        for said in ({}, {"laser_max_range": farthest})
+        started(Amcl.model_validate({"laser_model_type": kind, "max_particles": 100, "min_particles": 20, **given}))
+        for given in ({}, {"laser_max_range": farthest})
     )
     assert subject.belief.pose == usual.belief.pose
     assert moved(subject, 24, Pose2(0.3, 0, 0)).pose == moved(usual, 24, Pose2(0.3, 0, 0)).pose
