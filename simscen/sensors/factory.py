@@ -104,7 +104,7 @@ def _field_defect(name: str, value: object) -> str:
         case tuple():
             is_valid = all(isinstance(number, int | float | np.number) and np.isfinite(number) for number in value)
             return "" if is_valid else "does not consist of finite numbers"
-        case float() | np.floating() if name == "angle_increment" and value == 0:
+        case float() | int() | np.floating() if name == "angle_increment" and value == 0:
             return "is 0"
         case float() | np.floating():
             return "" if np.isfinite(value) else "is not finite"

@@ -1,4 +1,5 @@
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -6,10 +7,12 @@ from puppet import Puppet, SquareRoom
 from pydantic import ValidationError
 
 from simscen.core.clock import Clock
+from simscen.core.errors import RunError
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Scan
 from simscen.core.random_streams import Streams
 from simscen.model.robot import Ackermann, RobotSpec
-from simscen.sensors.factory import build_sensors
+from simscen.sensors.factory import PluginSensor, build_sensors
+from simscen.sensors.sensor import SensorSetting
 
 SENSORS = {
     "zed": {"camera": {"rate": 5.0, "width": 16, "height": 8}},
@@ -84,3 +87,14 @@ def test_bumper_reports_contacts_of_the_hull():
     assert not bumper.read(0).pressed
     view.pressed = True
     assert bumper.read(6).pressed
+
+
+@pytest.mark.parametrize("increment", [0, 0.0])
+def test_scan_of_a_plug_in_without_an_angle_between_its_beams_is_refused(increment):
+    def sensor(_spec, _setting):
+        return SimpleNamespace(read=lambda tick: Scan("beam", tick, np.ones(1), 0.0, increment, 0.1, 10.0))
+
+    spec = SimpleNamespace(reading_type="Scan", component="package:Beam", implementation=lambda: sensor)
+    setting = SensorSetting("beam", 24, 0.1, np.random.default_rng(1), Puppet(), None, None)
+    with pytest.raises(RunError, match="returned a reading whose `angle_increment` is 0"):
+        PluginSensor("beam", spec, setting).read(24)
