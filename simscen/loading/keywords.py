@@ -69,7 +69,7 @@ class _Parser:
                 raise self.error("a parenthesis is not closed")
             return inner
         if not self.tokens or self.tokens[0] in ("and", "or", ")"):
-            raise self.error("a part of an id is missing")
+            raise self.error("a part of a title is missing")
         word = self.tokens.pop(0).casefold()
         return lambda text: word in text.casefold()
 

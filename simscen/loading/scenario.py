@@ -175,7 +175,7 @@ def _load_variation(
     spec = check(ScenarioSpec, tree, multirobot.scenario_robot_problems)
     if isinstance(spec, list):
         assets, world = Assets(library), child(tree, "world")
-        if isinstance(world, ScalarNode) and isinstance(world.value, str):
+        if isinstance(world, ScalarNode) and isinstance(world.value, str) and world.value:
             assets.world(world)  # reports also the problems of the world file
         return library.with_source(sorted([*spec, *assets.problems]))
     if problems := ROBOT_NAMES.problems(tree, spec):

@@ -36,7 +36,7 @@ def test_2_a_folder_without_scenarios_is_not_a_success(simscen, folder: Path, co
         pytest.param("simscen: 1\n---\nsimscen: 1\n", "2:1", "more than one YAML document (line 2)", id="5"),
         pytest.param("simscen: 1\nrobot:\n\tpose: start\n", "3:1", "tab character", id="6"),
         pytest.param("simscen: 1\ngoals: [a, b\npass: 1\n", "3:5", "", id="7 bracket"),
-        pytest.param("simscen: 1\nname: 'a\n", "2:7", "this quoted scalar is not closed", id="7 quote"),
+        pytest.param("simscen: 1\nname: 'a\n", "2:7", "this text in quotes is not closed", id="7 quote"),
         pytest.param("simscen: 1\nseed: 1\nseed: 2\n", "3:1", "duplicate key `seed` (first at 2:1)", id="8"),
         pytest.param("!!python/object/apply:os.system ['touch marker']\n", "1:1", "tag", id="23 python"),
         pytest.param("simscen: 1\nseed: !!int abc\n", "2:7", "tag", id="15 !!int abc"),

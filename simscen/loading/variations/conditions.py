@@ -25,7 +25,10 @@ _COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
 _OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
 }  # fmt: skip
-_FUNCTIONS: dict[str, Callable[..., float]] = {"abs": abs, "min": min, "max": max, "hypot": math.hypot, "wrap": wrap}
+_FUNCTIONS: dict[str, Callable[..., float]] = {
+    "abs": abs, "min": lambda *numbers: min(numbers), "max": lambda *numbers: max(numbers), "hypot": math.hypot,
+    "wrap": wrap,
+}  # fmt: skip
 GRAMMAR = (
     "comparisons such as `goals[0].pose.x > robot.pose.x + 1` with and, or, not, + - * /, abs, min, max, hypot, wrap; "
     "quantities in quotes: '50 cm'; value('pass.clearance.min') for paths with keywords of Python"
@@ -134,7 +137,7 @@ def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> Any:
         case ast.Call(func=ast.Name(id="value"), args=[ast.Constant(value=str(path))]):
             return si_number(values[path])
         case ast.Call(func=ast.Name(id=name), args=parts):
-            return _FUNCTIONS[name](*[_evaluate(part, values) for part in parts])
+            return _FUNCTIONS[name](*[_evaluate_number(part, values) for part in parts])
     return si_number(values[_path_text(node, "")])
 
 

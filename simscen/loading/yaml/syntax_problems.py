@@ -10,9 +10,9 @@ from simscen.spec.quantities import with_article
 _MISSING_COLON = "could not find expected ':'"
 """Message of libyaml for a line that must be a key but has no colon. Its context is the key."""
 _UNCLOSED = {
-    "while parsing a flow sequence": "flow sequence",
-    "while parsing a flow mapping": "flow mapping",
-    "while scanning a quoted scalar": "quoted scalar",
+    "while parsing a flow sequence": "list in brackets",
+    "while parsing a flow mapping": "mapping in braces",
+    "while scanning a quoted scalar": "text in quotes",
 }
 """Contexts of libyaml that need a closing bracket or quote."""
 _CONTAINERS = {

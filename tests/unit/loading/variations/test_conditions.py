@@ -31,6 +31,7 @@ VALUES: dict[str, Any] = {
         ("value('pass.clearance.min') > 2 * faults.lidar.noise.std", True),
         ("abs(-robot.pose.x) + min(1, 2) * max(3, 4) / 2 - 1 == 2", True),
         ("hypot(3, 4) == 5 and wrap(7) < 1", True),
+        ("min(robot.pose.x) == max(1)", True),
         ("events.cart.speed == 10", True),
         ("flag", True),
         ("not flag", False),
@@ -54,6 +55,7 @@ def test_everything_else_is_refused(text: str) -> None:
 @pytest.mark.parametrize(
     "text",
     ["robot.model < 1", "robot.pose.x", "robot.pose.x / 0 < 1", "1 + robot.model == 2", "wrap(1e999) < 1",
+     "max(1, robot.model) == 1",
      "robot.model * 99999999999999 == 'amr'", "-flag < 1"],
 )  # fmt: skip
 def test_values_that_do_not_fit_are_errors(text: str) -> None:

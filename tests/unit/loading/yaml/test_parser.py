@@ -165,7 +165,7 @@ def test_position_of_a_syntax_error_is_inside_the_file() -> None:
         ("a: @home\n", (1, 4), "a value cannot begin with this character", "put the value in quotes"),
         ("a: {b: 1\nc: 2\n", (2, 2), "expected `,` or `}` in the mapping that starts at 1:4", ""),
         ("a: [1, , 2]\n", (1, 8), "expected a value", ""),
-        ("a: {b: 1\n", (1, 4), "this flow mapping is not closed", ""),
+        ("a: {b: 1\n", (1, 4), "this mapping in braces is not closed", ""),
         ("a: &\n", (1, 5), "while scanning an anchor that starts at 1:4", ""),
     ],
 )
