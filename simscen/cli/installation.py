@@ -89,6 +89,14 @@ def check_writable(folder: Path) -> str:
     return f"{folder} is writable"
 
 
+def check_temporary_folder() -> str:
+    """Check that there is a writable folder for temporary files."""
+    try:
+        return check_writable(Path(tempfile.gettempdir()))
+    except FileNotFoundError as error:
+        raise CheckFailed(f"{error.strerror}; set TMPDIR to a writable folder") from None
+
+
 def check_disk_space(folder: Path) -> str:
     """Check that a folder is writable and has MIN_DISK_BYTES of free space."""
     result = check_writable(folder)

@@ -69,7 +69,7 @@ def checks() -> Iterator[Check]:
     yield "pidfd", installation.check_pidfd
     yield "limits", installation.check_resource_limits
     yield "shared", installation.check_shared_memory
-    yield "temporary", partial(installation.check_writable, Path(tempfile.gettempdir()))
+    yield "temporary", installation.check_temporary_folder
     yield "here", partial(installation.check_disk_space, Path.cwd())
     yield "cache", check_cache
     yield "stacks", check_stacks

@@ -1,10 +1,12 @@
 """Checks of `simscen doctor`."""
 
+import errno
 import os
 import re
 import resource
 import shutil
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -41,6 +43,17 @@ def test_failed_check_is_reported_and_the_others_still_run(simscen, quick, monke
         "  ✗ here       only 30 MiB are free"
     )
     assert ended.out.splitlines()[-1] == "  ✓ speed      not now, either"
+
+
+def test_missing_temporary_folder_is_a_failed_check(simscen, quick, monkeypatch) -> None:
+    def missing() -> str:
+        raise FileNotFoundError(errno.ENOENT, "No usable temporary directory found")
+
+    monkeypatch.setattr(tempfile, "gettempdir", missing)
+    ended = simscen("doctor")
+    assert ended.code == 3
+    assert "  ✗ temporary  No usable temporary directory found; set TMPDIR" in ended.out
+    assert "  ✓ here " in ended.out
 
 
 def test_engine_that_cannot_be_imported_is_a_failed_check(simscen, quick, monkeypatch) -> None:
