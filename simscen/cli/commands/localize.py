@@ -117,7 +117,7 @@ def _load_inputs(
     if world.map is None:
         hint = "see `simscen world --help` for how to make one"
         raise InvalidInput([Problem(str(map_), 0, 0, "SC320", "not a ROS map", hint)])
-    root_folder = root or (default_root([Path(robot)]) if Path(robot).exists() else Path.cwd())
+    root_folder = root or default_root([Path(robot)])
     with paths_from_working_folder(root_folder):
         file = load_robot_file(robot, root_folder)
         body = robot_from_file(file.robot, file.roots)[1]
@@ -156,7 +156,7 @@ def _lines(localized: LocalizationResult, errors: PoseErrors | None, lost: float
     for interval in errors.lost:
         end = "to the end" if interval.until is None else f"to {interval.until:.1f} s"
         lines.append(f"lost (more than {lost:g} m off) from {interval.since:.1f} s {end}")
-    restriction = "" if errors.compared > MIN_COMPARED_FRACTION else ", as far as compared"
+    restriction = "" if errors.compared >= MIN_COMPARED_FRACTION else ", as far as compared"
     return lines if errors.lost else [*lines, f"never lost (more than {lost:g} m off){restriction}"]
 
 

@@ -98,11 +98,10 @@ def command(
         target, files = _target(name, out, from_log), GivenFiles(world, map_, robot)
         write_scenario_from_log(from_log, target, files, truth, topic or [], root, verify)
         return
-    for option, value in (("--out", out), ("--map", map_), ("--world", world)):
-        if value is not None:
-            raise UsageError(f"{option} needs --from-log")
-    if verify or robot or truth or topic or root:
-        raise UsageError("--robot, --truth, --topic, --root, and --verify need --from-log")
+    of_log = {"out": out, "map": map_, "world": world, "robot": robot, "truth": truth, "topic": topic, "root": root}
+    for option, value in {**of_log, "verify": verify}.items():
+        if value:
+            raise UsageError(f"--{option} needs --from-log")
     if not name:
         raise UsageError("missing argument NAME")
     last = name.rpartition("/")[2]

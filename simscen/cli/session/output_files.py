@@ -135,11 +135,13 @@ def require_writable_junit(junit: Path | None, folder: Path | None, inputs: Iter
     """
     if junit is None:
         return
-    real = Path(os.path.realpath(junit))
+    real, output = Path(os.path.realpath(junit)), None if folder is None else Path(os.path.realpath(folder))
     for parent in real.parents:
-        is_output = parent == (folder and Path(os.path.realpath(folder))) or (parent / JOURNAL_FILE).exists()
+        is_output = parent == output or (parent / JOURNAL_FILE).exists()
         if is_output and real.relative_to(parent).parts[0] in RESERVED_NAMES:
             raise UsageError(f"cannot write {junit}: simscen writes another file with this name there")
+    if output in real.parents and not real.exists():
+        return  # its folder is created later, because a new output folder must be empty
     require_writable(junit, inputs)
 
 

@@ -36,7 +36,8 @@ def sessions(simscen_in, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_merged_results_are_those_of_a_single_session(simscen, sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(sessions)
-    assert simscen("merge", "s2", "s1", "--out", "all").code == 1
+    assert simscen("merge", "s2", "s1", "--out", "all", "--junit", "all/ci/merged.xml").code == 1
+    assert Path("all/ci/merged.xml").read_bytes() == Path("all/junit.xml").read_bytes()
     assert Path("all/results.json").read_bytes() == Path("whole/results.json").read_bytes()
     times = re.compile(rb' time="[0-9.]+"')
     merged, whole = (times.sub(b"", Path(name, "junit.xml").read_bytes()) for name in ("all", "whole"))

@@ -113,6 +113,11 @@ def test_inputs_are_not_overwritten(simscen, tmp_path: Path) -> None:
     assert (tmp_path / "good.scenario.yaml").read_text() == scenario
 
 
+def test_junit_can_be_in_a_subfolder_of_a_new_output_folder(simscen, tmp_path: Path) -> None:
+    assert simscen("run", "good.scenario.yaml", "--out", "out", "--junit", "out/ci/report.xml").code == 0
+    assert (tmp_path / "out/ci/report.xml").read_bytes() == (tmp_path / "out/junit.xml").read_bytes()
+
+
 @pytest.mark.parametrize("name", ["results.json", "events.jsonl", "run.json", "report.html", "runs/good/junit.xml"])
 @pytest.mark.parametrize("before", [False, True])
 def test_junit_cannot_use_reserved_names(simscen, tmp_path: Path, name, before) -> None:
