@@ -14,7 +14,7 @@ from simscen.record.foreign.decoded_messages import DecodedMessages
 from simscen.record.foreign.goal_events import goal_events
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.raw_messages import UnusableLog
-from simscen.record.foreign.timebase import StampedMessages, Timebase
+from simscen.record.foreign.timebase import MAX_STAMP_DIFFERENCE_NS, StampedMessages, Timebase
 from simscen.record.foreign.tracks import (
     Track,
     is_twist_missing,
@@ -74,6 +74,8 @@ class ForeignTraceReader:
         self.missing: dict[Evidence, str] = dict(_ALWAYS_MISSING)
         self.partial: dict[Evidence, str] = {}
         self.rows = TraceRows()
+        if options.clock == "header":
+            self._remove_unstamped()
         truth, belief = self._truth(), self._track("amcl_pose", Evidence.BELIEF, Evidence.COVARIANCE)
         self.time = self._timebase(truth, belief)
         if truth is not None:
@@ -87,6 +89,20 @@ class ForeignTraceReader:
         self._check_scan_ages()
         self._add_goals()
 
+    def _remove_unstamped(self) -> None:
+        """Remove poses without a stamp from topics whose other messages have stamps."""
+        by_topic: dict[str, int] = {}
+        for role in ("truth", "amcl_pose", "odom"):
+            messages = self._decoded.by_role[role]
+            stamped = [message for message, is_set in zip(messages, _have_stamps(messages), strict=True) if is_set]
+            if stamped and len(stamped) < len(messages):
+                by_topic[self._topic(role)] = len(messages) - len(stamped)
+                self._decoded.by_role[role] = stamped
+        self.notes += [f"{topic}: messages without a stamp are ignored ({count})" for topic, count in by_topic.items()]
+
+    def _topic(self, role: str) -> str:
+        return (self._options.truth or "") if role == "truth" else self._options.topic(role)
+
     def _truth(self) -> Track | None:
         frames = self._options.frames
         if frames is None:
@@ -99,8 +115,7 @@ class ForeignTraceReader:
 
     def _track(self, role: str, *evidence: Evidence) -> Track | None:
         """Return the track (poses over time) of a role. If it has no messages, add `evidence` to `missing`."""
-        topic = (self._options.truth or "") if role == "truth" else self._options.topic(role)
-        messages = self._decoded.by_role[role]
+        topic, messages = self._topic(role), self._decoded.by_role[role]
         if messages:
             return track_from_topic(topic, messages, self._options)
         self.missing |= dict.fromkeys(evidence, self._reason_missing(role, topic))
@@ -155,9 +170,13 @@ class ForeignTraceReader:
         return first
 
     def _stamped(self, role: str) -> StampedMessages | None:
-        """Return the stamps of the messages with a role; None if the times of logging are used instead."""
+        """Return the stamps of the messages with a role; None if the times of logging are used instead.
+
+        Messages without a stamp are left out.
+        """
         messages = self._decoded.by_role[role]
-        logged, stamps = [time for time, _ in messages], [_stamp(message) or 0 for _, message in messages]
+        stamped = [message for message, is_set in zip(messages, _have_stamps(messages), strict=True) if is_set]
+        logged, stamps = [time for time, _ in stamped], [_stamp(message) or 0 for _, message in stamped]
         return stamped_messages(self._options.topic(role), logged, stamps, self._options)
 
     def _ticks(self, track: Track) -> Ticks:
@@ -225,9 +244,9 @@ class ForeignTraceReader:
                     self.missing[_EVIDENCE_OF_ROLE[role]] = self._short_reason(role)
                 continue
             values = [value for _, value in messages]
-            stamped = self._stamped(role) if all(_stamp(value) is not None for value in values) else None
-            logged = np.array([time for time, _ in messages], dtype=np.int64)
-            ticks = self.time.ticks_of_logged(logged) if stamped is None else self.time.ticks_of_stamped(stamped)
+            ticks = self.time.ticks_of_logged(np.array([time for time, _ in messages], dtype=np.int64))
+            if (stamped := self._stamped(role)) is not None:
+                ticks[_have_stamps(messages)] = self.time.ticks_of_stamped(stamped)
             self._add_role(role, ticks, values)
 
     def _check_scan_ages(self) -> None:
@@ -277,6 +296,16 @@ class ForeignTraceReader:
 def _stamp(message: Any) -> int | None:
     """Return the stamp of a decoded message; None for a message without a header."""
     return message if isinstance(message, int) else message.stamp
+
+
+def _have_stamps(messages: Sequence[tuple[int, Any]]) -> list[bool]:
+    """Return for each pair of a time of logging and a decoded message whether the message has a stamp.
+
+    A stamp of zero is the start of simulated time if the other stamps begin soon after it.
+    """
+    stamps = [_stamp(message) or 0 for _, message in messages]
+    is_simulated = min(filter(None, stamps), default=0) <= MAX_STAMP_DIFFERENCE_NS
+    return [is_simulated or stamp != 0 for stamp in stamps]
 
 
 def _last_per_tick(ticks: Ticks) -> tuple[Ticks, Ticks]:

@@ -190,6 +190,30 @@ def test_topics_of_different_clocks_are_refused(refused: Callable[..., str], rea
     assert len(read(messages, ForeignLogOptions(truth="/mocap", clock="log")).trace.belief) == 10
 
 
+@pytest.mark.parametrize("begin", [BEGIN, 100 * SECOND])
+@pytest.mark.parametrize("index", [0, 1, 5])
+@pytest.mark.parametrize("topic", ["/mocap", "/amcl_pose", "/odom", "/scan"])
+def test_single_messages_without_a_stamp_do_not_move_the_others(
+    read: Callable[..., ForeignLog], topic: str, index: int, begin: int
+) -> None:
+    """Drivers send such messages until they know the time."""
+    messages, expected = drive(begin=begin), read(drive(begin=begin)).trace
+    one = [one for one in messages if one.topic == topic][index]
+    one.message.header.stamp = header(0, "").stamp
+    log = read(messages)
+    trace = log.trace
+    assert list(log.notes) == ([] if topic == "/scan" else [f"{topic}: messages without a stamp are ignored (1)"])
+    assert trace.end == expected.end and not log.coverage.partial
+    for name in ("truth", "belief", "odometry"):
+        found, wanted = getattr(trace, name), getattr(expected, name)
+        assert len(wanted) - len(found) <= 1
+        rows = np.isin(wanted.ticks, found.ticks)
+        assert rows.sum() == len(found)
+        np.testing.assert_array_equal(found.values, wanted.values[rows])
+    assert len(trace.scans) == len(expected.scans)
+    assert np.abs(trace.scans - expected.scans).max() <= 20
+
+
 def test_log_times_replace_zero_stamps(read: Callable[..., ForeignLog]) -> None:
     messages = [one for one in drive() if one.topic != "/mocap"]
     poses = [stamped_pose(0, "map", SPEED * k / 20) for k in range(201)]
