@@ -54,8 +54,9 @@ def descendants(parent: int) -> List[int]:
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             with contextlib.suppress(OSError):
-                state, parent_pid = (entry / "stat").read_text().rpartition(")")[2].split()[:2]
-                if state != "Z":
+                # Bytes, because the name of a program can be invalid UTF-8: the kernel cuts it after 15 bytes.
+                state, parent_pid = (entry / "stat").read_bytes().rpartition(b")")[2].split()[:2]
+                if state != b"Z":
                     children.setdefault(int(parent_pid), []).append(int(entry.name))
     found, new = [], [parent]
     while new:

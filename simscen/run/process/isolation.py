@@ -103,7 +103,8 @@ def kill_children_except(kept: Iterable[int]) -> None:
 def _parent(pid: int) -> int:
     """Return the id of a process's parent, or 0 if the process has ended."""
     try:
-        return int(Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[1])
+        # Bytes, because the name of a program can be invalid UTF-8: the kernel cuts it after 15 bytes.
+        return int(Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()[1])
     except OSError:
         return 0
 

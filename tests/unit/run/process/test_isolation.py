@@ -1,0 +1,38 @@
+"""Tests of the cleanup of processes."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from simscen.ros2.launch import descendants
+
+NAME = 9 * "\u00df"
+"""Name of a program: 18 bytes in UTF-8, of which the kernel keeps 15, and therefore half of a character."""
+KILL = """
+import subprocess, sys
+from simscen.run.process.isolation import kill_children_except
+child = subprocess.Popen([sys.argv[1], "60"])
+kill_children_except(())
+print(child.poll() is not None)
+"""
+
+
+def copy_of_sleep(folder: Path) -> str:
+    program = shutil.which("sleep")
+    assert program is not None
+    return shutil.copy(program, folder / NAME)
+
+
+def test_children_with_a_name_that_is_cut_within_a_character_are_killed(tmp_path: Path) -> None:
+    argv = [sys.executable, "-c", KILL, copy_of_sleep(tmp_path)]
+    ended = subprocess.run(argv, capture_output=True, text=True, check=False)
+    assert (ended.stdout, ended.stderr) == ("True\n", "")
+
+
+def test_descendants_with_a_name_that_is_cut_within_a_character_are_found(tmp_path: Path) -> None:
+    with subprocess.Popen([copy_of_sleep(tmp_path), "60"]) as child:
+        try:
+            assert descendants(child.pid) == []
+        finally:
+            child.kill()
