@@ -43,6 +43,19 @@ def test_relative_errors_do_not_cover_a_teleportation():
     assert pose_metrics(trace)["rpe_trans_max"] == pytest.approx(7.9)
 
 
+@pytest.mark.parametrize(
+    ("ticks", "errors", "median", "mean"),
+    [
+        ([0, 6], [1, 3], 2.0, 2.0),
+        ([0, 6, 12], [1, 3, 8], 3.0, 4.0),
+        ([0, 6, 12, 36], [1, 2, 5, 9], 5.0, (6 * 1 + 6 * 2 + 24 * 5 + 6 * 9) / 42),
+    ],
+)
+def test_absolute_errors_count_for_the_time_until_the_next_belief(ticks, errors, median, mean):
+    metrics = pose_metrics(located(ticks, [(0, 0, 0)] * len(ticks), ticks, [(x, 0, 0) for x in errors]))
+    assert (metrics["ape_trans_median"], metrics["ape_trans_mean"]) == (median, pytest.approx(mean))
+
+
 def test_turning_in_place_adds_no_distance():
     ticks = [0, 6, 12]
     poses = [(0, 0, 0), (0.1, 0, 3.0), (0.2, 0, 0)]
