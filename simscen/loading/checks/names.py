@@ -93,9 +93,9 @@ def duplicate_names(scope: NameScope) -> Iterator[CheckProblem]:
                 yield CheckProblem((*keys, "name"), message, "choose another name")
             seen.setdefault(name or "", keys)
     for index, fault in enumerate(loaded.spec.faults):
-        if fault.name is not None and fault.name in event_names(loaded):
-            message = f"an event is also called {quoted(fault.name)}; criteria cannot distinguish them"
-            yield CheckProblem(("faults", index, "name"), message, RENAME_HINT)
+        if fault.label in event_names(loaded):
+            message = f"an event is also called {quoted(fault.label)}; criteria cannot distinguish them"
+            yield CheckProblem(("faults", index, "sensor" if fault.name is None else "name"), message, RENAME_HINT)
 
 
 @NAMES.check("SC033")
