@@ -72,8 +72,9 @@ def json_frame(kind: int, content: dict[str, Any]) -> bytes:
 def from_json(body: bytes) -> dict[str, Any]:
     """Return the JSON object in the body of a frame. Raises Malformed for invalid or too deeply nested JSON."""
     try:
-        content = json.loads(body.decode(), parse_constant=_reject_constant)
-        json.dumps(content, ensure_ascii=False).encode()  # raises ValueError for text that UTF-8 cannot represent
+        content = json.loads(body.decode())
+        # Raises ValueError for nan, infinity, and numbers such as 1e999, and for text that UTF-8 cannot represent.
+        json.dumps(content, ensure_ascii=False, allow_nan=False).encode()
     except (ValueError, RecursionError) as error:
         raise Malformed(f"its body is not JSON: {error}") from None
     if not isinstance(content, dict):
@@ -81,11 +82,6 @@ def from_json(body: bytes) -> dict[str, Any]:
     if _has_more_levels(content, MAX_JSON_DEPTH):
         raise Malformed(f"its body is nested deeper than {MAX_JSON_DEPTH}")
     return content
-
-
-def _reject_constant(word: str) -> None:
-    """Raise ValueError for NaN or Infinity in JSON."""
-    raise ValueError(f"{word} is not a JSON number")
 
 
 def _has_more_levels(content: Any, limit: int) -> bool:

@@ -154,6 +154,7 @@ def test_any_answer_is_decoded_or_malformed(body: bytes) -> None:
     [
         '{"kind": "plan.made", "data": {"length": NaN}}',
         '{"kind": "plan.made", "data": {"length": [-Infinity]}}',
+        '{"kind": "plan.made", "data": {"length": 1e999}}',
         '{"kind": "plan.made", "name": "\\ud800"}',
         '{"kind": "goal.failed", "data": {"message": "\\udfff"}}',
         '{"kind": "plan.made", "data": {"x": ' + 900 * "[" + 900 * "]" + "}}",
@@ -166,10 +167,17 @@ def test_an_event_that_cannot_be_logged_is_refused(answer: str) -> None:
             GoalTracker(True, 240).process(240, event)
 
 
-@pytest.mark.parametrize("expected", ['{"protocol": 1, "name": "\\ud800"}', '{"protocol": 1, "about": {"x": NaN}}'])
-def test_a_welcome_that_cannot_be_logged_is_refused(expected: str) -> None:
+@pytest.mark.parametrize(
+    "welcome",
+    [
+        '{"protocol": 1, "name": "\\ud800"}',
+        '{"protocol": 1, "about": {"x": NaN}}',
+        '{"protocol": 1, "about": {"x": 1e999}}',
+    ],
+)
+def test_a_welcome_that_cannot_be_logged_is_refused(welcome: str) -> None:
     with pytest.raises((ProtocolViolation, wire.Malformed)):
-        Welcome.parse(wire.WELCOME, expected.encode(), ())
+        Welcome.parse(wire.WELCOME, welcome.encode(), ())
 
 
 @pytest.mark.parametrize("topic", ["/particle_cloud", "/particle_cloud/exact"])
