@@ -4,7 +4,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from simscen.core.clock import Clock
-from simscen.core.environment.costmap_filters import Zones
+from simscen.core.environment.costmap_filters import Filter, Zones
 from simscen.core.external_command import ExternalCommand
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP
@@ -115,10 +115,10 @@ class ExternalStack:
         self._canceling = True
         self._interrupt(wire.CANCEL, {"tick": tick, "all": True, "reason": "canceled"})
 
-    @property
-    def can_switch_zones(self) -> bool:
-        """Whether the stack has subscribed to the topic of a zone mask."""
-        return not {KEEPOUT_ZONES.name, SPEED_ZONES.name}.isdisjoint(self._welcome.topics)
+    def receives_zones_of(self, costmap_filter: Filter) -> bool:
+        """Return whether the stack has subscribed to the zone mask of this costmap filter."""
+        topic = KEEPOUT_ZONES if costmap_filter == "keepout" else SPEED_ZONES
+        return topic.name in self._welcome.topics
 
     def set_zones(self, tick: int, zones: Zones) -> None:
         """Send the masks that change with the enabled `zones`, together with the next step."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from simscen.core.clock import Clock
-from simscen.core.environment.costmap_filters import ZoneSwitch
+from simscen.core.environment.costmap_filters import Filter, ZoneSwitch
 from simscen.core.environment.world_model import Patch, WalkingPedestrian, World
 from simscen.core.geometry import Polygon, Pose2
 from simscen.core.geometry.shapes import Body, MotionPath
@@ -233,8 +233,9 @@ class LiveStage:
             stage.record_event(event)
 
     def switch_zone(self, order: ZoneSwitch) -> str:
-        if not isinstance(self._stack, CheckedStack | ExternalStack) or not self._stack.can_switch_zones:
-            return "the stack does not support switching zones"
+        stack = self._zone_receiver(order.filter)
+        if stack is None:
+            return f"the stack does not support switching {order.filter} zones"
         if reason := self._filters.rejection_reason(order):
             return reason
         for region in self._filters.switch(order):
@@ -242,9 +243,16 @@ class LiveStage:
             data: dict[str, Value] = {"filter": order.filter, "enabled": order.enabled}
             data |= {"speed_limit": limit} if limit and order.enabled else {}
             self.record_event(Event(0, EventKind.ZONE_SWITCHED, region, data))
-        zones, set_zones = self._filters.zones, self._stack.set_zones
-        self._send_order(lambda tick: set_zones(tick, zones))
+        zones = self._filters.zones
+        self._send_order(lambda tick: stack.set_zones(tick, zones))
         return ""
+
+    def _zone_receiver(self, costmap_filter: Filter) -> CheckedStack | ExternalStack | None:
+        """Return the stack if it can switch the zones of this costmap filter, else None."""
+        stack = self._stack
+        if isinstance(stack, ExternalStack):
+            return stack if stack.receives_zones_of(costmap_filter) else None
+        return stack if isinstance(stack, CheckedStack) and stack.can_switch_zones else None
 
     def record_event(self, event: Event) -> None:
         stamped = event if event.tick else replace(event, tick=self.tick)

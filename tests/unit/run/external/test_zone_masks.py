@@ -65,13 +65,19 @@ def test_speed_mask_is_sent_again_when_events_switch_its_zones(play, tmp_path: P
     assert heard == [["20", "0"], ["20", "10"], ["0", "10"]]
 
 
-def test_stack_without_these_topics_does_not_support_switching(play) -> None:
-    events = "[{name: x, when: {time: 0.5}, do: {keepout: {region: far}}, required: false}]"
+@pytest.mark.parametrize(("topic", "happened"), [("/odom", [False, False]), ("/keepout_zones", [True, False])])
+def test_stack_switches_only_the_zones_whose_topic_it_receives(play, topic: str, happened: list[bool]) -> None:
+    events = (
+        "[{name: x, when: {time: 0.5}, required: false, "
+        "do: [{keepout: {region: far}}, {speed_zone: {region: near, speed_limit: 0.1}}]}]"
+    )
     run = play(
-        'peer = Peer("mine", topics=["/odom"])\nfor step in peer: step.drive(0.0, 0.0)\n', world=WORLD, events=events
+        f'peer = Peer("mine", topics=["{topic}"])\nfor step in peer: step.drive(0.0, 0.0)\n',
+        world=WORLD,
+        events=events,
     )
     (done,) = run.trace.of_kind(EventKind.EVENT_ENDED)
-    assert [effect["happened"] for effect in done.data["effects"]] == [False]
+    assert [effect["happened"] for effect in done.data["effects"]] == happened
 
 
 def test_scenario_without_zones_has_no_masks() -> None:
