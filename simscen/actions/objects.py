@@ -123,12 +123,12 @@ class Move(Motion, WorldAction):
     """The object to move."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Start the motion. Has no effect if the object does not exist or is already at all its waypoints."""
+        """Start the motion. Has no effect if the object does not exist, or if it rests at all its waypoints."""
         pose = stage.object(self.name)
         if pose is None:
             return Effect(False, f"there is nothing called {self.name}")
         path = self.path(pose)
-        if all(is_same_pose(pose, each) for each in path.poses):
+        if stage.motion(self.name) is None and all(is_same_pose(pose, each) for each in path.poses):
             return Effect(False, f"{self.name} is already at its waypoint")
         stage.move(self.name, path)
         return Effect(True, f"moved {self.name}")

@@ -103,6 +103,13 @@ def test_keyframes_at_the_pose_of_the_object_have_no_effect():
     assert perform(stage, move={"name": "cart", "keyframes": [[2, 1, 2.1, 0.5]]}).happened
 
 
+def test_moving_object_that_passes_its_waypoint_can_be_moved_to_it():
+    circuit = MotionPath((0.0, 1.0, 2.0), (Pose2(1, 2), Pose2(2, 2), Pose2(1, 2)), "loop")
+    stage = FakeStage(objects={"cart": Pose2(1.0, 2.0, 0.0)}, motions={"cart": (circuit, 2.0)})
+    assert perform(stage, move={"name": "cart", "keyframes": [[1, 1, 2, 0]]}).happened
+    assert pose_at(moved(stage), 1.5) == Pose2(1.0, 2.0, 0.0)
+
+
 def test_stopped_object_stays_at_its_pose():
     path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)))
     stage = FakeStage(motions={"cart": (path, 1.5)}, objects={"cart": Pose2(1.5, 0.0, 0.0)})
