@@ -91,7 +91,7 @@ class FaultEffect:
     """Whether a fault on a sensor also changes the motion of the robot. If so, `command` is called as well."""
 
     def reading(self, reading: Reading) -> Reading | None:
-        """Return the reading that the stack receives instead; None to drop or delay the reading."""
+        """Return the reading that the stack receives instead; None to drop or delay it, except if `measures_again`."""
         return reading
 
     def arriving_readings(self) -> Sequence[Reading]:

@@ -115,7 +115,10 @@ class FaultInjector:
         """Return the measurement that a sensor with faults makes instead of `reading`. Call it at each measurement."""
         for active in self._in_order() if self.active else ():
             if active.measures_again and active.affects(reading):
-                reading = self._disturb_reading(active, reading) or reading
+                disturbed = self._disturb_reading(active, reading)
+                if disturbed is None:
+                    self._raise_invalid(active.index, "withheld a measurement, although it `measures_again`")
+                reading = disturbed
         return reading
 
     def disturb(self, readings: Readings) -> Readings:

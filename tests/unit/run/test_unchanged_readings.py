@@ -1,4 +1,4 @@
-"""A fault takes effect if it changes any field of a reading by more than rounding."""
+"""A fault takes effect if it changes any field of a reading by more than rounding. It must not lose a measurement."""
 
 from copy import deepcopy
 from dataclasses import fields, replace
@@ -6,10 +6,16 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from simscen.core.errors import RunError
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.sensor_data import Bump, Image, Imu, Odometry, Reading, Scan
-from simscen.run.faults.injector import _equal
+from simscen.core.random_streams import Streams
+from simscen.faults.base import FaultSetting
+from simscen.faults.message_loss import Off
+from simscen.model.disturbances import FaultEntry
+from simscen.run.faults.command_link import CommandLink
+from simscen.run.faults.injector import FaultInjector, _equal
 
 TILTED = Pose3(0.1, 0.0, 0.3, 0.0, np.sin(0.1), 0.0, np.cos(0.1))
 SCAN = Scan("lidar", 24, np.array([1.0, np.inf, np.nan]), -1.0, 0.5, 0.1, 8.0)
@@ -49,3 +55,14 @@ def test_a_change_of_any_field_is_a_change(reading: Reading) -> None:
         else:
             other = value + 1
         assert not _equal(reading, replace(reading, **{field.name: other})), field.name
+
+
+def test_a_fault_that_measures_again_must_not_withhold_the_measurement(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Off, "measures_again", True)
+    entry = FaultEntry.model_validate({"sensor": "lidar", "off": {}})
+    setting = FaultSetting(kind="Scan")
+    injector = FaultInjector([entry], Streams(1), lambda _: setting, CommandLink(12, 120), lambda event: None)
+    injector.begin(0)
+    with pytest.raises(RunError) as raised:
+        injector.measure(SCAN)
+    assert raised.value.kind == "broken-component"
