@@ -55,7 +55,8 @@ def main() -> None:
     pidfd = os.pidfd_open(process.pid)
     released = _watch(process, pidfd, control, report)
     if not _has_exited(pidfd, EXIT_GRACE_S if released else 0.0):
-        os.killpg(process.pid, signal.SIGTERM)
+        with suppress(PermissionError):  # a program of another user, such as sudo
+            os.killpg(process.pid, signal.SIGTERM)
         _has_exited(pidfd, TERM_GRACE_S)
     kill_children_except(())
 

@@ -86,7 +86,7 @@ def has_running_children() -> bool:
 def kill_children_except(kept: Iterable[int]) -> None:
     """Kill and reap all children of this process and their descendants, except the children with the ids `kept`.
 
-    Call `adopt_orphans` once before.
+    Call `adopt_orphans` once before. Programs of other users, such as `sudo`, cannot be killed, and continue.
     """
     own, excluded = os.getpid(), set(kept)
     while True:
@@ -96,8 +96,12 @@ def kill_children_except(kept: Iterable[int]) -> None:
         if not children:
             return
         for pid in children:
-            os.kill(pid, signal.SIGKILL)
-            os.waitpid(pid, 0)
+            try:
+                os.kill(pid, signal.SIGKILL)
+            except PermissionError:
+                excluded.add(pid)
+            else:
+                os.waitpid(pid, 0)
 
 
 def _parent(pid: int) -> int:

@@ -1,9 +1,12 @@
 """Tests of the cleanup of processes."""
 
+import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 from simscen.ros2.launch import descendants
 
@@ -16,6 +19,20 @@ child = subprocess.Popen([sys.argv[1], "60"])
 kill_children_except(())
 print(child.poll() is not None)
 """
+KILL_AS_NOBODY = """
+import os, subprocess
+from simscen.run.process.isolation import kill_children_except
+foreign = subprocess.Popen(["sleep", "5"])
+os.setresuid(65534, 65534, 0)
+own = subprocess.Popen(["sleep", "60"])
+kill_children_except(())
+ended = foreign.poll() is not None, own.poll() is not None
+os.setresuid(0, 0, 0)
+foreign.kill()
+foreign.wait()
+print(*ended)
+"""
+"""Starts a program as root, and then kills the children as another user."""
 
 
 def copy_of_sleep(folder: Path) -> str:
@@ -28,6 +45,12 @@ def test_children_with_a_name_that_is_cut_within_a_character_are_killed(tmp_path
     argv = [sys.executable, "-c", KILL, copy_of_sleep(tmp_path)]
     ended = subprocess.run(argv, capture_output=True, text=True, check=False)
     assert (ended.stdout, ended.stderr) == ("True\n", "")
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can start a program of another user without a password")
+def test_a_child_of_another_user_does_not_prevent_the_killing_of_others() -> None:
+    ended = subprocess.run([sys.executable, "-c", KILL_AS_NOBODY], capture_output=True, text=True, check=False)
+    assert (ended.stdout, ended.stderr) == ("False True\n", "")
 
 
 def test_descendants_with_a_name_that_is_cut_within_a_character_are_found(tmp_path: Path) -> None:
