@@ -8,18 +8,17 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-from simscen.cli.diagnostics import paths_from_working_folder, relative_to_working_folder
+from simscen.cli.diagnostics import escaped, paths_from_working_folder, relative_to_working_folder
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.output_files import Reports, require_writable_junit
 from simscen.cli.session.pending_runs import plan_runs
 from simscen.cli.session.scenario_session import finish_session, start_session
-from simscen.cli.session.selection import require_not_skipped
 from simscen.cli.session.stacks import parse_stacks
 from simscen.cli.session.terminal import Screen, open_screen
 from simscen.cli.session.user_files import require_writable
 from simscen.cli.shared_options import OutputOptions
-from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, UsageError
+from simscen.core.errors import Exit, InvalidInput, NothingSelected, Problem, SimscenError, UsageError
 from simscen.core.records.run_result import PROPOSAL_PREFIX, Outcome, RunResult
 from simscen.core.records.session_events import RunFinished, SessionStarted, broadcast
 from simscen.core.records.verdict import Status
@@ -34,6 +33,7 @@ from simscen.loading.scenario import ChangedScenario
 from simscen.loading.variations.conditions import ConditionError
 from simscen.loading.variations.expand import Variation
 from simscen.loading.variations.search_space import SearchSpace, search_space
+from simscen.loading.yaml.tree import MappingNode, child
 from simscen.report.display_text import number_with_noun
 from simscen.report.journal import Journal
 from simscen.report.journal_reader import PlannedRun
@@ -109,7 +109,7 @@ class Falsification:
     """Search that runs a scenario with proposed values, and writes a scenario file for each distinct failure."""
 
     def __init__(self, request: FalsifyRequest) -> None:
-        """Read the scenario and its ranges. Raises InvalidInput and UsageError."""
+        """Read the scenario and its ranges. Raises InvalidInput, UsageError, and NothingSelected."""
         self._request = request
         root = request.root or default_root([request.file])
         stacks = parse_stacks([] if request.stack is None else [request.stack], root, request.world_path)
@@ -119,6 +119,7 @@ class Falsification:
             space = search_space(self._scenario.merged_tree)
             if not isinstance(space, SearchSpace):
                 raise InvalidInput(space)
+        _require_unmarked(self._scenario.merged_tree, request.file)
         self._root, self._space = root, space
         self._checker = FileChecker(root, request.world_path, request.lenient, stacks=stacks)
         self._search: Search = make_search(request.method, space.choice_counts, request.search_seed)
@@ -234,9 +235,6 @@ class Falsification:
         if isinstance(loaded, list):
             self._problems = loaded
             return None
-        require_not_skipped(loaded)
-        if loaded.spec.expected is not None:
-            raise UsageError(f"{self._request.file} is marked with `expected`; remove it to search for failures")
         checked, problems = self._checker.check_variation(
             loaded.with_changes(variation=name, varied_values=variation.values)
         )
@@ -274,6 +272,15 @@ class Falsification:
         text = self._scenario.text_in(file.parent, tree, comment)
         write_atomically(file, text.encode())
         self.found.append(FoundFailure(file, finished, variation.values))
+
+
+def _require_unmarked(scenario: MappingNode, file: Path) -> None:
+    """Raise NothingSelected if the scenario is marked with `skip`, and UsageError if it is marked with `expected`."""
+    skip, expected = (child(scenario, key) for key in ("skip", "expected"))
+    if skip is not None and skip.plain is not None:
+        raise NothingSelected(f"{file} is marked with `skip`: {escaped(str(skip.plain))}")
+    if expected is not None and expected.plain is not None:
+        raise UsageError(f"{file} is marked with `expected`; remove it to search for failures")
 
 
 def _new_failure_file(scenario: Path) -> Path:

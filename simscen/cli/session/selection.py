@@ -22,12 +22,6 @@ from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.variations.naming import number_of
 
 
-def require_not_skipped(scenario: LoadedScenario) -> None:
-    """Raise NothingSelected if the scenario is marked with `skip`."""
-    if scenario.spec.skip is not None:
-        raise NothingSelected(f"{scenario.title} is marked with `skip`: {escaped(scenario.spec.skip)}")
-
-
 class _ParallelJob(NamedTuple):
     """Environment variables of a CI system that number parallel jobs.
 

@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
-from simscen.cli.diagnostics import as_text, paths_from_working_folder, print_text
+from simscen.cli.diagnostics import as_text, escaped, paths_from_working_folder, print_text
 from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.exit_codes import exit_code
 from simscen.cli.session.live_page import LivePage
@@ -25,10 +25,10 @@ from simscen.cli.session.pending_runs import (
     write_reused,
 )
 from simscen.cli.session.scenario_session import finish_session, plugins_and_stacks, start_session
-from simscen.cli.session.selection import Selection, load_selection, require_not_skipped
+from simscen.cli.session.selection import Selection, load_selection
 from simscen.cli.session.terminal import open_screen
 from simscen.cli.shared_options import OutputOptions
-from simscen.core.errors import Exit, InvalidInput, Problem, SimscenError, UsageError
+from simscen.core.errors import Exit, InvalidInput, NothingSelected, Problem, SimscenError, UsageError
 from simscen.core.random_streams import MAX_SEED
 from simscen.core.records.run_result import scenario_title
 from simscen.core.records.run_store import RunStore
@@ -126,7 +126,8 @@ class _StudySession:
         first_number = None if self._space is None else next(_allowed_numbers(self._space, request.file))
         scenario = self._load([first_number])[0]
         acceptance = scenario.spec.acceptance
-        require_not_skipped(scenario)
+        if scenario.spec.skip is not None:
+            raise NothingSelected(f"{scenario.title} is marked with `skip`: {escaped(scenario.spec.skip)}")
         if acceptance is not None:
             claim = acceptance.pass_rate
             self._claim = claim if request.runs is None else claim.model_copy(update={"runs": request.runs})

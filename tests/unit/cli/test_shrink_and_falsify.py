@@ -270,6 +270,8 @@ def test_unsearchable_scenario_is_an_error(
     done = simscen("falsify", "a.scenario.yaml", *options)
     assert done.code == (5 if "skip" in ranges else 2)
     assert message in done.err
+    if "marked" in message:
+        assert not (tmp_path / "simscen-out").exists()
 
 
 TORQUES = "variations: {sampled: {count: 4, values: {robot.motor_torque: {uniform: [50 %, 100 %]}}}}\n"
