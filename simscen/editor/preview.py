@@ -11,10 +11,10 @@ from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.polylines import polyline_length
 from simscen.editor.checking import TextChecks
+from simscen.loading.builders import extend_bounds
 from simscen.loading.checks.scene import Scene
 from simscen.loading.goals import scenario_goals
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.open_ground import extend_bounds
 from simscen.loading.robot_size import RobotSize, blocking_world, robot_size
 from simscen.worlds.routes.shortest_paths import ShortestPaths
 

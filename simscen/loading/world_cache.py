@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 from simscen.core.environment.world_model import World
 from simscen.core.files import collect_read_files, record_read_file
 from simscen.core.geometry.shapes import Solid
-from simscen.loading.builders import load_world
+from simscen.loading.builders import Bounds, load_world
 from simscen.loading.loaded import LoadedScenario, LoadedWorld
 from simscen.worlds.routes.simple_paths import SimplePaths, simple_paths_between
 
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 Solids = tuple[Solid, ...]
 Paths = TypeVar("Paths")
-Bounds = tuple[float, float, float, float]
-"""(min x, min y, max x, max y) in m."""
 
 
 @dataclass

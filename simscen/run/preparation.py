@@ -13,10 +13,16 @@ from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import Estimate
 from simscen.core.records.case import CLEARANCE_RANGE_M, ROBOT_NAME, Case
 from simscen.criteria.base import Criterion
-from simscen.loading.builders import load_criterion_masks, load_map, load_masks, load_robot, load_world
+from simscen.loading.builders import (
+    load_criterion_masks,
+    load_map,
+    load_masks,
+    load_robot,
+    load_world,
+    with_stops_in_bounds,
+)
 from simscen.loading.goals import event_goals, expected_failures, scenario_goals
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.open_ground import with_stops_in_bounds
 from simscen.loading.plugins import plugins_of
 from simscen.loading.robot_size import blocking_solids
 from simscen.model.localizers import OdometryOnly

@@ -15,9 +15,8 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.environment.world_model import BuiltWorld, World
 from simscen.core.geometry import Pose2
 from simscen.core.messages.goals import Goal
-from simscen.loading.builders import load_world
+from simscen.loading.builders import load_world, with_stops_in_bounds
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.open_ground import with_stops_in_bounds
 from simscen.run.disk_cache import DiskCache
 from simscen.run.platform_fingerprint import arithmetic_fingerprints, software_versions, source_digest
 from simscen.run.preparation import PreparedScenario, map_resolution, prepare

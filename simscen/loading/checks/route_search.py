@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from simscen.core.geometry import Polygon, Pose2
 from simscen.core.geometry.polygons import distance_to_polygon
 from simscen.core.geometry.shapes import Solid
+from simscen.loading.builders import extend_bounds
 from simscen.loading.checks.scene import Scene
-from simscen.loading.open_ground import extend_bounds
 from simscen.loading.yaml.tree import Keys
 from simscen.worlds.routes.simple_paths import SimplePaths
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.files import require_not_input, require_regular_file
-from simscen.loading.builders import load_robot, world_from_file
+from simscen.loading.builders import load_robot, with_stops_in_bounds, world_from_file
 from simscen.loading.checks import masks, placement, regions, routes
 from simscen.loading.checks.built_world import check_built_world
 from simscen.loading.checks.registry import TIMING, WORLD
@@ -15,7 +15,6 @@ from simscen.loading.checks.runner import check_scenario
 from simscen.loading.checks.scene import Scene
 from simscen.loading.files.paths import path_in_messages
 from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
-from simscen.loading.open_ground import with_stops_in_bounds
 from simscen.loading.robot_size import blocking_world, robot_size
 from simscen.loading.world_cache import WorldCache
 from simscen.worlds.extent import oversize_hint
