@@ -15,9 +15,16 @@ import numpy as np
 from simscen.core.clock import NS_PER_SECOND
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, Pose3
-from simscen.reconstruction.drive.clocks import MAX_CLOCK_DIFFERENCE_NS, adjust_clock_rate, clock_offset
 from simscen.reconstruction.drive.goals import find_goals, goals_from_motion, trim_to_first_goal
-from simscen.reconstruction.drive.log_messages import LoggedMessage, LogMessages, PolygonMessage, collect_messages
+from simscen.reconstruction.drive.log_messages import (
+    MAX_CLOCK_DIFFERENCE_NS,
+    LoggedMessage,
+    LogMessages,
+    PolygonMessage,
+    adjust_clock_rate,
+    clock_offset,
+    collect_messages,
+)
 from simscen.reconstruction.drive.recorded_drive import (
     DEFAULT_LIDAR_HEIGHT_M,
     Mask,
