@@ -77,8 +77,8 @@ class GoalOutcome:
 def goal_outcomes(trace: Trace, case: Case) -> list[GoalOutcome]:
     """Return the outcome of each goal of the scenario and of each goal that an event sent, sorted by `outcome_start`.
 
-    Goals without any report come last. A via pose (a pose that the robot passes without a stop)
-    without reports gets the outcome of the next goal at which the robot stops, as Nav2 reports only whole actions.
+    Goals without any report come last. A via pose (a pose that the robot passes without a stop) without reports gets
+    the outcome of the next goal at which the robot stops, as Nav2 reports only whole actions.
     """
     reports = _reports_by_goal(trace)
     unused = {name: iter(own) for name, own in reports.items()}

@@ -28,8 +28,8 @@ def combine_robots(
     """Return the result of a run from the results and traces of its robots, by name of the robot.
 
     The run passes if all robots pass. Verdicts, metrics, and faults of a robot get the name `robot/name`. Events of the
-    world and verdicts on them are listed once. The metric `success` of the run is 1 if it is 1 for all robots
-    with goals. `expected` is the expected failure of the run; None to expect success.
+    world and verdicts on them are listed once. The metric `success` of the run is 1 if it is 1 for all robots with
+    goals. `expected` is the expected failure of the run; None to expect success.
     """
     first = next(iter(results.values()))
     shared = {one.disturbance.name for one in first.disturbances if one.disturbance.kind == "event"}

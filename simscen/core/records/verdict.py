@@ -76,8 +76,7 @@ class ExpectedFailure:
     """Declaration in a scenario that its runs are expected to fail.
 
     `criteria` contains the ids of the verdicts of which none may pass and at least one must fail. If it is empty, at
-    least one verdict must fail. `line` is the line in the
-    scenario file; 0 if unknown.
+    least one verdict must fail. `line` is the line in the scenario file; 0 if unknown.
     """
 
     reason: str
