@@ -277,7 +277,8 @@ class ForeignTraceReader:
             case "scan":
                 self.rows.scans.extend(ticks.tolist())
             case "plan":
-                self.rows.plans.extend((int(tick), plan.poses) for tick, plan in zip(ticks, values, strict=True))
+                order = np.argsort(ticks, kind="stable").tolist()
+                self.rows.plans.extend((int(ticks[k]), values[k].poses) for k in order)
 
     def _add_goals(self) -> None:
         messages = sorted(self._decoded.by_role["status"], key=lambda message: message[0])

@@ -12,6 +12,7 @@ from foreign_logs import (
     LATENCY,
     SECOND,
     SPEED,
+    STORE,
     Message,
     believed,
     drive,
@@ -212,6 +213,18 @@ def test_single_messages_without_a_stamp_do_not_move_the_others(
         np.testing.assert_array_equal(found.values, wanted.values[rows])
     assert len(trace.scans) == len(expected.scans)
     assert np.abs(trace.scans - expected.scans).max() <= 20
+
+
+def test_plans_are_in_the_order_of_their_stamps(read: Callable[..., ForeignLog]) -> None:
+    plan = STORE.types["nav_msgs/msg/Path"]
+    late = [
+        Message(
+            "/plan", BEGIN + logged * SECOND, plan(header(BEGIN + at * SECOND, "map"), [stamped_pose(0, "map", at)])
+        )
+        for logged, at in ((5, 4), (6, 3), (8, 7))
+    ]
+    plans = read([*drive(), *late]).trace.plans
+    assert [(one.tick, one.points[0, 0]) for one in plans] == [(3000, 3.0), (4000, 4.0), (7000, 7.0)]
 
 
 def test_log_times_replace_zero_stamps(read: Callable[..., ForeignLog]) -> None:
