@@ -3,7 +3,7 @@
 import math
 from xml.etree import ElementTree as ET
 
-from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry import Array, Pose3, Vector
 from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
 from simscen.sim.body.outline import hull_points
 from simscen.sim.body.robot_body import RobotBody
@@ -68,10 +68,17 @@ def _add_shape(link: ET.Element, solid: Solid) -> None:
 
 
 def _add_origin(element: ET.Element, pose: Pose3) -> None:
+    angles = _roll_pitch_yaw(pose)
+    ET.SubElement(element, "origin", xyz=_join_numbers(*pose.position), rpy=_join_numbers(*angles))
+
+
+def _roll_pitch_yaw(pose: Pose3) -> Vector:
+    """Return the angles in rad whose rotations about the fixed axes x, y, and z, in this order, give the rotation."""
     x, y, z, w = pose.quaternion
-    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
-    ET.SubElement(element, "origin", xyz=_join_numbers(*pose.position), rpy=_join_numbers(roll, pitch, pose.yaw))
+    sine = 2 * (w * y - z * x)
+    if abs(sine) > 1 - 1e-12:  # pitched by 90 degrees, only the sum or difference of roll and yaw is determined
+        return 0.0, math.copysign(math.pi / 2, sine), math.copysign(2.0, sine) * math.atan2(-x, w)
+    return math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)), math.asin(sine), pose.yaw
 
 
 def _join_numbers(*values: float) -> str:

@@ -1,9 +1,15 @@
 """Tests of URDF output, which is read back equal."""
 
+import math
+from dataclasses import replace
+from xml.etree import ElementTree as ET
+
 import numpy as np
 import pytest
 from simulation_helpers import robot_spec
 
+from simscen.core.geometry import Pose3
+from simscen.core.geometry.shapes import Box, Solid
 from simscen.sim.body.from_spec import build_robot_body
 from simscen.sim.body.outline import hull_points
 from simscen.sim.urdf.writer import to_urdf
@@ -36,3 +42,13 @@ def test_omnidirectional_robot_from_urdf_touches_the_ground_and_drives_sideways(
     simulation = simulate(body, drive=(0.0, 0.3, 0.0))
     simulation.step(480)
     assert simulation.truth().twist == pytest.approx((0.0, 0.3, 0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("pitch", [-math.pi / 2, -0.4, 0.0, 1.5, math.pi / 2])
+@pytest.mark.parametrize(("roll", "yaw"), [(0.0, 0.0), (0.5, 0.0), (0.0, -1.2), (-2.8, 2.9)])
+def test_orientation_of_a_shape_is_kept_at_every_pitch(roll, pitch, yaw):
+    body = build_robot_body(robot_spec("turtlebot"))
+    tilted = Solid(Box((0.1, 0.2, 0.3)), Pose3.from_rpy(0.0, 0.0, 0.5, roll, pitch, yaw), "mast")
+    root = ET.fromstring(to_urdf(replace(body, hull=(tilted,))))
+    written = [float(word) for word in root.find("link/collision/origin").get("rpy").split()]
+    assert Pose3.from_rpy(0.0, 0.0, 0.0, *written).rotation() == pytest.approx(tilted.pose.rotation(), abs=1e-6)
