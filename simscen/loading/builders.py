@@ -39,7 +39,10 @@ Bounds = tuple[float, float, float, float]
 
 def load_world(loaded: LoadedScenario) -> World:
     """Build the world of a scenario. Raises InvalidInput for an unusable map image or SDF file."""
-    return world_from_file(loaded.world, loaded.root, loaded.world_path, loaded.lenient)
+    try:
+        return world_from_file(loaded.world, loaded.root, loaded.world_path, loaded.lenient)
+    except InvalidInput as error:
+        raise InvalidInput([p if p.source else loaded.with_source_line(p) for p in error.problems]) from error
 
 
 def with_stops_in_bounds(world: World, loaded: LoadedScenario) -> World:
@@ -83,11 +86,33 @@ def world_from_file(source: LoadedWorld, root: Path, world_path: Sequence[Path] 
         from simscen.worlds.sdf import load_sdf
 
         base = load_sdf(source.sdf, search=world_path, root=root, lenient=lenient)
+        _check_names(source, base)
     if source.map is not None:
         from simscen.worlds.maps import ros_map
 
         grid, notes = ros_map.load_map(source.map.spec, source.map.image)
     return world_from_spec(source.spec or WorldSpec(simscen=1), source.name, grid, base, notes)
+
+
+def _check_names(source: LoadedWorld, sdf: World) -> None:
+    """Raise InvalidInput if something in a world file has the name of a body of its SDF file."""
+    if source.spec is None or source.tree is None:
+        return
+    taken = {body.name for body in sdf.bodies}
+    named = {"obstacles": source.spec.obstacles, "objects": source.spec.objects, "doors": source.spec.doors}
+    problems = [
+        Problem(
+            *value_position(source.tree, (key, index, "name")),
+            "SC033",
+            f"a model of the SDF file is also called {quoted(entry.name)}",
+            "choose another name",
+        )
+        for key, entries in named.items()
+        for index, entry in enumerate(entries)
+        if entry.name in taken
+    ]
+    if problems:
+        raise InvalidInput(problems)
 
 
 def load_map(source: LoadedMap) -> OccupancyGrid:

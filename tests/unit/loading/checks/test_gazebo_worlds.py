@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from simscen.core.environment.occupancy_grid import FREE
-from simscen.core.errors import Problem
+from simscen.core.errors import InvalidInput, Problem
+from simscen.loading.builders import load_world
 from simscen.loading.checks.scene_runner import check_in_world
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
@@ -112,3 +113,26 @@ def test_without_a_map_a_world_may_be_larger_than_any_map(tmp_path):
     loaded = load(tmp_path, GROUND + STAGE, lines="map: none")
     assert not errors(loaded)
     assert prepare(loaded).map is None
+
+
+WORLD_FILE = """
+simscen: 1
+sdf: w.sdf
+objects:
+  - {name: cart, box: [0.5, 0.5, 0.5], mass: 5, pose: {x: 3, y: 3}}
+doors:
+  - {name: gate, points: [[4, 4], [5, 4]]}
+"""
+
+
+def test_object_with_the_name_of_a_model_is_an_error_in_the_world_file(tmp_path):
+    movable = box("cart", 3, (0.5, 0.5, 0.5)).replace("<static>1</static>", "")
+    load(tmp_path, GROUND + WALL + movable)
+    (tmp_path / "w.world.yaml").write_text(WORLD_FILE)
+    scenario = tmp_path / "a.scenario.yaml"
+    scenario.write_text(scenario.read_text().replace("world: w.sdf", "world: w.world.yaml"))
+    with pytest.raises(InvalidInput) as caught:
+        load_world(load_scenario(scenario, tmp_path))
+    [problem] = caught.value.problems
+    assert (problem.path, problem.line, problem.col, problem.code) == ("w.world.yaml", 5, 12, "SC033")
+    assert problem.source == WORLD_FILE.split("\n")[4]
