@@ -16,6 +16,8 @@ from simscen.core.geometry import Array
 from simscen.core.geometry.shapes import Mesh, TriangleMesh
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy.typing as npt
 
     Faces = npt.NDArray[np.int32]
@@ -38,6 +40,13 @@ def submesh(vertices: Array, faces: Faces) -> Mesh:
     needed = np.zeros(len(vertices), dtype=np.bool_)
     needed[faces] = True
     return Mesh(vertices[needed], (np.cumsum(needed, dtype=np.int32) - np.int32(1))[faces])
+
+
+def concatenate_meshes(meshes: Sequence[Mesh]) -> Mesh:
+    """Return one mesh with the triangles of all meshes, which must have the same frame."""
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
+    faces = [mesh.faces + np.int32(start) for mesh, start in zip(meshes, starts, strict=True)]
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
 def submesh_between_heights(vertices: Array, faces: Faces, heights: tuple[float, float]) -> Mesh:

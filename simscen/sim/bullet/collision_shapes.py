@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from simscen.core.geometry import Array
-from simscen.core.geometry.meshes import FLOOR_HEIGHT_M, submesh
+from simscen.core.geometry.meshes import FLOOR_HEIGHT_M, concatenate_meshes, submesh
 from simscen.core.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
 from simscen.sim.body.outline import hull_points, reduce_hull_vertices
 from simscen.sim.bullet import pybullet
@@ -123,11 +123,8 @@ def are_primitives(solids: Sequence[Solid]) -> bool:
 
 def fuse_surfaces(solids: Sequence[Solid], triangulate: Triangulate) -> Mesh:
     """Return the surfaces of solids as one mesh."""
-    meshes = [(triangulate(solid.shape), solid.pose) for solid in solids]
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh, _ in meshes)])
-    vertices = np.concatenate([pose.apply(mesh.vertices) for mesh, pose in meshes])
-    faces = [mesh.faces + np.int32(start) for (mesh, _), start in zip(meshes, starts, strict=False)]
-    return Mesh(vertices, np.concatenate(faces))
+    surfaces = [(triangulate(solid.shape), solid.pose) for solid in solids]
+    return concatenate_meshes([Mesh(pose.apply(surface.vertices), surface.faces) for surface, pose in surfaces])
 
 
 def _primitive_parameters(shape: Shape) -> tuple[int, Sequence[float], float, float]:

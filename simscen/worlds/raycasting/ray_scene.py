@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Set
 import numpy as np
 
 from simscen.core.geometry import Array, Pose3, Vector, forward_and_left
-from simscen.core.geometry.meshes import submesh_between_heights
+from simscen.core.geometry.meshes import concatenate_meshes, submesh_between_heights
 from simscen.core.geometry.ray_fans import Float32Array, RayCaster, RayFan
 from simscen.core.geometry.shapes import Mesh, TriangleMesh
 from simscen.worlds.raycasting.mesh_scene import (
@@ -132,11 +132,9 @@ class RestingGroup:
     def _scene_between(self, heights: HeightRange) -> MeshScene:
         """Return the scene of the triangles between two heights. It is kept until the heights change."""
         if self._scene is None or heights != self._heights:
-            meshes = list(self._meshes.values())
-            firsts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])]).tolist()
-            vertices = np.concatenate([mesh.vertices for mesh in meshes])
-            faces = np.concatenate([mesh.faces + np.int32(first) for mesh, first in zip(meshes, firsts, strict=True)])
-            self._scene = MeshScene(submesh_between_heights(vertices, faces, heights), self._world_center)
+            whole = concatenate_meshes(list(self._meshes.values()))
+            near = submesh_between_heights(whole.vertices, whole.faces, heights)
+            self._scene = MeshScene(near, self._world_center)
             self._heights = heights
         return self._scene
 

@@ -15,6 +15,7 @@ import numpy as np
 from simscen.assets.folders import UnusableFile
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.geometry import Array, Pose3
+from simscen.core.geometry.meshes import concatenate_meshes
 from simscen.core.geometry.shapes import Mesh, Solid
 from simscen.worlds.sdf.elements import MAX_COORDINATE_M, Element, read_bool, read_numbers, read_sizes
 from simscen.worlds.sdf.files import MAX_MESH_BYTES, WorldFiles
@@ -142,9 +143,8 @@ def _select_submesh(parts: tuple[MeshPart, ...], request: MeshRequest, element: 
 
 def _merge_parts(parts: tuple[MeshPart, ...], request: MeshRequest) -> Mesh:
     """Return one read-only mesh of all parts, centered and scaled as requested."""
-    vertices = np.vstack([part.vertices for part in parts])
-    starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
-    faces = np.vstack([part.faces + start for part, start in zip(parts, starts, strict=True)]).astype(np.int32)
+    whole = concatenate_meshes([Mesh(part.vertices, part.faces.astype(np.int32)) for part in parts])
+    vertices, faces = whole.vertices, whole.faces
     with np.errstate(over="ignore"):  # huge coordinates and scales become infinite
         if request.is_centered:
             vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
