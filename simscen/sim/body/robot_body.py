@@ -13,12 +13,7 @@ from simscen.core.geometry.shapes import Solid, Sphere
 from simscen.model.robot import Drive, Limits, Omnidirectional, RobotSpec
 from simscen.sim.body.inertia import MassProperties, combine
 from simscen.sim.body.outline import circle, convex_hull, footprint, hull_points, radius_and_height
-from simscen.sim.body.undercarriage import (
-    Wheel,
-    add_casters,
-    add_motors,
-    wheel_guards,
-)
+from simscen.sim.body.undercarriage import Wheel, add_casters, add_motors, wheel_guards
 
 
 @dataclass(frozen=True, eq=False)

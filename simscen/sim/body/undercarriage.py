@@ -129,8 +129,9 @@ def add_casters(
 ) -> tuple[MassProperties, tuple[Solid, ...]]:
     """Return the chassis and two casters, one in front of the axle and one behind it.
 
-    The loaded caster, on the side of the center of mass, touches the ground. The other one is CASTER_GAP_M above it.
-    The center of mass is shifted towards the loaded caster if MIN_MASS_OFFSET_RATIO requires it. `outline` is the
+    The loaded caster touches the ground. It is the front one if the center of mass is in front of the axle by more than
+    MIN_MASS_OFFSET_RATIO, otherwise the rear one. The other caster is CASTER_GAP_M above the ground. If the center of
+    mass is too near to the axle, it is shifted towards the loaded caster (see MIN_MASS_OFFSET_RATIO). `outline` is the
     outline of the hull from above.
     """
     radius = 0.5 * wheel_radius

@@ -6,18 +6,7 @@ from dataclasses import dataclass
 from typing_extensions import assert_never
 
 from simscen.core.geometry import Pose3
-from simscen.core.geometry.shapes import (
-    Box,
-    Capsule,
-    Cone,
-    Cylinder,
-    Ellipsoid,
-    Extrusion,
-    Mesh,
-    Shape,
-    Solid,
-    Sphere,
-)
+from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 from simscen.worlds.geometry.triangulation import enclosed_volume, triangulate
 from simscen.worlds.sdf.elements import Element, parse_bool, read_pose, read_positive, reference_frame
 from simscen.worlds.sdf.known_elements import report_unknown, report_unknown_children
