@@ -27,7 +27,7 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.yaml.textfile import with_source_line
 from simscen.loading.yaml.tree import Keys, MappingNode, key_position, value_position
 from simscen.model.robot import RobotSpec
-from simscen.model.world import WorldSpec
+from simscen.model.world import Door, WorldObject, WorldSpec
 from simscen.worlds.world_file import world_from_spec
 
 if TYPE_CHECKING:
@@ -99,7 +99,11 @@ def _check_names(source: LoadedWorld, sdf: World) -> None:
     if source.spec is None or source.tree is None:
         return
     taken = {body.name for body in sdf.bodies}
-    named = {"obstacles": source.spec.obstacles, "objects": source.spec.objects, "doors": source.spec.doors}
+    lists: dict[str, Sequence[WorldObject | Door]] = {
+        "obstacles": source.spec.obstacles,
+        "objects": source.spec.objects,
+        "doors": source.spec.doors,
+    }
     problems = [
         Problem(
             *value_position(source.tree, (key, index, "name")),
@@ -107,7 +111,7 @@ def _check_names(source: LoadedWorld, sdf: World) -> None:
             f"a model of the SDF file is also called {quoted(entry.name)}",
             "choose another name",
         )
-        for key, entries in named.items()
+        for key, entries in lists.items()
         for index, entry in enumerate(entries)
         if entry.name in taken
     ]
