@@ -135,26 +135,31 @@ def _cells(row: "ParameterSetResults") -> tuple[str, ...]:
 
 
 def _success_text(rate: "SuccessRate") -> str:
-    interval = "" if rate.interval is None else f" ({rate.interval[0]:.2f} … {rate.interval[1]:.2f})"
+    interval = "" if rate.interval is None else f" ({_interval_text(rate.interval)})"
     return f"{rate.count} of {rate.of}{interval}"
+
+
+def _interval_text(interval: tuple[float, float]) -> str:
+    return f"{interval[0]:.2f} … {interval[1]:.2f}"
 
 
 def _consistency_lines(row: "ParameterSetResults") -> list[str]:
     """Return the name of the parameter set, and two lines for each circumstance.
 
-    The lines have the ANEES of all samples and at fixed times, each with the 95 % bounds of a consistent localizer.
+    The lines have the ANEES of all samples and at fixed times, each with the 95 % interval of a consistent localizer.
     """
     from simscen.bench.localization.campaign import CHECK_TIMES_S
 
     def lines(name: str, consistency: "Consistency") -> list[str]:
-        low, high = consistency.bounds or (0.0, 0.0)
-        right = f"; if the covariance is right on average: {low:.2f} … {high:.2f} (95 %)" if consistency.bounds else ""
+        interval = ""
+        if consistency.bounds is not None:
+            interval = f" (95 % interval of a consistent localizer: {_interval_text(consistency.bounds)})"
         pairs = zip(CHECK_TIMES_S, consistency.anees_by_time, strict=True)
-        moments = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in pairs)
-        low, high = consistency.bounds_by_time
+        values = ", ".join(f"{value:.2f} at {seconds:g} s" for seconds, value in pairs)
+        inside = f"{consistency.inside:.1%} of the errors in the 95 % ellipsoid"
         return [
-            f"  ANEES {name}: {consistency.anees:.2f}{right}; in the 95 % ellipsoid: {consistency.inside:.1%}",
-            f"    {moments}; with normal errors and independent logs: {low:.2f} … {high:.2f} (95 %)",
+            f"  ANEES {name}: {consistency.anees:.2f}{interval}; {inside}",
+            f"    {values} (95 % interval if logs are independent: {_interval_text(consistency.bounds_by_time)})",
         ]
 
     return [

@@ -131,10 +131,10 @@ def _suite_text(suite: "SuiteResult") -> str:
     return "\n".join([
         f"{suite.runs} runs, {duration}",
         f"  {figures['suite: runs a minute'].value:.0f} runs a minute",
-        f"  {suite.wall / baseline:.2f} times what PyBullet alone takes on one core to step and scan as long"
-        f" ({baseline:.1f} s)",
-        f"  CPU time {suite.cpu / baseline:.2f} times that,"
+        f"  PyBullet alone, for the same steps and scans on one core: {baseline:.1f} s",
+        f"  wall time: {suite.wall / baseline:.2f} times PyBullet alone",
+        f"  CPU time: {suite.cpu / baseline:.2f} times PyBullet alone,"
         f" {1e3 * suite.cpu / suite.simulated:.1f} ms per simulated second",
-        f"  memory of a worker {figures['suite: memory of a worker'].value:.0f} MB,"
-        f" of the largest {figures['suite: memory of the largest worker'].value:.0f} MB",
+        f"  memory of a worker: {figures['suite: memory of a worker'].value:.0f} MB,"
+        f" of the largest: {figures['suite: memory of the largest worker'].value:.0f} MB",
     ])  # fmt: skip
