@@ -7,6 +7,7 @@ from simscen.advanced.prediction.followed_path import FollowedPath
 from simscen.advanced.prediction.gyro_odometry import GyroOdometry
 from simscen.advanced.prediction.stand_position import StandPosition
 from simscen.advanced.prediction.tracker import Tracker
+from simscen.advanced.prediction.tracks import HIDDEN_TIMEOUT_S
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import Path
@@ -36,9 +37,10 @@ class MotionPrediction:
         self._avoidance = Avoidance(robot, full_speed)
         self._stand_position = StandPosition(robot, full_speed)
         self._warm_up_ticks, self._must_stay = WARM_UP_S * tick_rate, False
+        self._max_age_ticks = HIDDEN_TIMEOUT_S * tick_rate
         self._odometry = GyroOdometry(tick_rate)
         self._no_obstacles = MovingObstacles((), spec.acceleration)
-        self._active: list[Tracker] = []  # trackers with moving obstacles
+        self._active: list[Tracker] = []  # trackers with moving obstacles whose lidar has not failed
         self._predicted: tuple[int, MovingObstacles] | None = None
         self._transformed: tuple[MovingObstacles, Pose2, Pose2, MovingObstacles] | None = None
         self._plan: Path | None = None
@@ -57,7 +59,11 @@ class MotionPrediction:
         self._predicted = None
         if self.is_idle and not tracker.has_moving_obstacles:
             return
-        self._active = [each for each in self._trackers.values() if each.has_moving_obstacles]
+        self._active = [
+            each
+            for each in self._trackers.values()
+            if each.has_moving_obstacles and scan.tick - each.tick <= self._max_age_ticks
+        ]
         self.is_idle = not self._active and all(
             each.first_tick is not None and scan.tick - each.first_tick >= self._warm_up_ticks
             for each in self._trackers.values()
