@@ -1,10 +1,11 @@
-"""The advanced stack and its builder: motion prediction, compensation of turn slip, and its own clearing policy."""
+"""The advanced stack and its builder: motion prediction, turn slip, tilt, and its own clearing policy."""
 
 import math
 from typing import Any
 
 from simscen.advanced.prediction.motion_prediction import MotionPrediction
 from simscen.advanced.replanning import AdvancedPlanManager
+from simscen.advanced.tilt import TiltEstimator
 from simscen.advanced.turn_slip import TurnSlipObserver
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
@@ -21,15 +22,22 @@ ROBOT_IN_BASE_FRAME = Pose2(0.0, 0.0)
 class AdvancedStack(ReferenceStack):
     """Reference stack that predicts moving obstacles and avoids them, also while the robot has no goal.
 
+    It also ignores lidar hits on the floor while the robot is tilted.
+
     The private methods are hooks that ReferenceStack calls.
     """
 
     def __init__(
-        self, *parts: Any, prediction: MotionPrediction, turn_slip: TurnSlipObserver | None, **options: Any
+        self,
+        *parts: Any,
+        prediction: MotionPrediction,
+        tilt: TiltEstimator,
+        turn_slip: TurnSlipObserver | None,
+        **options: Any,
     ) -> None:
-        """Take the arguments of ReferenceStack and two components. If `turn_slip` is None, turn slip is ignored."""
+        """Take the arguments of ReferenceStack and three components. If `turn_slip` is None, turn slip is ignored."""
         super().__init__(*parts, **options)
-        self._prediction, self._turn_slip = prediction, turn_slip
+        self._prediction, self._tilt, self._turn_slip = prediction, tilt, turn_slip
         self._has_moving_obstacles = False
 
     def cancel(self, tick: int) -> None:
@@ -44,12 +52,17 @@ class AdvancedStack(ReferenceStack):
 
     def _on_motion(self, reading: Odometry | Imu) -> None:
         self._prediction.add_reading(reading)
+        if isinstance(reading, Imu):
+            self._tilt.add_imu(reading)
+        else:
+            self._tilt.add_odometry(reading)
 
     def _on_odometry_step(self, wheels: Pose2, fused: Pose2) -> None:
         if self._turn_slip is not None:
             self._turn_slip.update(wheels, fused)
 
     def _on_lidar_scan(self, tick: int, scan: Scan) -> Scan:
+        scan = self._tilt.without_floor(scan)
         self._prediction.on_scan(scan)
         return self._prediction.with_moving_hits(scan)
 
@@ -133,4 +146,9 @@ class AdvancedStackBuilder(StackBuilder):
             spec.prediction, self.robot, surroundings.lidars, surroundings.tick_rate, self.full_speed
         )
         compensates_slip = spec.localizer.fuses_odometry and spec.velocity_smoother.counter_turn_slip
-        return AdvancedStack(*parts, prediction=prediction, turn_slip=TurnSlipObserver() if compensates_slip else None)
+        return AdvancedStack(
+            *parts,
+            prediction=prediction,
+            tilt=TiltEstimator(surroundings.tick_rate),
+            turn_slip=TurnSlipObserver() if compensates_slip else None,
+        )
