@@ -7,10 +7,12 @@ import pytest
 import shapely
 import shapely.affinity
 
+from simscen.core.messages.navigation import Path
 from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import Status
 from simscen.criteria.clearance import PersonalSpace
+from simscen.criteria.trace_signals.catalog import read_signal
 from simscen.criteria.trace_signals.distances import pedestrian_gap, pedestrian_radii
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
@@ -68,3 +70,10 @@ def test_robot_drives_if_it_is_faster_than_a_tenth_of_a_meter_per_second(speed: 
     criterion = PersonalSpace(min=2.0, while_driving=True)
     (finding,) = criterion.judge(replace(trace, velocity=velocity), synthetic_case({"inscribed_radius": 0.2}))
     assert finding.status is (Status.FAIL if drives else Status.INCONCLUSIVE)
+
+
+def test_deviation_does_not_depend_on_the_headings_of_a_plan():
+    """Plans in logs of real robots can lack headings."""
+    plan = Path(np.array([[0.0, 1.0, np.nan], [5.0, 1.0, np.nan]]), 0)
+    trace = replace(synthetic_trace({"seconds": 2, "truth": [[0, 2, 0]]}), plans=(plan,))
+    assert read_signal("plan_deviation", trace, synthetic_case({}), {}).tolist() == [1.0] * len(trace.truth)
