@@ -15,13 +15,12 @@ from simscen.core.geometry.motion_paths import pose_at
 from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.model.world import Movable, Obstacle, Travel, WorldSpec
 from simscen.worlds.extent import placed_solids
-from simscen.worlds.prism_shapes import DECIMALS, PrismShape, first_problem, prism_shapes
+from simscen.worlds.prism_shapes import DECIMALS, PrismShape, first_problem, first_reason, prism_shapes
 
 MAX_NAME_LENGTH = 120
 """Maximum number of characters of a name in a world file. Longer names are cut."""
 STRAIGHT_TOLERANCE_RAD = 1e-6
 """Maximum change of direction at a point where a path does not turn."""
-
 
 ObjectT = TypeVar("ObjectT", Obstacle, Movable)
 
@@ -126,9 +125,7 @@ def _travel(name: str, path: MotionPath, shape: PrismShape, changes: list[str]) 
     try:
         return Travel.model_validate(timed)
     except ValidationError as error:
-        changes.append(
-            f"{name}: its motion cannot be written as keyframes ({error.errors()[0]['msg']}); it is made static"
-        )
+        changes.append(f"{name}: its motion cannot be written as keyframes: {first_reason(error)}; it is made static")
         return None
 
 

@@ -91,9 +91,13 @@ def _is_valid(shape: PrismShape, name: str, changes: list[str]) -> bool:
 
 def first_problem(error: ValidationError) -> str:
     """Return the first problem of a validation, e.g. "its `box` is not valid: input should be greater than 0"."""
-    problem = error.errors()[0]
-    message = problem["msg"].removeprefix("Value error, ")
-    return f"its `{problem['loc'][0]}` is not valid: {message[:1].lower()}{message[1:]}"
+    return f"its `{error.errors()[0]['loc'][0]}` is not valid: {first_reason(error)}"
+
+
+def first_reason(error: ValidationError) -> str:
+    """Return the reason for the first problem of a validation, e.g. "input should be greater than 0"."""
+    message = error.errors()[0]["msg"].removeprefix("Value error, ")
+    return f"{message[:1].lower()}{message[1:]}"
 
 
 def _exact_shape(solid: Solid) -> PrismShape | None:

@@ -153,7 +153,11 @@ def _convert(
         conversion = convert_world(world, height)
         return conversion.merged_into(spec), [*conversion.changes, *world.notes]
     except ValidationError as error:
-        details = "; ".join(f"{'.'.join(map(str, detail['loc']))}: {detail['msg']}" for detail in error.errors()[:3])
+        found = [
+            (".".join(map(str, detail["loc"])), detail["msg"].removeprefix("Value error, "))
+            for detail in error.errors()[:3]
+        ]
+        details = "; ".join(": ".join(filter(None, parts)) for parts in found)
         message = f"the world cannot be written as a world file: {details}"
         raise InvalidInput([Problem(str(source.path), 0, 0, "SC312", message)]) from None
 

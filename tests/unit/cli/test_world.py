@@ -119,6 +119,16 @@ def test_world_too_large_for_a_file_is_an_error(simscen, room: Path) -> None:
     assert not (room / "big.world.yaml").exists()
 
 
+def test_object_named_like_a_model_cannot_be_converted(simscen, room: Path) -> None:
+    box = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
+    (room / "cart.sdf").write_text(SDF.format(more=f"<model name='cart'><link name='l'>{box}</link></model>"))
+    objects = "objects: [{name: cart, box: [1, 1, 1], pose: {x: 3, y: 3}}]"
+    (room / "cart.world.yaml").write_text(f"simscen: 1\nsdf: cart.sdf\n{objects}\n")
+    ended = simscen("world", "convert", "cart.world.yaml", "copy.world.yaml")
+    assert ended.code == 2
+    assert "as a world file: several objects have the name `cart`" in ended.err
+
+
 @pytest.mark.parametrize(
     ("arguments", "expected_text"),
     [

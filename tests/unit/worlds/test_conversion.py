@@ -152,6 +152,14 @@ def test_unsupported_motions_and_shapes_are_reported():
     assert [solid.name for solid in world.solids] == ["table", "table-2"]
 
 
+def test_loop_that_does_not_end_at_its_start_is_reported_with_the_reason():
+    path = MotionPath((0.0, 1.0, 3.0), (Pose2(0, 0), Pose2(0, 0), Pose2(1, 0)), "loop")
+    body = Body("cart", (Solid(Cylinder(0.3, 1.0), Pose3(z=0.5)),), Pose3(), 0.0, path)
+    world, [change] = converted(bodies=(body,))
+    assert change.startswith("cart: its motion cannot be written as keyframes: the last keyframe of a loop must ")
+    assert world.bodies[0].path is None
+
+
 @pytest.mark.parametrize("mode", ["once", "back_and_forth"])
 def test_motion_with_changing_speed_becomes_keyframes(mode):
     disc = (Solid(Cylinder(0.3, 1.0), Pose3(z=0.5)),)
