@@ -18,7 +18,7 @@ from simscen.criteria.trace_signals.estimation_errors import (
     BELIEF_TIMEOUT_S,
     DIMENSIONS,
     NO_BELIEF,
-    durations,
+    error_weights,
     nees_samples,
     pose_error,
     root_mean_square,
@@ -37,8 +37,8 @@ class LocalizationError(Spec, Criterion):
 
     What is measured: the distance between the estimated and the true position, and the heading error. Both are measured
         whenever the stack publishes an estimated pose (belief), and continuously while its newest belief is over 1 s
-        old. In the root mean square, an error counts for the time until the next one. The trajectories are not
-        aligned, because an alignment would hide the error.
+        old. In the root mean square, each belief counts once; old beliefs count at the usual rate of the beliefs. The
+        trajectories are not aligned, because an alignment would hide the error.
     When it fails: the largest error, the root mean square, or the last error exceeds its bound. If the first belief is
         over 1 s later than `after`, only `final` can pass.
     Why this: a robot whose error is half a meter may reach goals in open space, but not near obstacles.
@@ -89,7 +89,7 @@ class LocalizationError(Spec, Criterion):
             largest = _judge_largest(trace, error, distances, "localization_error", self.max, "m")
             findings.append(self._if_known_early(trace, first, largest))
         if self.rmse is not None:
-            rmse = root_mean_square(distances, durations(error))
+            rmse = root_mean_square(distances, error_weights(trace, error))
             bound = at_most("localization_error rmse", rmse, self.rmse, "m", context="(not aligned)")
             findings.append(self._if_known_early(trace, first, if_complete(trace, bound)))
         if self.final is not None:

@@ -40,9 +40,16 @@ def pose_error(trace: Trace) -> Samples:
     return Samples(ticks, np.column_stack((distances, np.abs(wrap_array(believed[:, 2] - yaw)))))
 
 
-def durations(samples: Samples) -> Array:
-    """Return the time (n,) in ticks from each sample to the next one; for the last one, the median of these times."""
-    return np.append(np.diff(samples.ticks), usual_period(samples.ticks)).astype(np.float64)
+def error_weights(trace: Trace, error: Samples) -> Array:
+    """Return the weights (n,) of the samples of `pose_error` in statistics.
+
+    Each published belief has the weight 1, as in evo. While the newest belief is old, the samples of the truth together
+    have the weight that beliefs at their usual rate would have.
+    """
+    published, timeout = trace.belief.ticks, BELIEF_TIMEOUT_S * trace.tick_rate
+    belief_period = min(usual_period(published), timeout) if len(published) > 1 else timeout
+    old_weight = min(1.0, usual_period(trace.truth.ticks) / belief_period)
+    return np.where(np.isin(error.ticks, published), 1.0, old_weight)
 
 
 def root_mean_square(values: Array, weights: Array) -> float:

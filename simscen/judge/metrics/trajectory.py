@@ -9,7 +9,7 @@ from simscen.core.records.events import EventKind
 from simscen.core.records.trace import Trace
 from simscen.criteria.trace_signals.estimation_errors import (
     NO_BELIEF,
-    durations,
+    error_weights,
     interpolate_poses,
     nees_samples,
     pose_error,
@@ -117,7 +117,7 @@ def pose_metrics(trace: Trace) -> Values:
     if not len(error):
         return dict.fromkeys(POSE_METRICS, NO_BELIEF)
     distances, angles = error.values.T
-    weights = durations(error)
+    weights = error_weights(trace, error)
     return {
         **_error_statistics("ape_trans", distances, weights),
         "ape_trans_final": float(distances[-1]),

@@ -48,12 +48,24 @@ def test_relative_errors_do_not_cover_a_teleportation():
     [
         ([0, 6], [1, 3], 2.0, 2.0),
         ([0, 6, 12], [1, 3, 8], 3.0, 4.0),
-        ([0, 6, 12, 36], [1, 2, 5, 9], 5.0, (6 * 1 + 6 * 2 + 24 * 5 + 6 * 9) / 42),
+        ([0, 6, 12, 36], [1, 2, 5, 9], 3.5, 4.25),
     ],
 )
-def test_absolute_errors_count_for_the_time_until_the_next_belief(ticks, errors, median, mean):
+def test_absolute_errors_of_all_beliefs_count_equally(ticks, errors, median, mean):
     metrics = pose_metrics(located(ticks, [(0, 0, 0)] * len(ticks), ticks, [(x, 0, 0) for x in errors]))
     assert (metrics["ape_trans_median"], metrics["ape_trans_mean"]) == (median, pytest.approx(mean))
+
+
+def test_old_beliefs_count_at_the_usual_rate_of_beliefs():
+    """The robot publishes ten beliefs a second, but none between 1 s and 61 s, which are old from 2 s on."""
+    ticks = range(0, 71 * 240, 6)
+    beliefs = [*range(0, 241, 24), *range(61 * 240, 71 * 240, 24)]
+    trace = located([*ticks], [(0, 0, 0)] * len(ticks), beliefs, [(float(tick > 240), 0, 0) for tick in beliefs])
+    old = 59 * 40  # samples of the truth, each with a quarter of the weight of a belief
+    metrics = pose_metrics(trace)
+    assert metrics["ape_trans_mean"] == pytest.approx(100 / (11 + old / 4 + 100), rel=0.01)
+    assert metrics["ape_trans_rmse"] == pytest.approx((100 / (11 + old / 4 + 100)) ** 0.5, rel=0.01)
+    assert metrics["ape_trans_median"] == 0.0
 
 
 def test_turning_in_place_adds_no_distance():
