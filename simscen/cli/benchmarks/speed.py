@@ -56,6 +56,7 @@ def _growth_text(figures: Measurements) -> str:
 def worlds_command(
     format_: FormatOption = TextOrJson.TEXT,
     rounds: Annotated[int, typer.Option(min=1, max=100, help="Number of runs in each world; the median is used.")] = 3,
+    as_json: Annotated[bool, typer.Option("--json", hidden=True)] = False,
 ) -> None:
     """Measure the cost of a simulated second in large worlds.
 
@@ -63,6 +64,9 @@ def worlds_command(
     generated ROS map of 100 x 100 m with 400 blocks and noise. Each run takes at most 60 simulated seconds with all
     features enabled. Prints the CPU time of one core, also as a multiple of the time for the house.
     """
+    if as_json:
+        print("simscen: warning: --json is deprecated; use --format json", file=sys.stderr)
+        format_ = TextOrJson.JSON
     with engine_output_on_stderr():
         from simscen.bench.speed.large_worlds import measure_worlds
 
