@@ -114,13 +114,13 @@ def functions_of_command(name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
 
 
 def parameters_of(function: Callable[..., Any]) -> list[Parameter]:
-    """Return the arguments and options of a command from its function."""
+    """Return the arguments and options of a command from its function, without hidden (deprecated) options."""
     found = []
     # get_type_hints cannot be used: in Python 3.10 it hides Annotated in an Optional if the default is None.
     for parameter in inspect.signature(function, eval_str=True).parameters.values():
         if get_origin(parameter.annotation) is Annotated:
             kind, info = get_args(parameter.annotation)[:2]
-            if isinstance(info, ArgumentInfo | OptionInfo):
+            if isinstance(info, ArgumentInfo | OptionInfo) and not info.hidden:
                 found.append(_parameter(parameter, kind, info))
     return found
 
