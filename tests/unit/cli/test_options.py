@@ -30,7 +30,11 @@ def typer_command(words):
 
 @pytest.mark.parametrize(("words", "function"), calls(), ids=lambda value: value if isinstance(value, str) else "")
 def test_commands_page_lists_the_options_of_typer(words, function) -> None:
-    parameters = [parameter for parameter in typer_command(words).params if parameter.name != "help"]
+    parameters = [
+        parameter
+        for parameter in typer_command(words).params
+        if parameter.name != "help" and not getattr(parameter, "hidden", False)
+    ]
     names = [", ".join(p.opts) if p.param_type_name == "option" else p.name for p in parameters]
     output = [parameter.spelling for parameter in parameters_of(function)]
     arguments = re.compile(r"^\[?[A-Z_]+\]?…?$")
