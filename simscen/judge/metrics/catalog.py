@@ -133,7 +133,7 @@ METRICS: dict[str, Metric] = {
     **{
         f"ape_trans_{name}": Metric(
             "m",
-            f"Absolute pose error, position: {text} distance between belief and truth over time, not aligned.",
+            f"Absolute pose error, position: {text} distance between belief and truth, not aligned.",
             "evo",
             evidence=_BELIEF,
         )
@@ -143,7 +143,7 @@ METRICS: dict[str, Metric] = {
     **{
         f"ape_rot_{name}": Metric(
             "rad",
-            f"Absolute pose error, heading: {text} angle between belief and truth over time.",
+            f"Absolute pose error, heading: {text} angle between belief and truth.",
             "evo",
             evidence=_BELIEF,
         )
