@@ -29,11 +29,11 @@ class PassRate(Spec):
     """Minimum probability that a robot with a pass rate below `min` is not accepted."""
     method: Literal["fixed", "sprt", "anytime"] = "fixed"
     """`fixed`: the exact Clopper-Pearson limits after all `runs`. `sprt`: the sequential probability ratio test between
-    `min` and `target`. `anytime`: a confidence sequence. `sprt` and `anytime` are evaluated after each run. The study
-    ends with the batch of 32 runs in which the claim is decided."""
+    `min` and `target`. `anytime`: a confidence sequence. `sprt` and `anytime` are evaluated after each run. Runs start
+    in batches of 32, and the batch in which the claim is decided is completed."""
     runs: Annotated[int, Field(ge=1, le=MAX_RUNS)] | None = None
     """Number of runs of `fixed`, and maximum number of runs of the other methods. Default for `fixed`: the smallest
-    number of runs that proves the claim if all pass. For the other methods: 20 times as many."""
+    number of runs that proves the claim if all pass. For the other methods: 20 times this number, at most 1,000,000."""
     target: Rate | None = None
     """Pass rate of a robot that should be accepted; only for `sprt`."""
     power: Confidence = 0.9

@@ -206,8 +206,8 @@ class SimpleGoalChecker(GoalCheckerSpec):
     component: ClassVar[str] = "simscen.stack.checkers:SimpleGoalChecker"
     type: Literal["simple"] = "simple"
     stateful: bool = True
-    """Whether the position, once reached within the fraction `well_inside` of `xy_goal_tolerance`, only has to stay
-    within the whole `xy_goal_tolerance`; no effect if `well_inside` is 1. Nav2 does not check the position again."""
+    """Whether the position check is relaxed after its first success: from then on, the full `xy_goal_tolerance` applies
+    instead of its fraction `well_inside`. No effect if `well_inside` is 1. Nav2 does not check the position again."""
     well_inside: Annotated[float, Field(gt=0, le=1), Quantity("ratio")] = 1.0
     """Fraction of the tolerances that applies while the robot moves. At rest, the full tolerances apply. Nav2: 1."""
 

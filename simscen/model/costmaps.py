@@ -1,11 +1,20 @@
-"""Specifications of the global and the local costmap (nav2_costmap_2d)."""
+"""Specifications of the costmaps (nav2_costmap_2d), and of motion prediction, which adds moving obstacles to them."""
 
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from simscen.spec.base import Ranged, Spec, by_default
-from simscen.spec.quantities import Frequency, Length, NonNegativeAngle, NonNegativeLength, PositiveLength, Quantity
+from simscen.spec.quantities import (
+    Frequency,
+    Length,
+    NonNegativeAngle,
+    NonNegativeLength,
+    PositiveAcceleration,
+    PositiveLength,
+    PositiveSpeed,
+    Quantity,
+)
 
 ObstacleHeight = Annotated[Length, Field(ge=-100, le=100)]
 PublishFrequency = Annotated[float, Field(ge=0, le=1000), Quantity("frequency")]
@@ -110,3 +119,20 @@ class LocalCostmap(Spec):
         """Return the parameters except `width` and `height`. The global costmap `shared` supplies missing values."""
         own = {name: value for name in sorted(Costmap.model_fields) if (value := getattr(self, name, None)) is not None}
         return shared.model_copy(update=own)
+
+
+class Prediction(Ranged):
+    """Motion prediction: tracks moving objects in the lidar scans, so that the robot avoids their future positions."""
+
+    enabled: bool = False
+    """Whether to predict motion."""
+    max_range: PositiveLength = 12.0
+    """Maximum distance of tracked objects."""
+    max_radius: PositiveLength = 1.0
+    """Maximum radius of tracked objects; larger ones are static."""
+    min_speed: PositiveSpeed = 0.25
+    """Minimum speed of tracked objects; slower ones are static."""
+    acceleration: PositiveAcceleration = 1.5
+    """Standard deviation of the acceleration of a tracked object."""
+    margin: NonNegativeLength = 0.15
+    """Distance from a tracked object within which scan points belong to it and are not marked in costmaps."""

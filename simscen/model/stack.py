@@ -6,13 +6,13 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from simscen.model.controllers import Controller, GoalChecker, ProgressChecker
-from simscen.model.costmaps import Costmap, LocalCostmap
-from simscen.model.guards import CollisionMonitor, Prediction, VelocitySmoother
+from simscen.model.costmaps import Costmap, LocalCostmap, Prediction
 from simscen.model.localizers import GroundTruth, Localizer, OdometryFilter
 from simscen.model.planners import Planner
 from simscen.model.profiles import Profile, apply_profile
 from simscen.model.recovery import Recovery
 from simscen.model.stack_base import Latency, StackBase
+from simscen.model.velocity_commands import CollisionMonitor, VelocitySmoother
 from simscen.spec.base import Typed, by_default, text_or_mapping
 from simscen.spec.places import FilePath
 from simscen.spec.quantities import NonNegativeAngularSpeed, NonNegativeSpeed, Quantity

@@ -57,7 +57,7 @@ class StackFileSpec(Spec):
     simscen: LanguageVersion
     """Version of the scenario language."""
     name: Name | None = None
-    """Name of the stack."""
+    """Name of the stack for people. Results show NAME of `--stack NAME=FILE` instead."""
     description: Annotated[str, Field(max_length=10_000)] = ""
     """Description for people."""
     stack: AnyStack
@@ -79,8 +79,8 @@ def _check_absolute(folder: str) -> str:
 
 CommandLine = Annotated[str, StringConstraints(min_length=1, max_length=4096), AfterValidator(_check_command)]
 Folder = Annotated[str, StringConstraints(min_length=1, max_length=4096), AfterValidator(_check_absolute)]
-Variable = Annotated[str, StringConstraints(max_length=200, pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
-Content = Annotated[str, StringConstraints(max_length=32_768, pattern=r"^[^\x00]*$")]
+VariableName = Annotated[str, StringConstraints(max_length=200, pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+VariableValue = Annotated[str, StringConstraints(max_length=32_768, pattern=r"^[^\x00]*$")]
 
 
 class StackCommandSpec(Spec):
@@ -92,7 +92,7 @@ class StackCommandSpec(Spec):
     command: CommandLine
     """Program and its arguments. Quotes work as in a shell; variables such as `$HOME` and patterns such as `*` do not.
     """
-    env: dict[Variable, Content] = {}
+    env: dict[VariableName, VariableValue] = {}
     """Environment variables to add or replace."""
     cwd: Folder | None = None
     """Working directory, absolute or below `~`; default: the directory in which simscen runs."""

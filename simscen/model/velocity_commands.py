@@ -1,10 +1,10 @@
-"""Specifications of the velocity smoother, the collision monitor, and motion prediction."""
+"""Specifications of the components that modify velocity commands: velocity smoother and collision monitor."""
 
 from typing import Annotated
 
 from pydantic import Field
 
-from simscen.spec.base import Ranged, Spec
+from simscen.spec.base import Spec
 from simscen.spec.quantities import (
     Duration,
     NonNegativeLength,
@@ -12,7 +12,6 @@ from simscen.spec.quantities import (
     PositiveAngularAcceleration,
     PositiveAngularSpeed,
     PositiveDuration,
-    PositiveLength,
     PositiveSpeed,
 )
 
@@ -47,29 +46,12 @@ class CollisionMonitor(Spec):
     time_before_collision: PositiveDuration = 0.5
     """Action APPROACH: minimum time before a collision. The robot slows down to keep this time."""
     simulation_time_step: PositiveDuration | None = None
-    """Action APPROACH: maximum time step of the simulated motion; default: an eighth of `time_before_collision` (Nav2:
-    0.1 s)."""
+    """Action APPROACH: maximum time step of the simulated motion; default: an eighth of `time_before_collision`
+    (nav2_collision_monitor: 0.1 s)."""
     stop_margin: NonNegativeLength = 0.02
     """Action STOP: minimum distance between the footprint and obstacles in the direction of travel. Nav2 has no such
     margin."""
     min_points: Annotated[int, Field(ge=1, le=1000)] = 1
-    """Minimum number of scan points of an obstacle (Nav2: 4)."""
+    """Minimum number of scan points of an obstacle (nav2_collision_monitor: 4; nav2_bringup: 6)."""
     hold_timeout: Duration = 1.0
     """Time for which the monitor may hold the robot before navigation fails. 0: unlimited, as in Nav2."""
-
-
-class Prediction(Ranged):
-    """Motion prediction: tracks moving objects in the lidar scans, so that the robot avoids their future positions."""
-
-    enabled: bool = False
-    """Whether to predict motion."""
-    max_range: PositiveLength = 12.0
-    """Maximum distance of tracked objects."""
-    max_radius: PositiveLength = 1.0
-    """Maximum radius of tracked objects; larger ones are static."""
-    min_speed: PositiveSpeed = 0.25
-    """Minimum speed of tracked objects; slower ones are static."""
-    acceleration: PositiveAcceleration = 1.5
-    """Standard deviation of the acceleration of a tracked object."""
-    margin: NonNegativeLength = 0.15
-    """Distance from a tracked object within which scan points belong to it and are not marked in costmaps."""

@@ -11,7 +11,7 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.sensor_data import Scan
-from simscen.model.guards import CollisionMonitor as MonitorSpec
+from simscen.model.velocity_commands import CollisionMonitor as MonitorSpec
 from simscen.stack.costmap.obstacle_layer import ScanWithMovingHits
 from simscen.stack.kinematics import poses_along
 from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles

@@ -4,7 +4,7 @@ import math
 
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.model.guards import VelocitySmoother as SmootherSpec
+from simscen.model.velocity_commands import VelocitySmoother as SmootherSpec
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.kinematics import is_standstill
 from simscen.stack.latency_queue import LatencyQueue

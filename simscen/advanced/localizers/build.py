@@ -40,7 +40,14 @@ def slip_ekf(spec: model.SlipEkf, setting: Setting) -> Localizer:
 
 @dataclass(frozen=True, eq=False)
 class MapModels:
-    """Models that scan-matching AMCL computes from a map before a run. All runs on the map share them."""
+    """Models that scan-matching AMCL computes from a map before a run. All runs on the map share them.
+
+    sensor:      likelihood of a scan at a pose
+    free_space:  free cells, from which random poses are drawn
+    trust:       weight of a scan, from its agreement with the map
+    residuals:   agreement of scans with the map, for the covariance
+    search:      correlative search of the whole map for the pose of a lost robot
+    """
 
     sensor: SensorModel
     free_space: FreeSpace

@@ -12,7 +12,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import Path
 from simscen.core.messages.sensor_data import Scan
-from simscen.model.guards import Prediction
+from simscen.model.costmaps import Prediction
 from simscen.stack.costmap.obstacle_layer import ScanWithMovingHits
 from simscen.stack.moving_obstacles import MovingObstacles
 from simscen.stack.protocols import CostmapView, RobotModel

@@ -16,7 +16,7 @@ from simscen.advanced.prediction.free_space_memory import NO_HIT_RANGE_M, Earlie
 from simscen.advanced.prediction.tracks import Track, TrackLifecycle
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.sensor_data import Scan
-from simscen.model.guards import Prediction
+from simscen.model.costmaps import Prediction
 from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles
 
 CHECKED_BEAMS = 120

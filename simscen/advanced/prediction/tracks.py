@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from simscen.advanced.prediction.clusters import BOTH_EDGES
-from simscen.model.guards import Prediction
+from simscen.model.costmaps import Prediction
 
 
 @dataclass(slots=True)

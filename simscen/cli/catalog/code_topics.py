@@ -43,7 +43,7 @@ EXTERNAL_ONLY_CODES = frozenset({
     ErrorCode.FOLLOW_WAYPOINTS_UNKNOWN, ErrorCode.TASK_EXECUTOR_FAILED, ErrorCode.NO_VALID_WAYPOINTS,
     ErrorCode.BACKUP_INVALID_INPUT, ErrorCode.NAVIGATE_UNKNOWN,
 })  # fmt: skip
-"""Codes that the reference stack never returns."""
+"""Codes that the reference stack never returns. BACKUP_INVALID_INPUT is one of them because every robot can reverse."""
 EXTERNAL_ONLY_NOTE = "The reference stack never returns this code; Nav2, external stacks, and installed components may."
 
 JUNIT_ERROR_TYPES = {

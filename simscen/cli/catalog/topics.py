@@ -23,7 +23,6 @@ from simscen.model import (
     acceptance,
     controllers,
     costmaps,
-    guards,
     localizers,
     mppi,
     navigation,
@@ -36,6 +35,7 @@ from simscen.model import (
     stack_base,
     stack_files,
     variations,
+    velocity_commands,
     world,
 )
 from simscen.model.disturbances import EventEntry, FaultEntry, StepEntry
@@ -158,9 +158,9 @@ _STACK: dict[str, type[BaseModel]] = {
     "goal_checker": controllers.SimpleGoalChecker,
     "progress_checker": controllers.ProgressChecker,
     "recovery": recovery.Recovery,
-    "velocity_smoother": guards.VelocitySmoother,
-    "collision_monitor": guards.CollisionMonitor,
-    "prediction": guards.Prediction,
+    "velocity_smoother": velocity_commands.VelocitySmoother,
+    "collision_monitor": velocity_commands.CollisionMonitor,
+    "prediction": costmaps.Prediction,
     "denoise_layer": costmaps.DenoiseLayer,
     "latency": stack_base.Latency,
 }

@@ -16,7 +16,7 @@ from simscen.core.messages.navigation import ErrorCode
 from simscen.core.messages.sensor_data import Scan
 from simscen.model import recovery
 from simscen.model.costmaps import Costmap as CostmapSpec
-from simscen.model.guards import CollisionMonitor as MonitorSpec
+from simscen.model.velocity_commands import CollisionMonitor as MonitorSpec
 from simscen.stack.behaviors import BackUp, Spin
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.costmap.layered_costmap import LayeredCostmap

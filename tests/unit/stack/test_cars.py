@@ -6,7 +6,7 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Path
-from simscen.model.guards import VelocitySmoother as SmootherSpec
+from simscen.model.velocity_commands import VelocitySmoother as SmootherSpec
 from simscen.stack.commands import VelocitySmoother
 from simscen.stack.costmap.layered_costmap import CostmapView
 from simscen.stack.followed_plan import FollowedPlan

@@ -8,7 +8,7 @@ import pytest
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.sensor_data import Scan
-from simscen.model.guards import CollisionMonitor as MonitorSpec
+from simscen.model.velocity_commands import CollisionMonitor as MonitorSpec
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles
 from simscen.stack.protocols import RobotModel

@@ -17,11 +17,12 @@ from pydantic import BaseModel, ValidationError
 from scenes import Scene
 
 from simscen.advanced.spec import MedialAxisPlanner, Retrace, ScanMatchingAmcl, SlipEkf
-from simscen.model import controllers, costmaps, guards, localizers, planners
+from simscen.model import controllers, costmaps, localizers, planners
 from simscen.model import recovery as behaviors
 from simscen.model.localizers import OdometryFilter
 from simscen.model.stack import StackSpec
 from simscen.model.stack_base import ControllerSpec, Latency, SpeedZone
+from simscen.model.velocity_commands import CollisionMonitor, VelocitySmoother
 from simscen.spec.places import SpeedMask
 from simscen.spec.registry import all_types
 
@@ -167,10 +168,11 @@ PARTS = [
     )),
     Part(("recovery", "behaviors", 0), Retrace, ((recovery({"type": "retrace"}), scenes.blocked_corridor),), {
         "backup_dist": ((recovery({"type": "retrace"}), scenes.closed_door),)}),
-    Part(("velocity_smoother",), guards.VelocitySmoother, ((TRUTH, scenes.through_door), (TRUTH, scenes.arrival))),
-    Part(("collision_monitor",), guards.CollisionMonitor, (
+    Part(("velocity_smoother",), VelocitySmoother, ((TRUTH, scenes.through_door), (TRUTH, scenes.arrival))),
+    Part(("collision_monitor",), CollisionMonitor, (
         (TRUTH, scenes.lidar_outage), (BLIND, scenes.obstacle_not_on_map), (BLIND, scenes.through_door))),
-    Part(("prediction",), guards.Prediction, (({**TRUTH, "prediction": {"enabled": True}}, scenes.moving_obstacles),), {
+    Part(("prediction",), costmaps.Prediction, (
+        ({**TRUTH, "prediction": {"enabled": True}}, scenes.moving_obstacles),), {
         "enabled": ((TRUTH, scenes.moving_obstacles),)}, {
         "max_range": [1.0], "max_radius": [0.1], "min_speed": [1.0]}),
     Part(("latency",), Latency, ((TRUTH, scenes.obstacle_not_on_map), (amcl(), scenes.changed_room))),

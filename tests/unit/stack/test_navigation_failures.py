@@ -9,10 +9,10 @@ from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.model.controllers import ProgressChecker, RegulatedPurePursuit
 from simscen.model.costmaps import Costmap
-from simscen.model.guards import CollisionMonitor
 from simscen.model.planners import OmplPlanner
 from simscen.model.recovery import Recovery
 from simscen.model.stack import StackSpec
+from simscen.model.velocity_commands import CollisionMonitor
 from simscen.stack.protocols import NavigationFailure
 from simscen.testing.flatland import Flatland, drive
 

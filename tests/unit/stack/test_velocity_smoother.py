@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from simscen.core.geometry.kinematics import Twist
-from simscen.model.guards import VelocitySmoother as SmootherSpec
+from simscen.model.velocity_commands import VelocitySmoother as SmootherSpec
 from simscen.stack.commands import VelocitySmoother
 from simscen.testing.flatland import round_robot
 

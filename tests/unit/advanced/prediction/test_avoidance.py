@@ -16,13 +16,12 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.goals import Goal
 from simscen.model.controllers import DynamicWindow, RegulatedPurePursuit
-from simscen.model.costmaps import Costmap
-from simscen.model.guards import CollisionMonitor as CollisionMonitorSpec
-from simscen.model.guards import Prediction
+from simscen.model.costmaps import Costmap, Prediction
 from simscen.model.localizers import GroundTruth
 from simscen.model.mppi import Mppi
 from simscen.model.stack import StackSpec
 from simscen.model.stack_base import ControllerSpec
+from simscen.model.velocity_commands import CollisionMonitor as CollisionMonitorSpec
 from simscen.stack.collision_monitor import CollisionMonitor
 from simscen.stack.moving_obstacles import MovingObstacle, MovingObstacles
 from simscen.stack.protocols import CostmapView, RobotModel

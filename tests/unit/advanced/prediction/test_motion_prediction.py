@@ -9,7 +9,7 @@ from simscen.advanced.prediction.motion_prediction import MotionPrediction
 from simscen.advanced.prediction.tracks import HIDDEN_TIMEOUT_S
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
-from simscen.model.guards import Prediction
+from simscen.model.costmaps import Prediction
 from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot
 
 ORIGIN = Pose2(0.0, 0.0)

@@ -1,7 +1,7 @@
 """Tests of the life cycle of tracks."""
 
 from simscen.advanced.prediction.tracks import MAX_UPDATES_OUTSIDE_FREE_SPACE, Track, TrackLifecycle
-from simscen.model.guards import Prediction
+from simscen.model.costmaps import Prediction
 from simscen.testing.flatland import TICK_RATE_HZ
 
 

@@ -19,7 +19,7 @@ from simscen.advanced.prediction.tracker import Tracker
 from simscen.advanced.prediction.tracks import Track
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
-from simscen.model.guards import Prediction
+from simscen.model.costmaps import Prediction
 from simscen.testing.flatland import TICK_RATE_HZ, Flatland
 
 Disc = tuple[float, float, float]

@@ -12,9 +12,9 @@ from simscen.core.messages.goals import Goal
 from simscen.core.messages.sensor_data import Odometry, Readings
 from simscen.core.records.trace import Decision
 from simscen.model.costmaps import Costmap, LocalCostmap
-from simscen.model.guards import CollisionMonitor
 from simscen.model.localizers import GroundTruth
 from simscen.model.stack import StackSpec
+from simscen.model.velocity_commands import CollisionMonitor
 from simscen.stack.costmap.costmaps import Costmaps
 from simscen.stack.frames import Frames
 from simscen.stack.odometry_history import OdometryHistory
