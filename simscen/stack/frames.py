@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simscen.core.geometry import Array, Polygon, Pose2, wrap_array
+from simscen.core.geometry import Array, Pose2, wrap_array
 
 
 class Frames(NamedTuple):
@@ -46,9 +46,3 @@ def transform_poses(frame: Pose2, poses: Array) -> Array:
     moved = np.empty((len(poses), 3))
     moved[:, :2], moved[:, 2] = frame.apply(poses[:, :2]), wrap_array(poses[:, 2] + frame.yaw)
     return moved
-
-
-def transform_polygon(frame: Pose2, polygon: Polygon) -> Polygon:
-    """Return a polygon given in `frame`, expressed in its parent frame."""
-    c, s = math.cos(frame.yaw), math.sin(frame.yaw)
-    return tuple((frame.x + c * x - s * y, frame.y + s * x + c * y) for x, y in polygon)

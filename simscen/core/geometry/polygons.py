@@ -1,4 +1,4 @@
-"""Polygons in the plane: points inside of them, distances of points, and validity.
+"""Polygons in the plane: points inside of them, distances of points, transforms, and validity.
 
 A polygon is a sequence of corners (x, y) in m. The last corner is connected to the first one.
 """
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2
+from simscen.core.geometry import Array, Polygon, Pose2
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -22,6 +22,12 @@ Corner = tuple[float, float]
 
 MIN_WIDTH_M = 1e-6
 """Minimum width of a valid polygon."""
+
+
+def transform_polygon(frame: Pose2, polygon: Polygon) -> Polygon:
+    """Return a polygon given in `frame`, expressed in the parent frame of `frame`."""
+    c, s = math.cos(frame.yaw), math.sin(frame.yaw)
+    return tuple((frame.x + c * x - s * y, frame.y + s * x + c * y) for x, y in polygon)
 
 
 def polygon_edges(corners: Sequence[Corner]) -> list[tuple[Corner, Corner]]:

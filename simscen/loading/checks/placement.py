@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from simscen.core.errors import Problem
 from simscen.core.geometry import Polygon, Pose2, Pose3
 from simscen.core.geometry.motion_paths import MAX_STEP_M, largest_step, too_fast_message, top_speed
+from simscen.core.geometry.polygons import transform_polygon
 from simscen.core.geometry.shapes import MotionPath, Solid
 from simscen.core.messages.goals import Goal
 from simscen.loading.checks.registry import WORLD, CheckProblem
@@ -17,7 +18,7 @@ from simscen.loading.yaml.tree import Keys, MappingNode
 from simscen.sim.body.outline import radius_and_height
 from simscen.spec.motions import Motion
 from simscen.worlds.extent import top_height
-from simscen.worlds.geometry.overlaps import bounding_radius, first_solid_in_disc, place_polygon, polygons_overlap
+from simscen.worlds.geometry.overlaps import bounding_radius, first_solid_in_disc, polygons_overlap
 from simscen.worlds.geometry.prisms import upright_prism
 
 if TYPE_CHECKING:
@@ -122,7 +123,7 @@ def _inside_obstacle(scene: Scene, spawn: "Spawn") -> str | None:
     """Return "inside obstacle …" if an obstacle contains a spawned object completely; else None."""
     if spawn.pose is None:
         return None
-    corners = place_polygon(_outline(spawn), spawn.pose.pose)
+    corners = transform_polygon(spawn.pose.pose, _outline(spawn))
     for solid in scene.world.solids:
         prism = upright_prism(solid)
         if prism is None or prism.bottom > spawn.z or prism.top < spawn.z + spawn.total_height:
@@ -137,9 +138,9 @@ def _on_robot(scene: Scene, spawn: "Spawn", when: "Trigger | None") -> str | Non
     if spawn.z >= scene.size.height:
         return None
     if spawn.ahead is not None:
-        corners = place_polygon(_outline(spawn), Pose2(spawn.ahead[0], spawn.ahead[1], spawn.yaw))
+        corners = transform_polygon(Pose2(spawn.ahead[0], spawn.ahead[1], spawn.yaw), _outline(spawn))
     elif spawn.pose is not None and when and when.time is not None and when.chosen.root + when.delay == 0:
-        corners = place_polygon(_outline(spawn), scene.start.inverse().compose(spawn.pose.pose))
+        corners = transform_polygon(scene.start.inverse().compose(spawn.pose.pose), _outline(spawn))
     else:
         return None
     return "on the robot" if polygons_overlap(scene.size.footprint, corners) else None
@@ -231,7 +232,7 @@ def motion_stops(motion: Motion) -> list[MotionStop]:
 def overlapping_start_problems(scenes: Sequence[Scene]) -> Iterator[Problem]:
     """Yield a problem for each pair of robots of a scenario with overlapping footprints at their starts."""
     for one, other in combinations(scenes, 2):
-        outlines = [place_polygon(scene.size.footprint, scene.start) for scene in (one, other)]
+        outlines = [transform_polygon(scene.start, scene.size.footprint) for scene in (one, other)]
         if polygons_overlap(*outlines):
             first, second = one.loaded.robot_name, other.loaded.robot_name
             where = f"({other.start.x:g}, {other.start.y:g}) and ({one.start.x:g}, {one.start.y:g})"

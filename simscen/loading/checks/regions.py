@@ -5,13 +5,13 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from simscen.core.geometry import Pose2, wrap
-from simscen.core.geometry.polygons import depth_inside_polygon
+from simscen.core.geometry.polygons import depth_inside_polygon, transform_polygon
 from simscen.loading.checks.placement import blocked_poses
 from simscen.loading.checks.possible_run import MAX_SPEED_RATIO
 from simscen.loading.checks.registry import WORLD, CheckProblem
 from simscen.loading.checks.route_search import robot_routes, trigger_areas
 from simscen.loading.checks.scene import START, Scene
-from simscen.worlds.geometry.overlaps import place_polygon, polygons_overlap
+from simscen.worlds.geometry.overlaps import polygons_overlap
 
 
 def _start_is_blocked(scene: Scene) -> bool:
@@ -44,7 +44,7 @@ def keepout_regions_on_goals(scene: Scene) -> Iterator[CheckProblem]:
             continue
         region, keys = entry.chosen.region, ("pass", index, "keepout", "region")
         corners = scene.world.regions[region]
-        if polygons_overlap(corners, place_polygon(scene.size.footprint, scene.start)):
+        if polygons_overlap(corners, transform_polygon(scene.start, scene.size.footprint)):
             yield CheckProblem(keys, f"keepout can never hold: the robot starts in `{region}`")
             continue
         inside = [

@@ -7,6 +7,7 @@ from pathlib import Path
 from simscen.core.environment.world_model import World
 from simscen.core.errors import InvalidInput, Problem, UsageError
 from simscen.core.files import require_not_input, require_regular_file
+from simscen.core.geometry.polygons import transform_polygon
 from simscen.loading.builders import load_robot, with_stops_in_bounds, world_from_file
 from simscen.loading.checks import masks, placement, regions, routes
 from simscen.loading.checks.built_world import check_built_world
@@ -18,7 +19,6 @@ from simscen.loading.loaded import LoadedMap, LoadedScenario, LoadedWorld
 from simscen.loading.robot_size import blocking_world, robot_size
 from simscen.loading.world_cache import WorldCache
 from simscen.worlds.extent import oversize_hint
-from simscen.worlds.geometry.overlaps import place_polygon
 from simscen.worlds.maps.map_size import map_size_error
 
 MODULES = (masks, placement, routes, regions)
@@ -102,7 +102,7 @@ def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path
     low, high = scene.z_range
     height = (low + high) / 2
     poses = [scene.start, *(goal.pose for _, goal in scene.expected_goals)]
-    outlines = [place_polygon(scene.size.footprint, pose) for pose in poses]
+    outlines = [transform_polygon(pose, scene.size.footprint) for pose in poses]
     image = draw_world(build_world_and_map(scene.world, height), height, outlines, gaps)
     loaded, robot = scene.loaded, scene.loaded.robot_name
     maps = (loaded.world.map, loaded.map, loaded.keepout_mask, loaded.speed_mask)

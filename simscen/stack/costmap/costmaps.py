@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 from simscen.core.environment.costmap_filters import Zones
 from simscen.core.geometry import Pose2
+from simscen.core.geometry.polygons import transform_polygon
 from simscen.core.messages.sensor_data import Image, Scan
 from simscen.model.stack import StackSpec
 from simscen.stack.costmap.grid_frame import MAX_ROLL_OFFSET_M
 from simscen.stack.costmap.layered_costmap import LayeredCostmap
-from simscen.stack.frames import Frames, transform_polygon
+from simscen.stack.frames import Frames
 from simscen.stack.latency_queue import LatencyQueue
 from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Surroundings

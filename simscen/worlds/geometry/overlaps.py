@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from simscen.core.geometry import Polygon, Pose2
-from simscen.core.geometry.polygons import polygon_contains, segments_cross
+from simscen.core.geometry.polygons import polygon_contains, segments_cross, transform_polygon
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Extrusion, Mesh, Shape, Solid, Sphere
 from simscen.worlds.geometry.prisms import upright_prism
 
@@ -75,19 +75,13 @@ def _bounding_radius(shape: Shape) -> float:
             return float(np.linalg.norm(vertices, axis=1).max(initial=0.0))
 
 
-def place_polygon(outline: Polygon, pose: Pose2) -> Polygon:
-    """Transform the corners of an outline from the frame at `pose` to the frame in which `pose` is given."""
-    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
-    return tuple((pose.x + c * x - s * y, pose.y + s * x + c * y) for x, y in outline)
-
-
 def first_solid_in_footprint(solids: Iterable[Solid], outline: Polygon, pose: Pose2, z_range: ZRange) -> str | None:
     """Return the name of the first solid that a footprint at `pose` overlaps between two heights, or None.
 
     `outline` are the corners of the footprint in its own frame.
     """
     radius = max(math.hypot(x, y) for x, y in outline)
-    corners = place_polygon(tuple((x * (1 - SHRINK_FRACTION), y * (1 - SHRINK_FRACTION)) for x, y in outline), pose)
+    corners = transform_polygon(pose, tuple((x * (1 - SHRINK_FRACTION), y * (1 - SHRINK_FRACTION)) for x, y in outline))
     for solid in solids:
         if is_near(solid, (pose.x, pose.y), radius) and _overlaps(solid, corners, z_range):
             return solid.name
@@ -95,7 +89,10 @@ def first_solid_in_footprint(solids: Iterable[Solid], outline: Polygon, pose: Po
 
 
 def polygons_overlap(first: Sequence[tuple[float, float]], second: Sequence[tuple[float, float]]) -> bool:
-    """Return whether the interiors of two polygons have a point in common. Tests corners, edges, and centers."""
+    """Return whether the interiors of two polygons have a point in common.
+
+    Tests all pairs of edges, one corner of each polygon, and both centers.
+    """
     # The centers are needed for equal polygons, whose corners are not inside each other.
     if polygon_contains(first, second[0]) or polygon_contains(second, first[0]):
         return True

@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simscen.core.geometry import Pose2, Pose3
-from simscen.core.geometry.polygons import polygon_contains
+from simscen.core.geometry.polygons import polygon_contains, transform_polygon
 from simscen.core.geometry.shapes import Box, Solid
 from simscen.worlds.geometry.mesh_overlaps import footprint_overlaps_solid
-from simscen.worlds.geometry.overlaps import first_solid_in_footprint, place_polygon
+from simscen.worlds.geometry.overlaps import first_solid_in_footprint
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.routes.clearance import clearance_field, search_grid
 from simscen.worlds.routes.narrow_gaps import narrowest_gap
@@ -82,12 +82,13 @@ def test_footprint_overlaps_boxes_that_contain_its_points(box: Solid, x: float, 
     pose = Pose2(x, y, yaw)
     hit = first_solid_in_footprint([box], OUTLINE, pose, Z) is not None
     assert (
-        footprint_overlaps_solid(box, place_polygon(tuple((0.999 * a, 0.999 * b) for a, b in OUTLINE), pose), Z) == hit
+        footprint_overlaps_solid(box, transform_polygon(pose, tuple((0.999 * a, 0.999 * b) for a, b in OUTLINE)), Z)
+        == hit
     )
     size = box.shape.size  # type: ignore[union-attr]
-    corners = place_polygon(
-        tuple((a * size[0] / 2, b * size[1] / 2) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))),
+    corners = transform_polygon(
         Pose2(box.pose.x, box.pose.y, 2 * math.atan2(box.pose.qz, box.pose.qw)),
+        tuple((a * size[0] / 2, b * size[1] / 2) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))),
     )
     grid = np.stack(np.meshgrid(np.linspace(-0.39, 0.39, 40), np.linspace(-0.19, 0.19, 20)), -1).reshape(-1, 2)
     inside = any(polygon_contains(corners, (px, py)) for px, py in pose.apply(grid).tolist())
