@@ -46,8 +46,8 @@ def command(
     two without people and with the furniture of the map, one of them also without slip; one with an unknown start; one
     in which half of the floor was rebuilt after mapping; one with a map of only half of the floor; and one of a
     kidnapped robot. Each log is evaluated with several sets of parameters, including Nav2's and simscen's defaults.
-    Intervals are by bootstrap over buildings. Lost robots are listed on standard error. Takes a few minutes on two
-    cores.
+    Confidence intervals are computed by bootstrap over buildings. Lost robots are listed on standard error. Takes a
+    few minutes on two cores.
 
     With --sparse, variants of AMCL are compared on logs with scans 1 m or 0.5 rad apart, as in many public data sets.
     The table has a row for each kind of log and a column for each variant. Each cell shows the number of lost runs, the

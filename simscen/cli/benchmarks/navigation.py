@@ -80,12 +80,12 @@ def command(
 ) -> None:
     """Measure the navigation of the reference stack, and print one line per experiment.
 
-    The experiments are: BARN; generated fields, which are similar; narrow fields; dynamic fields (moving cylinders);
-    random goals in shipped worlds and generated buildings; degraded sensing; ramps; two robots in a corridor;
-    tb3_sandbox (Nav2's system test); corner cases; and localization. Intervals are by bootstrap over worlds. The worlds
-    of BARN and Nav2 are not included; pass their folders as options. Experiments without data are skipped with a
-    message. Failed runs are printed on standard error, each with a command to repeat the run. An interrupted session
-    prints its results so far; use --resume with the same options to continue.
+    The experiments are: BARN; generated fields (obstacle fields similar to those of BARN); narrow fields; dynamic
+    fields (moving cylinders); random goals in shipped worlds and generated buildings; degraded sensing; ramps; two
+    robots in a corridor; tb3_sandbox (Nav2's system test); corner cases; and localization. Confidence intervals are
+    computed by bootstrap over worlds. The worlds of BARN and Nav2 are not included; pass their folders as options.
+    Experiments without data are skipped with a message. Failed runs are printed on standard error, each with a command
+    to repeat the run. An interrupted session prints its results so far; use --resume with the same options to continue.
 
     Exit code 0: all runs were completed; 3: a run could not be completed; 5: no experiment matches --only and has runs.
     """
@@ -104,8 +104,8 @@ def command(
         is_whole = _is_selected(group.name, only)
         if not is_whole and not any(_is_selected(name, only) for name in group.other_names):
             continue
-        if group.missing:
-            print(f"{group.name}: skipped, {group.missing}", file=sys.stderr)
+        if group.missing_message:
+            print(f"{group.name}: skipped, {group.missing_message}", file=sys.stderr)
             continue
         experiments += [
             experiment

@@ -24,8 +24,11 @@ if TYPE_CHECKING:
 
 SHIPPED_WORLDS = ("house", "office", "warehouse")
 """Names of the shipped worlds in which robots drive to random goals."""
-BARN_HINT = "--barn names a folder with its worlds: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"
-NAV2_HINT = "--nav2 names a folder with it: https://github.com/ros-navigation/nav2_minimal_turtlebot_simulation"
+BARN_HINT = "give the folder with the BARN worlds with --barn; download: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"
+NAV2_HINT = (
+    "give the folder with Nav2's TurtleBot 3 simulation with --nav2; "
+    "download: https://github.com/ros-navigation/nav2_minimal_turtlebot_simulation"
+)
 """Messages if the option with the folder of the data is missing."""
 LIDAR_HEIGHT_M = 0.2
 """Height of the lidar for the maps of the worlds."""
@@ -77,7 +80,7 @@ class ExperimentGroup:
     missing_hint: str = ""
 
     @property
-    def missing(self) -> str:
+    def missing_message(self) -> str:
         """Message that the data is missing; "" if the data is available."""
         if self.data_folder is None:
             return self.missing_hint

@@ -133,7 +133,9 @@ def _spread(figure: Measurement) -> str:
 CompareOption = Annotated[
     Path | None,
     typer.Option(
-        "--compare", metavar="FILE", help="Compare with this result of --format json, and tell changes from noise."
+        "--compare",
+        metavar="FILE",
+        help="Compare with this result of --format json, and mark differences that are within the noise.",
     ),
 ]
 FormatOption = Annotated[TextOrJson, typer.Option("--format", help="Output format.")]

@@ -38,9 +38,10 @@ Check = tuple[str, Callable[[], str]]
 def command() -> None:
     """Check that this installation can run scenarios.
 
-    Checks Python, the packages and their versions, Linux features, limits of memory and files, disk space, the world
-    cache, and the external stacks in your configuration. Then runs one simulated second twice, compares the logs, and
-    measures the speed of a patrol. For each failed check, it prints what to do.
+    Checks Python, the packages and their versions, Linux features, limits of memory and files, disk space, the cache of
+    maps and shortest paths, and the external stacks in your configuration. Then runs one simulated second twice,
+    compares the logs, and measures how fast a drive through a hall is simulated. For each failed check, it prints what
+    to do.
 
     Exit code 0: all checks passed; 3: a check failed.
     """
@@ -68,9 +69,9 @@ def checks() -> Iterator[Check]:
     yield "fork", installation.check_fork
     yield "pidfd", installation.check_pidfd
     yield "limits", installation.check_resource_limits
-    yield "shared", installation.check_shared_memory
-    yield "temporary", installation.check_temporary_folder
-    yield "here", partial(installation.check_disk_space, Path.cwd())
+    yield "/dev/shm", installation.check_shared_memory
+    yield "tmp", installation.check_temporary_folder
+    yield "disk", partial(installation.check_disk_space, Path.cwd())
     yield "cache", check_cache
     yield "stacks", check_stacks
     yield "run", check_run

@@ -48,11 +48,11 @@ def command(
 ) -> None:
     """Edit a scenario or a world on its map, in a browser.
 
-    The page shows the map and the text of the file side by side. An edit on the map or in a form changes only its own
-    values in the text; comments, order, and formatting stay. Problems are shown while you edit. Nothing is written
-    until you save. If another program has changed the file, the page asks before it overwrites the file. The button Run
-    simulates the text without saving it. The page is served on this machine only, at an address with a secret token,
-    until you press Ctrl-C.
+    The page shows the map and the text of the file side by side. An edit on the map or in a form changes only the
+    edited values in the text; comments, order, and formatting stay. Problems are shown while you edit. Nothing is
+    written until you save. If another program has changed the file, the page asks before it overwrites the file. The
+    button Run simulates the text without saving it. The page is served on this machine only, at an address with a
+    secret token, until you press Ctrl-C.
 
     Exit code 0: ended with Ctrl-C; 2: the file or an option is unusable; 129 and 143: ended by another signal.
     """

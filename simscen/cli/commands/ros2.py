@@ -66,9 +66,10 @@ def command(
             help="Python interpreter with rclpy; default: SIMSCEN_ROS_PYTHON, or the first such python3 on the PATH."
         ),
     ] = None,
-    sync: Annotated[Sync, typer.Option(help="Let the simulation wait for the graph, or run at its own pace.")] = (
-        Sync.LOCKSTEP
-    ),
+    sync: Annotated[
+        Sync,
+        typer.Option(help="lockstep: the simulation waits for the nodes; paced: it runs at --factor times real time."),
+    ] = Sync.LOCKSTEP,
     factor: Annotated[float, typer.Option(min=0.01, max=1000, help="With paced: speed relative to real time.")] = 1.0,
     goals: Annotated[Goals, typer.Option(help="Action of Nav2, or topic /goal_pose; auto: the one that exists.")] = (
         Goals.AUTO
@@ -100,18 +101,18 @@ def command(
         typer.Option(min=0, max=60, help="Time in s for which the graph must stay unchanged before the run starts."),
     ] = 1.0,
     answer: Annotated[
-        float, typer.Option(min=0.1, max=3600, help="Maximum time to wait for the answer of a node, in s.")
+        float, typer.Option(min=0.1, max=3600, help="Maximum time to wait for a node to respond to a request, in s.")
     ] = 5.0,
     wait: Annotated[
-        float, typer.Option(min=0, max=60, help="With lockstep: maximum time to wait for a command, in s.")
+        float, typer.Option(min=0, max=60, help="With lockstep: maximum time to wait for a velocity command, in s.")
     ] = 0.05,
     rounds: Annotated[
         int,
         typer.Option(
             min=0,
             max=100,
-            help="With lockstep: maximum number of additional rounds, in which all nodes are asked again, until a "
-            "command arrives; 0: as many rounds as there are nodes.",
+            help="With lockstep: if no velocity command has arrived, wait for a response of every node again, at most "
+            "this many times; 0: as many times as there are nodes.",
         ),
     ] = 0,
     wall_time: Annotated[bool, typer.Option(help="Accept nodes that do not use sim time.")] = False,

@@ -98,8 +98,8 @@ def command(
         typer.Option(
             "--last-failed",
             "--lf",
-            help="Run only what failed when it last ran, by the sessions in simscen-out or in the parent folder of "
-            "--out; if nothing failed, run everything.",
+            help="Repeat only runs that failed last time, according to the sessions in simscen-out or in the parent "
+            "folder of --out; if none failed, run everything.",
         ),
     ] = False,
     durations: Annotated[

@@ -138,7 +138,7 @@ class Falsification:
         """
         start, stopped, empty_batches = time.monotonic(), None, 0
         error: SimscenError | None = None
-        listen = broadcast(journal, screen)
+        listener = broadcast(journal, screen)
         workers = self._request.options.workers
         runs = self._request.runs
         screen(SessionStarted(__version__, runs, 1, workers, str(reports.folder), seeds=runs))
@@ -157,7 +157,7 @@ class Falsification:
             empty_batches = 0 if valid else empty_batches + 1
             self._plan(journal, valid)
             with interrupt_on_signals():
-                finished_runs, stopped = run_session(valid, self._request.options, backend, listen)
+                finished_runs, stopped = run_session(valid, self._request.options, backend, listener)
             by_key = {finished.key: finished for finished in finished_runs}
             ordered = [None if job is None else by_key[job.key] for job in jobs]
             self.finished_runs += [finished for finished in ordered if finished is not None]
@@ -171,7 +171,7 @@ class Falsification:
             raise error or InvalidInput(problems or [Problem(str(self._request.file), 0, 0, "SC016", message)])
         study = evaluate_study(self._study_plan(), (finished.result for finished in self.finished_runs))
         is_interrupted = stopped is not None
-        written = finish_session(reports, journal, listen, self.finished_runs, start, is_interrupted, study=study)
+        written = finish_session(reports, journal, listener, self.finished_runs, start, is_interrupted, study=study)
         if error is not None:
             raise error
         if stopped is not None or not written:

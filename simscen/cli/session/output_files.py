@@ -38,7 +38,7 @@ class Reports:
     junit:         further file for the JUnit report; None for no further file
     family:        dialect of JUnit XML
     junit_only:    whether to write only the file `junit`
-    used:          further entries of run.json: plug-ins and external stacks that the runs use
+    extra_entries: further entries of run.json: plug-ins and external stacks that the runs use
     is_resumable:  whether the command has the option --resume
     """
 
@@ -48,19 +48,19 @@ class Reports:
         junit: Path | None,
         family: Family,
         junit_only: bool = False,
-        used: Mapping[str, object] | None = None,
+        extra_entries: Mapping[str, object] | None = None,
         is_resumable: bool = True,
     ) -> None:
         self.folder, self.page = folder, folder / PAGE
         self._junit, self._junit_only = junit or folder / "junit.xml", junit_only
         self._family: Family = family
-        self._used, self._is_resumable = used or {}, is_resumable
+        self._extra_entries, self._is_resumable = extra_entries or {}, is_resumable
         self._missing = frozenset({self.page, self._junit})
 
     def begin(self) -> None:
         """Write run.json before the first run. Raises UsageError if the folder is not writable."""
         try:
-            write_atomically(self.folder / "run.json", _session_info_json(self._used))
+            write_atomically(self.folder / "run.json", _session_info_json(self._extra_entries))
         except OSError as error:
             raise UsageError(f"cannot use the output folder {self.folder}: {error.strerror}") from error
 
@@ -91,7 +91,7 @@ class Reports:
 
     def write_duration(self, wall: float) -> bool:
         """Write run.json again with the duration of the session in seconds, and return whether it was written."""
-        return _write(self.folder / "run.json", _session_info_json(self._used, wall))
+        return _write(self.folder / "run.json", _session_info_json(self._extra_entries, wall))
 
     def finished_event(
         self,
@@ -154,8 +154,8 @@ def _write(path: Path, data: bytes | Iterable[bytes]) -> bool:
     return True
 
 
-def _session_info_json(used: Mapping[str, object], wall: float | None = None) -> bytes:
-    """Return the content of run.json with the further entries `used`.
+def _session_info_json(extra_entries: Mapping[str, object], wall: float | None = None) -> bytes:
+    """Return the content of run.json with `extra_entries`.
 
     `wall` is the wall-clock duration of the session in s; None while the session runs.
     """
@@ -170,7 +170,7 @@ def _session_info_json(used: Mapping[str, object], wall: float | None = None) ->
             "cpu_flags": cpu_flags(),
             "arithmetic": arithmetic_fingerprints(),
             "packages": software_versions(),
-            **used,
+            **extra_entries,
         },
         indent=2,
     ).encode()

@@ -34,7 +34,7 @@ from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_sess
 
 @dataclass(frozen=True)
 class SessionRequest:
-    """Arguments of `simscen run` by name. `selection` and `options` each contain several arguments."""
+    """Arguments of `simscen run`. `selection`, `options`, and `output` each contain several arguments."""
 
     paths: Sequence[Path]
     selection: Selection
@@ -92,24 +92,26 @@ def _run(
     pending: PendingRuns,
     options: SessionOptions,
     reports: Reports,
-    show: Listener,
+    listener: Listener,
     unused_server: ForkServerProcess | None,
 ) -> Exit:
     """Execute the pending runs, write the reports, and return the exit code.
 
-    `show` receives all events, including the events of reused results.
+    `listener` receives all events, including the events of reused results.
     """
-    start, listen = time.monotonic(), broadcast(pending.journal, show)
-    show(pending.started(reports.folder))
+    start, journal_and_listener = time.monotonic(), broadcast(pending.journal, listener)
+    listener(pending.started(reports.folder))
     for finished in pending.reused:
-        show(finished)
+        listener(finished)
     with interrupt_on_signals(), backend_of(options, unused_server) as backend:
-        done, stopped = run_session(pending.jobs, options, backend, listen)
+        done, stopped = run_session(pending.jobs, options, backend, journal_and_listener)
     finished_runs = RunStore(pending.reused)
     finished_runs.extend(done)
     pending.journal.complete(finished_runs)
     comparison = compare_stacks((finished.result for finished in finished_runs), pending.stacks)
-    written = finish_session(reports, pending.journal, listen, finished_runs, start, stopped is not None, comparison)
+    written = finish_session(
+        reports, pending.journal, journal_and_listener, finished_runs, start, stopped is not None, comparison
+    )
     code = exit_code(finished_runs)
     if code is Exit.NOTHING_SELECTED:
         print_text("simscen: nothing was run: all selected scenarios are skipped", sys.stderr)
@@ -119,17 +121,19 @@ def _run(
 def start_session(
     output: OutputOptions,
     inputs: Iterable[Path],
-    used: Mapping[str, object] | None = None,
+    extra_entries: Mapping[str, object] | None = None,
     is_resumable: bool = True,
 ) -> tuple[Reports, Journal]:
-    """Create the output folder with its journal and run.json, which has the further entries `used`.
+    """Create the output folder with its journal and run.json. `extra_entries` are added to run.json.
 
     The file of --junit must not be one of the `inputs`. `is_resumable`: whether the command has the option --resume.
     Raises InvalidInput and UsageError.
     """
     require_writable_junit(output.junit, output.out or output.resume, inputs)
     folder, journal = open_output_folder(output.out, output.resume)
-    reports = Reports(folder, output.junit, output.junit_family.value, used=used, is_resumable=is_resumable)
+    reports = Reports(
+        folder, output.junit, output.junit_family.value, extra_entries=extra_entries, is_resumable=is_resumable
+    )
     reports.begin()
     return reports, journal
 
@@ -137,21 +141,21 @@ def start_session(
 def finish_session(
     reports: Reports,
     journal: Journal,
-    listen: Listener,
+    listener: Listener,
     finished_runs: Sequence[RunFinished],
     start: float,
     is_interrupted: bool,
     comparison: Comparison | None = None,
     study: Study | None = None,
 ) -> bool:
-    """Write the reports of a session, send its last event to `listen`, and close the journal.
+    """Write the reports of a session, send its last event to `listener`, and close the journal.
 
     Return whether all files were written. `start` is the value of time.monotonic() at the start of the session. Without
     runs, only run.json is written.
     """
     written = not finished_runs or reports.write(finished_runs, comparison, study)
     wall = time.monotonic() - start
-    listen(reports.finished_event(finished_runs, wall, is_interrupted, comparison, study))
+    listener(reports.finished_event(finished_runs, wall, is_interrupted, comparison, study))
     written = reports.write_duration(wall) and written
     journal.close()
     if journal.error is not None:

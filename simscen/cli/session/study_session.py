@@ -140,10 +140,11 @@ class _StudySession:
         self._batch = list(islice(self._runs, self._batch_size))
         return self._load([run.number for run in self._batch])
 
-    def execute(self, backend: Backend, journal: Journal, reports: Reports, show: Listener) -> Exit:
+    def execute(self, backend: Backend, journal: Journal, reports: Reports, listener: Listener) -> Exit:
         """Run batches until the claim is decided or all runs are done, write the reports, and return the exit code.
 
-        `show` receives all events. If a later run cannot be loaded, the error is raised after the reports are written.
+        `listener` receives all events. If a later run cannot be loaded, the error is raised after the reports are
+        written.
         """
         start, finished_runs, stopped = time.monotonic(), RunStore(), None
         error: SimscenError | None = None
@@ -152,18 +153,18 @@ class _StudySession:
         scenario_id = next(iter(self._loaded.values())).id
         longest_title = scenario_id if self._space is None else scenario_title(scenario_id, f"variation-{self.total}")
 
-        listen = broadcast(journal, show)
+        journal_and_listener = broadcast(journal, listener)
         workers = self._request.options.workers
         titles = (longest_title,)
-        show(SessionStarted(__version__, self.total, 1, workers, str(reports.folder), titles, seeds=self.total))
+        listener(SessionStarted(__version__, self.total, 1, workers, str(reports.folder), titles, seeds=self.total))
         while self._batch and stopped is None:
             jobs = self._jobs(len(finished_runs), reports.folder)
             remaining, reused = self._plan(journal, jobs, earlier)
             write_reused(journal, reused)
             for finished in reused:
-                show(finished)
+                listener(finished)
             with interrupt_on_signals():
-                done, stopped = run_session(remaining, self._request.options, backend, listen)
+                done, stopped = run_session(remaining, self._request.options, backend, journal_and_listener)
             journal.complete([*reused, *done])
             finished_runs.extend([*reused, *done])
             if stopped is not None or self._is_decided(finished_runs):
@@ -180,7 +181,9 @@ class _StudySession:
         if stopped is None:
             warn_of_dropped_runs(journal.folder, past, self._planned)
         study = evaluate_study(self._study_plan(), (finished.result for finished in finished_runs))
-        written = finish_session(reports, journal, listen, finished_runs, start, stopped is not None, study=study)
+        written = finish_session(
+            reports, journal, journal_and_listener, finished_runs, start, stopped is not None, study=study
+        )
         if error is not None:
             raise error
         return stopped or (exit_code(finished_runs, study) if written else Exit.INCOMPLETE)

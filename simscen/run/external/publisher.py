@@ -1,4 +1,4 @@
-"""Encode sensor readings, maps, and masks as ROS messages for an external stack."""
+"""Queue of the ROS messages for an external stack: sensor readings, maps, and masks."""
 
 from __future__ import annotations
 
@@ -31,7 +31,10 @@ _FIRST_STAMP = (0, 0)
 
 
 class StepPublisher:
-    """Queue of the messages for the next frame STEP to a stack. Implements MessageSink, to which encoders write."""
+    """Queue of the ROS messages for the next STEP frame of the stack protocol.
+
+    Implements MessageSink, to which the encoders of the messages write.
+    """
 
     def __init__(self, tick_rate: int, sensors: Mapping[str, str], mounts: Mapping[str, Pose3]) -> None:
         """`sensors` are the reading types, such as "Scan", and `mounts` the poses in the base frame, by sensor name."""
@@ -71,7 +74,7 @@ class StepPublisher:
         latched = [topic for topic, _ in self._latched]
         return {topic.name: topic for topic in (*sent, topics.TF, *latched)}
 
-    def subscribe(self, available: Iterable[str], names: Collection[str]) -> None:
+    def set_subscriptions(self, available: Iterable[str], names: Collection[str]) -> None:
         """Publish only the topics `names` from now on, and queue the latched messages on them.
 
         `available` are the names of all topics, in the order of `available_topics`. Messages refer to a topic by its
@@ -113,7 +116,10 @@ class StepPublisher:
         return BatchWriter(self, layouts)
 
     def publish(self, topic: Topic, time: int, data: bytes) -> None:
-        """Publish a message if the stack has subscribed to its topic. `time` is the simulated time in ns."""
+        """Publish a message if the stack has subscribed to its topic. `time` is the simulated time in ns.
+
+        Static transforms that are published before `set_subscriptions` are kept, and queued by `set_subscriptions`.
+        """
         if topic is topics.TF_STATIC and not self._numbers:  # sensor mounts, published before topics are selected
             self._latched.append((topic, data))
         if topic.name in self._requested_topics:

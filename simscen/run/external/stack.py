@@ -101,7 +101,7 @@ class ExternalStack:
             self._welcome = Welcome.parse(kind, body, self._available_topics, self._parameters.mode)
         except (ProtocolViolation, wire.Malformed) as error:
             raise self._process.error(protocol.PROTOCOL, f"the answer to HELLO: {error}") from error
-        self._publisher.subscribe(self._available_topics, self._welcome.topics)
+        self._publisher.set_subscriptions(self._available_topics, self._welcome.topics)
         self._send(wire.GOAL, goal_content(estimate, goals, self._parameters))
         self._goals.start(goals)
 

@@ -10,8 +10,9 @@ from simscen.peer import wire
 from simscen.run.external.protocol import ProtocolViolation
 
 MAX_NAME_LENGTH = 200
+"""Maximum number of characters of `name` and of `version`."""
 MAX_ABOUT_LENGTH = 1 << 20
-"""Largest numbers of characters of `name` or `version`, and of `about`."""
+"""Maximum number of characters of `about`."""
 MAX_FIRST_ANSWER_S = 3700
 """Largest value of `first_answer_limit` and `first_answer_until` in s."""
 
@@ -26,7 +27,8 @@ class Welcome:
         topics: Names of the topics to send to the stack.
         every_beat: Whether the stack must answer at each tick with messages, not only when a command is due.
         about: Additional information from the stack for the log.
-        first_answer_limit: Wall time in s for the first answer. It applies if it is longer than `answer_limit`.
+        first_answer_limit: Maximum wall time in s for the first answer. It applies if it is longer than
+            `answer_limit`.
         first_answer_until: Simulated time in s until which `first_answer_limit` applies to all answers.
     """
 
@@ -42,14 +44,15 @@ class Welcome:
     def parse(cls, kind: int, body: bytes, available: Collection[str], mode: Mode = "navigate_to_pose") -> "Welcome":
         """Parse the first frame of a stack. Raises Malformed or ProtocolViolation.
 
-        `available` are the names of the topics to which the stack can subscribe.
+        `available` are the names of the topics to which the stack can subscribe. `mode` is the navigation mode of the
+        scenario, which the stack must support.
         """
         if kind != wire.WELCOME:
             raise ProtocolViolation("its first frame is not a WELCOME")
         content = wire.from_json(body)
         if content.get("protocol") != wire.PROTOCOL:
             raise ProtocolViolation(
-                f"it uses version {content.get('protocol')} of the protocol, simscen version {wire.PROTOCOL}"
+                f"it uses protocol version {content.get('protocol')}, but simscen uses protocol version {wire.PROTOCOL}"
             )
         step = content.get("step", "control")
         if step not in ("control", "beat"):

@@ -136,7 +136,7 @@ class PedestrianSimulation:
         shape = Cylinder(walker.radius, walker.height)
         solids = (Solid(shape, Pose3(z=walker.height / 2), walker.name),)
         body = Body(walker.name, solids, Pose3.planar(walker.pose))
-        self._simulation.add_steered(body, crowd.top_speed(walker.name))
+        self._simulation.add_steered_body(body, crowd.top_speed(walker.name))
         self._simulation.call_before_steps(self._period, self._step)
         return body
 

@@ -94,9 +94,9 @@ def _seeds(title: str, scenario: LoadedScenario, options: SessionOptions) -> Seq
 
 
 def run_session(
-    jobs: Sequence[Job], options: SessionOptions, backend: Backend, listen: Listener
+    jobs: Sequence[Job], options: SessionOptions, backend: Backend, listener: Listener
 ) -> tuple[RunStore, Exit | None]:
-    """Run all jobs, and pass the events of the session to `listen`: exactly one result for each job, and progress.
+    """Run all jobs, and pass the events of the session to `listener`: exactly one result for each job, and progress.
 
     Returns the results, and the exit code if the session was interrupted, else None.
     """
@@ -110,7 +110,7 @@ def run_session(
         all_good = all_good and run.outcome.is_good
         positions[job.number] = len(results)
         results.append(run)
-        listen(run)
+        listener(run)
 
     for job in jobs:
         if job.scenario.spec.skip is not None:
@@ -123,9 +123,9 @@ def run_session(
             match update:
                 case Started():
                     started.add(job.number)
-                    listen(RunStarted(job.key, job.scenario.path, job.scenario.spec.time_limit))
+                    listener(RunStarted(job.key, job.scenario.path, job.scenario.spec.time_limit))
                 case Progressed(seconds=seconds):
-                    listen(RunProgress(job.key, seconds))
+                    listener(RunProgress(job.key, seconds))
                 case Ended(end=end):
                     has_twin = options.twice and job.number ^ 1 in positions
                     twin = results[positions[job.number ^ 1]] if has_twin else None

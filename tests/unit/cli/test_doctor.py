@@ -40,7 +40,7 @@ def test_failed_check_is_reported_and_the_others_still_run(simscen, quick, monke
     ended = simscen("doctor")
     assert ended.code == 3
     assert next(line for line in ended.out.splitlines() if "✗" in line).startswith(
-        "  ✗ here       only 30 MiB are free"
+        "  ✗ disk       only 30 MiB are free"
     )
     assert ended.out.splitlines()[-1] == "  ✓ speed      not now, either"
 
@@ -52,8 +52,8 @@ def test_missing_temporary_folder_is_a_failed_check(simscen, quick, monkeypatch)
     monkeypatch.setattr(tempfile, "gettempdir", missing)
     ended = simscen("doctor")
     assert ended.code == 3
-    assert "  ✗ temporary  No usable temporary directory found; set TMPDIR" in ended.out
-    assert "  ✓ here " in ended.out
+    assert "  ✗ tmp        No usable temporary directory found; set TMPDIR" in ended.out
+    assert "  ✓ disk " in ended.out
 
 
 def test_engine_that_cannot_be_imported_is_a_failed_check(simscen, quick, monkeypatch) -> None:

@@ -94,8 +94,11 @@ def test_a_stack_without_answer_is_a_timeout(play, text: str) -> None:
         (RAW + "c.send(wire.frame(wire.WELCOME, b'[1]'))", "its body is not a JSON object"),
         (RAW + "c.send(wire.frame(wire.ANSWER, b''))", "its first frame is not a WELCOME"),
         (RAW + "c.send(wire.frame(77, b''))", "its first frame is not a WELCOME"),
-        (RAW + "c.send_json(wire.WELCOME, {'protocol': 2})", "it uses version 2 of the protocol, simscen version 1"),
-        (RAW + "c.send_json(wire.WELCOME, {})", "it uses version None of the protocol, simscen version 1"),
+        (
+            RAW + "c.send_json(wire.WELCOME, {'protocol': 2})",
+            "it uses protocol version 2, but simscen uses protocol version 1",
+        ),
+        (RAW + "c.send_json(wire.WELCOME, {})", "it uses protocol version None, but simscen uses protocol version 1"),
         (
             RAW + "c.send_json(wire.WELCOME, {'protocol': 1, 'topics': ['/scam']})",
             "it requests the topic `/scam`, which does not exist",
