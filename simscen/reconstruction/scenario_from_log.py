@@ -13,7 +13,7 @@ from simscen.loading.scenario import try_variations
 from simscen.loading.world_cache import WorldCache
 from simscen.reconstruction.drive.reader import read_drive
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive
-from simscen.reconstruction.drive.run_description import choose_robot, read_description
+from simscen.reconstruction.drive.run_description import checked_robot_name, read_description
 from simscen.reconstruction.estimators import run_estimators
 from simscen.reconstruction.objects.find_objects import object_of_robot
 from simscen.reconstruction.scenario.contents import EstimatedParts, GivenParts, ScenarioContents, scenario_contents
@@ -149,7 +149,7 @@ def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> R
 
 def _reconstruct(log: Path, out: Path, options: ReconstructionOptions, new: NewFiles) -> Reconstruction:
     """Write the scenario file `out`, and other files, which are added to `new`."""
-    robot_of_log = choose_robot(log, options.files.robot)
+    robot_of_log = checked_robot_name(log, options.files.robot)
     files = replace(options.files, robot="") if robot_of_log else options.files
     drive = read_drive(log, options.truth, options.topics, robot_of_log)
     described = read_description(log, options.root or Path.cwd(), robot_of_log)

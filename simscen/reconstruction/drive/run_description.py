@@ -45,7 +45,7 @@ class RunDescription:
     notes: tuple[str, ...] = ()
 
 
-def choose_robot(log: Path, name: str) -> str:
+def checked_robot_name(log: Path, name: str) -> str:
     """Return `name` for a simscen log with several robots, and "" for all other logs.
 
     Raises InvalidInput if the log has several robots, but none with this name.
@@ -53,7 +53,8 @@ def choose_robot(log: Path, name: str) -> str:
     robots = () if log.is_dir() else recorded_robots(log)
     if robots and name not in robots:
         hint = f"choose one: --robot {robots[0]}"
-        raise invalid_log(log, "SC804", f"the log has several robots: {', '.join(robots)}", hint)
+        problem = f"the log has no robot `{name}`" if name else "the log has several robots"
+        raise invalid_log(log, "SC804", f"{problem}; its robots are: {', '.join(robots)}", hint)
     return name if robots else ""
 
 
@@ -72,8 +73,8 @@ def read_description(log: Path, root: Path, robot: str = "") -> RunDescription:
     if not robot:
         return _described_run(recorded.header, tree.plain, root)
     own = tree.plain.get("robots", {}).get(robot, {})
-    written = {**tree.plain, "robot": own, "stack": own.get("stack", tree.plain.get("stack", {}))}
-    described = _described_run(recorded.header.robots[robot], written, root)
+    scenario_data = {**tree.plain, "robot": own, "stack": own.get("stack", tree.plain.get("stack", {}))}
+    described = _described_run(recorded.header.robots[robot], scenario_data, root)
     return replace(described, other_robots=tuple(_other_robots(recorded, robot)))
 
 
@@ -86,11 +87,11 @@ def _other_robots(recorded: Log, robot: str) -> Iterator[tuple[str, Polygon, Arr
             yield name, outline, truth.ticks / log.trace.tick_rate, truth.values[:, :3]
 
 
-def _described_run(header: LogHeader, written: Mapping[str, Any], root: Path) -> RunDescription:
-    """Return the description of a run from the log header and the data `written` of the recorded scenario."""
+def _described_run(header: LogHeader, scenario_data: Mapping[str, Any], root: Path) -> RunDescription:
+    """Return the description of a run from the log header and `scenario_data`, the content of the recorded scenario."""
     scenario_folder = root / Path(header.name).parent
     notes: list[str] = []
-    world, named = written.get("world"), written.get("robot", {}).get("model", "turtlebot")
+    world, named = scenario_data.get("world"), scenario_data.get("robot", {}).get("model", "turtlebot")
     if isinstance(world, str):
         file = (scenario_folder / world).resolve()
         if not file.is_file():
@@ -104,5 +105,5 @@ def _described_run(header: LogHeader, written: Mapping[str, Any], root: Path) ->
         if not file.is_file():
             notes.append(f"the robot `{named}` of the run is not below {root}; use --root or --robot")
         model = file if file.is_file() else None
-    has_map, stack = header.map is not None, written.get("stack", {})
+    has_map, stack = header.map is not None, scenario_data.get("stack", {})
     return RunDescription(header.seed, world, has_map, model, stack, notes=tuple(notes))

@@ -18,9 +18,9 @@ MIN_HITS, MAX_SKIPPED_BEAMS = 3, 2
 """Minimum number of hits of a cluster, and maximum number of beams without a hit between two hits of a cluster."""
 MAX_GAP_M, MAX_GAP_BEAMS = 0.25, 3.0
 """Maximum distance between neighbor hits of a cluster: the larger of a distance and a multiple of the beam spacing."""
-TRUE_WALL_DISTANCE_M = 0.12
-"""Distance from a wall below which a hit belongs to the wall, if the poses of the drive are true."""
-BELIEVED_WALL_DISTANCE_M, BELIEVED_WALL_DISTANCE_PER_M = 0.2, 0.02
+MAX_WALL_HIT_DISTANCE_TRUE_POSES_M = 0.12
+"""Maximum distance between a wall and a hit that belongs to it, if the poses of the drive are true."""
+MAX_WALL_HIT_DISTANCE_M, MAX_WALL_HIT_DISTANCE_PER_M = 0.2, 0.02
 """The same distance for estimated poses: a constant, and an addition per m of range."""
 
 
@@ -63,8 +63,8 @@ def scan_clusters(compared: ComparedScans, world: StaticWorld, has_true_poses: b
         unexplained[:, first : last + 1] = False
     rows, beams = np.nonzero(unexplained)
     if len(rows):
-        fixed = TRUE_WALL_DISTANCE_M if has_true_poses else BELIEVED_WALL_DISTANCE_M
-        growth = 0.0 if has_true_poses else BELIEVED_WALL_DISTANCE_PER_M
+        fixed = MAX_WALL_HIT_DISTANCE_TRUE_POSES_M if has_true_poses else MAX_WALL_HIT_DISTANCE_M
+        growth = 0.0 if has_true_poses else MAX_WALL_HIT_DISTANCE_PER_M
         limit = fixed + growth * compared.scans.ranges[rows, beams]
         near = world.distance_to_walls(compared.ends[rows, beams]) < limit
         unexplained[rows[near], beams[near]] = False

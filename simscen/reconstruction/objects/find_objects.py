@@ -152,10 +152,10 @@ def _object_of_track(compared: ComparedScans, track: ObjectTrack, usable: Indice
     """Return the object of a track, still without a name."""
     shape = fit_shape(track.clusters, is_moving)
     keyframes = keyframes_of(shape) if is_moving else [_keyframe(shape, 0)]
-    appears = _appearance(compared, track, usable)
-    disappears = _disappearance(compared, track, usable)
-    if disappears is not None and is_moving:
-        disappears = max(disappears, keyframes[-1][0] + 0.01)
+    appear_time = _appearance(compared, track, usable)
+    disappear_time = _disappearance(compared, track, usable)
+    if disappear_time is not None and is_moving:
+        disappear_time = max(disappear_time, keyframes[-1][0] + 0.01)
     seen = f"seen in {len(track.clusters)} scans"
     if is_moving:
         length = float(np.hypot(*np.diff(shape.poses[:, :2], axis=0).T).sum())
@@ -164,7 +164,7 @@ def _object_of_track(compared: ComparedScans, track: ObjectTrack, usable: Indice
         text = f"{seen} at one place, and not on the map"
     confidence = "high" if len(track.clusters) >= 20 else "medium"
     reason = Reason(text, track.begin, track.end, confidence)
-    return FoundObject("", shape.size, tuple(keyframes), appears, disappears, reason)
+    return FoundObject("", shape.size, tuple(keyframes), appear_time, disappear_time, reason)
 
 
 def _appearance(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> float | None:

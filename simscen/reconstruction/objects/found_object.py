@@ -17,10 +17,10 @@ Keyframe = tuple[float, float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class FittedPedestrian:
-    """Simulated pedestrian whose motion in the recorded drive approximates the track of a person.
+    """Pedestrian whose simulated motion next to the recorded robot approximates the track of a person.
 
     Attributes:
-        begin: Time in s at which the pedestrian appears.
+        appear_time: Time in s at which the pedestrian appears.
         walker: Start, goals, speed, and behavior of the pedestrian.
         times: Times (n,) in s of the simulation.
         positions: Positions (n, 2) of the pedestrian in the simulation.
@@ -29,7 +29,7 @@ class FittedPedestrian:
         meets_robot: Whether the robot came so near that the track shows how the person reacts to the robot.
     """
 
-    begin: float
+    appear_time: float
     walker: WalkingPedestrian
     times: Array
     positions: Array
@@ -38,8 +38,8 @@ class FittedPedestrian:
     meets_robot: bool = False
 
     @property
-    def sentence(self) -> str:
-        """Phrase with the RMSE and with the reaction of the pedestrian to the robot."""
+    def summary(self) -> str:
+        """Summary of the fit: the RMSE, and how the pedestrian reacts to the robot."""
         reaction = ""
         if self.walker.blind_to:
             reaction = " if it does not evade the robot"
@@ -56,8 +56,8 @@ class FoundObject:
         name: Name in the scenario.
         size: (length, width) of a box in m, or (radius,) of a cylinder.
         keyframes: Poses in order of time; one keyframe for a standing object.
-        appears: Time in s at which the object appears; None for the start of the drive.
-        disappears: Time in s at which the object disappears; None if it stays.
+        appear_time: Time in s at which the object appears; None for the start of the drive.
+        disappear_time: Time in s at which the object disappears; None if it stays.
         reason: Observation of the object in the log.
         is_robot: Whether the object is another robot, whose poses are in the log.
         pedestrian: Fitted pedestrian; None if the object is no person or no pedestrian fits.
@@ -66,8 +66,8 @@ class FoundObject:
     name: str
     size: tuple[float, ...]
     keyframes: tuple[Keyframe, ...]
-    appears: float | None = None
-    disappears: float | None = None
+    appear_time: float | None = None
+    disappear_time: float | None = None
     reason: Reason = field(default_factory=lambda: Reason(""))
     is_robot: bool = False
     pedestrian: FittedPedestrian | None = None
@@ -87,9 +87,9 @@ class FoundObject:
         """Radius in m of the circle around the outline."""
         return self.size[0] if self.is_cylinder else math.hypot(*self.size) / 2
 
-    def is_there(self, time: float) -> bool:
+    def is_present(self, time: float) -> bool:
         """Return whether the object is present at a time in s."""
-        return (self.appears or 0.0) <= time and (self.disappears is None or time < self.disappears)
+        return (self.appear_time or 0.0) <= time and (self.disappear_time is None or time < self.disappear_time)
 
     def poses_at(self, times: Array) -> Array:
         """Return the poses x, y, yaw (n, 3) at `times` (n,) by linear interpolation between the keyframes."""
@@ -98,7 +98,7 @@ class FoundObject:
 
     @property
     def comment(self) -> str:
-        """The reason as one line, with the sentence of the pedestrian if there is one."""
+        """The reason as one line, with the summary of the fitted pedestrian if there is one."""
         if self.pedestrian is None:
             return self.reason.comment
-        return replace(self.reason, text=f"{self.reason.text}; {self.pedestrian.sentence}").comment
+        return replace(self.reason, text=f"{self.reason.text}; {self.pedestrian.summary}").comment

@@ -61,7 +61,7 @@ class PedestrianTrial:
         robot = _RecordedDisc("robot", self._radius, self._poses.poses_at(times))
         discs = [_RecordedDisc(person.name, person.radius, person.poses_at(times)) for person in people]
         outlines = [_RecordedOutline(thing, times) for thing in objects]
-        present = [np.array([thing.is_there(time) for time in times.tolist()]) for thing in (*people, *objects)]
+        present = [np.array([thing.is_present(time) for time in times.tolist()]) for thing in (*people, *objects)]
         for index, time in enumerate(times.tolist()):
             while waiting and waiting[0][0] <= time + 1e-9:
                 crowd.add(waiting.pop(0)[1])

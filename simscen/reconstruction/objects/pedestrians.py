@@ -166,7 +166,7 @@ def _fit_pedestrian(
         return None
     for factor in SPEED_FACTORS:
         faster = replace(best.walker, speed=round(factor * track.speed, 2))
-        best = _better(best, tried(best.begin, faster), MIN_RMSE_DECREASE_M / 2)
+        best = _better(best, tried(best.appear_time, faster), MIN_RMSE_DECREASE_M / 2)
     return replace(best, meets_robot=meets_robot)
 
 
@@ -242,7 +242,7 @@ def _last_goal(track: _Track, radius: float, trial: PedestrianTrial) -> Array:
 
 def _simulated_together(found: Sequence[FoundObject], trial: PedestrianTrial) -> list[FoundObject]:
     """Return the objects with the positions and errors from one simulation of all pedestrians."""
-    walkers = [(thing.pedestrian.begin, thing.pedestrian.walker) for thing in found if thing.pedestrian]
+    walkers = [(thing.pedestrian.appear_time, thing.pedestrian.walker) for thing in found if thing.pedestrian]
     objects = [thing for thing in found if not thing.pedestrian]
     end = max(thing.keyframes[-1][0] for thing in found if thing.pedestrian)
     paths = trial.simulate(walkers, [], objects, end)
@@ -250,7 +250,7 @@ def _simulated_together(found: Sequence[FoundObject], trial: PedestrianTrial) ->
     for thing in found:
         pedestrian = thing.pedestrian
         if pedestrian is not None:
-            again = _with_errors(_Track(thing), pedestrian.begin, pedestrian.walker, *paths[thing.name])
+            again = _with_errors(_Track(thing), pedestrian.appear_time, pedestrian.walker, *paths[thing.name])
             pedestrian = replace(again, meets_robot=pedestrian.meets_robot)
         together.append(replace(thing, pedestrian=pedestrian))
     return together

@@ -11,7 +11,7 @@ from simscen.reconstruction.objects.clusters import ScanCluster
 
 MAX_CENTER_DISTANCE_M = 2.5
 """Maximum distance between the center of a cluster and the center that the track predicts."""
-GATE_M, GATE_M_S = 0.25, 0.8
+GATE_DISTANCE_M, GATE_DISTANCE_PER_S_M = 0.25, 0.8
 """Maximum distance between a track and its next cluster: constant, and per second since the last cluster."""
 MAX_UNSEEN_S = 2.0
 """Maximum time without a cluster in a track."""
@@ -20,11 +20,11 @@ CENTER_WEIGHT = 0.3
 centers."""
 VELOCITY_CLUSTERS, MAX_SPEED_M_S = 6, 2.5
 """Number of clusters from which the velocity is computed, and upper limit of the speed."""
-MOVING_SPEED_M_S = 0.3
-"""Last measured speed below which a hidden object may have stopped at once instead of moving on."""
+MAX_STOPPING_SPEED_M_S = 0.3
+"""A hidden object whose last measured speed is lower may also have stopped where it was last seen."""
 MIN_CLUSTERS, MIN_TRACK_S = 6, 0.6
 """Minimum number of clusters, and minimum duration, of a track."""
-MAX_LINK_S, LINK_M, LINK_M_S = 6.0, 0.5, 0.5
+MAX_LINK_S, LINK_DISTANCE_M, LINK_DISTANCE_PER_S_M = 6.0, 0.5, 0.5
 """Maximum time for which an object is hidden, and maximum distance between its predicted position and the position
 where it reappears: constant, and per second hidden."""
 
@@ -92,7 +92,7 @@ def _associate(active: list[ObjectTrack], clusters: list[ScanCluster]) -> None:
     for number, track in enumerate(active):
         for index, cluster in enumerate(clusters):
             distance = track.distance_to(cluster)
-            if distance <= GATE_M + GATE_M_S * (cluster.time - track.end):
+            if distance <= GATE_DISTANCE_M + GATE_DISTANCE_PER_S_M * (cluster.time - track.end):
                 pairs.append((distance, number, index))
     used_tracks: set[int] = set()
     used: set[int] = set()
@@ -128,7 +128,7 @@ def _link_distance(before: ObjectTrack, after: ObjectTrack) -> float | None:
     if not 0.0 < gap <= MAX_LINK_S:
         return None
     places = [before.clusters[-1].center + before.velocity * gap]
-    if float(np.hypot(*before.velocity)) < MOVING_SPEED_M_S:
+    if float(np.hypot(*before.velocity)) < MAX_STOPPING_SPEED_M_S:
         places.append(before.clusters[-1].center)
     distance = min(float(np.hypot(*(after.clusters[0].center - place))) for place in places)
-    return distance if distance <= LINK_M + LINK_M_S * gap else None
+    return distance if distance <= LINK_DISTANCE_M + LINK_DISTANCE_PER_S_M * gap else None

@@ -143,9 +143,9 @@ def _events(contents: ScenarioContents) -> Iterator[str]:
 
 def _object(thing: FoundObject) -> Iterator[str]:
     yield from _scripted_object(thing) if thing.pedestrian is None else _pedestrian(thing.pedestrian)
-    if thing.disappears is not None:
+    if thing.disappear_time is not None:
         yield f"  - name: {_text(f'{thing.name} disappears')}"
-        yield f"    when: {{time: {thing.disappears:.2f} s}}"
+        yield f"    when: {{time: {thing.disappear_time:.2f} s}}"
         yield f"    do: {{remove: {{name: {_text(thing.name)}}}}}"
 
 
@@ -164,7 +164,7 @@ def _pedestrian(fitted: FittedPedestrian) -> Iterator[str]:
     if walker.blind_to:
         keys.append(f"blind_to: [{', '.join(sorted(walker.blind_to))}]")
     yield f"  - name: {_text(f'{walker.name} appears')}"
-    yield f"    when: {{time: {fitted.begin:.2f} s}}"
+    yield f"    when: {{time: {fitted.appear_time:.2f} s}}"
     yield "    do:"
     yield "      pedestrian:"
     glued = ", ".join(key.replace(" ", NO_BREAK_SPACE) for key in keys)
@@ -173,7 +173,7 @@ def _pedestrian(fitted: FittedPedestrian) -> Iterator[str]:
 
 
 def _scripted_object(thing: FoundObject) -> Iterator[str]:
-    begin = thing.appears or 0.0
+    begin = thing.appear_time or 0.0
     _, x, y, yaw = thing.keyframes[0]
     height = PERSON_HEIGHT_M if is_person(thing) else OBJECT_HEIGHT_M
     size = ", ".join(f"{value:.2f}" for value in (*thing.size, height))

@@ -26,7 +26,7 @@ def test_an_empty_room_has_no_object():
 def test_a_standing_box_is_found_with_its_size_and_pose():
     (thing,) = found(lambda time: [drives.body(4.5, 1.0, math.radians(30), (0.8, 0.4))])
     assert not thing.is_moving
-    assert thing.appears is None and thing.disappears is None
+    assert thing.appear_time is None and thing.disappear_time is None
     _, x, y, yaw = thing.keyframes[0]
     assert math.hypot(x - 4.5, y - 1.0) < 0.15
     turned = (yaw - math.radians(30)) % (math.pi / 2)
@@ -43,8 +43,8 @@ def test_a_standing_column_is_a_cylinder():
 
 def test_an_object_that_appears_and_disappears_has_both_times():
     (thing,) = found(lambda time: [drives.body(4.5, 1.2, 0.0, (0.6, 0.6))] if 3.0 <= time < 7.0 else [])
-    assert thing.appears == pytest.approx(3.0, abs=0.15)
-    assert thing.disappears == pytest.approx(7.0, abs=0.25)
+    assert thing.appear_time == pytest.approx(3.0, abs=0.15)
+    assert thing.disappear_time == pytest.approx(7.0, abs=0.25)
 
 
 def test_crossing_person_is_tracked():

@@ -14,7 +14,7 @@ from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Pose2
 from simscen.loading.scenario import load_scenario
 from simscen.reconstruction.drive.log_messages import collect_messages
-from simscen.reconstruction.drive.run_description import choose_robot
+from simscen.reconstruction.drive.run_description import checked_robot_name
 from simscen.reconstruction.objects.find_objects import object_of_robot
 from simscen.reconstruction.scenario.given_parts import GivenFiles
 from simscen.reconstruction.scenario_from_log import ReconstructionOptions, scenario_from_log
@@ -56,8 +56,8 @@ def test_the_scenario_has_the_chosen_robot_and_the_other_one_as_a_moving_object(
 
 @pytest.mark.parametrize("name", ["", "green"])
 def test_a_robot_of_the_log_must_be_chosen(log, name):
-    with pytest.raises(InvalidInput, match="several robots: blue, red"):
-        choose_robot(log, name)
+    with pytest.raises(InvalidInput, match="its robots are: blue, red"):
+        checked_robot_name(log, name)
 
 
 def test_the_box_of_a_robot_is_around_its_footprint():
