@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from simscen.core.records.verdict import POSITION, Evidence, Finding
+from simscen.core.records.verdict import POSITION_EVIDENCE, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import MissingEvidence, at_least, undecided
 from simscen.criteria.trace_signals.distances import INTIMATE_SPACE_M, pedestrian_gap
@@ -89,7 +89,7 @@ class PersonalSpace(Spec, Criterion):
     def evidence(self) -> frozenset[Evidence]:
         """Evidence in the log that the criterion needs."""
         speed_needed = {Evidence.VELOCITY} if self.while_driving else set()
-        return POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT, *speed_needed}
+        return POSITION_EVIDENCE | {Evidence.OBJECTS, Evidence.FOOTPRINT, *speed_needed}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return the finding for the smallest gap."""

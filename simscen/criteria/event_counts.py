@@ -84,7 +84,7 @@ class Replans(CountBounds, Criterion):
     evidence: ClassVar[frozenset[Evidence]] = frozenset({Evidence.PLANNING})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for each bound. Raises MissingEvidence if the reasons for the plans are unknown."""
+        """Return one finding for each bound. Raises MissingEvidence if it is unknown why plans were computed."""
         counted_replans = [plan for plan in replans(trace) if self.reason in (None, plan.data["reason"])]
         plans = trace.of_kind(EventKind.PLAN_MADE)[:MAX_DETAILS]
         details = [f"t = {trace.seconds(plan.tick):.2f} s: {plan.data.get('reason', 'goal')}" for plan in plans]

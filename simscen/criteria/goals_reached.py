@@ -11,7 +11,7 @@ from pydantic import Field
 
 from simscen.core.geometry import wrap
 from simscen.core.messages.goals import FAILED, matches_goal_name
-from simscen.core.records.verdict import POSITION, Evidence, Finding
+from simscen.core.records.verdict import POSITION_EVIDENCE, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, held, missed, undecided
 from simscen.criteria.goal_outcomes import GoalOutcome, closest_approach, goal_outcomes, outcome_start
@@ -65,7 +65,7 @@ class GoalsReached(Spec, Criterion):
     within: PositiveDuration | None = None
     """Maximum time from the acceptance of each goal to the report that it is reached."""
 
-    evidence: ClassVar[frozenset[Evidence]] = POSITION | {Evidence.NAVIGATION}
+    evidence: ClassVar[frozenset[Evidence]] = POSITION_EVIDENCE | {Evidence.NAVIGATION}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return findings for distance, heading, and time of each reached goal, and one finding for each other goal."""

@@ -10,7 +10,7 @@ from pydantic import model_validator
 
 from simscen.core.geometry.polygon_separation import POINT, separation, separation_from_boxes
 from simscen.core.geometry.polygons import polygon_defect
-from simscen.core.records.verdict import POSITION, Evidence, Finding
+from simscen.core.records.verdict import POSITION_EVIDENCE, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import InvalidTrace, at_least, undecided
 from simscen.criteria.timeline import NEVER_ENABLED, clip_samples, enabled_spans
@@ -73,7 +73,7 @@ class Keepout(Spec, Criterion):
     def evidence(self) -> frozenset[Evidence]:
         """Evidence in the log that the criterion needs."""
         switched = {Evidence.DISTURBANCES} if self.while_on else set()
-        return POSITION | {Evidence.FOOTPRINT, *switched}
+        return POSITION_EVIDENCE | {Evidence.FOOTPRINT, *switched}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return the finding for the smallest distance."""

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from simscen.core.geometry import Array
-from simscen.core.records.verdict import POSITION, Evidence, Finding, Status
+from simscen.core.records.verdict import POSITION_EVIDENCE, Evidence, Finding, Status
 from simscen.core.statistics import chi2_quantile, nees_mean_bounds
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_least, at_most, if_complete, missed, undecided
@@ -69,7 +69,7 @@ class LocalizationError(Spec, Criterion):
         """Simulated time in s before which the criterion cannot pass."""
         return self.after
 
-    evidence: ClassVar[frozenset[Evidence]] = POSITION | {Evidence.BELIEF}
+    evidence: ClassVar[frozenset[Evidence]] = POSITION_EVIDENCE | {Evidence.BELIEF}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each given bound."""
@@ -153,7 +153,7 @@ class RelocalizedWithin(Spec, Criterion):
     def evidence(self) -> frozenset[Evidence]:
         """Evidence in the log that the criterion needs."""
         started = {Evidence.DISTURBANCES} if self.after is not None else set()
-        return POSITION | {Evidence.BELIEF, *started}
+        return POSITION_EVIDENCE | {Evidence.BELIEF, *started}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each start of `after`, or one for the start of the run."""
@@ -235,7 +235,7 @@ class LocalizationConsistency(Spec, Criterion):
         """Simulated time in s before which the criterion cannot pass."""
         return self.after
 
-    evidence: ClassVar[frozenset[Evidence]] = POSITION | {Evidence.BELIEF, Evidence.COVARIANCE}
+    evidence: ClassVar[frozenset[Evidence]] = POSITION_EVIDENCE | {Evidence.BELIEF, Evidence.COVARIANCE}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return the finding for the upper bound of the average, and with `both_sides` also for the lower bound."""

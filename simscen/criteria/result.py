@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from simscen.core.messages.goals import matches_goal_name
 from simscen.core.records.events import GOAL_END_KINDS, Event, EventKind
-from simscen.core.records.verdict import POSITION, Evidence, Finding
+from simscen.core.records.verdict import POSITION_EVIDENCE, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.error_codes import ErrorCodeValue, error_code_name, has_error_code
 from simscen.criteria.findings import at_most, held, missed, undecided
@@ -127,7 +127,7 @@ class NoFalseSuccess(Spec, Criterion):
     tolerance: PositiveLength = 1.0
     """True distance from the goal above which a reported success is false."""
 
-    evidence: ClassVar[frozenset[Evidence]] = POSITION | {Evidence.NAVIGATION}
+    evidence: ClassVar[frozenset[Evidence]] = POSITION_EVIDENCE | {Evidence.NAVIGATION}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return findings for all goals that were reported as reached, and for all false reports of SUCCEEDED."""

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from simscen.core.geometry.polygons import points_in_polygon
-from simscen.core.records.verdict import POSITION, Evidence, Finding
+from simscen.core.records.verdict import POSITION_EVIDENCE, Evidence, Finding
 from simscen.criteria.base import Criterion
 from simscen.criteria.findings import at_most, undecided
 from simscen.criteria.timeline import NEVER_ENABLED, enabled_spans
@@ -83,7 +83,7 @@ class Speed(Spec, Criterion):
     @property
     def evidence(self) -> frozenset[Evidence]:
         """Evidence in the log that the criterion needs."""
-        place = POSITION if self.in_ is not None or self.mask is not None else set()
+        place = POSITION_EVIDENCE if self.in_ is not None or self.mask is not None else set()
         switched = {Evidence.DISTURBANCES} if self.while_on else set()
         return frozenset({Evidence.TRUTH, Evidence.VELOCITY, *place, *switched})
 

@@ -1,4 +1,4 @@
-"""Checks of the text in the editor, which need not be saved. They are the checks of `simscen validate`."""
+"""Runs the checks of `simscen validate` on the text in the editor, whether it is saved or not."""
 
 from dataclasses import dataclass, field
 
@@ -16,7 +16,7 @@ from simscen.loading.world_cache import WorldCache
 CHECKED_VARIATIONS = range(1, 4)
 """Numbers of the variations (sets of values of a scenario) that the editor checks."""
 
-MAX_WORLDS = 8
+MAX_CACHED_WORLDS = 8
 """Maximum number of cached worlds."""
 
 
@@ -32,7 +32,7 @@ class TextChecks:
     file: EditedFile
     lenient: bool = False
     stack: StackChoice | None = None
-    cache: WorldCache = field(default_factory=lambda: WorldCache(MAX_WORLDS))
+    cache: WorldCache = field(default_factory=lambda: WorldCache(MAX_CACHED_WORLDS))
 
     def load(self, text: str) -> tuple[LoadedScenario, ...]:
         """Return the variations CHECKED_VARIATIONS of the scenario in a text. Raises InvalidInput."""

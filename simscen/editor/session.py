@@ -18,7 +18,7 @@ from simscen.editor.forms import form_data
 from simscen.editor.map_view.background import Backgrounds
 from simscen.editor.map_view.map_edits import read_edits, read_keys
 from simscen.editor.map_view.map_objects import MapObject
-from simscen.editor.map_view.scene import map_objects, object_at_problem, scene_data, scene_parts
+from simscen.editor.map_view.scene import map_objects, object_id_at_problem, scene_data, scene_parts
 from simscen.editor.preview import preview_data
 from simscen.editor.text_editing.splices import EditRefused
 from simscen.editor.text_editing.text_edits import apply_edits
@@ -237,7 +237,7 @@ class EditorSession:
             "severity": problem.severity,
             "message": problem.message,
             "hint": problem.hint,
-            "object": object_at_problem(problem, objects, source, text) if is_own else "",
+            "object": object_id_at_problem(problem, objects, source, text) if is_own else "",
         }
 
 

@@ -39,7 +39,7 @@ def required_evidence(entry: AnyCriterion) -> frozenset[Evidence]:
 
 def missing_evidence_reason(required: Set[Evidence], coverage: LogCoverage) -> str:
     """Return as text which required evidence the log lacks; "" if nothing is missing."""
-    missing = coverage.lacking(required)
+    missing = coverage.missing_from(required)
     return f"the log lacks {' and '.join(evidence.value for evidence in missing)}" if missing else ""
 
 
@@ -61,7 +61,7 @@ def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: LogCovera
     assert isinstance(criterion, Criterion)
     try:
         if reason := missing_evidence_reason(required, coverage):
-            causes = dict.fromkeys(coverage.missing[evidence] for evidence in coverage.lacking(required))
+            causes = dict.fromkeys(coverage.missing[evidence] for evidence in coverage.missing_from(required))
             detail = tuple(cause for cause in causes if cause)
             return (Finding(Status.INCONCLUSIVE, entry.kind, reason, "", detail=detail),)
         findings = criterion.judge(trace, case)

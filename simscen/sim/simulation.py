@@ -134,7 +134,7 @@ class Simulation:
         self._stepper.add_push(partial(actors.push, name), impulse, seconds, self.tick + 1)
 
     def place_robot(self, name: str, pose: Pose2) -> None:
-        """Place a robot at rest at `pose`, and end its collisions."""
+        """Place a robot at rest at `pose`, and end the collisions at its old pose."""
         with self._stepper.change():
             self.robots[name].place(pose)
 
@@ -150,7 +150,7 @@ class Simulation:
             push(impulse)
             self._stepper.on_push()
 
-    def add_steered(self, body: Body, max_speed: float) -> None:
+    def add_steered_body(self, body: Body, max_speed: float) -> None:
         """Add a body with a circular outline, such as a pedestrian. `follow` can move it at up to `max_speed` m/s."""
         path = MotionPath((0.0,), (body.pose.plane,))
         with self._stepper.change():
@@ -158,7 +158,7 @@ class Simulation:
             self._scene.actors.follow(body.name, path, max_speed, self.tick)
 
     def follow(self, name: str, path: MotionPath, max_speed: float) -> None:
-        """Let a body from `add_steered` follow a path from its pose on. The path must not exceed `max_speed` m/s."""
+        """Let a body of `add_steered_body` follow a path from its pose on, at no more than `max_speed` m/s."""
         self._scene.actors.follow(name, path, max_speed, self.tick)
 
     # Observing the world

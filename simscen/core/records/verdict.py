@@ -75,7 +75,7 @@ class Verdict:
 class ExpectedFailure:
     """Declaration in a scenario that its runs are expected to fail.
 
-    `criteria` contains the ids of the verdicts of which none may pass and at least one must fail. If it is empty, at
+    `criteria` are the ids of verdicts: at least one of them must fail, and none may pass. Without `criteria`, at
     least one verdict must fail. `line` is the line in the scenario file; 0 if unknown.
     """
 
@@ -98,7 +98,7 @@ class Evidence(str, Enum):
     PLANS = "the plans"
     NAVIGATION = "the outcomes of the goals"
     ERROR_CODES = "the error codes of the navigation"
-    PLANNING = "the reasons for the plans"
+    PLANNING = "the reasons why plans were computed"
     RECOVERIES = "the recoveries"
     OBJECTS = "the poses of moving objects"
     DISTURBANCES = "the times of faults and events"
@@ -106,13 +106,13 @@ class Evidence(str, Enum):
     FOOTPRINT = "the footprint of the robot"
 
 
-POSITION = frozenset({Evidence.TRUTH, Evidence.ALIGNMENT})
+POSITION_EVIDENCE = frozenset({Evidence.TRUTH, Evidence.ALIGNMENT})
 """Evidence for comparing the true position of the robot with positions on the map."""
 
 
 @dataclass(frozen=True)
 class LogCoverage:
-    """Evidence that a log lacks, with the reason for each.
+    """Coverage of a log: the evidence that it lacks, with the reason for each.
 
     `missing` evidence is not in the log. `partial` evidence covers only a part of the time. Logs of other recorders
     (`recorded_by_simscen` is False) can contain irregular signals and values that are not finite.
@@ -122,7 +122,7 @@ class LogCoverage:
     partial: Mapping[Evidence, str] = field(default_factory=dict)
     recorded_by_simscen: bool = True
 
-    def lacking(self, required: Set[Evidence]) -> list[Evidence]:
+    def missing_from(self, required: Set[Evidence]) -> list[Evidence]:
         """Return the required evidence that is missing."""
         return [evidence for evidence in Evidence if evidence in self.missing and evidence in required]
 

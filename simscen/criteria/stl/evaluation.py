@@ -1,4 +1,4 @@
-"""Evaluation of conditions on a run: the robustness of a condition at each sample of the truth."""
+"""Evaluation of conditions in signal temporal logic (STL): their robustness at each sample of the ground truth."""
 
 from __future__ import annotations
 
@@ -39,7 +39,10 @@ WindowOperator = Callable[[Array, SampleWindows, Continuation], Array]
 
 @dataclass(frozen=True, eq=False)
 class EvaluationContext:
-    """Run on which conditions are evaluated, at each sample of the truth. `run_ended` is False for a truncated log."""
+    """Run on which conditions are evaluated, at each sample of the ground truth.
+
+    `run_ended` is False for a truncated log.
+    """
 
     trace: Trace
     case: Case
@@ -68,8 +71,9 @@ class EvaluationContext:
 def robustness(condition: Condition, context: EvaluationContext, begin: int = 0) -> Robustness:
     """Return the robustness of a condition at each sample.
 
-    The premise of a `whenever` is checked from sample `begin` on. Raises MissingEvidence if the trace lacks a signal,
-    and InvalidTrace if a signal is not finite.
+    `begin` is the sample at which the criterion is evaluated: a `whenever` counts as tested only if its premise is true
+    in the window of this sample. Raises MissingEvidence if the trace lacks a signal, and InvalidTrace if a signal is
+    not finite.
     """
     if condition.signal is not None:
         return _compare(condition, context)
@@ -96,9 +100,11 @@ def _windowed(operator: WindowOperator, condition: Windowed, context: Evaluation
     return _apply_windows(operator, robustness(condition, context, _start(windows, begin)), windows, context)
 
 
-def _until(until: Release, context: EvaluationContext, begin: int) -> Robustness:
-    windows = context.sample_windows(until)
-    holds, releases = robustness(until.hold, context, begin), robustness(until.release, context, _start(windows, begin))
+def _until(condition: Release, context: EvaluationContext, begin: int) -> Robustness:
+    """Return the robustness of `until`: `hold` is true until `release` is true. For `begin`, see `robustness`."""
+    windows = context.sample_windows(condition)
+    holds = robustness(condition.hold, context, begin)
+    releases = robustness(condition.release, context, _start(windows, begin))
     low, high = (
         operators.until(holds.bound(bound), releases.bound(bound), windows, continuation)
         for bound, continuation in _continuations(context)
@@ -159,6 +165,7 @@ def _combine(parts: Sequence[Robustness], operator: Literal["all", "any"]) -> Ro
 
 
 def _compare(condition: Condition, context: EvaluationContext) -> Robustness:
+    """Return the robustness of the comparison of a signal with a value. Unknown values have an unlimited range."""
     assert condition.signal is not None
     values = read_signal(condition.signal, context.trace, context.case, condition.arguments)
     if condition.definition.is_boolean:

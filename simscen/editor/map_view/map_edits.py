@@ -12,42 +12,42 @@ from simscen.loading.yaml.source_nodes import SourceNode, parse_source, source_a
 
 
 def read_edits(request: Any, text: str, kind: str) -> list[Edit]:
-    """Return the edits of `text` for a list of changes in `request`. `kind` is "scenario" or "world".
+    """Convert `request`, a list of changes, to edits of `text`. `kind` is "scenario" or "world".
 
     A change is a mapping with the operation `op`, the path `keys`, and further arguments. The operations `set`, `add`,
     and `remove` change any value. `pose` and `keyframe` set a position in m and, if given, a heading in rad; `point`
     sets a position. Raises EditRefused for a malformed request.
     """
     if not isinstance(request, list):
-        raise EditRefused("the request has no list of edits")
+        raise EditRefused("the request has no list of changes")
     order = tuple(schema_of_kind(kind)["properties"])
     source = parse_source(text)
-    return [edit for one in request for edit in _read_change(one, source, order)]
+    return [edit for change in request for edit in _read_change(change, source, order)]
 
 
-def _read_change(one: Any, source: SourceNode | None, order: tuple[str, ...]) -> Iterator[Edit]:
+def _read_change(change: Any, source: SourceNode | None, order: tuple[str, ...]) -> Iterator[Edit]:
     """Yield the edits for one change. `source` is the syntax tree of the text; `order` is the order of new keys."""
-    if not isinstance(one, dict):
-        raise EditRefused("an edit must be a mapping")
-    keys = read_keys(one.get("keys"))
-    match one.get("op"):
+    if not isinstance(change, dict):
+        raise EditRefused("a change must be a mapping")
+    keys = read_keys(change.get("keys"))
+    match change.get("op"):
         case "set":
-            yield SetValue(keys, one.get("value"), order)
+            yield SetValue(keys, change.get("value"), order)
         case "add":
-            index = one.get("index")
-            yield AddItem(keys, one.get("value"), index if isinstance(index, int) else None, order)
+            index = change.get("index")
+            yield AddItem(keys, change.get("value"), index if isinstance(index, int) else None, order)
         case "remove":
             yield RemovePart(keys)
         case "pose":
-            yield from _pose_edits(keys, _number(one, "x"), _number(one, "y"), _yaw(one), source, order)
+            yield from _pose_edits(keys, _number(change, "x"), _number(change, "y"), _yaw(change), source, order)
         case "point":
-            yield from _list_edits(keys, {0: _number(one, "x"), 1: _number(one, "y")}, source)
+            yield from _list_edits(keys, {0: _number(change, "x"), 1: _number(change, "y")}, source)
         case "keyframe":
-            yaw = _yaw(one)
-            axes = {1: _number(one, "x"), 2: _number(one, "y")}
-            yield from _list_edits(keys, axes if yaw is None else {**axes, 3: yaw}, source)
+            yaw = _yaw(change)
+            position = {1: _number(change, "x"), 2: _number(change, "y")}
+            yield from _list_edits(keys, position if yaw is None else {**position, 3: yaw}, source)
         case _:
-            raise EditRefused("unknown kind of edit")
+            raise EditRefused("unknown kind of change")
 
 
 def _pose_edits(
@@ -73,17 +73,18 @@ def _pose_edits(
         yield SetValue(keys, pose, order)
 
 
-def _list_edits(keys: Keys, axes: dict[int, float], source: SourceNode | None) -> Iterator[Edit]:
-    """Yield edits that set numbers of a list such as [x, y] or [t, x, y, yaw]. `axes` are the new numbers by index.
+def _list_edits(keys: Keys, numbers: dict[int, float], source: SourceNode | None) -> Iterator[Edit]:
+    """Yield edits that set numbers of a list such as [x, y] or [t, x, y, yaw]. `numbers` are the new ones by index.
 
-    If the text has no such list, `axes` become a new list. Raises EditRefused if they lack index 0, such as the time t.
+    If the text has no list at `keys`, `numbers` become a new list. Then raises EditRefused if index 0 is missing, as
+    the time t of a keyframe is.
     """
     node = None if source is None else source_at(source, keys)
     if node is not None and node.kind == "sequence":
-        for index, value in axes.items():
+        for index, value in numbers.items():
             yield SetValue((*keys, index), value)
-    elif 0 in axes:
-        yield SetValue(keys, list(axes.values()))
+    elif 0 in numbers:
+        yield SetValue(keys, list(numbers.values()))
     else:
         raise EditRefused("the keyframe is not a list in this file; change it where it is written")
 
@@ -102,14 +103,14 @@ def read_keys(value: Any) -> Keys:
     return tuple(value)
 
 
-def _number(one: dict[str, Any], key: str) -> float:
+def _number(change: dict[str, Any], key: str) -> float:
     """Return the value of a key of a change. Raises EditRefused if it is not a finite number."""
-    value = one.get(key)
+    value = change.get(key)
     if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
-        raise EditRefused(f"an edit needs a number `{key}`")
+        raise EditRefused(f"a change needs a number `{key}`")
     return value
 
 
-def _yaw(one: dict[str, Any]) -> float | None:
+def _yaw(change: dict[str, Any]) -> float | None:
     """Return the heading of a change in rad; None if the change has no heading."""
-    return None if one.get("yaw") is None else _number(one, "yaw")
+    return None if change.get("yaw") is None else _number(change, "yaw")

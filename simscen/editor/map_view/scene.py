@@ -108,7 +108,7 @@ def _world_file(parts: SceneParts) -> str:
 
 
 def _object_data(one: MapObject, parts: SceneParts, source: SourceNode | None) -> dict[str, Any]:
-    is_here, line = _own_line(one.keys, parts, source)
+    is_here, line = _editable_and_line(one.keys, parts, source)
     return {
         "id": "/".join(map(str, one.keys)) or "settings",
         "keys": list(one.keys),
@@ -141,7 +141,7 @@ def _handle_data(handle: Handle) -> dict[str, Any]:
     }
 
 
-def _own_line(keys: Keys, parts: SceneParts, source: SourceNode | None) -> tuple[bool, int]:
+def _editable_and_line(keys: Keys, parts: SceneParts, source: SourceNode | None) -> tuple[bool, int]:
     """Return whether the object at `keys` can be edited in this text, and its line; 0 if it is in another file.
 
     `source` is the syntax tree of the text without inherited content; None if the text is invalid.
@@ -157,7 +157,7 @@ def _own_line(keys: Keys, parts: SceneParts, source: SourceNode | None) -> tuple
     return True, line
 
 
-def object_at_problem(problem: Problem, objects: Sequence[MapObject], source: SourceNode | None, text: str) -> str:
+def object_id_at_problem(problem: Problem, objects: Sequence[MapObject], source: SourceNode | None, text: str) -> str:
     """Return the ID of the object to which a problem in the text belongs; "" if there is none.
 
     If several objects contain the problem, the one with the shortest YAML is chosen. A problem at a key belongs to the

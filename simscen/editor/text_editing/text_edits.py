@@ -19,8 +19,8 @@ from simscen.loading.yaml.tree import Key
 class SetValue:
     """Edit that sets the value at `keys`, and creates the missing mappings that contain it.
 
-    `order` is the order of the keys at the top of the file, and of the same keys in nested mappings, such as those of
-    one of several robots. It determines the position of a new key.
+    `order` lists the top-level keys in their usual order. A new key is inserted according to it, also in nested
+    mappings with the same keys, such as `robots.a`.
     """
 
     keys: tuple[Key, ...]
@@ -60,13 +60,16 @@ def apply_edits(text: str, edits: Sequence[Edit]) -> str:
             raise EditRefused("the text is not valid YAML; correct it first")
         splices = _independent_splices(text, source, remaining) or [_splice(text, source, remaining[0])]
         new = apply_splices(text, splices)
-        _require_content(text, new, remaining[: len(splices)])
+        _require_only_edits(text, new, remaining[: len(splices)])
         text, remaining = new, remaining[len(splices) :]
     return text
 
 
 def _independent_splices(text: str, source: SourceNode, edits: Sequence[Edit]) -> list[Splice]:
-    """Return the splices of the first edits that replace different scalars, so that one syntax tree suffices."""
+    """Return the splices of the first edits of `edits`, up to the first one that does not replace another scalar.
+
+    They can be applied together, because none of them changes the syntax tree `source`.
+    """
     found: list[Splice] = []
     for edit in edits:
         if not isinstance(edit, SetValue) or isinstance(edit.value, dict | list):
@@ -132,7 +135,7 @@ def _replacement(text: str, node: SourceNode, value: Any) -> Splice:
     return Splice(node.start, node.end, new)
 
 
-def _require_content(old: str, new: str, edits: Sequence[Edit]) -> None:
+def _require_only_edits(old: str, new: str, edits: Sequence[Edit]) -> None:
     """Raise EditRefused if the new text differs from the old text by more than the edits."""
     before, after = parse_yaml(old, "")[0], parse_yaml(new, "")[0]
     if before is None or after is None:

@@ -3,7 +3,7 @@
 from collections.abc import Set
 from dataclasses import dataclass
 
-from simscen.core.records.verdict import POSITION, Evidence
+from simscen.core.records.verdict import POSITION_EVIDENCE, Evidence
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Metric:
 _PATH = frozenset({Evidence.TRUTH})
 _MOTION = frozenset({Evidence.TRUTH, Evidence.VELOCITY})
 _GOALS = frozenset({Evidence.NAVIGATION})
-_SUCCESS = POSITION | _GOALS | {Evidence.CONTACTS}
-_BELIEF = POSITION | {Evidence.BELIEF}
-_PEOPLE = POSITION | {Evidence.OBJECTS, Evidence.FOOTPRINT}
+_SUCCESS = POSITION_EVIDENCE | _GOALS | {Evidence.CONTACTS}
+_BELIEF = POSITION_EVIDENCE | {Evidence.BELIEF}
+_PEOPLE = POSITION_EVIDENCE | {Evidence.OBJECTS, Evidence.FOOTPRINT}
 """Sets of evidence that several metrics need."""
 
 _ERROR_STATISTICS = {"rmse": "root mean square", "mean": "mean", "median": "median", "max": "largest"}
@@ -62,7 +62,7 @@ METRICS: dict[str, Metric] = {
         "",
         "max(0, 1 - d / l) x l / max(l, p), d = final distance from the last goal.",
         "Habitat",
-        evidence=POSITION | _GOALS,
+        evidence=POSITION_EVIDENCE | _GOALS,
     ),
     "heading_change": Metric(
         "rad", "Sum of the absolute changes of the true heading, wrapped.", "HuNavSim", evidence=_PATH

@@ -43,11 +43,12 @@ CenterPose = tuple[Vector, tuple[float, float, float, float]]
 class Actor:
     """A movable body, and the `path` that the body has followed since `path_start_tick` (None: no path).
 
-    segments:         line segments; every position of its origin on the path is within their `deviation`
-    max_speed:        upper bound in m/s of the speed of any of its points on the path
-    bounding_radius:  radius in m of its bounding sphere around its origin
-    cylinder_radius:  radius in m of its bounding cylinder around the vertical axis
-    surface:          its surface in the body frame if its collision shape is a hollow triangle mesh, else None
+    segments:         line segments along the initial path, each with a `deviation` in m: the origin of the body is
+                      always within this distance of one of the segments. `follow` does not update them.
+    max_speed:        upper bound in m/s of the speed of any point of the body on the path
+    bounding_radius:  radius in m of the bounding sphere around the origin of the body
+    cylinder_radius:  radius in m of the bounding cylinder around the vertical axis of the body
+    surface:          surface in the body frame if the collision shape is a hollow triangle mesh, else None
     """
 
     body: Body
@@ -61,15 +62,15 @@ class Actor:
     is_steered: bool = False
     """Whether the path can be replaced at any time, as for pedestrians."""
     body_id: int | None = None
-    """Body id in the engine; None if it is not in the engine."""
+    """Body id in the engine; None if the actor is not in the engine."""
     collides: bool = False
-    """Whether it is in the engine and can collide."""
+    """Whether the actor is in the engine and can collide."""
     engine_pose: Pose3 | None = None
-    """Pose at which it was last placed in the engine."""
+    """Pose at which the actor was last placed in the engine."""
     center_from_base: Pose3 = Pose3()
     """Pose of the body frame in the frame of the principal axes of inertia."""
     center_and_pose: tuple[CenterPose, Pose3] | None = None
-    """Pose of its center of mass at the last query of the engine, and the resulting pose of its body frame."""
+    """Pose of the center of mass at the last query of the engine, and the resulting pose of the body frame."""
     is_resting: bool = False
     """Whether the engine returned the same pose at the last two queries."""
     _sampler: PathSampler | None = None
@@ -78,18 +79,18 @@ class Actor:
 
     @property
     def id(self) -> int:
-        """Body id in the engine; raises LookupError if it is not in the engine."""
+        """Body id in the engine; raises LookupError if the actor is not in the engine."""
         if self.body_id is None:
             raise LookupError(f'"{self.body.name}" is not in the engine')
         return self.body_id
 
     @property
     def is_pushable(self) -> bool:
-        """Whether it can be pushed: it has a mass and no path."""
+        """Whether the actor can be pushed: the body has a mass, and the actor has no path."""
         return self.body.mass > 0 and self.path is None
 
     def is_parked(self, elapsed: float, horizon: float) -> bool:
-        """Return whether it stands still for `horizon` seconds, beginning `elapsed` seconds after its path began.
+        """Return whether the actor stands still for `horizon` seconds, from `elapsed` seconds after its path began.
 
         Always False for an actor that has no path or is steered.
         """
@@ -103,7 +104,7 @@ class Actor:
         self._path_poses.clear()
 
     def path_pose(self, tick: int, tick_rate: int) -> Pose3:
-        """Return the pose on its path at a tick."""
+        """Return the pose on the path at a tick."""
         pose = self._path_poses.get(tick)
         if pose is None:
             if len(self._path_poses) > 1:

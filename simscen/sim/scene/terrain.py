@@ -72,7 +72,10 @@ class Terrain:
         return np.array([max(0.0, hit[3][2]) if hit[0] in self.names else 0.0 for hit in hits])
 
     def raise_to_ground(self, body: Body) -> Body:
-        """Return a body, raised to the ground below its origin. A body that is already on or above it is unchanged."""
+        """Return a body, raised to the ground if its origin is below the ground.
+
+        A body at or above the height of the ground is returned unchanged, and also a body at a negative height.
+        """
         height = float(self.heights(np.array([body.pose.position[:2]]))[0])
         return replace(body, pose=body.pose._replace(z=height)) if 0.0 <= body.pose.z < height else body
 

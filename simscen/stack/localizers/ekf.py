@@ -64,7 +64,7 @@ class EkfLocalizer:
         self._map_from_odom = pose
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Move the pose up to this reading."""
+        """Predict the pose at the time of this reading. Ignores implausible and out-of-order readings."""
         last = self._last
         if not is_plausible(odometry.pose) or (last is not None and odometry.tick <= last.tick):
             return
@@ -97,12 +97,12 @@ class EkfLocalizer:
         return Pose2(x, y, wrap(yaw))
 
     def _advance(self, step: Pose2, seconds: float) -> None:
-        """Update the velocity with `step`, the motion by odometry in the last `seconds`, and move the pose by it."""
+        """Update the velocity with `step`, the odometry motion of the last `seconds`, and integrate the velocity."""
         self._measure_velocity(step, seconds)
         self._move(seconds)
 
     def _measure_velocity(self, step: Pose2, seconds: float) -> None:
-        """Update the velocity with `step`, the motion by odometry since the last reading, and with the gyroscope."""
+        """Update the velocity with `step`, the odometry motion of the last `seconds`, and with the gyroscope."""
         transition, noise = np.eye(7), np.zeros((7, 7))
         velocities = [VX, VY, VYAW]
         transition[velocities, velocities], noise[velocities, velocities] = 0.0, VELOCITY_VARIANCE

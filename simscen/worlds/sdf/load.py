@@ -39,7 +39,7 @@ def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bo
     `search`.
 
     Raises InvalidInput for elements that affect the geometry but cannot be used. With `lenient`, such elements are left
-    out with a note in `World.notes`. Only a world file that is unreadable, or of which nothing is left, is an error.
+    out with a note in `World.notes`, and InvalidInput is raised only if the file is unreadable or nothing is left.
     """
     report, files = ImportReport(lenient=lenient), WorldFiles.of([root, *search])
     try:

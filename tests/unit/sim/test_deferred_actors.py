@@ -198,7 +198,7 @@ def test_no_actor_is_deferred_if_one_can_be_pushed(simulate):
 
 def test_steered_actor_is_not_deferred(simulate):
     simulation = simulate(has_images=False)
-    simulation.add_steered(FAR, 1.0)
+    simulation.add_steered_body(FAR, 1.0)
     assert actors_in_engine(simulation) == {"far"}
 
 
