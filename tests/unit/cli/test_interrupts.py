@@ -68,7 +68,7 @@ def test_signal_during_the_run_of_a_reconstructed_scenario_leaves_no_files(
 ) -> None:
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: os.kill(os.getpid(), number))
     with pytest.raises(Interrupted):
-        from_log._run(temporary / "a.scenario.yaml", temporary / "a.mcap")
+        from_log._run(temporary / "a.scenario.yaml", temporary / "a.mcap", temporary / "recorded.mcap")
     assert not list(temporary.iterdir())
 
 
