@@ -68,6 +68,14 @@ def test_old_beliefs_count_at_the_usual_rate_of_beliefs():
     assert metrics["ape_trans_median"] == 0.0
 
 
+def test_a_single_belief_counts_as_one_belief_per_second():
+    ticks = [*range(0, 11 * 240, 6)]
+    trace = located(ticks, [(float(tick >= 6 * 240), 0, 0) for tick in ticks], [0], [(0, 0, 0)])
+    old = np.array([tick for tick in ticks if tick > 240])  # each has 1/40 of the weight of the belief
+    expected = (old >= 6 * 240).sum() / 40 / (1 + len(old) / 40)
+    assert pose_metrics(trace)["ape_trans_mean"] == pytest.approx(expected)
+
+
 def test_turning_in_place_adds_no_distance():
     ticks = [0, 6, 12]
     poses = [(0, 0, 0), (0.1, 0, 3.0), (0.2, 0, 0)]
