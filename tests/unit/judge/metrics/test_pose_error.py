@@ -76,6 +76,19 @@ def test_a_single_belief_counts_as_one_belief_per_second():
     assert pose_metrics(trace)["ape_trans_mean"] == pytest.approx(expected)
 
 
+@pytest.mark.parametrize(
+    ("truth_period", "beliefs", "weight"),
+    [(6, [0, 24], 0.25), (480, [*range(0, 241, 24)], 1.0)],
+    ids=["two beliefs", "truth less often than beliefs"],
+)
+def test_weight_of_old_beliefs_is_the_ratio_of_the_periods_but_at_most_one(truth_period, beliefs, weight):
+    ticks = [*range(0, 4801, truth_period)]
+    trace = located(ticks, [(float(tick > 600), 0, 0) for tick in ticks], beliefs, [(0, 0, 0)] * len(beliefs))
+    old = np.array([tick for tick in ticks if tick > beliefs[-1] + 240])
+    expected = (old > 600).sum() * weight / (len(beliefs) + len(old) * weight)
+    assert pose_metrics(trace)["ape_trans_mean"] == pytest.approx(expected)
+
+
 def test_turning_in_place_adds_no_distance():
     ticks = [0, 6, 12]
     poses = [(0, 0, 0), (0.1, 0, 3.0), (0.2, 0, 0)]
