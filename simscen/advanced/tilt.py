@@ -1,4 +1,4 @@
-"""Tilt of the robot by its IMU, and removal of the lidar hits on the floor that a tilted robot sees.
+"""Estimate of the robot's tilt from its IMU, and removal of the lidar hits on the floor that a tilted robot sees.
 
 On the way down a ramp, the beams of a level lidar point to the floor ahead, whose hits look like a wall.
 """
@@ -16,7 +16,7 @@ CORRECTION_TIME_S = 1.0
 MAX_GAP_S = 0.5
 """Time between two readings above which their difference is ignored."""
 MAX_ACCELERATION_ERROR_M_S2 = 1.0
-"""Deviation of the measured acceleration from gravity above which it does not correct the direction."""
+"""Difference between the magnitudes of measured acceleration and gravity above which the former is not used."""
 MIN_SLOPE = 0.05
 """Slope of a beam below which its hit counts as an obstacle, because the tilt is not known more precisely."""
 MIN_LIDAR_HEIGHT_M = 0.1
@@ -33,19 +33,19 @@ class TiltEstimator:
     def __init__(self, tick_rate: int) -> None:
         self._tick_rate = tick_rate
         self.up = (0.0, 0.0, 1.0)
-        """Estimated direction away from the center of the earth in the base frame, a unit vector."""
+        """Estimated upward direction (against gravity) in the base frame, a unit vector."""
         self._imu: Imu | None = None
         self._odometry: Odometry | None = None
         self._acceleration = (0.0, 0.0)  # of the robot along x and y, by odometry
 
     def add_odometry(self, odometry: Odometry) -> None:
-        """Update the acceleration of the robot from its change of speed and from its turn."""
+        """Update the acceleration of the robot from its changes of velocity and from its turn."""
         last, self._odometry = self._odometry, odometry
-        twist = odometry.twist
-        forward = 0.0
+        vx, vy, wz = odometry.twist
+        forward = left = 0.0
         if last is not None and (seconds := self._seconds(last.tick, odometry.tick)):
-            forward = (twist.vx - last.twist.vx) / seconds
-        self._acceleration = forward - twist.vy * twist.wz, twist.vx * twist.wz
+            forward, left = (vx - last.twist.vx) / seconds, (vy - last.twist.vy) / seconds
+        self._acceleration = forward - vy * wz, left + vx * wz
 
     def add_imu(self, imu: Imu) -> None:
         """Update the direction with a reading in the base frame."""
@@ -75,5 +75,5 @@ class TiltEstimator:
             return scan
         angles = scan.mount.yaw + scan.angles()
         descent = -(x * np.cos(angles) + y * np.sin(angles))
-        is_floor = (descent > MIN_SLOPE) & (scan.ranges * descent > MIN_LIDAR_HEIGHT_M)
+        is_floor = np.isfinite(scan.ranges) & (descent > MIN_SLOPE) & (scan.ranges * descent > MIN_LIDAR_HEIGHT_M)
         return replace(scan, ranges=np.where(is_floor, np.nan, scan.ranges)) if is_floor.any() else scan

@@ -22,7 +22,7 @@ def drive(tilt: TiltEstimator, seconds: float, slope: float, twist_at, pitch_rat
         t = step * STEP_S
         down = slope if pitch is None else pitch(t)
         twist, later = twist_at(t), twist_at(t + STEP_S)
-        ax, ay = (later.vx - twist.vx) / STEP_S, twist.vx * twist.wz
+        ax, ay = (later.vx - twist.vx) / STEP_S, (later.vy - twist.vy) / STEP_S + twist.vx * twist.wz
         gravity = -GRAVITY_M_S2 * math.sin(down), GRAVITY_M_S2 * math.cos(down)
         tilt.add_odometry(Odometry("odom", start + step * PERIOD, Pose2(0.0, 0.0), later))
         acceleration = (gravity[0] + ax, ay, gravity[1])
@@ -45,8 +45,13 @@ def test_gyroscope_shows_the_begin_of_a_slope_at_once() -> None:
 
 @pytest.mark.parametrize(
     "twist_at",
-    [lambda t: Twist(1.5 * t), lambda t: Twist(3.0 - 1.5 * t), lambda _: Twist(1.5, 0.0, 1.0)],
-    ids=["acceleration", "braking", "turn"],
+    [
+        lambda t: Twist(1.5 * t),
+        lambda t: Twist(3.0 - 1.5 * t),
+        lambda t: Twist(0.0, 1.5 * t),
+        lambda _: Twist(1.5, 0.0, 1.0),
+    ],
+    ids=["acceleration", "braking", "lateral acceleration", "turn"],
 )
 def test_acceleration_of_the_robot_is_no_tilt(twist_at) -> None:
     tilt = TiltEstimator(TICK_RATE_HZ)
@@ -72,6 +77,7 @@ def test_possible_hits_on_the_floor_are_invalid() -> None:
     tilt = TiltEstimator(TICK_RATE_HZ)
     drive(tilt, 8.0, 0.1, lambda _: Twist(0.4))
     assert np.array_equal(tilt.without_floor(scan([1.8, 2.0, 2.0, 2.0])).ranges, [np.nan, 2, 2, 2], equal_nan=True)
+    assert np.array_equal(tilt.without_floor(scan([np.inf, 2.0, 2.0, 2.0])).ranges, [np.inf, 2, 2, 2])
     turned = tilt.without_floor(scan([2.0, 1.8, 2.0, 2.0], yaw=-math.pi / 2))
     assert np.array_equal(turned.ranges, [2, np.nan, 2, 2], equal_nan=True)
 
