@@ -174,7 +174,7 @@ def _value_text(kind: Any, info: ArgumentInfo | OptionInfo) -> str:
         return " or ".join(f"`{member.value}`" for member in kind)
     text = _TYPE_NAMES[kind]
     if info.min is not None and info.max is not None:
-        return f"{text}, {info.min:g} to {info.max:g}" if kind is float else f"{text}, {info.min} to {info.max}"
+        return f"{text}, {info.min:.12g} to {info.max:.12g}"
     return f"{text}, at least {info.min:g}" if info.min is not None else text
 
 

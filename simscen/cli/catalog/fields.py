@@ -159,4 +159,6 @@ def _default(model: type[BaseModel], name: str, field: FieldInfo) -> str:
         return OPTIONAL
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(str, value))}]" if value else OPTIONAL
-    return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return f"{value:.0f}" if value.is_integer() else f"{value:g}"
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -12,7 +12,7 @@ from simscen.cli.diagnostics import as_github, as_json, as_text, print_text, rel
 from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.stacks import parse_stacks
 from simscen.cli.shared_options import Format, RootOption, WorldPathOption
-from simscen.core.errors import Exit, Problem
+from simscen.core.errors import Exit, InvalidInput, Problem
 from simscen.loading.checks.files import CHECKED_VARIATIONS, STACK_KINDS, check_file, file_kind
 from simscen.loading.files.discovery import SUFFIXES, default_root, discover
 
@@ -52,21 +52,32 @@ def command(
         root_folder, world_path or [], lenient, fast, picture, stacks=stacks, requires_commands=bool(stack)
     )
     kinds, invalid_files, found = Counter[str](), 0, dict[Problem, None]()
-    for file in discover(paths, root_folder, SUFFIXES):
+    try:
+        files = discover(paths, root_folder, SUFFIXES)
+    except InvalidInput as error:
+        if format_ is Format.TEXT:
+            raise
+        _print_problems(error.problems, format_, file_count=0, is_valid=False)
+        sys.exit(Exit.USAGE)
+    for file in files:
         kind = file_kind(file, root_folder)
         of_file = relative_to_working_folder(_problems(kind, file, checker), root_folder)
         kinds[kind] += 1
         invalid_files += any(problem.severity == "error" for problem in of_file)
         found.update(dict.fromkeys(of_file))
     problems = list(found)
-    if format_ is Format.JSON:
-        print(as_json(problems, valid=not invalid_files, files=kinds.total()))
-    else:
-        if problems:
-            print_text(as_github(problems) if format_ is Format.GITHUB else as_text(problems))
+    _print_problems(problems, format_, kinds.total(), is_valid=not invalid_files)
+    if format_ is not Format.JSON:
         print_text(_summary(kinds, problems, invalid_files))
     if invalid_files:
         sys.exit(Exit.USAGE)
+
+
+def _print_problems(problems: list[Problem], format_: Format, file_count: int, is_valid: bool) -> None:
+    if format_ is Format.JSON:
+        print(as_json(problems, valid=is_valid, files=file_count))
+    elif problems:
+        print_text(as_github(problems) if format_ is Format.GITHUB else as_text(problems))
 
 
 def _problems(kind: str, file: Path, checker: FileChecker) -> list[Problem]:

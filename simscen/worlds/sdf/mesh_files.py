@@ -3,6 +3,7 @@
 COLLADA is parsed by pycollada, because trimesh drops the unit and the node names. STL and OBJ are parsed by trimesh.
 """
 
+import codecs
 import io
 import logging
 import warnings
@@ -86,7 +87,8 @@ def _check_face_count(count: int) -> None:
 def _read_stl(data: bytes) -> Iterator[MeshPart]:
     from trimesh.exchange.stl import load_stl
 
-    is_ascii = data[:5] == b"solid" and b"facet" in data[:2000]
+    text = data.removeprefix(codecs.BOM_UTF8).lstrip().lower()
+    is_ascii = text.startswith(b"solid") and b"facet" in text[:2000]
     if not is_ascii:
         _check_stl_header(data)
     yield from _parts_from_trimesh(lambda: load_stl(io.BytesIO(data)), "STL")

@@ -51,6 +51,15 @@ def test_github_annotations_are_printed(simscen, tmp_path: Path) -> None:
     )
 
 
+def test_missing_file_is_printed_in_the_chosen_format(simscen) -> None:
+    ended = simscen("validate", "missing.yaml", "--format", "json")
+    output = json.loads(ended.out)
+    assert (ended.code, output["valid"], output["files"]) == (2, False, 0)
+    assert [(problem["path"], problem["code"]) for problem in output["problems"]] == [("missing.yaml", "SC001")]
+    ended = simscen("validate", "missing.yaml", "--format", "github")
+    assert (ended.code, ended.out[:25]) == (2, "::error file=missing.yaml")
+
+
 def test_goal_in_a_wall_is_found_without_a_run(simscen, tmp_path: Path) -> None:
     good = (tmp_path / "good.scenario.yaml").read_text()
     (tmp_path / "bad.scenario.yaml").write_text(good.replace("x: 5, y: 3", "x: 3, y: 2"))

@@ -173,9 +173,11 @@ class TestStl:
         shape = mesh(stl(1, 1), name="x.stl")
         np.testing.assert_allclose(corners(shape), [(0, 0, 0), (1, 0, 0), (0, 1, 0)])
 
-    def test_text_files_are_read(self, mesh):
+    @pytest.mark.parametrize("prefix", ["", "\n  ", "\ufeff"])
+    @pytest.mark.parametrize("write", [str, str.upper])
+    def test_text_files_are_read(self, mesh, prefix, write):
         loop = "outer loop\nvertex 0 0 0\nvertex 2 0 0\nvertex 0 1 0\nendloop\n"
-        text = f"solid x\nfacet normal 0 0 1\n{loop}endfacet\nendsolid x\n"
+        text = prefix + write(f"solid x\nfacet normal 0 0 1\n{loop}endfacet\nendsolid x\n")
         np.testing.assert_allclose(
             sorted(map(tuple, corners(mesh(text, name="x.STL")))), [(0, 0, 0), (0, 1, 0), (2, 0, 0)]
         )
