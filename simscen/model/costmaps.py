@@ -115,10 +115,10 @@ class LocalCostmap(Spec):
     track_unknown_space: bool = False
     """Whether cells that no beam has passed are unknown; otherwise they are free."""
 
-    def with_defaults_from(self, shared: Costmap) -> Costmap:
-        """Return the parameters except `width` and `height`. The global costmap `shared` supplies missing values."""
-        own = {name: value for name in sorted(Costmap.model_fields) if (value := getattr(self, name, None)) is not None}
-        return shared.model_copy(update=own)
+    def with_defaults_from(self, global_costmap: Costmap) -> Costmap:
+        """Return the parameters except `width` and `height`. Missing values are taken from the global costmap."""
+        local = {name: getattr(self, name, None) for name in sorted(Costmap.model_fields)}
+        return global_costmap.model_copy(update={name: value for name, value in local.items() if value is not None})
 
 
 class Prediction(Ranged):

@@ -57,8 +57,8 @@ class EventEntry(Spec):
     then: Annotated[list[StepEntry], Field(max_length=50)] = []
     """Sequence of further steps; each becomes active when the previous one has happened."""
     required: bool = True
-    """Whether the run fails if this event never happens: its trigger does not fire, one of its actions has no effect,
-    or its `probability` is not drawn."""
+    """Whether the run fails if this event never happens: its trigger does not fire, its `probability` prevents it, or
+    one of its actions has no effect."""
 
     @model_validator(mode="after")
     def _check_not_empty(self) -> "EventEntry":
@@ -143,7 +143,7 @@ class FaultEntry(AnyFault):
     for_: PositiveDuration | None = Field(default=None, alias="for")
     """Duration; default: until the end of the run."""
     required: bool = True
-    """Whether the run fails if this fault has no effect: its trigger does not fire, its `probability` is not drawn, or
+    """Whether the run fails if this fault has no effect: its trigger does not fire, its `probability` prevents it, or
     it ends before it changes a message or a command."""
 
     @property

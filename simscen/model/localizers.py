@@ -154,7 +154,7 @@ class Ekf(EkfParameters):
 
 
 class GroundTruth(LocalizerSpec):
-    """Localizer that returns the true pose, to separate faults of localization from faults of navigation."""
+    """Localizer that returns the true pose, to test navigation without localization errors."""
 
     component: ClassVar[str] = "simscen.stack.localizers.build:ground_truth"
     type: Literal["ground_truth"]

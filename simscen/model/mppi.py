@@ -181,7 +181,7 @@ class MppiVelocityDeadbandCritic(MppiCritic):
     """Penalizes velocities that are too low to move a base with friction."""
 
     cost_weight: Weight = 35.0
-    """Weight of the m/s and rad/s by which a velocity is too low, integrated over time."""
+    """Weight of the difference between a velocity and its deadband (m/s, rad/s), integrated over time."""
     deadband_velocities: Annotated[
         tuple[NonNegativeSpeed, NonNegativeSpeed, NonNegativeAngularSpeed], Field(strict=False)
     ] = (0.0, 0.0, 0.0)
@@ -261,7 +261,7 @@ class Mppi(PathFollowerSpec):
     regenerate_noises: bool = False
     """Whether to draw new samples for each command."""
     retry_attempt_limit: Annotated[int, Field(ge=0, le=20)] = 1
-    """Number of restarts per command if all trajectories collide, or if the optimized one does."""
+    """Number of restarts per command if all sampled trajectories collide, or if the optimized trajectory collides."""
     open_loop: bool = False
     """Whether to use the last command instead of the measured velocity."""
     sgf_order: Annotated[int, Field(ge=1, le=2)] = 2

@@ -8,7 +8,8 @@ Values = Mapping[str, Any]
 """Parameters by key, or by section and key."""
 
 SECTIONS_BY_TYPE = ("localizer", "planner", "controller", "goal_checker")
-"""Sections in which the parameters depend on `type`. A profile contains their parameters by type, the default first."""
+"""Sections whose parameters depend on `type`. In a profile, the parameters of these sections are grouped by type. The
+first type is the default."""
 _COSTMAP: Values = {
     "obstacle_max_range": 2.5, "obstacle_min_range": 0.0, "raytrace_max_range": 3.0, "raytrace_min_range": 0.0,
     "max_obstacle_height": 2.0, "min_obstacle_height": 0.0, "max_ground_slope": 0.0,
@@ -19,7 +20,7 @@ _COSTMAP: Values = {
 _PLANNER: Values = {"tolerance": 0.5, "allow_unknown": True, "replanning": "rate", "cautious": False}
 """Parameters of all planners in the profile `nav2`."""
 _USE_CIRCLE: Values = {"consider_footprint": False}
-"""Parameters of MPPI critics in the profile `nav2`: only the inscribed circle is checked."""
+"""Parameters of MPPI critics in the profile `nav2`: check only the inscribed circle of the footprint."""
 NAV2: Values = {
     "controller_frequency": 20.0,
     "failure_tolerance": 0.3,
@@ -99,24 +100,27 @@ def apply_profile(parameters: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _complete_section(name: str, defaults: Any, section: Any) -> Any:
-    """Return a section in which missing parameters are taken from the profile. `section` is None if it is missing."""
+    """Return the section `name` of a stack, with missing parameters from the profile's section `defaults`.
+
+    `section` is None if the stack has no such section.
+    """
     if section is None:
         if name not in SECTIONS_BY_TYPE:
             return defaults
-        kind = next(iter(defaults))
-        return {"type": kind, **defaults[kind]}
+        default_type = next(iter(defaults))
+        return {"type": default_type, **defaults[default_type]}
     if not isinstance(section, Mapping) or not isinstance(defaults, Mapping):
         return section
     if name not in SECTIONS_BY_TYPE:
         return merge_parameters(defaults, section)
-    kind = str(section.get("type", next(iter(defaults))))
-    return merge_parameters({"type": kind, **defaults.get(kind, {})}, section)
+    type_name = str(section.get("type", next(iter(defaults))))
+    return merge_parameters({"type": type_name, **defaults.get(type_name, {})}, section)
 
 
 def merge_parameters(defaults: Mapping[str, Any], parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Return `defaults` updated by `parameters`. Nested mappings are merged."""
     merged = dict(defaults)
     for key, value in parameters.items():
-        nested = isinstance(defaults.get(key), Mapping) and isinstance(value, Mapping)
-        merged[key] = merge_parameters(defaults[key], value) if nested else value
+        is_nested = isinstance(defaults.get(key), Mapping) and isinstance(value, Mapping)
+        merged[key] = merge_parameters(defaults[key], value) if is_nested else value
     return merged

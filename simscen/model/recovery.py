@@ -102,15 +102,15 @@ Behavior = Annotated[str | BehaviorSpec, ExtensibleUnion("behavior", allows_name
 class Recovery(Spec):
     """Recovery behaviors, as in Nav2's default behavior tree.
 
-    If planning fails, the global costmap is cleared; if control fails, the local one. If the next attempt fails as
-    well, the next behavior runs.
+    After planning fails, the global costmap is cleared; after control fails, the local costmap is cleared. If the next
+    attempt fails as well, the next behavior runs.
     """
 
     number_of_retries: Annotated[int, Field(ge=0, le=100)] = 6
     """Number of behaviors before the goal fails (retries after a cleared costmap do not count)."""
     retries_since_progress: bool = False
-    """Whether to start again with the first retry and the first behavior when the robot is one meter nearer to its goal
-    than at all earlier recoveries. Nav2 counts all retries of a goal."""
+    """Whether the count of retries and the list of behaviors start again when the robot is one meter nearer to its goal
+    than at any earlier recovery. Nav2 counts all retries of a goal."""
     planner_codes: Annotated[list[PlannerCode], Field(max_length=20)] = [
         "PLANNER_UNKNOWN",
         "PLANNER_TIMEOUT",
@@ -123,9 +123,9 @@ class Recovery(Spec):
     clear_entirely: bool = True
     """Whether `clear_costmap`, and the clearing after a planner error, cover the entire global costmap, as in Nav2.
 
-    With false, only the area of the local costmap is cleared, so that known dead ends are kept. Exception: after
-    planner errors, the entire global costmap is cleared the first time, again when the robot is one meter nearer to its
-    goal, and otherwise at increasing intervals (10 s, 20 s, 40 s, …)."""
+    With false, only the area of the local costmap is cleared, so that known dead ends are kept. Exception: the entire
+    global costmap is cleared after the first planner error, again when the robot is one meter nearer to its goal, and
+    otherwise at increasing intervals (10 s, 20 s, 40 s, …)."""
     spin_dist: Angle = 1.57
     """Angle of `spin`."""
     wait_duration: Duration = 5.0
@@ -137,8 +137,8 @@ class Recovery(Spec):
     backup_partial: bool = False
     """Whether `backup` drives a shorter distance if there is not enough room. Nav2 fails instead."""
     retrace_dist: NonNegativeLength = 1.0
-    """Maximum distance of `retrace`, with which the advanced stack drives back along its own path. After `backup_dist`,
-    it ends as soon as there is room to turn in place."""
+    """Maximum distance of `retrace`, the behavior of the advanced stack that drives back along the robot's own path.
+    After `backup_dist`, `retrace` ends as soon as there is room to turn in place."""
     simulate_ahead_time: Duration = 2.0
     """Time for which the motions of `spin` and `backup` are checked for collisions; 0 = no check."""
     max_rotational_vel: PositiveAngularSpeed = 1.0
@@ -148,8 +148,8 @@ class Recovery(Spec):
     rotational_acc_lim: PositiveAngularAcceleration | None = None
     """Angular deceleration at the end of `spin`; default: the limit of the robot (Nav2: 3.2 rad/s²)."""
     time_allowance: PositiveDuration = 10.0
-    """Time after which `spin`, `backup`, or `retrace` fails. For `retrace`, it is at least 1.5 times the duration of
-    driving `retrace_dist` at `backup_speed`."""
+    """Time after which `spin`, `backup`, or `retrace` fails; for `retrace`, at least 1.5 times the duration of driving
+    `retrace_dist` at `backup_speed`."""
 
     @property
     def names(self) -> list[str]:
@@ -163,6 +163,7 @@ class Recovery(Spec):
     def _with_shared_parameters(self, entry: str | BehaviorSpec) -> BehaviorSpec:
         """Return the complete specification of a behavior that is given by name or with some of its parameters."""
         model = _SHIPPED[entry] if isinstance(entry, str) else type(entry)
-        shared = type(self).model_fields.keys() & model.model_fields.keys()
-        own = {} if isinstance(entry, str) else {name: getattr(entry, name) for name in entry.model_fields_set}
-        return model.model_validate({**{name: getattr(self, name) for name in sorted(shared)}, **own})
+        shared_names = type(self).model_fields.keys() & model.model_fields.keys()
+        shared = {name: getattr(self, name) for name in sorted(shared_names)}
+        given = {} if isinstance(entry, str) else {name: getattr(entry, name) for name in entry.model_fields_set}
+        return model.model_validate({**shared, **given})

@@ -25,7 +25,7 @@ from simscen.spec.quantities import (
 )
 from simscen.spec.shapes import ShapedObject
 
-Argument = Annotated[str, Field(max_length=4096)] | int | float | bool
+XacroArgument = Annotated[str, Field(max_length=4096)] | int | float | bool
 JointNames = Annotated[list[Name], Field(min_length=1, max_length=20)]
 
 
@@ -150,7 +150,7 @@ class RobotSpec(Spec):
     """URDF or xacro file, relative to this file, instead of `body`."""
     packages: Annotated[dict[Name, FilePath], Field(max_length=100)] = {}
     """Folders of ROS packages by name, relative to this file, for `package://` and `$(find)` in the URDF."""
-    arguments: Annotated[dict[Name, Argument], Field(max_length=200)] = {}
+    arguments: Annotated[dict[Name, XacroArgument], Field(max_length=200)] = {}
     """Values of the `<xacro:arg>` elements of the xacro file, instead of their defaults."""
     body: Annotated[list[Part], Field(min_length=1, max_length=50)] | None = None
     """Simple shapes of the hull; the drive adds the wheels."""

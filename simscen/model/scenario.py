@@ -119,7 +119,7 @@ class GoalEntry(Spec):
     pose: PlaceOrPose
     """Pose in the map frame, or name of a place of the world."""
     timeout: PositiveDuration | None = None
-    """Simulated time after which this goal fails with NAVIGATE_TIMEOUT."""
+    """Simulated time after which this goal fails with NAVIGATE_TIMEOUT; default: only `time_limit` applies."""
     xy_tolerance: PositiveLength | None = None
     """Distance from the goal within which the goal counts as reached; default: tolerance of the goal checker."""
     yaw_tolerance: PositiveAngle | None = None
@@ -138,8 +138,8 @@ MAX_GOALS = 1000
 class MultiRobotEntry(RobotEntry):
     """One of several robots, with its own start, goals, faults, and criteria.
 
-    A missing `map` or `on_goal_failure` is taken from the scenario. The `stack` is merged with the stack of the
-    scenario.
+    A missing `map` or `on_goal_failure` is taken from the scenario. `stack` and `navigation` are merged with those of
+    the scenario.
 
     Example: `robots: {left: {pose: {x: 1, y: 1}, goals: [{pose: dock}]}, right: {pose: {x: 4, y: 1}}}`
     """
@@ -153,7 +153,8 @@ class MultiRobotEntry(RobotEntry):
     navigation: Navigation | None = None
     """Navigation action for the goals, and number of loops."""
     on_goal_failure: Literal["stop", "continue"] | None = None
-    """Whether this robot stops or drives to the next goal after a failed goal."""
+    """Behavior of this robot after a failed goal. `stop`: skip the remaining goals. `continue`: drive to the next goal.
+    """
     faults: Annotated[list[FaultEntry], Field(max_length=500)] = []
     """Faults of this robot. Triggers refer to this robot unless they name another one."""
     pass_: Annotated[list[AnyCriterion], Field(max_length=200, alias="pass")] = []
@@ -182,7 +183,7 @@ class ExpectedFailure(Spec):
     fail: Reason
     """Reason, e.g. a ticket and the problem."""
     criteria: Annotated[list[Annotated[Name, ReferenceTo("verdict")]], Field(max_length=200)] = []
-    """Ids of the criteria that must fail, and names of the events and faults that must not happen; nothing else may
+    """Ids of the criteria that must fail, and names of the events and faults that must not take place. Nothing else may
     fail. Default: at least one criterion must fail."""
 
     @model_validator(mode="before")
@@ -245,7 +246,8 @@ class ScenarioSpec(Spec):
     navigation: Navigation = by_default()
     """Navigation action for the goals, and number of loops."""
     on_goal_failure: Literal["stop", "continue"] = "stop"
-    """Whether the robot stops or drives to the next goal after a failed goal (stop_on_failure of FollowWaypoints)."""
+    """Behavior of the robot after a failed goal (stop_on_failure of FollowWaypoints). `stop`: skip the remaining goals.
+    `continue`: drive to the next goal."""
     time_limit: Annotated[PositiveDuration, Field(le=8000)] = 300.0
     """Simulated time after which the run ends in any case."""
     linger: Annotated[Duration, Field(le=3600)] = 0.5
@@ -265,7 +267,7 @@ class ScenarioSpec(Spec):
     skip: Reason | None = None
     """Reason for not running this scenario. The file must still be valid."""
     variations: Variations | None = None
-    """Values by path of a key, such as `robot.motor_torque`. Each combination of values is a separate run."""
+    """Values by path, such as `robot.motor_torque`. Each combination of values is a separate run."""
     acceptance: Acceptance | None = None
     """Claim about many random runs that `simscen study` tests. Other commands ignore the claim."""
 

@@ -50,7 +50,7 @@ class Mount(Spec):
 
 
 class SensorSpec(Component):
-    """Base class of sensor specifications. The setting of the component is simscen.sensors.sensor.SensorSetting."""
+    """Base class of sensor specifications. The component is called with a simscen.sensors.sensor.SensorSetting."""
 
     reading_type: ClassVar[str]
     """Name of the class of the readings in simscen.core.messages.sensor_data: Scan, Odometry, Imu, Bump, or Image."""

@@ -21,8 +21,9 @@ _LatencyOrRobot = Annotated[
     Annotated[Literal["robot"], Tag("a text")] | Annotated[Latency, Tag("a mapping")], Discriminator(text_or_mapping)
 ]
 REFERENCE_BUILDER = "simscen.stack.build:StackBuilder"
+"""Class that builds the reference stack from its specification, as `module:Class`."""
 ADVANCED_BUILDER = "simscen.advanced.stack:AdvancedStackBuilder"
-"""Classes that build the stack from its specification, as `module:Class`."""
+"""Class that builds the advanced stack from its specification, as `module:Class`."""
 
 
 class InProcessStack(StackBase, Typed):
@@ -55,11 +56,12 @@ class StackSpec(InProcessStack):
     """Time without a valid command after which the controller fails with PATIENCE_EXCEEDED. 0: the controller fails
     immediately with NO_VALID_CONTROL. -1: the controller never fails."""
     min_x_velocity_threshold: NonNegativeSpeed = 0.0
-    """Measured forward speed up to which controller and goal checker get 0 instead (Nav2: 0.0001)."""
+    """Deadband of the measured forward speed: the controller and the goal checker get 0 for speeds up to this value
+    (Nav2: 0.0001)."""
     min_y_velocity_threshold: NonNegativeSpeed = 0.0
-    """The same for the sideways speed (Nav2: 0.0001)."""
+    """Deadband of the measured sideways speed (Nav2: 0.0001)."""
     min_theta_velocity_threshold: NonNegativeAngularSpeed = 0.0
-    """The same for the turn rate (Nav2: 0.0001)."""
+    """Deadband of the measured turn rate (Nav2: 0.0001)."""
     goal_checker: GoalChecker = by_default()
     """Checker that decides whether a goal is reached."""
     progress_checker: ProgressChecker = by_default()
@@ -82,14 +84,14 @@ class StackSpec(InProcessStack):
 
     @property
     def builder(self) -> str:
-        """Class that builds the stack: ADVANCED_BUILDER if any parameter needs the advanced stack."""
-        is_advanced = (
+        """Class that builds the stack, as `module:Class`: ADVANCED_BUILDER if a parameter needs the advanced stack."""
+        needs_advanced_stack = (
             self.prediction.enabled
             or self.planner.cautious
             or not self.recovery.clear_entirely
             or (self.velocity_smoother.counter_turn_slip and self.localizer.fuses_odometry)
         )
-        return ADVANCED_BUILDER if is_advanced else REFERENCE_BUILDER
+        return ADVANCED_BUILDER if needs_advanced_stack else REFERENCE_BUILDER
 
     def filters_odometry(self, has_imu: bool) -> bool:
         """Return whether the odometry filter fuses wheel odometry and IMU."""

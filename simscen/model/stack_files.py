@@ -27,7 +27,7 @@ class ExternalStackSpec(StackBase):
     external: StackName
     """Name of the stack on the command line and in the user configuration: letters, digits, `_`, `.`, and `-`."""
     ground_truth: bool = False
-    """Whether to send the true pose to the stack, to separate faults of localization from faults of navigation."""
+    """Whether to send the true pose to the stack, to test navigation without localization errors."""
 
     @property
     def gets_ground_truth(self) -> bool:
@@ -50,8 +50,8 @@ AnyStack = Annotated[
 class StackFileSpec(Spec):
     """Stack file for `--stack NAME=FILE`, which replaces the `stack` section of scenarios.
 
-    It cannot contain zones and masks: those of the scenario apply, and also the goal tolerances that the scenario sets.
-    All other parameters that the file does not set have their default values.
+    The file cannot contain zones and masks. The zones and masks of the scenario still apply, and so do the goal
+    tolerances that the scenario sets. All other parameters that the file does not set have their default values.
     """
 
     simscen: LanguageVersion

@@ -30,9 +30,9 @@ class Normal(Spec):
     std: AnyAmount
     """Standard deviation."""
     min: AnyAmount | None = None
-    """Smallest value."""
+    """Lower bound of the values."""
     max: AnyAmount | None = None
-    """Largest value."""
+    """Upper bound of the values."""
 
 
 class Uniform(Value[Interval]):
@@ -111,9 +111,9 @@ class VariationBlock(Spec):
     """Random values."""
     require: Annotated[list[Annotated[str, StringConstraints(max_length=1000)]], Field(max_length=50)] = []
     """Conditions that all variations meet, such as `goals[0].pose.x > robot.pose.x + 1`. Other combinations are left
-    out; independent random values alone are drawn until `count` variations meet the conditions. Paths may also lead to
-    values that are not varied. Numbers are in SI units; quantities with a unit are written in quotes:
-    `time_limit < '2 min'`."""
+    out. If the only values are `sampled` with `method: random`, values are drawn until `count` variations meet the
+    conditions. Paths may also lead to values that are not varied. Numbers are in SI units; quantities with a unit are
+    written in quotes: `time_limit < '2 min'`."""
 
     @model_validator(mode="after")
     def _check_not_empty(self) -> "VariationBlock":
@@ -124,13 +124,9 @@ class VariationBlock(Spec):
     @property
     def is_random(self) -> bool:
         """Whether the variations are independent random draws, without other kinds of values."""
-        return self.is_sampled_alone and self.sampled is not None and self.sampled.method == "random"
-
-    @property
-    def is_sampled_alone(self) -> bool:
-        """Whether `sampled` is the only kind of values in the block."""
-        others = (self.grid, self.pairwise, self.pairs, self.list_)
-        return self.sampled is not None and all(other is None for other in others)
+        other_kinds = (self.grid, self.pairwise, self.pairs, self.list_)
+        has_other_kinds = any(values is not None for values in other_kinds)
+        return self.sampled is not None and self.sampled.method == "random" and not has_other_kinds
 
 
 class Variations(
@@ -154,6 +150,6 @@ class Variations(
 
 
 class VariationsSection(Spec):
-    """The key `variations` of a scenario, without its other keys."""
+    """Scenario of which only the key `variations` is validated."""
 
     variations: Variations

@@ -137,7 +137,7 @@ class WorldSpec(Spec):
 
     @model_validator(mode="after")
     def _check_names(self) -> "WorldSpec":
-        names = [*(thing.name for thing in self.objects), *(door.name for door in self.doors)]
+        names = [*(entry.name for entry in self.objects), *(door.name for door in self.doors)]
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:
             raise ValueError(f"several objects have the name `{repeated[0]}`")

@@ -26,7 +26,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 
 class Spec(BaseModel):
-    """Base class of all specifications: immutable, strict, without unknown keys, infinity, and NaN."""
+    """Base class of all specifications: immutable and strict. Unknown keys, infinity, and NaN are errors."""
 
     model_config = ConfigDict(
         strict=True,
@@ -67,9 +67,9 @@ class Value(RootModel[T], Generic[T]):
 
 
 class Ranged(Spec):
-    """Base class of specifications with pairs of fields whose names differ in `min` and `max`, e.g. `laser_max_range`.
+    """Base class of specifications with pairs of minimum and maximum, such as `laser_min_range` and `laser_max_range`.
 
-    No minimum may exceed its maximum.
+    Fields form a pair if their names differ only in `min` and `max`. No minimum may exceed its maximum.
     """
 
     unlimited_at_zero: ClassVar[tuple[str, ...]] = ()
@@ -141,21 +141,22 @@ def _docs_of_class(node: ast.ClassDef) -> dict[str, str]:
 class Component(Spec):
     """Specification of an object that is built for a run: a stack, a part of a stack, or a sensor.
 
-    The class of the object is imported when the run starts, so validation does not need its libraries.
+    The class of the object is imported when the run starts, so that validation does not import the libraries of the
+    class.
     """
 
     component: ClassVar[str]
     """Address `package.module:Class` of the class of the object, or of a function that returns the object.
 
-    It is called with the specification and a setting (facts about the run): simscen.stack.setting.Setting for a stack
-    and its parts, simscen.sensors.sensor.SensorSetting for a sensor.
+    The class or function is called with the specification and a setting (facts about the run). The setting is a
+    simscen.stack.setting.Setting for a stack and its parts, and a simscen.sensors.sensor.SensorSetting for a sensor.
     """
 
     @classmethod
     def definition_problem(cls) -> str:
         """Return the reason why `component` of this class is missing or malformed; "" if it is valid."""
-        valid = isinstance(getattr(cls, "component", None), str) and re.fullmatch(r"[\w.]+:\w+", cls.component)
-        return "" if valid else "it has no attribute `component` of the form package.module:Class"
+        is_valid = isinstance(getattr(cls, "component", None), str) and re.fullmatch(r"[\w.]+:\w+", cls.component)
+        return "" if is_valid else "it has no attribute `component` of the form package.module:Class"
 
     @classmethod
     def implementation(cls) -> Any:
@@ -173,7 +174,10 @@ class Typed(Component):
 
 @dataclass(frozen=True)
 class LazySpec:
-    """Annotation of a specification `name` in `module`, which is imported when a value of the field is validated."""
+    """Annotation of a field: the specification class `name` in `module`.
+
+    The module is imported when a value of the field is validated.
+    """
 
     module: str
     name: str

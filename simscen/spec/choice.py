@@ -14,7 +14,7 @@ class Choice(Spec):
     """Mapping with exactly one of several keys (the choices), e.g. `spawn: {…}`, and optional modifiers.
 
     A subclass has one optional field for each choice. A mapping with a key of an installed package becomes an instance
-    of an extended class: a subclass with a further field for each key that installed packages add.
+    of an extended class: a subclass with an additional field for each key that installed packages add.
     """
 
     modifiers: ClassVar[frozenset[str]] = frozenset()
@@ -37,14 +37,14 @@ class Choice(Spec):
 
     @classmethod
     def addresses(cls) -> dict[str, str]:
-        """Return the address "module:Class" of each choice by YAML key, except of lists and other Choices."""
+        """Return the address "module:Class" of each choice, by YAML key. Lists and other Choices are left out."""
         addresses = {key: _address(cls.model_fields[name]) for key, name in cls.choices().items()}
         return {key: address for key, address in addresses.items() if address}
 
     @model_validator(mode="wrap")
     @classmethod
     def _use_installed(cls, value: Any, handler: ModelWrapValidatorHandler["Choice"]) -> "Choice":
-        """Validate a mapping with a key of an installed package by the extended class."""
+        """Validate a mapping. If it has a key of an installed package, the extended class validates it."""
         if (
             cls.group
             and cls.original_class is None

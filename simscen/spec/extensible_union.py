@@ -15,18 +15,18 @@ from simscen.spec.registry import BrokenPlugin, RegisteredType, all_types, built
 GROUP_KEY = "simscen group"
 """Key in the metadata of a pydantic schema: the value is the name of the registry group."""
 NAMES_ALLOWED_KEY = "simscen names"
-"""Key in this metadata: the value is True if the name of a type alone is valid."""
+"""Key in the same metadata: the value is True if the name of a type alone is valid."""
 MAPPINGS_ALLOWED_KEY = "simscen mappings"
-"""Key in this metadata: the value is True if a mapping with the key `type` is valid."""
+"""Key in the same metadata: the value is True if a mapping with the key `type` is valid."""
 UNTYPED_TAG = "without type"
 """Union tag of mappings without `type`. Locations of validation errors contain it, so it must not be a key in YAML."""
 
 
 @dataclass(frozen=True)
 class ExtensibleUnion:
-    """Annotation of a field with a specification of a registry group, which the key `type` selects.
+    """Annotation of a field with a specification of a registry group. The key `type` selects the specification.
 
-    The module of a specification is imported, and its validator is built, when a value has its type.
+    The module of a specification is imported when a value of this type is validated.
     """
 
     group: str
@@ -35,9 +35,9 @@ class ExtensibleUnion:
     allows_names: bool = False
     """Whether the name of a type alone is also valid."""
     untyped_key: str = ""
-    """Key of the mappings that have this key instead of `type`; "" if there are none."""
+    """Key that a mapping can have instead of `type`, such as `external`; "" if all mappings have a type."""
     untyped: LazySpec | None = None
-    """Specification of the mappings with `untyped_key`."""
+    """Specification of mappings with `untyped_key`."""
 
     def members(self) -> dict[str, LazySpec]:
         """Return the specifications of the built-in types by type, and `untyped` under UNTYPED_TAG."""
@@ -119,7 +119,7 @@ def _unknown_type_error(group: str, name: str) -> PydanticCustomError:
 
 
 _CHECKED_PROPERTIES = ("horizon", "clearance_range")
-"""Properties of plug-ins that are read before a run: a time in s, and a distance in m."""
+"""Properties of specifications that are read before a run: a time in s, and a distance in m."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,10 @@ class PluginSpec(LazySpec):
 
 
 def validate_plugin_spec(entry: RegisteredType, value: Any) -> BaseModel:
-    """Return the specification of a value, validated by a plug-in. Errors of the plug-in become validation errors."""
+    """Return the specification of `value`, validated by the class of a plug-in type.
+
+    Exceptions of the plug-in become validation errors.
+    """
     try:
         return _with_valid_properties(entry, entry.load().model_validate(value, by_alias=True, by_name=False))
     except BrokenPlugin as broken:
@@ -145,8 +148,8 @@ def validate_plugin_spec(entry: RegisteredType, value: Any) -> BaseModel:
     except (ValueError, AssertionError):  # pydantic reports these as mistakes in the file
         raise
     except Exception as error:  # code of other packages can raise anything
-        why = f"its validation raises {type(error).__name__}: {error}"
-        raise _plugin_error(BrokenPlugin(entry, why)) from error
+        reason = f"its validation raises {type(error).__name__}: {error}"
+        raise _plugin_error(BrokenPlugin(entry, reason)) from error
 
 
 def _plugin_error(broken: BrokenPlugin) -> PydanticCustomError:

@@ -15,15 +15,15 @@ from simscen.spec.places import PlaceOrPoint
 from simscen.spec.quantities import Angle, Duration, Length, PositiveSpeed
 
 CORNER_TURN_S = 0.25
-"""Half of the duration of a turn at a corner. Motions without stops shorten it to a quarter of the duration of a short
-leg."""
+"""Half of the duration of a turn at a corner, at most. In motions without stops, it is also at most a quarter of the
+duration of the leg."""
 SMOOTH_DURATION_FACTOR = 1.5
 """Duration of a leg with `ease: smooth`, divided by its duration at constant top speed."""
 LOOP_TOLERANCE_M_RAD = 1e-6
-"""Largest distance in m, and largest yaw difference in rad, between the ends of a loop of keyframes."""
+"""Maximum distance in m, and maximum yaw difference in rad, between the first and the last keyframe of a loop."""
 
 Keyframe = Annotated[tuple[Duration, Length, Length, Angle], Field(strict=False)]
-"""Time in s, x and y in m, and yaw in rad. Lists are valid as well as tuples."""
+"""Time in s, x and y in m, and yaw in rad. In YAML, it is a list."""
 
 
 def _check_times(keyframes: list[tuple[float, float, float, float]]) -> list[tuple[float, float, float, float]]:
@@ -51,13 +51,13 @@ class Motion(Spec):
     """Behavior at the end: stop, start over, or move backward along the path. A loop through waypoints returns to its
     start; a loop of keyframes must end at its first keyframe."""
     ease: Literal["linear", "smooth", "spline"] = "linear"
-    """Velocity profile. `linear`: constant speed between waypoints or keyframes. `smooth`: a stop at each of them;
-    after a fraction u of the time for a leg, the object has covered 3u² - 2u³ of its length (peak speed 1.5 times the
-    mean). `spline`: through keyframes without stopping, along a cubic Hermite curve; at rest at both ends, except in a
-    loop. The velocities at keyframes are Catmull-Rom velocities for uneven times: (next - previous) / (difference of
-    their times)."""
+    """Velocity profile. `linear`: constant speed between waypoints or keyframes. `smooth`: a stop at each waypoint or
+    keyframe; after a fraction u of the time for a leg, the object has covered 3u² - 2u³ of the leg (peak speed 1.5
+    times the mean). `spline`: through keyframes without stopping, along a cubic Hermite curve; at rest at both ends,
+    except in a loop. The velocity at a keyframe is the Catmull-Rom velocity for uneven times: (next pose - previous
+    pose) / (next time - previous time)."""
     phase: Duration = 0.0
-    """Time into the keyframes at which the motion starts, so that several objects can share keyframes."""
+    """Time of the keyframes at which the motion starts, so that several objects can share keyframes."""
 
     @model_validator(mode="after")
     def _check_kind(self) -> Motion:
@@ -87,7 +87,7 @@ class Motion(Spec):
         return self
 
     def path(self, current: Pose2, start: float = 0.0) -> MotionPath:
-        """Return the path of an object from the pose `current`. The object starts to move in `start` seconds."""
+        """Return the path of an object from the pose `current`. The object starts to move after `start` seconds."""
         if self.keyframes is None:
             assert self.through is not None and self.speed is not None
             return path_through_waypoints(current, self.through, self.speed, self.repeat, self.ease, start)
@@ -118,7 +118,10 @@ def path_through_waypoints(
 
 
 class _Leg(NamedTuple):
-    """Straight leg between two waypoints. `begin` has its heading, `length` is in m, and `end_point` is (x, y)."""
+    """Straight leg between two waypoints.
+
+    `begin` is the pose at the beginning, with the heading of the leg. `length` is in m. `end_point` is (x, y) in m.
+    """
 
     begin: Pose2
     length: float
@@ -135,7 +138,7 @@ class _Leg(NamedTuple):
 
 
 def _poses_at_constant_speed(legs: list[_Leg], speed: float, repeat: str) -> list[tuple[float, Pose2]]:
-    """Return times in s and poses of a motion without stops. Half of each turn is before its corner, half after it."""
+    """Return times in s and poses of a motion without stops. Half of each turn is before the corner, half after it."""
     stops, time = [(0.0, legs[0].begin)], 0.0
     for leg, following in itertools.zip_longest(legs, legs[1:]):
         duration = leg.length / speed

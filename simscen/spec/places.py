@@ -1,4 +1,4 @@
-"""Field types for names, points, poses, polygons, filter masks, and references to named things.
+"""Field types for names, points, poses, polygons, and filter masks, and for names that refer to other entries.
 
 Some pose and point fields also accept the name of a place (a named pose of a world). The loader replaces the name by
 the pose or point of the place.
@@ -90,15 +90,16 @@ class PoseSpec(Spec):
 ReferenceKind = Literal[
     "place", "region", "object", "movable", "mover", "door", "goal", "event", "disturbance", "mask", "verdict"
 ]
-"""Kind of thing to which a name refers."""
+"""Kind of entry to which a name refers. ReferenceTo explains the kinds."""
 
 
 @dataclass(frozen=True)
 class ReferenceTo:
-    """Annotation of a string that must be the name of an existing thing of the kind `target`.
+    """Annotation of a string that must be the name of an existing entry of the kind `target`.
 
-    `object`: anything that can be touched. `movable`: an object or door that can move. `mover`: a movable, or a robot.
-    `event`: an event of the scenario. `disturbance`: an event, a fault, or a mark of the scenario. `mask`: the file of
+    Kinds in the world: `place`, `region`, `door`; `object`, any solid object, including walls and robots; `movable`, an
+    object or door that can move; `mover`, a movable or a robot. Kinds in the scenario: `goal`; `event`, an event or a
+    mark; `disturbance`, an event, a fault, or a mark; `verdict`, a criterion, an event, or a fault. `mask`: the file of
     a filter mask.
     """
 

@@ -10,20 +10,28 @@ from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, PlainVal
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 _METERS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
+"""Factors to meters, by unit."""
 _SECONDS = {"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0}
+"""Factors to seconds, by unit."""
 _RADIANS = {"rad": 1.0, "deg": math.pi / 180}
-"""Factors to meters, seconds, and radians, by unit."""
+"""Factors to radians, by unit."""
 NUMBER_AND_UNIT_PATTERN = re.compile(
     r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([^\s\d](?:.*\S)?)\s*"
 )
 """Pattern of a quantity such as "1.5 m". Group 1 is the number, group 2 the unit."""
 MAX_TEXT_CHARS = 60
-"""Maximum length of a text of a file in a message."""
+"""Maximum number of characters of a text from a file that a message shows."""
 
 
-def _units_per(top: dict[str, float], bottom: dict[str, float], power: Literal["", "^2"] = "") -> dict[str, float]:
-    """Return the SI factors of the units `top/bottom` or `top/bottom^2`, e.g. of m/s^2 from m and s."""
-    return {f"{a}/{b}{power}": x / (y**2 if power else y) for a, x in top.items() for b, y in bottom.items()}
+def _units_per(
+    numerators: dict[str, float], denominators: dict[str, float], power: Literal["", "^2"] = ""
+) -> dict[str, float]:
+    """Return the SI factors of all quotients of two units, e.g. of m/s^2 from m and s with the power "^2"."""
+    return {
+        f"{top}/{bottom}{power}": top_factor / (bottom_factor**2 if power else bottom_factor)
+        for top, top_factor in numerators.items()
+        for bottom, bottom_factor in denominators.items()
+    }
 
 
 UNITS: dict[str, dict[str, float]] = {
@@ -90,7 +98,7 @@ class Quantity:
 
 
 def _text(value: str) -> str:
-    """Return a text of a file for messages, shortened to MAX_TEXT_CHARS."""
+    """Return a text from a file for messages, shortened to MAX_TEXT_CHARS."""
     return f"the text `{value if len(value) <= MAX_TEXT_CHARS else value[: MAX_TEXT_CHARS - 1] + '…'}`"
 
 
@@ -104,7 +112,7 @@ def _json_schema_pattern(units: Iterable[str]) -> str:
 class AnyQuantity:
     """Annotation of a float with a dimension that depends on another field. The JSON schema allows all units.
 
-    The specification that contains the field must convert text by `si_number`.
+    The specification that contains the field must convert text to a number with `si_number`.
     """
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -165,16 +173,17 @@ class Amount(NamedTuple):
 
 
 def to_common_unit(amounts: tuple[Amount, ...]) -> tuple[tuple[float, ...], str]:
-    """Return the amounts as numbers in their common unit, or else in SI units, and this unit ("" for SI units).
+    """Return the amounts as numbers in one unit, and this unit.
 
-    Raises ValueError if their dimensions differ.
+    If all amounts have the same unit, they keep it. Otherwise, the numbers are in SI units, and the unit is "". Raises
+    ValueError for units of different dimensions.
     """
     units = {amount.unit for amount in amounts}
     if len(units) == 1:
         return tuple(amount.number for amount in amounts), units.pop()
-    for known in UNITS.values():
-        if units <= {"", *known}:
-            return tuple(amount.number * known.get(amount.unit, 1.0) for amount in amounts), ""
+    for factors in UNITS.values():
+        if units <= {"", *factors}:
+            return tuple(amount.number * factors.get(amount.unit, 1.0) for amount in amounts), ""
     names = " and ".join(f"`{unit}`" for unit in sorted(units - {""}))
     raise ValueError(f"{names} are units of different dimensions")
 
@@ -184,14 +193,15 @@ def si_number(value: Any) -> Any:
     match = NUMBER_AND_UNIT_PATTERN.fullmatch(value) if isinstance(value, str) else None
     if match is None:
         return value
-    scales = [units[match[2]] for units in UNITS.values() if match[2] in units]
-    return float(match[1]) * scales[0] if scales else value
+    factors = [units[match[2]] for units in UNITS.values() if match[2] in units]
+    return float(match[1]) * factors[0] if factors else value
 
 
 def exact_text(number: float, units: Mapping[str, float]) -> str:
-    """Return a number without rounding, in the first of `units` in which it is short, such as "500 mm/h".
+    """Return a number as text, in the first of `units` in which 12 digits are exact, such as "500 mm/h".
 
-    `units` are factors to SI units, by unit. The unit "" is not shown. Without such a unit, return all digits.
+    `units` are factors to SI units, by unit. The unit "" is not shown. If 12 digits are exact in no unit, return all
+    digits in SI units.
     """
     for unit, factor in units.items():
         shown = f"{number / factor:.12g}"
@@ -201,7 +211,10 @@ def exact_text(number: float, units: Mapping[str, float]) -> str:
 
 
 def possible_units(text: str) -> dict[str, float]:
-    """Return the unit of a quantity such as "20 km", and the SI unit, with factors to SI units; {} for other texts."""
+    """Return the unit of a quantity such as "20 km", and the SI unit of its dimension, with their factors to SI units.
+
+    Return {} for other texts.
+    """
     match = NUMBER_AND_UNIT_PATTERN.fullmatch(text)
     units = next((units for units in UNITS.values() if match and match[2] in units), {})
     si_units = {unit: factor for unit, factor in units.items() if factor == 1.0}

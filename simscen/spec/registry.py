@@ -6,8 +6,8 @@ specification class (a pydantic model of the YAML):
     [project.entry-points."simscen.criterion"]
     headway = "my_package.headway:Headway"
 
-A package is imported when a file uses one of its types. simscen's advanced components are registered in this way, too.
-All other types of simscen are built in: reading entry points takes 35 ms, which only files that need them should cost.
+A package is imported when a file uses one of its types. simscen's advanced components are also added by entry points.
+All other types of simscen are built in, so that files without other types do not wait 35 ms for entry points.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class RegisteredType:
     version: str = ""
     """Version of this package; "" for a built-in type."""
     problem: str = ""
-    """Reason why the type cannot be used, as far as it is known without an import; "" if there is none."""
+    """Reason why the type cannot be used; "" if none is known before the package is imported."""
     folder: str = ""
     """Folder in which the package is installed; "" for a built-in type."""
 
@@ -109,12 +109,12 @@ class RegisteredType:
 
 
 class BrokenPlugin(Exception):
-    """A type of an installed package cannot be used. `why` is the reason, `hint` the next step for the user."""
+    """A type of an installed package cannot be used, for a `reason`. `hint` is the next step for the user."""
 
-    def __init__(self, entry: RegisteredType, why: str, hint: str = "") -> None:
-        self.entry, self.why = entry, why
+    def __init__(self, entry: RegisteredType, reason: str, hint: str = "") -> None:
+        self.entry, self.reason = entry, reason
         self.hint = hint or "`simscen plugins` lists what installed packages add"
-        super().__init__(f"{entry.group} `{entry.name}` of {entry.origin} cannot be used: {why}")
+        super().__init__(f"{entry.group} `{entry.name}` of {entry.origin} cannot be used: {reason}")
 
 
 def built_in_types(group: str) -> tuple[RegisteredType, ...]:
@@ -130,17 +130,23 @@ def built_in_specs(group: str) -> dict[str, type[BaseModel]]:
 
 
 def installed_types(group: str) -> tuple[RegisteredType, ...]:
-    """Return the types, also unusable ones, that packages including simscen add by entry points, sorted by name."""
+    """Return the types that entry points of simscen and other packages add to a group, sorted by name.
+
+    Unusable types are included.
+    """
     return tuple(entry for entry in _all_installed_types() if entry.group == group)
 
 
 def plugin_types(group: str) -> tuple[RegisteredType, ...]:
-    """Return the types that installed packages except simscen add to a group, including unusable ones."""
+    """Return the types that packages except simscen add to a group, sorted by name. Unusable types are included."""
     return tuple(entry for entry in installed_types(group) if not entry.is_shipped)
 
 
 def installed_specs(group: str, with_plugins: bool = True) -> dict[str, type[BaseModel]]:
-    """Return the usable specifications that entry points of simscen, or of all packages, add to a group, by name."""
+    """Return the usable specification classes that entry points add to a group, by name of the type.
+
+    With `with_plugins` false, only the entry points of simscen count.
+    """
     specs = {}
     for entry in installed_types(group):
         if not (entry.is_shipped or with_plugins):
@@ -152,9 +158,9 @@ def installed_specs(group: str, with_plugins: bool = True) -> dict[str, type[Bas
 
 def all_types(group: str) -> tuple[RegisteredType, ...]:
     """Return all types of a group: built-in types, then types of installed packages with other names."""
-    own = built_in_types(group)
-    names = {entry.name for entry in own}
-    return (*own, *(entry for entry in installed_types(group) if entry.name not in names))
+    built_in = built_in_types(group)
+    names = {entry.name for entry in built_in}
+    return (*built_in, *(entry for entry in installed_types(group) if entry.name not in names))
 
 
 def find_type(group: str, name: str) -> RegisteredType | None:
@@ -163,8 +169,8 @@ def find_type(group: str, name: str) -> RegisteredType | None:
     return next((entry for entry in types if entry.name == name), None)
 
 
-def unknown_groups() -> tuple[RegisteredType, ...]:
-    """Return the entry points of installed packages in groups `simscen.…` that do not exist.
+def types_without_group() -> tuple[RegisteredType, ...]:
+    """Return the types that installed packages add to groups `simscen.…` that do not exist.
 
     For each package with a damaged entry_points.txt, also return an entry with the problem.
     """
@@ -184,7 +190,7 @@ def plugins_with_spec(spec: type) -> tuple[RegisteredType, ...]:
 
 @cache
 def _all_installed_types() -> tuple[RegisteredType, ...]:
-    """Return all types of installed packages, sorted by group and name; of equal names, simscen's first."""
+    """Return all types of installed packages, sorted by group and name. If names are equal, simscen's type is first."""
     found = sorted(
         set(_read_installed_types()),
         key=lambda e: (e.group, e.name, not e.is_shipped, e.distribution, e.version, e.value),
@@ -193,12 +199,12 @@ def _all_installed_types() -> tuple[RegisteredType, ...]:
 
 
 def _read_installed_types() -> Iterator[RegisteredType]:
-    """Yield the types of all packages on the search path. Later packages of the same name are ignored."""
+    """Yield the types of all packages on the search path. If a package is there twice, the first one counts."""
     from importlib.metadata import distributions
 
     seen: set[str] = set()
     for package in distributions(path=search_path()):
-        if not _mentions_simscen(package):  # reading its name and the rest would take ten times longer
+        if not _mentions_simscen(package):  # reading the names of all packages would take ten times longer
             continue
         name, version = package.metadata["Name"], package.metadata["Version"] or ""
         key = re.sub("[-_.]+", "-", name or "").lower()
@@ -248,8 +254,8 @@ def _type_problem(entry: RegisteredType, installed: list[RegisteredType]) -> str
     if entry.name in group.reserved:
         return f"the name `{entry.name}` is reserved"
     others = [other for other in installed if (other.group, other.name) == (entry.group, entry.name)]
-    shipped = {own.name for own in (*built_in_types(entry.group), *others) if own.is_shipped}
-    if not entry.is_shipped and entry.name in shipped:
+    shipped_names = {other.name for other in (*built_in_types(entry.group), *others) if other.is_shipped}
+    if not entry.is_shipped and entry.name in shipped_names:
         return "simscen ships a type with the same name, which takes precedence"
     others = [other for other in others if other.is_shipped == entry.is_shipped]
     if len(others) > 1:
@@ -266,14 +272,14 @@ def _load(entry: RegisteredType) -> type[BaseModel]:
         # Output of a module during import must not get into output that programs read.
         with contextlib.redirect_stdout(sys.stderr):
             model = getattr(import_module(module), name, None)
-        if (why := _specification_problem(entry, model)) is None:
+        if (problem := _specification_problem(entry, model)) is None:
             model.model_rebuild()  # type: ignore[union-attr]
     except (Exception, SystemExit) as error:  # code of other packages can raise anything
         cause = f"{type(error).__name__}: {error}".splitlines()[0]
         hint = f"`{sys.executable} -c 'import {module}'` shows the traceback"
         raise BrokenPlugin(entry, f"`{entry.value}` cannot be loaded: {cause}", hint) from error
-    if why is not None:
-        raise BrokenPlugin(entry, why)
+    if problem is not None:
+        raise BrokenPlugin(entry, problem)
     return model  # type: ignore[return-value]
 
 

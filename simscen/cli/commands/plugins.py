@@ -19,7 +19,7 @@ from simscen.spec.registry import (
     BrokenPlugin,
     RegisteredType,
     plugin_types,
-    unknown_groups,
+    types_without_group,
 )
 
 INDENT = 6
@@ -34,7 +34,7 @@ def command(format_: Annotated[TextOrJson, typer.Option("--format", help="Output
     one is not.
     """
     found = [entry for kind in GROUPS for entry in plugin_types(kind)]
-    by_package = sorted([*found, *unknown_groups()], key=lambda one: (one.distribution.lower(), one.distribution))
+    by_package = sorted([*found, *types_without_group()], key=lambda one: (one.distribution.lower(), one.distribution))
     listed = [_row(entry) for entry in by_package]
     if format_ is TextOrJson.JSON:
         print_json(json.dumps({"plugins": listed}, indent=2, ensure_ascii=False))
@@ -50,7 +50,7 @@ def _row(entry: RegisteredType) -> dict[str, Any]:
         first_paragraph = inspect.cleandoc(entry.load().__doc__ or "").partition("\n\n")[0]
         text = " ".join(first_paragraph.split())
     except BrokenPlugin as error:
-        broken, hint = error.why, error.hint
+        broken, hint = error.reason, error.hint
     return {
         "kind": entry.group,
         "name": entry.name,

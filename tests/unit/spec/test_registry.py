@@ -19,7 +19,7 @@ from simscen.spec.registry import (
     installed_specs,
     installed_types,
     plugin_types,
-    unknown_groups,
+    types_without_group,
 )
 from simscen.triggers.base import Trigger
 
@@ -117,7 +117,7 @@ def test_advanced_components_are_entry_points_of_simscen_that_packages_cannot_re
 
 def test_unknown_groups_are_reported(packages, calm_module) -> None:
     packages("calm", "1.0", {"criteria": {"calm": "calm:Calm"}}, calm=calm_module)
-    assert [entry.problem for entry in unknown_groups()] == ["there is no group `simscen.criteria`"]
+    assert [entry.problem for entry in types_without_group()] == ["there is no group `simscen.criteria`"]
 
 
 def test_output_of_a_module_during_import_goes_to_stderr(packages, capsys, calm_module) -> None:
@@ -155,7 +155,7 @@ def test_damaged_installation_is_reported_and_hides_no_other(packages, calm_modu
     packages("wreck", "2.0", {})
     (site / "wreck-2.0.dist-info" / "entry_points.txt").write_bytes(text.encode("latin-1"))
     assert find_type("criterion", "calm").load().__name__ == "Calm"
-    output = [(stranger.distribution, stranger.problem.partition(":")[0]) for stranger in unknown_groups()]
+    output = [(stranger.distribution, stranger.problem.partition(":")[0]) for stranger in types_without_group()]
     assert output == ([("wreck", "its entry_points.txt is damaged")] if "simscen." in text else [])
 
 
