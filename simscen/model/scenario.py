@@ -3,7 +3,7 @@
 from itertools import count
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import Estimate
@@ -52,10 +52,16 @@ else:
     Variations = Annotated[Spec, LazySpec("simscen.model.variations", "Variations")]
 
 
+def _with_language_version(world: Any) -> Any:
+    """Return the keys of an inline world with the version of the language; other values unchanged."""
+    return {"simscen": 1, **world} if isinstance(world, dict) else world
+
+
 WorldOrFile = Annotated[
     Annotated[FilePath, Tag("a text")]
     | Annotated[WorldSpec, LazySpec("simscen.model.world", "WorldSpec"), Tag("a mapping")],
     Discriminator(text_or_mapping),
+    BeforeValidator(_with_language_version),
 ]
 
 

@@ -107,7 +107,7 @@ class WorldSpec(Spec):
     """World: walls, obstacles, movable objects, and named places and regions, in meters in the map frame."""
 
     simscen: LanguageVersion
-    """Version of the scenario language."""
+    """Version of the scenario language; optional for a world within a scenario file."""
     name: Name | None = None
     """Name of the world; default: the name of the file."""
     description: Annotated[str, Field(max_length=10_000)] = ""

@@ -43,6 +43,8 @@ def schema_of(name: str, with_plugins: bool = False) -> Schema:
         for definition in definitions.values():
             for key in SCENARIO_KEYS:
                 definition.get("properties", {}).pop(key, None)
+    if name == "scenario":
+        definitions[WorldSpec.__name__].pop("required")  # an inline world needs no `simscen`
     if name == "base":
         _make_extensible_keys_optional(generated, definitions)
     properties = {"extends": _EXTENDS, **generated["properties"]}

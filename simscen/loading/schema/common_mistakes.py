@@ -22,6 +22,8 @@ HINTS_FOR_BOUNDS: dict[Keys, str] = {
     ("physics", "truth_rate"): "criteria are judged at these samples; lower rates miss short violations"
 }
 """Hints for values outside their bounds, by the keys of the value."""
+FILE_KEYS = ("file", "path", "yaml", "urdf", "xacro")
+"""Keys that authors write to name a file, but that neither `world` nor `robot` has."""
 MAX_SEARCH_DEPTH = 3
 """Number of levels below a mapping that are searched for the right place of a misplaced key."""
 
@@ -74,8 +76,16 @@ def hint_for_misplaced_key(model: type[BaseModel], tree: Node, loc: Sequence[Key
     return ""
 
 
-def hint_for_reserved_key(loc: Sequence[Key], key: str) -> str:
-    """Return a hint for `robot` in faults and criteria, and for `then` in a step of a sequence; "" for other keys."""
+def hint_for_known_mistake(loc: Sequence[Key], key: str) -> str:
+    """Return a hint for keys that name a file, and for reserved keys; "" for other keys.
+
+    Reserved are `robot` in faults and criteria, and `then` in a step of a sequence.
+    """
+    keys = [part for part in loc if isinstance(part, int) or " " not in part]  # tags of unions contain a space
+    if key in FILE_KEYS and keys == ["world"]:
+        return "write the path as the value: `world: FILE`"
+    if key in FILE_KEYS and keys == ["robot"]:
+        return "write `model: FILE`"
     if key == "robot" and loc and loc[0] in ("faults", "pass", "robots"):
         return "write it under the name of the robot: `robots: {NAME: {faults: …, pass: …}}`"
     if key == "then" and "then" in loc:

@@ -139,7 +139,7 @@ def _unknown_key_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Probl
     else:
         hint = (
             lookalike_hint(key)
-            or common_mistakes.hint_for_reserved_key(loc[:-1], key)
+            or common_mistakes.hint_for_known_mistake(loc[:-1], key)
             or messages.did_you_mean(key, keys_of(models))
             or common_mistakes.hint_for_misplaced_key(model, tree, loc[:-1], key)
         )

@@ -43,8 +43,10 @@ def test_places_of_values_and_keys_are_known(write: Write, scenario: str, tmp_pa
     assert (problem.place, problem.source) == ("a.scenario.yaml:4:16", "goals: [{pose: desk}]")
 
 
-def test_inline_world_belongs_to_the_scenario(write: Write, scenario: str, tmp_path: Path) -> None:
-    inline = scenario.replace("room.world.yaml", "{simscen: 1, places: {start: {x: 0, y: 0}, desk: {x: 1, y: 1}}}")
+@pytest.mark.parametrize("version", ["", "simscen: 1, "])
+def test_inline_world_belongs_to_the_scenario(write: Write, scenario: str, tmp_path: Path, version: str) -> None:
+    places = "places: {start: {x: 0, y: 0}, desk: {x: 1, y: 1}}"
+    inline = scenario.replace("room.world.yaml", f"{{{version}{places}}}")
     loaded = _loaded(write("a.scenario.yaml", inline), tmp_path)
     assert loaded.world.path == loaded.file
     assert loaded.world.spec is loaded.spec.world
