@@ -16,24 +16,26 @@ from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration, PositiveAcceleration, PositiveAngularAcceleration, PositiveSpeed, Quantity
 
 SlipRatio = Annotated[float, Field(ge=0, lt=1), Quantity("ratio")]
+"""Slip ratio s = 1 - v / (ω r); see Slip."""
 GainFactor = Annotated[float, Field(ge=-10, le=10), Quantity("ratio")]
+"""Ratio of driven to commanded velocity."""
 SpeedLimit = Annotated[float, Field(ge=0, le=100), Quantity("speed")]
 TurnRateLimit = Annotated[float, Field(ge=0, le=100), Quantity("angular speed")]
 
 
 def side_speeds(motion: Twist, wheel_separation: float) -> tuple[float, float]:
-    """Return the rolling speeds (left, right) in m/s of the wheels of a differential drive."""
+    """Return the rolling speeds (left, right) in m/s of the wheels without slip. `wheel_separation` is in m."""
     half = wheel_separation / 2
     return motion.vx - half * motion.wz, motion.vx + half * motion.wz
 
 
 def twist_from_sides(left: float, right: float, lateral: float, wheel_separation: float) -> Twist:
-    """Return the velocity of the base from the rolling speeds of its sides and its `lateral` speed in m/s."""
+    """Return the velocity of the base, given the speeds of the left and right wheels and the lateral speed in m/s."""
     return Twist((left + right) / 2, lateral, (right - left) / wheel_separation)
 
 
 def inapplicable_side(fault: Gain | Saturation, target: FaultTarget) -> tuple[str, str] | None:
-    """Return (key, reason) if `left` or `right` is set although the target has no such wheels, otherwise None."""
+    """Return (key, reason) if `left` or `right` is set, but the target has no left and right wheels; otherwise None."""
     given = [key for key in ("left", "right") if key in fault.model_fields_set and getattr(fault, key) is not None]
     if given and target.kind != "Wheels":
         return given[0], f"`{given[0]}` does not apply there: a command has no sides; set it on `wheels`"
@@ -47,7 +49,7 @@ class Slip(Spec, Fault):
 
     The slip ratio is s = 1 - v / (ω r), as in vehicle dynamics (Wong, Theory of Ground Vehicles, ch. 2). With different
     ratios for left and right, the robot also turns, and the odometry does not measure this turn. The robot slips with
-    either target. On `wheels`, all wheel odometry is wrong; on an odometry sensor, only its readings are wrong.
+    both targets. On `wheels`, all wheel odometry is wrong; on an odometry sensor, only the readings of this sensor.
 
     Example: `{sensor: odom, slip: {left: 30 %, right: 10 %}, when: {time: 5 s}, for: 4 s}`
     """
@@ -69,12 +71,12 @@ class _SlippingWheels(OdometryDistortion):
     changes_motion = True
 
     def __init__(self, slip: Slip, separation: float) -> None:
-        self._left, self._right, self._separation = 1 - slip.left, 1 - slip.right, separation
-        inverse = 1 / self._left, 1 / self._right
+        self._left_ratio, self._right_ratio, self._separation = 1 - slip.left, 1 - slip.right, separation
+        inverse = 1 / self._left_ratio, 1 / self._right_ratio
         super().__init__(lambda step, velocity, _: (self._scaled(step, *inverse), self._scaled(velocity, *inverse)))
 
     def command(self, command: Twist) -> Twist | None:
-        return command if self._ended else self._scaled(command, self._left, self._right)
+        return command if self._has_ended else self._scaled(command, self._left_ratio, self._right_ratio)
 
     def _scaled(self, motion: Twist, left: float, right: float) -> Twist:
         """Return the motion with the speeds of the left and right wheels multiplied by `left` and `right`."""
@@ -111,11 +113,11 @@ class Gain(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         def scaled(command: Twist) -> Twist:
-            both = Twist(self.linear * command.vx, self.linear * command.vy, self.angular * command.wz)
+            twist = Twist(self.linear * command.vx, self.linear * command.vy, self.angular * command.wz)
             if not setting.separation or self.left == self.right == 1:
-                return both
-            left, right = side_speeds(both, setting.separation)
-            return twist_from_sides(self.left * left, self.right * right, both.vy, setting.separation)
+                return twist
+            left, right = side_speeds(twist, setting.separation)
+            return twist_from_sides(self.left * left, self.right * right, twist.vy, setting.separation)
 
         return ChangedCommands(scaled)
 
@@ -185,7 +187,7 @@ class _LimitedCommands(FaultEffect):
 
 
 def _limit_length(vector: tuple[float, ...], limit: float | None, seconds: float = 1.0) -> tuple[float, ...]:
-    """Return the vector, shortened to at most `limit * seconds`. A limit of None is no limit."""
+    """Return the vector, shortened to the length `limit * seconds` if it is longer. None is no limit."""
     length = math.hypot(*vector)
     if limit is None or length <= limit * seconds:
         return vector
@@ -195,9 +197,9 @@ def _limit_length(vector: tuple[float, ...], limit: float | None, seconds: float
 class LowBattery(Spec, Fault):
     """The maximum speed falls as the battery drains and the motor voltage drops; the stack is not informed.
 
-    The maximum speed falls linearly from `start` to `end` during `drain` and then stays constant. Linear and angular
-    velocity of faster commands are reduced by the same factor, so that the robot drives the same curves more slowly.
-    Odometry measures the actual motion.
+    The maximum speed falls linearly from `start` to `end` during the time `drain`, and then stays constant. Linear and
+    angular velocity of faster commands are reduced by the same factor, so that the robot drives the same curves more
+    slowly. Odometry measures the actual motion.
 
     Example: `{sensor: cmd_vel, low_battery: {start: 0.4 m/s, end: 0.15 m/s, drain: 20 s}}`
     """
@@ -220,8 +222,8 @@ class LowBattery(Spec, Fault):
         start_tick = setting.now()
 
         def limited(command: Twist) -> Twist:
-            drained = min(1.0, setting.seconds_since(start_tick) / self.drain) if self.drain > 0 else 1.0
-            speed, max_speed = math.hypot(command.vx, command.vy), self.start + (self.end - self.start) * drained
+            drained_ratio = min(1.0, setting.seconds_since(start_tick) / self.drain) if self.drain > 0 else 1.0
+            speed, max_speed = math.hypot(command.vx, command.vy), self.start + (self.end - self.start) * drained_ratio
             return command if speed <= max_speed else Twist(*(value * max_speed / speed for value in command))
 
         return ChangedCommands(limited)

@@ -26,28 +26,28 @@ if TYPE_CHECKING:
 
 
 class SensorSimulator(Protocol):
-    """Simulator of the faulty lidar or camera, with another sensor pose or without some objects."""
+    """Simulates what the target of a fault, a lidar or camera, would measure with another pose or without objects."""
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
         """Return the true distances (n,) in meters along the beams of a scan of the current tick.
 
         Distances above twice the maximum range of the scan are inf. Beams that point down end at the floor.
 
-        error:    true pose of the lidar in the frame of its nominal pose; None if both are equal
+        error:    pose from which the lidar measures, in the frame of its nominal pose; None for the nominal pose
         without:  names of objects that the beams pass through
         """
         ...
 
     def image(self, error: Pose3) -> Image:
-        """Return the current image of a camera with the true pose `error` in the frame of its nominal pose."""
+        """Return the current image of a camera at the pose `error`, in the frame of its nominal pose."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class FaultSetting:
-    """Facts that an active fault needs about its target and the run.
+    """Target and run of an active fault: the second argument of `Fault.begin`.
 
-    separation:  distance between left and right wheels in meters; 0 for a drive without left and right wheels
+    separation:  distance between left and right wheels in m; 0 for a drive without left and right wheels
     clock:       conversion between ticks (physics steps) and seconds
     now:         returns the current tick
     kind:        kind of the target, one of the fault's `affects`
@@ -71,9 +71,9 @@ class FaultSetting:
 class FaultTarget:
     """Target of a fault: a sensor, cmd_vel, the wheels, the localizer, or the map.
 
-    kind:  kind of the target, one of the fault's `affects`
+    kind:  kind of the target; see `Fault.affects`
     rate:  messages per second; 0 if unknown
-    spec:  specification of the sensor, or of the drive for `wheels`; None for other targets
+    spec:  specification of a sensor, or for `wheels`, of the robot's drive; None for other targets
     """
 
     kind: str
@@ -82,16 +82,19 @@ class FaultTarget:
 
 
 class FaultEffect:
-    """Effect of an active fault on readings, commands, beliefs, and the map. The default changes nothing.
+    """Effect of an active fault on readings, commands, beliefs, and the map. This base class changes nothing.
 
-    The effect must be deterministic for a given random generator, and it must not modify its arguments.
+    The methods must be deterministic for a given random generator, and must not modify their arguments.
     """
 
     changes_motion: ClassVar[bool] = False
-    """Whether a fault on a sensor also changes the motion of the robot. If so, `command` is called as well."""
+    """Whether a fault of a sensor also changes the motion of the robot. If so, `command` is called as well."""
 
     def reading(self, reading: Reading) -> Reading | None:
-        """Return the reading that the stack receives instead; None to drop or delay it, except if `measures_again`."""
+        """Return the reading that the stack receives instead; None to drop or delay the reading.
+
+        A fault with `measures_again` must not return None.
+        """
         return reading
 
     def arriving_readings(self) -> Sequence[Reading]:
@@ -99,11 +102,11 @@ class FaultEffect:
         return ()
 
     def command(self, command: Twist) -> Twist | None:
-        """Return the command that the wheels follow instead; None (only on cmd_vel) to drop or delay the command."""
+        """Return the command that the base executes instead; None to drop or delay the command (only on cmd_vel)."""
         return command
 
     def arriving_command(self) -> Twist | None:
-        """Remove the delayed commands that arrive now, and return the newest or None. Called before `command`."""
+        """Remove the delayed commands that arrive now, and return the newest one, or None. Called before `command`."""
         return None
 
     def belief(self, belief: Belief) -> Belief:
@@ -126,10 +129,10 @@ class Fault(ABC):
     """Kinds of targets that the fault can be applied to: class names of readings ("Scan", "Odometry", …), "Command" for
     cmd_vel, "Wheels" for the wheels, "Belief" for the localizer, and "Map" for the map."""
     keys_by_kind: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-    """Keys that apply to each kind of target; all keys for kinds that are not listed."""
+    """Keys that apply to each kind of target. All keys apply to kinds that are not listed."""
     measures_again: ClassVar[bool] = False
-    """Whether the fault simulates measurements again. It then acts at the tick of the measurement, before the latency
-    of the sensor and before all other faults."""
+    """Whether the fault simulates the measurement again. If so, the fault acts at the tick of the measurement: before
+    the latency of the sensor and before all other faults."""
     neutral_values: ClassVar[Mapping[str, object]] = {}
     """Values of the keys with which the fault has no effect; {} if the fault always has an effect."""
 
@@ -141,9 +144,9 @@ class Fault(ABC):
         return "" if is_valid else f"its `affects` is not a set of {', '.join(FAULT_TARGET_KINDS)}"
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        """Return (key, reason) for a key that does not apply to the target; None if all keys apply.
+        """Return (key, reason) for the first key that does not suit the target; None if all keys do.
 
-        The key "" stands for the whole fault. The default checks the keys that are set against `keys_by_kind`.
+        The key "" stands for the whole fault. The default compares the keys in the scenario with `keys_by_kind`.
         """
         applicable = self.keys_by_kind.get(target.kind)
         if applicable is None:

@@ -12,22 +12,22 @@ from simscen.core.messages.sensor_data import Image, Odometry, Reading, Scan
 from simscen.faults.base import FaultEffect
 
 
-def apply_correction(belief: Belief, map_from_odom: Pose2) -> Belief:
-    """Return the belief with the transform `map_from_odom` instead of its own.
+def replace_map_from_odom(belief: Belief, map_from_odom: Pose2) -> Belief:
+    """Return the belief with another transform from map to odom frame.
 
-    The pose in the map frame changes accordingly; the pose in the odom frame stays the same.
+    The pose in the odom frame stays the same. The pose in the map frame changes accordingly.
     """
     odometry = belief.map_from_odom.between(belief.pose)
     return replace(belief, pose=map_from_odom.compose(odometry), map_from_odom=map_from_odom)
 
 
 def apply_pose_error(belief: Belief, error: Pose2) -> Belief:
-    """Return the belief with its pose and its transform displaced by `error`, a transform in the map frame."""
+    """Return the belief with its pose and its transform from map to odom moved by `error`, given in the map frame."""
     return replace(belief, pose=error.compose(belief.pose), map_from_odom=error.compose(belief.map_from_odom))
 
 
 def change_distances(reading: Reading, change: Callable[[Array], Array]) -> Reading:
-    """Return a scan or image with its finite ranges or depths changed. Other readings are returned unchanged.
+    """Return a scan or image with changed ranges or depths. Values that are not finite, and other readings, stay as is.
 
     `change` maps an array of distances in m to the changed distances. Ranges outside the limits of the lidar become inf
     or -inf (REP 117). Negative depths become 0.
@@ -54,10 +54,10 @@ def clip_to_sensor_range(scan: Scan, ranges: Array) -> Array:
 
 
 def ranges_with_scan_errors(scan: Scan, new_distances: Array, scan_distances: Array) -> Array:
-    """Return the ranges (n,) that the lidar would report if the true distances were `new_distances` (n,).
+    """Return the ranges (n,) in m that the lidar would report if the true distances were `new_distances` (n,).
 
-    Each beam keeps the measurement error of the scan, relative to the scan's true distances `scan_distances` (n,). The
-    ranges are rounded to whole millimeters.
+    Each beam keeps its measurement error: the range in the scan minus the true distance `scan_distances` (n,) of the
+    scan. The result is rounded to whole millimeters.
     """
     with np.errstate(invalid="ignore"):
         errors = scan.ranges - scan_distances
@@ -67,7 +67,7 @@ def ranges_with_scan_errors(scan: Scan, new_distances: Array, scan_distances: Ar
 
 
 class ChangedReadings(FaultEffect):
-    """Effect that changes only readings. `change` returns the changed reading."""
+    """Effect that changes only readings, by the function `change`."""
 
     def __init__(self, change: Callable[[Reading], Reading]) -> None:
         self._change = change
@@ -77,7 +77,7 @@ class ChangedReadings(FaultEffect):
 
 
 class ChangedRanges(FaultEffect):
-    """Effect that changes only the ranges of scans. `ranges` returns the changed ranges (n,) in m of a scan."""
+    """Effect that changes only scans. The function `ranges` returns the changed ranges (n,) of a scan in m."""
 
     def __init__(self, ranges: Callable[[Scan], Array]) -> None:
         self._ranges = ranges
@@ -87,7 +87,7 @@ class ChangedRanges(FaultEffect):
 
 
 class ChangedCommands(FaultEffect):
-    """Effect that changes only velocity commands. `change` returns the changed command."""
+    """Effect that changes only velocity commands, by the function `change`."""
 
     def __init__(self, change: Callable[[Twist], Twist]) -> None:
         self._change = change
@@ -96,41 +96,41 @@ class ChangedCommands(FaultEffect):
         return self._change(command)
 
 
-MAX_ODOMETRY = 1e6
-"""Maximum absolute value of a coordinate in m, or of a heading in rad, that odometry can reach."""
+MAX_ODOMETRY_VALUE = 1e6
+"""Odometry with a coordinate in m or a heading in rad beyond this absolute value is garbage."""
 
 
 class OdometryDistortion(FaultEffect):
-    """Effect on odometry. Distorts each increment and integrates the distorted increments to a pose.
+    """Effect that distorts each odometry increment, and integrates the distorted increments to a pose.
 
     The reported pose does not jump when the fault begins. The accumulated error remains when the fault ends. Garbage
     from another fault, such as nan, is returned unchanged, and is not part of any increment.
     """
 
     def __init__(self, distort: Callable[[Twist, Twist, int], tuple[Twist, Twist]]) -> None:
-        """Create the effect.
+        """Take the function `distort`.
 
-        `distort` takes an increment (m, m, rad), the velocity (m/s, m/s, rad/s) at its end, and its duration in ticks.
-        It returns the distorted increment and velocity.
+        Its arguments are an increment (m, m, rad), the velocity (m/s, m/s, rad/s) at the end of the increment, and the
+        duration of the increment in ticks. It returns the distorted increment and velocity.
         """
         self._distort = distort
         self._previous: dict[str, tuple[Odometry, Pose2]] = {}
         """Last true reading and last reported pose by sensor."""
-        self._ended = False
+        self._has_ended = False
 
     def reading(self, reading: Reading) -> Reading:
         """Return the distorted odometry. Garbage and other readings are returned unchanged."""
-        if not (isinstance(reading, Odometry) and all(abs(value) <= MAX_ODOMETRY for value in reading.pose)):
+        if not (isinstance(reading, Odometry) and all(abs(value) <= MAX_ODOMETRY_VALUE for value in reading.pose)):
             return reading
         previous, pose = self._previous.get(reading.sensor, (reading, reading.pose))
         step, velocity = Twist(*previous.pose.between(reading.pose)), reading.twist
-        if not self._ended:
+        if not self._has_ended:
             step, velocity = self._distort(step, velocity, reading.tick - previous.tick)
         pose = pose.compose(Pose2(*step))
         self._previous[reading.sensor] = reading, pose
         return replace(reading, pose=pose, twist=velocity)
 
     def end(self) -> FaultEffect:
-        """Return this effect, which keeps the accumulated error in all later readings."""
-        self._ended = True
+        """Stop the distortion, and return this effect, which adds the accumulated error to all later readings."""
+        self._has_ended = True
         return self

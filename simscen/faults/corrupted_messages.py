@@ -22,17 +22,17 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 GARBAGE_NUMBERS = {"nan": math.nan, "inf": math.inf, "zero": 0.0, "negative": -1.0, "huge": 1e30}
-"""Number that replaces all measurements in a message, except colors, by the keyword of `Garbage.value`."""
+"""Numbers that replace all measurements in a message, except colors, by keyword of `Garbage.value`."""
 WRONG_SIZES = ("empty", "short")
-"""Keywords of `Garbage.value` that change the number of values of a message."""
+"""Keywords of `Garbage.value` that change the number of values in a message."""
 T = TypeVar("T", bound="np.generic")
 
 
 class Garbage(Spec, Fault):
-    """Messages with meaningless content: nan, inf, zero, negative or huge values, no values at all, or too few.
+    """Messages with meaningless content: nan, inf, zero, negative, or huge values, no values, or too few values.
 
-    Real drivers send such messages while they start, when a frame is cut off, or when a checksum is not verified. A
-    stack must tolerate them and must not treat them as measurements.
+    Real drivers send garbage while they start, when a packet is cut off, or when a checksum is not verified. A stack
+    must tolerate garbage and must not treat it as a measurement.
 
     Example: `{sensor: lidar, garbage: {value: nan, probability: 20 %}}`
     """
@@ -41,7 +41,7 @@ class Garbage(Spec, Fault):
     neutral_values: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     value: Literal["nan", "inf", "zero", "negative", "huge", "empty", "short", "anything"] = "anything"
     """Value of all measurements in the message, except colors: nan, inf, zero, negative (-1), or huge (1e30). A scan or
-    image can also be empty (no values) or short (half of the values). `anything` draws one of these for each
+    image can also be empty (no values) or short (half of the values). `anything` draws one of these keywords for each
     message."""
     probability: Probability = 1.0
     """Probability that a message is garbage."""
@@ -55,8 +55,8 @@ class Garbage(Spec, Fault):
         return ChangedReadings(lambda reading: self._garbage(rng, reading))
 
     def _garbage(self, rng: np.random.Generator, reading: Reading) -> Reading:
-        has_size = isinstance(reading, Scan | Image)
-        contents = (*GARBAGE_NUMBERS, *(WRONG_SIZES if has_size else ()))
+        has_variable_size = isinstance(reading, Scan | Image)
+        contents = (*GARBAGE_NUMBERS, *(WRONG_SIZES if has_variable_size else ()))
         draw, random_content = rng.random(), contents[int(rng.integers(len(contents)))]
         if draw >= self.probability:
             return reading
@@ -78,9 +78,9 @@ class Garbage(Spec, Fault):
 
 
 def _garbage_values(values: npt.NDArray[T], content: str) -> npt.NDArray[T]:
-    """Return an array of the same dtype that is empty, half as long, or filled with one number.
+    """Return an empty array, the first half of `values`, or an array of the same shape filled with one number.
 
-    `content` is a keyword of `Garbage.value`.
+    `content` is a keyword of `Garbage.value`, except `anything`.
     """
     if content == "empty":
         return values[:0]
@@ -92,8 +92,8 @@ def _garbage_values(values: npt.NDArray[T], content: str) -> npt.NDArray[T]:
 class Stuck(Spec, Fault):
     """The same message is repeated with a fresh time stamp: a driver that hangs and sends its last buffer again.
 
-    The repeated message is the first one after the start of the fault. On `cmd_vel`, the base keeps that command. On
-    `localizer`, the navigator always receives the same pose. On `wheels`, the wheels are blocked.
+    The repeated message is the first message after the start of the fault. On `cmd_vel`, the base repeats this command.
+    On `localizer`, the navigator always receives the same pose. On `wheels`, the wheels are blocked.
 
     Example: `{sensor: lidar, stuck: {}, when: {time: 5 s}, for: 2 s}`
     """
@@ -107,7 +107,7 @@ class Stuck(Spec, Fault):
 
 
 class _RepeatedMessage(FaultEffect):
-    """Effect of `stuck`. Repeats the first message that it receives, or `command` if it is given."""
+    """Effect of `stuck`: repeats the first message, or only `command` if it is not None."""
 
     def __init__(self, command: Twist | None) -> None:
         self._command = command

@@ -13,7 +13,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Reading
 from simscen.faults.base import Fault, FaultEffect, FaultSetting
-from simscen.faults.common import apply_correction
+from simscen.faults.common import replace_map_from_odom
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Duration
 
@@ -24,8 +24,8 @@ class Delay(Spec, Fault):
     """Messages arrive late and in order: a slow driver, or a busy bus or network.
 
     Messages keep the time stamp of their measurement. The delay is `latency` plus a random part of `jitter`, but no
-    message overtakes an earlier one. Messages in transit at the end of the fault still arrive, and later messages wait
-    for them. On `localizer`, the transform from map to odom is late.
+    message overtakes an earlier message. Messages that are in transit when the fault ends still arrive, and before all
+    later messages. On `localizer`, the transform from map to odom is late.
 
     Example: `{sensor: lidar, delay: {latency: 200 ms, jitter: 50 ms}}`
     """
@@ -35,7 +35,7 @@ class Delay(Spec, Fault):
     latency: Duration = 0.0
     """Delay of every message."""
     jitter: Duration = 0.0
-    """Largest additional delay; drawn uniformly for each message."""
+    """Maximum additional delay. The additional delay is drawn uniformly for each message."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         return _DelayedMessages(rng, self, setting)
@@ -46,14 +46,15 @@ class _DelayedMessages(FaultEffect):
 
     def __init__(self, rng: np.random.Generator, delay: Delay, setting: FaultSetting) -> None:
         self._rng, self._delay, self._setting = rng, delay, setting
-        self._readings, self._commands = _LatencyQueue[Reading](), _LatencyQueue[Twist]()
-        self._corrections = _LatencyQueue[Pose2]()
-        self._correction: Pose2 | None = None
-        self._ended = False
+        self._readings, self._commands = _TransitQueue[Reading](), _TransitQueue[Twist]()
+        self._transforms = _TransitQueue[Pose2]()
+        self._map_from_odom: Pose2 | None = None
+        """The newest transform that has arrived."""
+        self._has_ended = False
 
     def _due_tick(self) -> int:
         """Return the tick at which a message that is sent now arrives."""
-        if self._ended:
+        if self._has_ended:
             return self._setting.now()
         delay = self._delay.latency + self._delay.jitter * self._rng.random()
         return self._setting.now() + self._setting.clock.ticks(delay)
@@ -71,20 +72,20 @@ class _DelayedMessages(FaultEffect):
         return next(reversed(self._commands.pop_due(self._setting.now())), None)
 
     def belief(self, belief: Belief) -> Belief:
-        now, newest = self._setting.now(), belief.map_from_odom
-        arrived = self._corrections.pop_due(now)
-        if (fresh := self._corrections.pass_or_hold(newest, self._due_tick(), now)) is not None:
-            arrived.append(fresh)
-        self._correction = arrived[-1] if arrived else self._correction or newest
-        return apply_correction(belief, self._correction)
+        now, sent = self._setting.now(), belief.map_from_odom
+        arrived = self._transforms.pop_due(now)
+        if (undelayed := self._transforms.pass_or_hold(sent, self._due_tick(), now)) is not None:
+            arrived.append(undelayed)
+        self._map_from_odom = arrived[-1] if arrived else self._map_from_odom or sent
+        return replace_map_from_odom(belief, self._map_from_odom)
 
     def end(self) -> FaultEffect | None:
         """Return this effect if messages are still in transit, otherwise None."""
-        self._ended = True
-        return self if self._readings or self._commands or self._corrections else None
+        self._has_ended = True
+        return self if self._readings or self._commands or self._transforms else None
 
 
-class _LatencyQueue(Generic[T]):
+class _TransitQueue(Generic[T]):
     """Queue of messages in transit, oldest first. All times are ticks."""
 
     def __init__(self) -> None:
@@ -94,7 +95,7 @@ class _LatencyQueue(Generic[T]):
         return len(self._waiting)
 
     def pass_or_hold(self, message: T, due: int, now: int) -> T | None:
-        """Return the message if it is due and the queue is empty; otherwise add it to the queue and return None."""
+        """Return the message if it is due and the queue is empty. Otherwise, add it to the queue and return None."""
         if not self._waiting and due <= now:
             return message
         self._waiting.append((max(due, self._waiting[-1][0]) if self._waiting else due, message))

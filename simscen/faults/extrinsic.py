@@ -19,9 +19,9 @@ ROTATION_KEYS = ("roll", "pitch", "yaw")
 
 
 class Extrinsic(Spec, Fault):
-    """The mounting pose of a sensor is wrong: it was knocked out of place or never calibrated.
+    """The mounting pose of a sensor is wrong: the sensor was knocked out of place or never calibrated.
 
-    The keys are the true pose of the sensor in the frame of its nominal pose; the stack assumes the nominal pose. A
+    The keys are the true pose of the sensor in the frame of its nominal pose. The stack assumes the nominal pose. A
     lidar that is pitched down sees the floor as a wall. A tilted IMU measures a part of gravity as acceleration.
 
     Example: `{sensor: lidar, extrinsic: {yaw: 3 deg, x: 1 cm}}`
@@ -55,8 +55,8 @@ class Extrinsic(Spec, Fault):
         def measured(reading: Reading) -> Reading:
             match reading:
                 case Scan() if simulator is not None:
-                    nominal, actual = simulator.distances(reading), simulator.distances(reading, error)
-                    return replace(reading, ranges=ranges_with_scan_errors(reading, actual, nominal))
+                    nominal, displaced = simulator.distances(reading), simulator.distances(reading, error)
+                    return replace(reading, ranges=ranges_with_scan_errors(reading, displaced, nominal))
                 case Image() if simulator is not None:
                     image = simulator.image(error)
                     return replace(reading, rgb=image.rgb, depth=image.depth)

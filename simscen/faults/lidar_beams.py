@@ -19,7 +19,7 @@ from simscen.spec.quantities import Angle, PositiveAngle, PositiveLength, Probab
 
 
 class BeamDropout(Spec, Fault):
-    """Each beam of each scan returns nothing (nan) with a fixed probability, as over dark or wet surfaces.
+    """Each beam of each scan returns nothing (nan) with a fixed probability, as on dark or wet surfaces.
 
     Example: `{sensor: lidar, beam_dropout: {probability: 40 %}}`
     """
@@ -38,7 +38,7 @@ class BeamDropout(Spec, Fault):
 
 
 class Sector(Spec, Fault):
-    """Beams in a range of directions return nothing (nan): dirt on the lidar, a cable or a load in front of it.
+    """Beams in a range of directions return nothing (nan): dirt on the lidar, or a cable or load in front of the lidar.
 
     Example: `{sensor: lidar, sector: {from: -30 deg, to: 30 deg}}`
     """
@@ -51,7 +51,7 @@ class Sector(Spec, Fault):
 
     @property
     def width(self) -> float:
-        """Counterclockwise angle from the first to the last direction in rad; 2 pi for a whole turn."""
+        """Counterclockwise angle in rad from the first to the last blind direction; at most 2 pi."""
         turn = 2 * math.pi
         return turn if self.to - self.from_ >= turn - 1e-9 else (self.to - self.from_) % turn
 
@@ -77,10 +77,10 @@ class RangeLimit(Spec, Fault):
     """Largest range or depth that is still measured."""
 
     def unsuitable_key(self, target: FaultTarget) -> tuple[str, str] | None:
-        own = getattr(target.spec, "max_range", None)
-        if own is None or self.max < own:
+        sensor_range = getattr(target.spec, "max_range", None)
+        if sensor_range is None or self.max < sensor_range:
             return None
-        return "max", f"{self.max:g} m is no limit: the range of the sensor is {own:g} m"
+        return "max", f"{self.max:g} m is no limit: the range of the sensor is {sensor_range:g} m"
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         return ChangedReadings(self._limited)
@@ -107,7 +107,7 @@ class Ghost(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Scan"})
     neutral_values: ClassVar[Mapping[str, object]] = {"probability": 0.0}
     range: PositiveLength
-    """Distance of the ghost. Beams that hit a nearer object report the nearer object."""
+    """Distance of the ghost. Beams that hit a nearer object measure this object."""
     direction: Angle = 0.0
     """Center of the window in the lidar's frame."""
     width: PositiveAngle = 0.17453292519943295

@@ -17,8 +17,9 @@ from simscen.spec.places import ObjectName
 from simscen.spec.quantities import PositiveLength, Probability, Quantity
 
 MM_PER_HOUR = 0.001 / 3600
+"""One millimeter per hour in m/s."""
 REFERENCE_REFLECTIVITY = 0.9
-"""Lowest reflectivity of a surface that a lidar detects at its maximum range in clear air."""
+"""Minimum reflectivity of a surface that a lidar detects at its maximum range in clear air."""
 
 
 class Glass(Spec, Fault):
@@ -44,10 +45,10 @@ class Glass(Spec, Fault):
         assert simulator is not None  # a lidar has one
 
         def ranges(scan: Scan) -> Array:
-            passes = rng.random(len(scan.ranges)) < self.probability
-            opaque, transparent = simulator.distances(scan), simulator.distances(scan, without=self.of)
-            changed = ranges_with_scan_errors(scan, transparent, opaque)
-            return np.where(passes & (transparent != opaque), changed, scan.ranges)
+            passes_glass = rng.random(len(scan.ranges)) < self.probability
+            to_glass, behind_glass = simulator.distances(scan), simulator.distances(scan, without=self.of)
+            changed = ranges_with_scan_errors(scan, behind_glass, to_glass)
+            return np.where(passes_glass & (behind_glass != to_glass), changed, scan.ranges)
 
         return ChangedRanges(ranges)
 
@@ -56,10 +57,10 @@ class Rain(Spec, Fault):
     """Rain weakens the returned light and adds range noise: distant or dark objects disappear (inf).
 
     At a rain rate of R mm/h, the extinction coefficient is α = 0.01 R^0.6 per meter. A surface with reflectivity ρ at
-    range z returns the fraction ρ exp(-2 α z) / z² of the light. The lidar detects the surface if at least as much
-    light returns as from a surface with 90 % reflectivity at the lidar's maximum range in clear air. Range errors have
-    the standard deviation 0.02 z (1 - exp(-R))². Source: Goodin, Carruth, Doude and Hudson, Predicting the influence of
-    rain on lidar in ADAS, Electronics 8 (2019), eq. 3 to 6. For echoes of drops, use `dust`.
+    range z returns light proportional to ρ exp(-2 α z) / z². The lidar detects the surface if at least as much light
+    returns as from a surface with 90 % reflectivity at the lidar's maximum range in clear air. Range errors have the
+    standard deviation 0.02 z (1 - exp(-R))². Source: Goodin, Carruth, Doude and Hudson, Predicting the influence of
+    rain on lidar in ADAS, Electronics 8 (2019), eq. 3 to 6. To simulate echoes of raindrops, use `dust`.
 
     Example: `{sensor: lidar, rain: {rate: 25 mm/h, reflectivity: 50 %}}`
     """
@@ -102,9 +103,9 @@ class Dust(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         def ranges(scan: Scan) -> Array:
-            particles = np.round(rng.exponential(self.mean_free_path, len(scan.ranges)), 3)
+            to_particle = np.round(rng.exponential(self.mean_free_path, len(scan.ranges)), 3)
             with np.errstate(invalid="ignore"):
-                is_nearer = particles < np.minimum(scan.ranges, scan.range_max)
-            return np.where(is_nearer, clip_to_sensor_range(scan, particles), scan.ranges)
+                is_nearer = to_particle < np.minimum(scan.ranges, scan.range_max)
+            return np.where(is_nearer, clip_to_sensor_range(scan, to_particle), scan.ranges)
 
         return ChangedRanges(ranges)

@@ -20,13 +20,14 @@ from simscen.spec.places import Ring
 from simscen.spec.quantities import Angle, Length
 
 Rings = Annotated[list[Ring], Field(max_length=100)]
+"""Polygons in the map frame."""
 
 
 class Jump(Spec, Fault):
     """The estimated pose jumps, as when a localizer mistakes one aisle for another.
 
-    The jump is given in the frame of the estimated pose at the start of the fault. The estimate keeps this error until
-    the fault ends, and then jumps back. The localizer itself continues undisturbed.
+    The jump is given in the frame of the estimated pose at the start of the fault. The estimated pose keeps this error
+    until the fault ends, and then jumps back. The fault does not disturb the localizer itself.
 
     Example: `{sensor: localizer, jump: {x: 1 m, yaw: 10 deg}, when: {time: 5 s}, for: 3 s}`
     """
@@ -88,9 +89,9 @@ class Outdated(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Map"})
     neutral_values: ClassVar[Mapping[str, object]] = {"missing": [], "extra": []}
     missing: Rings = []
-    """Polygons, given by their corners, in which the map shows free space."""
+    """Polygons, each a list of corners [x, y], in which the map shows free space."""
     extra: Rings = []
-    """Polygons in which the map shows an obstacle."""
+    """Polygons, each a list of corners [x, y], in which the map shows an obstacle."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         return _ChangedMap(self._edited)

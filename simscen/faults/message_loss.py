@@ -12,7 +12,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Reading
 from simscen.faults.base import Fault, FaultEffect, FaultSetting, FaultTarget
-from simscen.faults.common import apply_correction
+from simscen.faults.common import replace_map_from_odom
 from simscen.spec.base import Spec
 from simscen.spec.quantities import Frequency, PositiveDuration, Probability
 
@@ -21,14 +21,14 @@ MESSAGE_KINDS = frozenset({"Scan", "Odometry", "Imu", "Bump", "Image", "Command"
 
 
 class _MessageLoss(FaultEffect):
-    """Effect that drops messages. If beliefs are lost, the transform from map to odom keeps its last value.
+    """Effect that drops messages. If a belief is lost, the transform from map to odom keeps its last value.
 
-    `is_lost` is called once for each message, and returns whether this message is lost.
+    `is_lost` is called once for each message, and returns whether the message is lost.
     """
 
     def __init__(self, is_lost: Callable[[], bool]) -> None:
         self._is_lost = is_lost
-        self._correction: Pose2 | None = None
+        self._map_from_odom: Pose2 | None = None
 
     def reading(self, reading: Reading) -> Reading | None:
         return None if self._is_lost() else reading
@@ -37,9 +37,9 @@ class _MessageLoss(FaultEffect):
         return None if self._is_lost() else command
 
     def belief(self, belief: Belief) -> Belief:
-        if not self._is_lost() or self._correction is None:
-            self._correction = belief.map_from_odom
-        return apply_correction(belief, self._correction)
+        if not self._is_lost() or self._map_from_odom is None:
+            self._map_from_odom = belief.map_from_odom
+        return replace_map_from_odom(belief, self._map_from_odom)
 
 
 class Off(Spec, Fault):
@@ -94,18 +94,19 @@ class Intermittent(Spec, Fault):
 
 
 class _GilbertChannel:
-    """Channel whose periods and gaps have exponentially distributed lengths."""
+    """Channel that alternates between up and down, for exponentially distributed times. Down at first."""
 
     def __init__(self, rng: np.random.Generator, spec: Intermittent, setting: FaultSetting) -> None:
         self._rng, self._spec, self._setting = rng, spec, setting
         self._is_down = True
-        self._until = setting.clock.seconds(setting.now()) + rng.exponential(spec.down)
+        self._next_change_s = setting.clock.seconds(setting.now()) + rng.exponential(spec.down)
 
     def is_down(self) -> bool:
+        """Return whether messages are lost now."""
         now = self._setting.clock.seconds(self._setting.now())
-        while self._until <= now:
+        while self._next_change_s <= now:
             self._is_down = not self._is_down
-            self._until += self._rng.exponential(self._spec.down if self._is_down else self._spec.up)
+            self._next_change_s += self._rng.exponential(self._spec.down if self._is_down else self._spec.up)
         return self._is_down
 
 
@@ -132,20 +133,20 @@ class Slow(Spec, Fault):
 
 
 class _RateLimit:
-    """Limit of the rate of messages to the first message in each period."""
+    """Passes only the first message of each period. Periods are counted from the first message."""
 
     def __init__(self, rate: float, setting: FaultSetting) -> None:
         self._period_ticks, self._now = setting.clock.rate / rate, setting.now
         self._first_tick: int | None = None
-        self._periods = 0
-        """Number of periods, since the first message, in which no further message may arrive."""
+        self._next_period = 0
+        """Index of the earliest period in which another message may arrive."""
 
     def exceeds(self) -> bool:
-        """Return whether a message now exceeds the rate, because an earlier one arrived in the same period."""
+        """Return whether a message that is sent now is lost, because an earlier one arrived in the same period."""
         now = self._now()
         if self._first_tick is None:
             self._first_tick = now
-        if now - self._first_tick < self._periods * self._period_ticks - 1e-6:
+        if now - self._first_tick < self._next_period * self._period_ticks - 1e-6:
             return True
-        self._periods = int((now - self._first_tick) / self._period_ticks + 1e-6) + 1
+        self._next_period = int((now - self._first_tick) / self._period_ticks + 1e-6) + 1
         return False

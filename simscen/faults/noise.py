@@ -49,11 +49,11 @@ class Noise(Spec, Fault):
     std: NonNegativeLength = 0.0
     """Standard deviation of each range or depth."""
     colour: Probability = 0.0
-    """Standard deviation of red, green, and blue of each pixel, relative to full scale."""
+    """Standard deviation of red, green, and blue of each pixel; 1 is the full scale."""
     linear: NonNegativeLength = 0.0
-    """Standard deviation of the odometry distance after one meter. For the localizer, standard deviation of x and y."""
+    """Odometry: standard deviation of the distance after one meter. Localizer: standard deviation of x and of y."""
     angular: NonNegativeAngle = 0.0
-    """Standard deviation of the odometry heading after a turn of one radian. For the localizer, of the heading."""
+    """Odometry: standard deviation of the heading after a turn of one radian. Localizer: of each estimated heading."""
     gyro: NonNegativeAngularSpeed = 0.0
     """Standard deviation of the angular velocity about each axis."""
     accelerometer: NonNegativeAcceleration = 0.0
@@ -64,14 +64,14 @@ class Noise(Spec, Fault):
             return _NoisyValues(rng, self)
 
         def noisy(step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
-            along, turn = rng.standard_normal(2).tolist()
-            forward = step.vx + self.linear * math.sqrt(math.hypot(step.vx, step.vy)) * along
-            turned = step.wz + self.angular * math.sqrt(abs(step.wz)) * turn
+            forward_draw, turn_draw = rng.standard_normal(2).tolist()
+            forward = step.vx + self.linear * math.sqrt(math.hypot(step.vx, step.vy)) * forward_draw
+            turn = step.wz + self.angular * math.sqrt(abs(step.wz)) * turn_draw
             if ticks:
                 seconds = setting.clock.seconds(ticks)
-                vx, wz = velocity.vx + (forward - step.vx) / seconds, velocity.wz + (turned - step.wz) / seconds
+                vx, wz = velocity.vx + (forward - step.vx) / seconds, velocity.wz + (turn - step.wz) / seconds
                 velocity = Twist(vx, velocity.vy, wz)
-            return Twist(forward, step.vy, turned), velocity
+            return Twist(forward, step.vy, turn), velocity
 
         return OdometryDistortion(noisy)
 
@@ -102,9 +102,9 @@ class _NoisyValues(FaultEffect):
                 return reading
 
     def belief(self, belief: Belief) -> Belief:
-        x, y, turn = self._rng.standard_normal(3).tolist()
+        x_draw, y_draw, yaw_draw = self._rng.standard_normal(3).tolist()
         std = self._noise.linear
         pose = belief.pose
-        noisy = Pose2(pose.x + std * x, pose.y + std * y, pose.yaw + self._noise.angular * turn)
+        noisy = Pose2(pose.x + std * x_draw, pose.y + std * y_draw, pose.yaw + self._noise.angular * yaw_draw)
         odometry = belief.map_from_odom.between(pose)
         return replace(belief, pose=noisy, map_from_odom=noisy.compose(odometry.inverse()))

@@ -29,9 +29,9 @@ from simscen.spec.quantities import (
 
 
 class Bias(Spec, Fault):
-    """A constant error: wrong wheel radii, a gyroscope that was not zeroed, a lidar that is too warm.
+    """A constant error: wrong wheel radii, a gyroscope that was not calibrated, a lidar that is too warm.
 
-    To scale all values of a sensor by one factor, use `scale`.
+    To multiply all values of a sensor by one factor, use `scale`.
 
     Example: `{sensor: odom, bias: {linear_scale: 1.1, turn_per_metre: 0.05}}`
     """
@@ -48,11 +48,11 @@ class Bias(Spec, Fault):
         "Image": ("range", "brightness"),
     }
     linear_scale: Ratio = 1.0
-    """Ratio of reported to driven distance. A wheel worn to 95 % of its radius has the ratio 1.05."""
+    """Ratio of reported to driven distance, for example 1.05 if the wheels are worn to 95 % of their radius."""
     angular_scale: Ratio = 1.0
     """Ratio of reported to true turn."""
     turn_per_metre: Angle = 0.0
-    """Additional turn that the odometry reports for each meter driven forward: unequal wheel radii."""
+    """Additional turn that the odometry reports for each meter driven forward, as with unequal wheel radii."""
     range: Length = 0.0
     """Added to each range or depth."""
     gyro: AngularSpeed = 0.0
@@ -60,7 +60,7 @@ class Bias(Spec, Fault):
     accelerometer: Acceleration = 0.0
     """Added to the forward acceleration."""
     brightness: Annotated[float, Field(ge=-1, le=1), Quantity("ratio")] = 0.0
-    """Added to red, green, and blue of each pixel, relative to full scale."""
+    """Added to red, green, and blue of each pixel; 1 is the full scale."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         if setting.kind == "Odometry":
@@ -85,10 +85,10 @@ class Bias(Spec, Fault):
 
 
 class Scale(Spec, Fault):
-    """All values of a sensor (of a camera: the depths) are too large or too small by a factor.
+    """All values of a sensor are too large or too small by a factor. Of a camera, only the depths change.
 
     Possible causes are a lidar clock that runs fast or slow, low tire pressure (odometry), and a wrong full-scale
-    setting of an IMU. The factor also applies to gravity in the acceleration of an IMU.
+    setting of an IMU. The acceleration that the factor scales in an IMU includes gravity.
 
     Example: `{sensor: odom, scale: {factor: 105 %}}`
     """
@@ -115,7 +115,7 @@ class Scale(Spec, Fault):
 
 
 class Drift(Spec, Fault):
-    """An error that starts at zero and grows with time: electronics that warm up, a gyroscope bias that drifts.
+    """An error that starts at zero and grows with time: electronics that warm up, a drifting gyroscope bias.
 
     Odometry reports motion while the robot stands still. On the localizer, the estimated pose drifts in the direction
     of its heading when the fault started, as with a scan matcher in a corridor without features.
@@ -162,18 +162,19 @@ class _DriftingValues(FaultEffect):
         self._drift, self._setting, self._start_tick = drift, setting, setting.now()
         self._start_pose: Pose2 | None = None
 
-    def _elapsed_seconds(self, tick: int) -> float:
+    def _seconds_until(self, tick: int) -> float:
+        """Return the time in s from the start of the fault to `tick`; 0 if `tick` is earlier."""
         return self._setting.clock.seconds(max(0, tick - self._start_tick))
 
     def reading(self, reading: Reading) -> Reading | None:
-        elapsed = self._elapsed_seconds(reading.tick)
+        elapsed = self._seconds_until(reading.tick)
         if isinstance(reading, Imu):
             x, y, z = reading.angular_velocity
             return replace(reading, angular_velocity=(x, y, z + self._drift.gyro * elapsed))
         return change_distances(reading, lambda distances: distances + self._drift.range * elapsed)
 
     def belief(self, belief: Belief) -> Belief:
-        elapsed = self._elapsed_seconds(self._setting.now())
+        elapsed = self._seconds_until(self._setting.now())
         if self._start_pose is None:
             self._start_pose = belief.pose
         drift = Pose2(self._drift.linear * elapsed, 0.0, self._drift.angular * elapsed)

@@ -22,13 +22,13 @@ from simscen.pedestrians.surroundings import (
 )
 
 INTERACTION_RANGE_M = 10.0
-"""Distance beyond which social forces do not act (HuNavSim's max_dist_view)."""
+"""Maximum distance at which social forces act (HuNavSim's max_dist_view)."""
 MIN_SOCIAL_FORCE_M_S2 = 0.05
-"""Weaker social forces count as 0, so that a new pedestrian does not change the motion of others far away."""
+"""Weaker social forces count as 0, so that a new pedestrian does not affect pedestrians far away."""
 VIEW_CHECK_STEPS = 20
-"""Number of steps between two checks of whether the pedestrian still sees the next corner of its path."""
+"""A pedestrian checks in every n-th step that no wall hides the next corner of its path."""
 MIN_SPEED_M_S = 0.01
-"""Speed below which a pedestrian stands still."""
+"""A pedestrian stands still if its velocity, and the velocity that the forces lead to, are below this speed."""
 REFERENCE_RADIUS_M = 0.25
 """Body radius for which the parameters of the social force model were determined."""
 
@@ -39,7 +39,7 @@ PathPlanner = Callable[[Point, Point, float], list[Point]]
 
 
 class Crowd:
-    """All pedestrians of a world, sorted by name, and their motion, which uses no random numbers."""
+    """Simulates all pedestrians of a world, in the order of their names and without random numbers."""
 
     def __init__(self, walls: WallMap, plan_path: PathPlanner) -> None:
         self._walls, self._plan_path = walls, plan_path
@@ -64,61 +64,62 @@ class Crowd:
         return self._people[name].spec.radius
 
     def top_speed(self, name: str) -> float:
-        """Return an upper bound in m/s on the walking speed of a pedestrian with any behavior."""
+        """Return an upper bound in m/s on the walking speed of a pedestrian, whatever its behavior."""
         spec = self._people[name].spec
         return max(forces.MAX_SPEED_RATIO * spec.speed, THREATENING_SPEED_M_S)
 
     def step(self, surroundings: Surroundings, seconds: float) -> list[PedestrianAction]:
         """Move all pedestrians by one step of `seconds`.
 
-        Returns their actions in this step: they began or ended a reaction, or reached a goal.
+        Returns the actions of this step: a pedestrian began or ended a reaction, or reached a goal.
         """
         people = list(self._people.values())
         if not people:
             return []
-        reacting, actions = self._reactions(people, surroundings, seconds)
+        target_robots, actions = self._update_reactions(people, surroundings, seconds)
         for number, person in enumerate(people):
             self._update_path(person, number)
-        intents = [person.intent(robot) for person, robot in zip(people, reacting, strict=True)]
+        intents = [person.intent(robot) for person, robot in zip(people, target_robots, strict=True)]
         positions = np.array([person.position for person in people])
         velocities = np.array([person.velocity for person in people])
         walls = self._walls.nearest_points(positions)
-        external = self._external_forces(people, reacting, intents, positions, velocities, surroundings, walls)
-        moves, after = _integrate(intents, positions, velocities, external, seconds)
-        allowed = clip_moves(moves, move_limits(people, positions, surroundings, walls))
-        clipped = (allowed != moves).any(axis=1)
-        after[clipped] = allowed[clipped] / seconds
-        for person, move, velocity, intent in zip(people, allowed, after, intents, strict=True):
+        external = self._external_forces(people, target_robots, intents, positions, velocities, surroundings, walls)
+        moves, new_velocities = _integrate(intents, positions, velocities, external, seconds)
+        clipped_moves = clip_moves(moves, move_limits(people, positions, surroundings, walls))
+        is_clipped = (clipped_moves != moves).any(axis=1)
+        new_velocities[is_clipped] = clipped_moves[is_clipped] / seconds
+        for person, move, velocity, intent in zip(people, clipped_moves, new_velocities, intents, strict=True):
             person.move(move, velocity, intent.looks_at, seconds)
             actions += person.update_goal()
         self._steps += 1
         return actions
 
-    def _reactions(
+    def _update_reactions(
         self, people: list[Pedestrian], surroundings: Surroundings, seconds: float
     ) -> tuple[list[ObservedRobot | None], list[PedestrianAction]]:
-        """Begin and end reactions to robots.
+        """Begin and end reactions to robots in a step of `seconds`.
 
-        Returns the robot that each pedestrian reacts to, or None, and the beginnings and ends as actions.
+        Returns for each pedestrian the robot that the pedestrian reacts to, or None; and one action for each reaction
+        that began or ended.
         """
-        reacting: list[ObservedRobot | None] = []
+        target_robots: list[ObservedRobot | None] = []
         actions: list[PedestrianAction] = []
         for person in people:
             visible: dict[str, ObservedRobot] = {}
             if person.spec.reacts_within and "robots" not in person.spec.blind_to:
                 visible = {r.name: r for r in surroundings.robots if self._sees(person, r.pose[:2])}
                 actions += person.update_reaction(visible, seconds)
-            reacting.append(None if person.reacts_to is None else visible.get(person.reacts_to))
-        return reacting, actions
+            target_robots.append(None if person.reacts_to is None else visible.get(person.reacts_to))
+        return target_robots, actions
 
     def _sees(self, person: Pedestrian, point: Point) -> bool:
-        """Return whether no wall hides a point from a pedestrian."""
+        """Return whether no wall hides a point from a pedestrian, regardless of the field of view."""
         return bool(self._walls.visible(np.array([person.position]), np.array([point]))[0])
 
     def _update_path(self, person: Pedestrian, number: int) -> None:
-        """Plan a path if the goal is new or if the pedestrian no longer sees the next corner of its path.
+        """Plan a path if the goal is new, or if a wall hides the next corner of the path.
 
-        `number` is the index of the pedestrian. Pedestrians check their view in different steps.
+        `number` is the index of the pedestrian. It distributes the checks of several pedestrians over several steps.
         """
         goal = person.destination
         is_outdated = person.planned_goal != goal
@@ -130,19 +131,19 @@ class Crowd:
     def _external_forces(
         self,
         people: list[Pedestrian],
-        reacting: list[ObservedRobot | None],
+        target_robots: list[ObservedRobot | None],
         intents: list[Intent],
         positions: Array,
         velocities: Array,
         surroundings: Surroundings,
         walls: NearestPoints,
     ) -> Array:
-        """Return all forces (n, 2) in m/s² on pedestrians except their driving forces."""
-        force = self._social_forces(people, reacting, positions, velocities, surroundings)
+        """Return the sum (n, 2) in m/s² of all forces on each pedestrian, except the driving force to the target."""
+        force = self._social_forces(people, target_robots, positions, velocities, surroundings)
         force += self._obstacle_forces(people, positions, surroundings, walls)
         for members in _groups(people):
             force[members] += forces.group_forces(positions[members], velocities[members])
-        for number, (person, robot, intent) in enumerate(zip(people, reacting, intents, strict=True)):
+        for number, (person, robot, intent) in enumerate(zip(people, target_robots, intents, strict=True)):
             if intent.is_immovable:
                 force[number] = 0.0
             elif robot is not None and person.spec.behavior == "scared":
@@ -154,7 +155,7 @@ class Crowd:
     def _social_forces(
         self,
         people: list[Pedestrian],
-        reacting: list[ObservedRobot | None],
+        target_robots: list[ObservedRobot | None],
         positions: Array,
         velocities: Array,
         surroundings: Surroundings,
@@ -165,13 +166,13 @@ class Crowd:
         other_positions = np.concatenate((positions, np.array([robot.pose[:2] for robot in robots]).reshape(-1, 2)))
         other_velocities = np.concatenate((velocities, np.array([robot.velocity for robot in robots]).reshape(-1, 2)))
         radii = np.array([*(person.spec.radius for person in people), *(robot.radius for robot in robots)])
-        towards = other_positions[np.newaxis] - positions[:, np.newaxis]
-        interacts = np.hypot(towards[..., 0], towards[..., 1]) <= INTERACTION_RANGE_M
+        offsets = other_positions[np.newaxis] - positions[:, np.newaxis]
+        interacts = np.hypot(offsets[..., 0], offsets[..., 1]) <= INTERACTION_RANGE_M
         np.fill_diagonal(interacts, False)
-        interacts &= _interactions(people, reacting, surroundings)
+        interacts &= _evades(people, target_robots, surroundings)
         person, other = np.nonzero(interacts)
         force = forces.social_forces(
-            towards[person, other], velocities[person] - other_velocities[other], radii[other] - REFERENCE_RADIUS_M
+            offsets[person, other], velocities[person] - other_velocities[other], radii[other] - REFERENCE_RADIUS_M
         )
         is_strong = np.hypot(force[:, 0], force[:, 1]) > MIN_SOCIAL_FORCE_M_S2
         person, other, force = person[is_strong], other[is_strong], force[is_strong]
@@ -183,7 +184,7 @@ class Crowd:
     ) -> Array:
         """Return the forces (n, 2) in m/s² of walls and objects on pedestrians.
 
-        Robots act as objects on pedestrians with the behavior `impassive`.
+        For pedestrians with the behavior `impassive`, robots are objects.
         """
         person, solid, nearest = walls
         first = nearest_by_solid(person, solid, np.hypot(*(nearest - positions[person]).T))
@@ -202,21 +203,22 @@ class Crowd:
         return _sum_by_person(person, force, len(people))
 
 
-def _interactions(
-    people: list[Pedestrian], reacting: list[ObservedRobot | None], surroundings: Surroundings
+def _evades(
+    people: list[Pedestrian], target_robots: list[ObservedRobot | None], surroundings: Surroundings
 ) -> npt.NDArray[np.bool_]:
-    """Return whether each pedestrian (row) evades each pedestrian or robot (column) by social forces.
+    """Return a matrix: whether each pedestrian (row) evades each pedestrian or robot (column) by social forces.
 
     The columns are all pedestrians, followed by all robots.
     """
     evades = np.ones((len(people), len(people) + len(surroundings.robots)), dtype=np.bool_)
-    for number, (person, reacts_to) in enumerate(zip(people, reacting, strict=True)):
+    for number, (person, target_robot) in enumerate(zip(people, target_robots, strict=True)):
         if "people" in person.spec.blind_to:
             evades[number, : len(people)] = False
         if "robots" in person.spec.blind_to or person.spec.behavior == "impassive":
             evades[number, len(people) :] = False
-        elif reacts_to is not None:
-            evades[number, len(people) :] &= np.array([robot.name != reacts_to.name for robot in surroundings.robots])
+        elif target_robot is not None:
+            is_other = [robot.name != target_robot.name for robot in surroundings.robots]
+            evades[number, len(people) :] &= np.array(is_other)
     return evades
 
 
@@ -233,34 +235,35 @@ def _groups(people: list[Pedestrian]) -> list[Indices]:
 def _integrate(
     intents: list[Intent], positions: Array, velocities: Array, external: Array, seconds: float
 ) -> tuple[Array, Array]:
-    """Return moves (n, 2) in m and velocities (n, 2) in m/s after a step of `seconds` under constant forces.
+    """Return moves (n, 2) in m during a step of `seconds`, and velocities (n, 2) in m/s at its end.
 
-    Solves dv/dt = (intended velocity - v) / τ + external force exactly, and limits the result to the maximum speeds.
+    Solves dv/dt = (intended velocity - v) / τ + force exactly for the constant `external` forces (n, 2) in m/s², and
+    limits moves and velocities to the maximum speeds.
     """
     intended = np.zeros_like(positions)
     for number, intent in enumerate(intents):
         if intent.target is not None:
-            towards = np.array(intent.target) - positions[number]
-            distance = math.hypot(*towards)
-            intended[number] = intent.speed * towards / distance if distance > 0 else 0.0
+            offset = np.array(intent.target) - positions[number]
+            distance = math.hypot(*offset)
+            intended[number] = intent.speed * offset / distance if distance > 0 else 0.0
     steady = intended + RELAXATION_TIME_S * external
     decay = math.exp(-seconds / RELAXATION_TIME_S)
     max_speeds = np.array([intent.max_speed for intent in intents])
-    after = _limit_lengths(steady + (velocities - steady) * decay, max_speeds)
+    new_velocities = _limit_lengths(steady + (velocities - steady) * decay, max_speeds)
     moves = steady * seconds + (velocities - steady) * RELAXATION_TIME_S * (1 - decay)
     is_standing = (np.hypot(*steady.T) < MIN_SPEED_M_S) & (np.hypot(*velocities.T) < MIN_SPEED_M_S)
-    moves[is_standing] = after[is_standing] = 0.0
-    return _limit_lengths(moves, max_speeds * seconds), after
+    moves[is_standing] = new_velocities[is_standing] = 0.0
+    return _limit_lengths(moves, max_speeds * seconds), new_velocities
 
 
 def _limit_lengths(vectors: Array, limits: Array) -> Array:
-    """Return vectors (n, 2), shortened to at most `limits` (n,)."""
+    """Return vectors (n, 2), shortened to the lengths `limits` (n,) if they are longer."""
     lengths = np.hypot(vectors[:, 0], vectors[:, 1])
     limited: Array = vectors * np.minimum(1.0, limits / np.maximum(lengths, 1e-12))[:, np.newaxis]
     return limited
 
 
 def _sum_by_person(person: Indices, force: Array, count: int) -> Array:
-    """Return the sum (count, 2) of the forces (n, 2) on each pedestrian. `person` (n,) are indices of pedestrians."""
+    """Return the sum (count, 2) of the forces (n, 2) on each pedestrian. `person` (n,): index of each pedestrian."""
     sums = [np.bincount(person, force[:, axis], minlength=count) for axis in (0, 1)]
     return np.stack(sums, axis=1).astype(np.float64)  # without any force, bincount returns integers

@@ -24,19 +24,20 @@ MAX_SPEED_RATIO = 1.3
 SOCIAL_STRENGTH_M_S2 = 4.5
 """Maximum social force, A [M09]."""
 VELOCITY_WEIGHT_S_PER_M = 2.0
-"""Weight λ of the relative velocity in the interaction vector D = λ (v - v_other) + unit vector to the other [M09]."""
+"""Weight λ of the relative velocity in the interaction vector D = λ (v - v_other) + e [M09]. e is the unit vector from
+the pedestrian to the other."""
 RANGE_PER_INTERACTION_M = 0.35
 """Ratio γ of the interaction range B to the length of the interaction vector D [M09]."""
 TURN_DECAY_PER_M, BRAKE_DECAY_PER_M = 2.0, 3.0
 """Angular decay rates n of the turning force and n′ of the braking force [M09]."""
 HEAD_ON_BIAS_RAD_PER_M = 0.005
-"""Bias ε of the angle: pedestrians that meet exactly head-on evade to the right [M09]."""
+"""Bias ε of the angle, because of which pedestrians that meet exactly head-on evade to the right [M09]."""
 
 WALL_STRENGTH_M_S2, WALL_RANGE_M = 3.0, 0.1
-"""Force a of a wall at contact, and distance b over which the force decays by 1/e [M09]."""
+"""Force a of a wall at contact, and distance b over which the force falls to 1/e [M09]."""
 
 GAZE_WEIGHT_PER_RAD_S, COHERENCE_M_S2, REPULSION_M_S2 = 4.0, 3.0, 1.0
-"""Weights in a group: turning the head β₁, moving to the center β₂, and keeping a distance β₃ [M10]."""
+"""Weights of the forces in a group [M10]: β₁ of the turn of the head, β₂ to the center, β₃ away from near members."""
 HALF_VISION_RAD = math.pi / 2
 """Angle to each side in which a pedestrian sees its group without turning the head [M10]."""
 MIN_GROUP_GAP_M = 0.8
@@ -46,7 +47,7 @@ MIN_GROUP_GAP_M = 0.8
 def social_forces(offsets: Array, relative_velocities: Array, extra_radii: Array) -> Array:
     """Return the forces (n, 2) with which pedestrians brake and turn to evade others.
 
-    Each row is one pair of a pedestrian and another pedestrian or robot.
+    Each row is a pair of a pedestrian and "the other": another pedestrian, or a robot.
 
     offsets (n, 2):              vector in m from the pedestrian to the other
     relative_velocities (n, 2):  velocity of the pedestrian minus velocity of the other in m/s
@@ -71,10 +72,10 @@ def social_forces(offsets: Array, relative_velocities: Array, extra_radii: Array
 
 
 def wall_forces(directions: Array, gaps: Array) -> Array:
-    """Return the repulsive forces (n, 2) of walls and objects. Each row is one pair of a pedestrian and a wall.
+    """Return the repulsive forces (n, 2) of walls and objects. Each row is a pair of a pedestrian and a wall or object.
 
-    directions (n, 2):  unit vector from the wall to the pedestrian
-    gaps (n,):          distance in m between the wall and the body of the pedestrian
+    directions (n, 2):  unit vector from the wall or object to the pedestrian
+    gaps (n,):          distance in m from the wall or object to the body of the pedestrian
     """
     force: Array = (WALL_STRENGTH_M_S2 * np.exp(-np.maximum(gaps, 0.0) / WALL_RANGE_M))[:, np.newaxis] * directions
     return force
@@ -83,7 +84,7 @@ def wall_forces(directions: Array, gaps: Array) -> Array:
 def group_forces(positions: Array, velocities: Array) -> Array:
     """Return the forces (n, 2) that keep the members of one group together.
 
-    `positions` (n, 2) in m and `velocities` (n, 2) in m/s belong to the members.
+    `positions` (n, 2) in m and `velocities` (n, 2) in m/s are those of the at least two members.
     """
     # Python floats are faster than arrays for small groups.
     points, point_velocities = positions.tolist(), velocities.tolist()
@@ -91,7 +92,7 @@ def group_forces(positions: Array, velocities: Array) -> Array:
     mx, my = sum(x for x, _ in points) / count, sum(y for _, y in points) / count
     forces = []
     for (x, y), (vx, vy) in zip(points, point_velocities, strict=True):
-        ratio = count / (count - 1)  # of the distances to the centers of the others and of all
+        ratio = count / (count - 1)  # the center of the other members is farther away than the center of all members
         turn = GAZE_WEIGHT_PER_RAD_S * _head_turn(vx, vy, ratio * (mx - x), ratio * (my - y))
         fx, fy, distance = -turn * vx, -turn * vy, math.hypot(mx - x, my - y)
         if distance > (count - 1) / 2:
@@ -105,9 +106,9 @@ def group_forces(positions: Array, velocities: Array) -> Array:
 
 
 def _head_turn(vx: float, vy: float, x: float, y: float) -> float:
-    """Return the angle in rad by which a pedestrian with velocity (vx, vy) must turn its head to see the point (x, y).
+    """Return the angle in rad by which a pedestrian with velocity (vx, vy) must turn its head to see a point.
 
-    (x, y) is relative to the pedestrian.
+    (x, y) is the offset of the point from the pedestrian in m.
     """
     if (vx == 0 and vy == 0) or (x == 0 and y == 0):
         return 0.0

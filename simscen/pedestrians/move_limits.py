@@ -30,50 +30,51 @@ class MoveLimits(NamedTuple):
 def move_limits(
     people: Sequence[Pedestrian], positions: Array, surroundings: Surroundings, walls: NearestPoints
 ) -> list[MoveLimits]:
-    """Return limits of the moves of one step. `positions` (n, 2) in m belong to the `people`.
+    """Return limits of the moves of one step. `positions` (n, 2) in m are those of the `people`.
 
     A pedestrian may use the entire gap to a wall, but only half of the gap to an object, robot, or pedestrian.
     """
     radii = np.array([person.spec.radius for person in people])
-    near, _, points = walls
-    limits = [_limits_towards(near, points - positions[near], radii[near], 1.0)]
+    pedestrians, _, points = walls
+    limits = [_limits_towards(pedestrians, points - positions[pedestrians], radii[pedestrians], 1.0)]
     for kind, outlines in [
         *(("objects", item.outlines) for item in surroundings.objects),
         *(("robots", (robot.pose.apply(robot.outline),)) for robot in surroundings.robots),
     ]:
         aware = np.array([k for k, person in enumerate(people) if kind not in person.spec.blind_to], np.int64)
-        near, points = nearest_outline_points(outlines, aware, positions, of_each_segment=True)
-        limits.append(_limits_towards(near, points - positions[near], radii[near], 0.5))
-    towards = positions[np.newaxis] - positions[:, np.newaxis]
-    distance = np.hypot(towards[..., 0], towards[..., 1])
-    one, other = np.nonzero((distance < 2 * OBSTACLE_RANGE_M) & ~np.eye(len(people), dtype=np.bool_))
-    return [*limits, _limits_towards(one, towards[one, other], radii[one], 0.5, radii[other])]
+        pedestrians, points = nearest_outline_points(outlines, aware, positions, of_each_segment=True)
+        limits.append(_limits_towards(pedestrians, points - positions[pedestrians], radii[pedestrians], 0.5))
+    offsets = positions[np.newaxis] - positions[:, np.newaxis]
+    distance = np.hypot(offsets[..., 0], offsets[..., 1])
+    pedestrians, others = np.nonzero((distance < 2 * OBSTACLE_RANGE_M) & ~np.eye(len(people), dtype=np.bool_))
+    between = offsets[pedestrians, others]
+    return [*limits, _limits_towards(pedestrians, between, radii[pedestrians], 0.5, radii[others])]
 
 
 def _limits_towards(
-    pedestrians: Indices, towards: Array, radii: Array, ratio: float, other_radii: Array | float = 0.0
+    pedestrians: Indices, offsets: Array, radii: Array, ratio: float, other_radii: Array | float = 0.0
 ) -> MoveLimits:
-    """Return limits that allow pedestrians (k,) to use a `ratio` of their gaps to other points.
+    """Return limits that allow each pedestrian (k,) to use the fraction `ratio` of the gap to an obstacle.
 
-    `towards` (k, 2) are the vectors in m to these points. The gap is the distance minus `radii` (k,) and `other_radii`
-    (k,) in m.
+    `offsets` (k, 2) are vectors in m from the pedestrians to the obstacles. A gap is the distance minus the radius of
+    the pedestrian (`radii`) and of the obstacle (`other_radii`) in m.
     """
-    distance = np.maximum(np.hypot(towards[:, 0], towards[:, 1]), 1e-9)
+    distance = np.maximum(np.hypot(offsets[:, 0], offsets[:, 1]), 1e-9)
     gaps = distance - radii - other_radii
-    return MoveLimits(pedestrians, towards / distance[:, np.newaxis], ratio * np.maximum(gaps, 0.0))
+    return MoveLimits(pedestrians, offsets / distance[:, np.newaxis], ratio * np.maximum(gaps, 0.0))
 
 
 def clip_moves(moves: Array, all_limits: Iterable[MoveLimits]) -> Array:
-    """Return the moves (n, 2) in m, restricted to the limits. Pedestrians slide along obstacles if possible."""
-    parts = list(all_limits)
-    pedestrians = np.concatenate([each.pedestrians for each in parts])
-    directions = np.concatenate([each.directions for each in parts])
-    limits = np.concatenate([each.limits for each in parts])
+    """Return the moves (n, 2) in m, restricted to all limits. Pedestrians slide along obstacles if possible."""
+    all_limits = list(all_limits)
+    pedestrians = np.concatenate([each.pedestrians for each in all_limits])
+    directions = np.concatenate([each.directions for each in all_limits])
+    limits = np.concatenate([each.limits for each in all_limits])
     exceeds = np.sum(moves[pedestrians] * directions, axis=1) > limits
     clipped: Array = moves.copy()
     for pedestrian in np.unique(pedestrians[exceeds]).tolist():
-        own = pedestrians == pedestrian
-        clipped[pedestrian] = _clip_move(clipped[pedestrian], directions[own], limits[own])
+        applies = pedestrians == pedestrian
+        clipped[pedestrian] = _clip_move(clipped[pedestrian], directions[applies], limits[applies])
     return clipped
 
 

@@ -9,32 +9,32 @@ from simscen.pedestrians.forces import MAX_SPEED_RATIO, RELAXATION_TIME_S
 from simscen.pedestrians.surroundings import ObservedRobot
 
 GOAL_RADIUS_M = 0.3
-"""Distance at which a goal counts as reached (HuNavSim's goal_radius)."""
+"""Maximum distance at which a goal counts as reached (HuNavSim's goal_radius)."""
 CORNER_RADIUS_M = 0.5
-"""Distance at which a corner of the path counts as passed."""
+"""Maximum distance at which a corner of the path counts as passed."""
 HALF_FIELD_OF_VIEW_RAD = math.pi / 2 + 0.17
-"""Maximum angle between the heading and a robot at which a reaction begins (HuNavSim's lineOfSight)."""
+"""Maximum angle between the heading and the direction to a robot for a reaction to begin (HuNavSim's lineOfSight)."""
 MAX_TURN_RATE_RAD_S = math.pi
 """Maximum turn rate (HuNavSim's max_ang_vel)."""
 MIN_TURNING_SPEED_M_S = 0.1
-"""Speed above which a pedestrian turns to its direction of motion."""
+"""Speed above which a pedestrian turns to the direction of motion."""
 LOST_RANGE_RATIO = 1.5
 """Ratio of the distance at which a reaction ends to the distance at which it begins (hysteresis)."""
 CURIOUS_SPEED_M_S, CURIOUS_DISTANCE_M = 1.8, 1.5
-"""Maximum speed of curious pedestrians, and distance to the robot at which they stop."""
+"""Maximum speed of a curious pedestrian, and distance from the robot at which a curious pedestrian stops."""
 SCARED_SPEED_M_S, SCARED_FORCE_M2_S2 = 0.6, 4.0
-"""Maximum speed of scared pedestrians, and factor k of the force k / d that drives them away from the robot. d is the
-distance from their body to the center of the robot (HuNavSim: 20 x 0.2)."""
+"""Maximum speed of a scared pedestrian, and factor k of the force k / d away from the robot. d is the distance from the
+pedestrian's body to the center of the robot (HuNavSim: k = 20 x 0.2)."""
 THREATENING_SPEED_M_S, BLOCKING_DISTANCE_M, STARING_RANGE_M = 2.0, 1.1, 1.2
-"""Maximum speed of threatening pedestrians, distance in front of the robot at which they stand, and distance within
-which they look at the robot."""
+"""Maximum speed of a threatening pedestrian, distance in front of the robot at which the pedestrian stands, and maximum
+distance from the robot at which the pedestrian looks at the robot."""
 STOPPING_DISTANCE_M = 0.05
 """Distance from the target position within which a pedestrian stops walking."""
 
 
 @dataclass(frozen=True)
 class Intent:
-    """Motion that a pedestrian intends in the next step.
+    """Motion that a pedestrian intends in the next step. Points (x, y) are in m in the world frame.
 
     target:        point to walk to; None to stand still
     speed:         intended speed in m/s
@@ -52,7 +52,7 @@ class Intent:
 
 @dataclass
 class Pedestrian:
-    """A pedestrian with its current state in the world frame."""
+    """State of a pedestrian. Positions (x, y) are in m in the world frame."""
 
     spec: WalkingPedestrian
     pose: Pose2
@@ -62,9 +62,10 @@ class Pedestrian:
     goal_index: int = 0
     """Index of the current goal in `spec.goals`."""
     is_forward: bool = True
-    """Whether the goals are visited in their order, not in reverse order. Used with `repeat: back_and_forth`."""
+    """Whether the goals are visited in the order of `spec.goals`; False for the reverse order on the way back, with
+    `repeat: back_and_forth`."""
     has_arrived: bool = False
-    """Whether the last goal was reached; True without goals."""
+    """Whether the last goal has been reached for good; True without goals."""
     path: list[tuple[float, float]] = field(default_factory=list)
     """Corners of the remaining path around walls. The last corner is the current goal."""
     planned_goal: tuple[float, float] | None = None
@@ -74,8 +75,8 @@ class Pedestrian:
     total_reaction_s: float = 0.0
     """Total duration in s of all reactions so far."""
     has_lost_interest: bool = False
-    """Whether the last reaction ended after `total_reaction_s` had reached `spec.reacts_for`. Only scared pedestrians
-    react again afterwards."""
+    """Whether `total_reaction_s` had reached `spec.reacts_for` when the last reaction ended. If so, only scared
+    pedestrians react again."""
 
     @property
     def position(self) -> tuple[float, float]:
@@ -90,7 +91,10 @@ class Pedestrian:
     # Goals
 
     def update_goal(self) -> list[PedestrianAction]:
-        """Advance to the next corner or goal if the current one is reached. Return an action for a reached goal."""
+        """Remove passed corners from the path, and set the next goal if the goal is reached.
+
+        Returns one action if the goal is reached.
+        """
         while len(self.path) > 1 and math.dist(self.position, self.path[0]) <= CORNER_RADIUS_M:
             self.path.pop(0)
         if self.has_arrived or math.dist(self.position, self.destination) > GOAL_RADIUS_M:
@@ -100,7 +104,7 @@ class Pedestrian:
         return [action]
 
     def _advance_goal(self) -> None:
-        """Set the next goal, according to `repeat`."""
+        """Set the next goal, according to `spec.repeat`."""
         count = len(self.spec.goals)
         if self.spec.repeat == "once" or (count == 1 and self.spec.repeat == "loop"):
             self.has_arrived = self.goal_index == count - 1
@@ -116,7 +120,7 @@ class Pedestrian:
 
     # Reaction to robots
 
-    def sees(self, robot: ObservedRobot) -> bool:
+    def _is_in_view(self, robot: ObservedRobot) -> bool:
         """Return whether a robot is within the reaction distance and in the field of view, regardless of walls."""
         if math.dist(self.position, robot.pose[:2]) > self.spec.reacts_within:
             return False
@@ -131,19 +135,19 @@ class Pedestrian:
         if self.reacts_to is not None:
             self.total_reaction_s += seconds
             robot = visible.get(self.reacts_to)
-            lost = (
+            is_lost = (
                 robot is None or math.dist(self.position, robot.pose[:2]) > LOST_RANGE_RATIO * self.spec.reacts_within
             )
-            is_over = self.total_reaction_s >= self.spec.reacts_for
-            if not lost and not (is_over and self.spec.behavior != "scared"):
+            is_time_over = self.total_reaction_s >= self.spec.reacts_for
+            if not is_lost and (not is_time_over or self.spec.behavior == "scared"):
                 return []
-            self.has_lost_interest = is_over
+            self.has_lost_interest = is_time_over
             robot_name, self.reacts_to = self.reacts_to, None
             return [PedestrianAction(self.spec.name, "calmed", robot_name)]
         if self.has_lost_interest and self.spec.behavior != "scared":
             return []
         near = sorted((math.dist(self.position, robot.pose[:2]), name) for name, robot in visible.items()
-                      if self.sees(robot))  # fmt: skip
+                      if self._is_in_view(robot))  # fmt: skip
         if not near:
             return []
         self.reacts_to = near[0][1]
@@ -177,11 +181,11 @@ class Pedestrian:
         return Intent(self._target(), speed, max_speed)
 
     def _target(self) -> tuple[float, float]:
-        """Return the next corner of the path, or the goal without a path."""
+        """Return the next corner of the path; the goal if there is no path."""
         return self.path[0] if self.path else self.destination
 
     def _blocking_intent(self, robot: ObservedRobot) -> Intent:
-        """Return the intent to stand in front of the robot."""
+        """Return the intent to walk to a position in front of the robot, and to stand there."""
         # HuNavSim's blockRobot swaps sine and cosine here, so that its pedestrians do not stand in front of the robot.
         gap = max(BLOCKING_DISTANCE_M, robot.radius + self.spec.radius + STOPPING_DISTANCE_M)
         yaw = robot.pose.yaw
@@ -210,5 +214,5 @@ class Pedestrian:
 
 
 def _braking_speed(distance: float) -> float:
-    """Return the speed in m/s from which a pedestrian stops within a distance in m; 0 within STOPPING_DISTANCE_M."""
+    """Return the speed in m/s from which a pedestrian stops within `distance` m; 0 up to STOPPING_DISTANCE_M."""
     return distance / RELAXATION_TIME_S if distance > STOPPING_DISTANCE_M else 0.0

@@ -1,4 +1,4 @@
-"""Surroundings of pedestrians: walls that block them and their view, robots, and other objects."""
+"""Surroundings of pedestrians: walls, robots, and other objects, and geometric queries about them."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from simscen.core.geometry import Array, Pose2
 from simscen.pedestrians.forces import Indices
 
 WALL_CELL_M = 1.0
-"""Size of the grid cells for which the nearby wall segments are cached."""
+"""Size of the grid cells for which WallMap caches the nearby wall segments."""
 OBSTACLE_RANGE_M = 1.2
 """Distance from the center of a pedestrian within which walls and objects act on it."""
 SIGHT_CELL_M = 0.1
@@ -19,12 +19,13 @@ SIGHT_CELL_M = 0.1
 MAX_SIGHT_CELLS = 4_000_000
 """Approximate maximum number of cells of the visibility grid."""
 SIGHT_MARGIN_M = 0.3
-"""Distance from both ends of a line of sight within which walls do not block it."""
+"""Length at both ends of a line of sight in which walls do not block the view."""
 
 NearestPoints = tuple[Indices, Indices, Array]
-"""Indices of pedestrians (k,), indices of solids (k,), and points (k, 2) in m on wall segments of these solids.
+"""Indices of pedestrians (k,), indices of solids (k,), and points (k, 2) in m in the world frame.
 
-Each row is the nearest point of one nearby wall segment to one pedestrian.
+Each row belongs to a pedestrian and a nearby wall segment: the solid that the segment belongs to, and the point of the
+segment that is nearest to the pedestrian.
 """
 
 
@@ -32,10 +33,10 @@ Each row is the nearest point of one nearby wall segment to one pedestrian.
 class ObservedRobot:
     """State of a robot in the current step.
 
-    pose:     pose of the base in the world frame
-    velocity: velocity of the base in m/s along x and y of the world frame
-    radius:   radius in m of a circle around the base that contains the body
-    outline:  corners (n, 2) of the body in the base frame
+    pose:      pose of the base in the world frame
+    velocity:  velocity of the base in m/s along x and y of the world frame
+    radius:    radius in m of a circle around the base that contains the body
+    outline:   corners (n, 2) of the body in m in the base frame
     """
 
     name: str
@@ -47,7 +48,7 @@ class ObservedRobot:
 
 @dataclass(frozen=True, eq=False)
 class ObservedObject:
-    """Outlines of an object in the current step, each as corners (n, 2) in the world frame."""
+    """Outlines of an object in the current step, each as corners (n, 2) in m in the world frame."""
 
     name: str
     outlines: tuple[Array, ...]
@@ -62,7 +63,7 @@ class Surroundings:
 
 
 class WallMap:
-    """Walls that block pedestrians. Opaque walls also block their view."""
+    """Walls that block pedestrians. Opaque walls also block the view of pedestrians."""
 
     def __init__(self, segments: Array, owners: Indices, is_opaque: npt.NDArray[np.bool_]) -> None:
         """Create the map. Raises ValueError for coordinates that are not finite.
@@ -79,9 +80,10 @@ class WallMap:
         self._sight = _SightGrid(segments[is_opaque])
 
     def nearest_points(self, points: Array) -> NearestPoints:
-        """Return the nearest points of wall segments for pedestrians at `points` (n, 2).
+        """Return the nearest point of each nearby wall segment for pedestrians at `points` (n, 2).
 
-        Includes all segments within OBSTACLE_RANGE_M of a pedestrian, and some segments a little farther away.
+        Segments are nearby up to OBSTACLE_RANGE_M. The result also contains some segments that are a little farther
+        away.
         """
         cells = np.floor(points / WALL_CELL_M).astype(np.int64).tolist()
         candidates = [self._segments_near(column, row) for column, row in cells]
@@ -101,13 +103,13 @@ class WallMap:
         return self._segments_by_cell[column, row]
 
     def distance(self, point: tuple[float, float]) -> float:
-        """Return the distance in m from a point to the nearest wall; inf if no wall is near (OBSTACLE_RANGE_M)."""
+        """Return the distance in m from a point to the nearest wall; inf without a wall in `nearest_points`."""
         points = np.array([point])
         _, _, nearest = self.nearest_points(points)
         return float(np.hypot(*(nearest - points).T).min(initial=math.inf))
 
     def visible(self, viewers: Array, targets: Array) -> npt.NDArray[np.bool_]:
-        """Return for each pair of points `viewers` (n, 2) and `targets` (n, 2) whether no wall hides the target."""
+        """Return for each pair of a viewer (n, 2) and a target (n, 2) whether no wall hides the target."""
         return self._sight.clear_lines(viewers, targets)
 
 
@@ -129,7 +131,7 @@ class _SightGrid:
         self._opaque[cells[:, 0], cells[:, 1]] = True
 
     def clear_lines(self, viewers: Array, targets: Array) -> npt.NDArray[np.bool_]:
-        """Return for each pair of points (n, 2) whether the line of sight between them is clear."""
+        """Return for each pair of a viewer (n, 2) and a target (n, 2) whether the line between both is clear."""
         # One sample per cell length suffices, because walls are closed outlines or thicker than a cell.
         offset = targets - viewers
         distance = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-9)
@@ -156,7 +158,7 @@ def _nearest_points_on(segments: Array, points: Array) -> Array:
 
 
 def nearest_by_solid(person: Indices, solid: Indices, distance: Array) -> Indices:
-    """Return for each pair of a pedestrian and a solid the index k of the point on the solid nearest to the pedestrian.
+    """Return the indices of the nearest points: one index for each pair of a pedestrian and a solid.
 
     Point k is on the solid `solid[k]`, `distance[k]` m away from the pedestrian `person[k]`.
     """
@@ -174,7 +176,7 @@ def nearest_outline_points(
     """Find the pedestrians within OBSTACLE_RANGE_M of closed outlines, and the nearest point of the outlines to each.
 
     Returns the indices (k,) of these pedestrians, and the points (k, 2) in m. With `of_each_segment`, returns instead
-    one entry for each pedestrian and each segment of an outline within this range.
+    one index and one point for each pair of a pedestrian and a segment of an outline within this range.
 
     outlines:          corners (m, 2) of each outline
     indices:           indices of the pedestrians to examine

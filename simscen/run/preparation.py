@@ -183,7 +183,7 @@ def _with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh,
 def _clearance_range(spec: ScenarioSpec) -> float:
     """Return the largest clearance in m that a criterion or trigger uses, at least CLEARANCE_RANGE_M."""
     ranges = [entry.chosen.clearance_range for entry in spec.pass_ if isinstance(entry.chosen, Criterion)]
-    near = (test.clearance_below for trigger in spec.triggers for test in trigger.parts())
+    near = (test.clearance_below for trigger in spec.triggers for test in trigger.walk())
     ranges += [condition.root for condition in near if isinstance(condition, ClearanceBelow)]
     return max([CLEARANCE_RANGE_M, *ranges])
 

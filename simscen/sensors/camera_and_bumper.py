@@ -20,7 +20,7 @@ class CameraSensor:
 
 
 class BumperSensor:
-    """Contact switch around the hull. It stays pressed for 0.1 s after a contact."""
+    """Contact switch around the hull, which stays pressed for 0.1 s after a contact."""
 
     def __init__(self, spec: Bumper, setting: SensorSetting) -> None:
         self.name, self.period, self._view = setting.name, setting.period, setting.view

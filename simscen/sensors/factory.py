@@ -18,15 +18,15 @@ from simscen.sensors.sensor import Sensor, SensorSetting, SensorView
 
 T = TypeVar("T")
 _DISTANCE_ARRAYS = {"ranges": 1, "depth": 2}
-"""Dimensions of the fields of readings that contain distances."""
+"""Fields of readings that contain distances, with their number of array dimensions."""
 
 
 def build_sensors(
     spec: RobotSpec, clock: Clock, streams: Streams, view: SensorView, rays: RayCaster
 ) -> tuple[Sensor, ...]:
-    """Return the sensors of a robot, sorted by name, with the sensors from plug-ins last.
+    """Return the sensors of a robot: first shipped sensors, then sensors from plug-ins, both sorted by name.
 
-    Each sensor has its own random stream `sensor.<name>`. `view` gives the true state, and `rays` measures distances.
+    Each sensor has its own random stream `sensor.<name>`. `view` provides the true state, `rays` the true distances.
     Raises ValueError if a period is not a whole number of ticks, and RunError if a plug-in's sensor is invalid.
     """
     sensors: list[Sensor] = []
@@ -43,9 +43,10 @@ def build_sensors(
 
 
 class PluginSensor:
-    """Sensor from a plug-in (an installed package), with a check of each reading. `kind` is its key in YAML.
+    """Wrapper of a sensor from a plug-in (an installed package), which validates each reading.
 
-    Raises RunError if the plug-in's sensor raises an exception or has no method `read`.
+    `kind` is the YAML key of the sensor type. Constructor and `read` raise RunError if the plug-in's sensor raises an
+    exception, or has no method `read`.
     """
 
     def __init__(self, kind: str, spec: SensorSpec, setting: SensorSetting) -> None:
@@ -57,7 +58,7 @@ class PluginSensor:
             self._fail(f"{type(self._sensor).__name__} has no method `read`")
 
     def read(self, tick: int) -> Reading:
-        """Return a reading; raises RunError if the reading is invalid."""
+        """Return a reading. Raises RunError if the reading is invalid."""
         reading: Reading = self._call(lambda: self._sensor.read(tick))
         if type(reading) is not self._reading_type:
             self._fail(f"returned {type(reading).__name__}, but its specification declares {self._spec.reading_type}")
@@ -82,6 +83,7 @@ class PluginSensor:
             raise RunError("crashed", f"{self._label}: {type(error).__name__}: {error} ({place})") from error
 
     def _fail(self, problem: str) -> NoReturn:
+        """Raise RunError. `problem` continues a sentence that starts with the sensor."""
         raise RunError(BROKEN_COMPONENT, f"{self._label} {problem}")
 
     @property
@@ -90,7 +92,7 @@ class PluginSensor:
 
 
 def _field_defect(name: str, value: object) -> str:
-    """Return the defect of a reading's field as part of a message, or "" if the field is valid.
+    """Return the defect of a reading's field, such as "is not finite", or "" if the field is valid.
 
     Valid distances are numbers of at least 0, nan (invalid), inf (no hit), and -inf (too close, REP 117).
     """

@@ -10,8 +10,8 @@ from simscen.sensors.sensor import NormalStream, SensorSetting
 class ImuSensor:
     """Measures the angular velocity with a constant bias, and the mean specific force since the last reading.
 
-    The specific force is the acceleration minus gravity. The IMU is at `spec.mount`, or at the origin of the base frame
-    if there is no mount. Teleporting the robot (action `kidnap`) causes no acceleration.
+    The specific force is the acceleration minus gravity. The IMU is at `spec.mount`; without a mount, at the origin of
+    the base frame. Teleporting the robot (action `kidnap`) causes no acceleration.
     """
 
     def __init__(self, spec: InertialUnit, setting: SensorSetting) -> None:
@@ -29,33 +29,37 @@ class ImuSensor:
     def read(self, tick: int) -> Imu:
         """Return a reading in the frame of the sensor. A level sensor at rest measures +9.81 m/s² along z."""
         (i, j, k, w), linear, angular = self._sensor_motion()
-        px, py, pz = self._velocity
-        if (placements := self._view.placements()) != self._placements:
-            self._placements, (px, py, pz) = placements, linear
+        old_vx, old_vy, old_vz = self._velocity
+        if (placements := self._view.placements()) != self._placements:  # teleported: no acceleration
+            self._placements, (old_vx, old_vy, old_vz) = placements, linear
         self._velocity = vx, vy, vz = linear
         seconds, sensor_from_world = self._seconds, (-i, -j, -k, w)
-        p, q, r = rotated(sensor_from_world, angular)
-        x, y, z = rotated(
-            sensor_from_world, ((vx - px) / seconds, (vy - py) / seconds, (vz - pz) / seconds + GRAVITY_M_S2)
+        wx, wy, wz = rotated(sensor_from_world, angular)
+        ax, ay, az = rotated(
+            sensor_from_world,
+            ((vx - old_vx) / seconds, (vy - old_vy) / seconds, (vz - old_vz) / seconds + GRAVITY_M_S2),
         )
-        gyro, force, (bp, bq, br) = self._gyro_std, self._force_std, self._bias
-        np, nq, nr, nx, ny, nz = self._normals.take(6)
+        gyro_std, force_std, (bias_x, bias_y, bias_z) = self._gyro_std, self._force_std, self._bias
+        gyro_x, gyro_y, gyro_z, force_x, force_y, force_z = self._normals.take(6)
         return Imu(
             self.name,
             tick,
-            (p + bp + gyro * np, q + bq + gyro * nq, r + br + gyro * nr),
-            (x + force * nx, y + force * ny, z + force * nz),
+            (wx + bias_x + gyro_std * gyro_x, wy + bias_y + gyro_std * gyro_y, wz + bias_z + gyro_std * gyro_z),
+            (ax + force_std * force_x, ay + force_std * force_y, az + force_std * force_z),
             self._gyro_variance,
             self._force_variance,
             self._mount,
         )
 
     def _sensor_motion(self) -> tuple[tuple[float, float, float, float], Vector, Vector]:
-        """Return orientation (x, y, z, w), linear velocity (m/s), and angular velocity (rad/s) in the world frame."""
+        """Return the sensor's orientation (x, y, z, w), linear velocity (m/s), and angular velocity (rad/s).
+
+        All three are in the world frame.
+        """
         pose, (linear, angular) = self._view.base_pose(), self._view.base_velocity()
         if self._is_at_base:
             return pose.quaternion, linear, angular
         x, y, z = rotated(pose.quaternion, self._mount.position)
         (vx, vy, vz), (wx, wy, wz) = linear, angular
-        moved = vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x
-        return pose.compose(self._mount).quaternion, moved, angular
+        velocity_at_mount = vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x
+        return pose.compose(self._mount).quaternion, velocity_at_mount, angular

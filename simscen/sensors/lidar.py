@@ -11,7 +11,7 @@ from simscen.model.sensors import Lidar
 from simscen.sensors.sensor import SensorSetting
 
 MAX_NOISE_STDS = 10.0
-"""Largest assumed noise in standard deviations; determines the length of the rays."""
+"""Largest expected noise in standard deviations, by which the rays are longer than the maximum range."""
 NOISE_BUFFER_SCANS = 8
 """Number of scans whose noise is drawn at once, to save time."""
 
@@ -40,7 +40,7 @@ class LidarSensor:
         self._noise_buffer, self._next = np.empty((0, spec.beams)), 0
 
     def read(self, tick: int) -> Scan:
-        """Return a scan. A range is inf if the beam hits nothing, and -inf below the minimum range (REP 117)."""
+        """Return a scan. A range is inf without a hit up to the maximum range, -inf below the minimum (REP 117)."""
         pose, spec = self._view.base_pose(), self._spec
         if self._tilted_mount is not None:
             lidar = pose.compose(self._tilted_mount)
@@ -85,9 +85,9 @@ class LidarSensor:
 
 
 def floor_distances(height: float, beam_z: Array) -> Array:
-    """Return the distances (n,) in m along beams from `height` m to the floor (z = 0); inf for beams that miss it.
+    """Return the distances (n,) in m to the floor (z = 0) along beams; inf for beams that miss the floor.
 
-    `beam_z` (n,) are the z components of the unit vectors of the beams.
+    The beams start at a height of `height` m. `beam_z` (n,) are the z components of their unit vectors.
     """
     down = beam_z < -1e-9
     return np.where(down, height / np.where(down, -beam_z, 1.0), np.inf)

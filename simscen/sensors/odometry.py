@@ -19,15 +19,16 @@ Kinematics = Callable[[EncoderIncrement], Displacement]
 """Returns the displacement for an encoder increment."""
 Variances = tuple[float, float, float]
 """Variances of the errors of a displacement: forward (m²), left (m²), and turn (rad²)."""
-_new = tuple.__new__
-"""Creates a named tuple without the call overhead of its class."""
+_new_tuple = tuple.__new__
+"""Creates a named tuple faster than a call of its class."""
 
 
 class WheelOdometrySensor:
-    """Dead reckoning from wheel encoders; the origin of the odom frame is the initial pose of the robot.
+    """Dead reckoning from wheel encoders. The origin of the odom frame is the initial pose of the robot.
 
     The errors of displacements are independent. Their variances are proportional to distance and turn, so that the
-    accumulated error does not depend on the rate. Readings contain the covariances of velocity and pose.
+    accumulated error does not depend on the rate. Readings contain the variances of the velocity and the covariance of
+    the pose.
     """
 
     def __init__(self, spec: WheelOdometry, setting: SensorSetting) -> None:
@@ -46,39 +47,41 @@ class WheelOdometrySensor:
         encoders, before, seconds = self._view.encoders(), self._encoders, self._seconds
         self._encoders = encoders
         exact = self._kinematics(tuple(map(sub, encoders, before)))
-        forward, lateral, turn = variances = self._variances(exact)
-        step = self._add_noise(exact, variances) if forward or turn else exact
+        forward_variance, lateral_variance, turn_variance = variances = self._variances(exact)
+        has_noise = forward_variance > 0 or turn_variance > 0
+        step = self._add_noise(exact, variances) if has_noise else exact
         last, self._pose = self._pose, self._pose.compose(integrate_arc(step))
-        pose, (vx, vy, wz) = self._pose, step
-        if forward or turn:
+        pose, (dx, dy, turn) = self._pose, step
+        if has_noise:
             self._grow_covariance(last, pose, variances)
-        twist = _new(Twist, (vx / seconds, vy / seconds, wz / seconds))
+        twist = _new_tuple(Twist, (dx / seconds, dy / seconds, turn / seconds))
         squared = seconds * seconds
-        twist_variance = forward / squared, lateral / squared, turn / squared
+        twist_variance = forward_variance / squared, lateral_variance / squared, turn_variance / squared
         return Odometry(self.name, tick, pose, twist, twist_variance, self._covariance)
 
     def _variances(self, step: Displacement) -> Variances:
         """Return the variances of the errors of a displacement (Probabilistic Robotics, table 5.6)."""
-        vx, vy, wz = step
-        distance = math.hypot(vx, vy)
+        dx, dy, turn = step
+        distance = math.hypot(dx, dy)
         position = self._position_variance_per_m * distance
-        heading = self._heading_variance_per_rad * abs(wz) + self._heading_variance_per_m * distance
-        return position, position if vy else 0.0, heading
+        heading = self._heading_variance_per_rad * abs(turn) + self._heading_variance_per_m * distance
+        return position, position if dy else 0.0, heading
 
     def _add_noise(self, step: Displacement, variances: Variances) -> Displacement:
+        """Return the displacement with random errors of these variances."""
         forward_draw, lateral_draw, turn_draw = self._normals.take(3)
-        (vx, vy, wz), (forward, lateral, turn) = step, variances
-        return _new(Twist, (
-            vx + math.sqrt(forward) * forward_draw, vy + math.sqrt(lateral) * lateral_draw,
-            wz + math.sqrt(turn) * turn_draw,
+        (dx, dy, turn), (forward_variance, lateral_variance, turn_variance) = step, variances
+        return _new_tuple(Twist, (
+            dx + math.sqrt(forward_variance) * forward_draw, dy + math.sqrt(lateral_variance) * lateral_draw,
+            turn + math.sqrt(turn_variance) * turn_draw,
         ))  # fmt: skip
 
     def _grow_covariance(self, last: Pose2, pose: Pose2, variances: Variances) -> None:
         """Propagate the pose covariance to first order from `last` to `pose`, for a displacement with `variances`."""
-        xx, xy, xa, _, yy, ya, _, _, aa = self._covariance
+        xx, xy, xa, _, yy, ya, _, _, aa = self._covariance  # a: yaw
         forward, lateral, turn = variances
         dx, dy, heading = pose.x - last.x, pose.y - last.y, (pose.yaw + last.yaw) / 2
-        if abs(pose.yaw - last.yaw) > math.pi:
+        if abs(pose.yaw - last.yaw) > math.pi:  # the yaw has wrapped around
             heading += math.pi
         c, s = math.cos(heading), math.sin(heading)
         xa_new, ya_new = xa - dy * aa, ya + dx * aa
@@ -90,11 +93,11 @@ class WheelOdometrySensor:
 
 def integrate_arc(step: Displacement) -> Pose2:
     """Return the pose after driving a displacement from the origin at constant velocity (exponential map of SE(2))."""
-    vx, vy, turn = step
+    dx, dy, turn = step
     if abs(turn) < 1e-9:
-        return _new(Pose2, (vx, vy, turn))
+        return _new_tuple(Pose2, (dx, dy, turn))
     sine, cosine = math.sin(turn) / turn, (1 - math.cos(turn)) / turn
-    return _new(Pose2, (vx * sine - vy * cosine, vx * cosine + vy * sine, turn))
+    return _new_tuple(Pose2, (dx * sine - dy * cosine, dx * cosine + dy * sine, turn))
 
 
 def kinematics_of(drive: Drive) -> Kinematics:
@@ -112,6 +115,6 @@ def kinematics_of(drive: Drive) -> Kinematics:
 
     def two_sided_motion(increment: EncoderIncrement) -> Displacement:
         left, right = increment[0] * radius, increment[1] * radius
-        return _new(Twist, ((left + right) / 2, 0.0, (right - left) / separation))
+        return _new_tuple(Twist, ((left + right) / 2, 0.0, (right - left) / separation))
 
     return two_sided_motion

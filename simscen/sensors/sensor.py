@@ -1,4 +1,4 @@
-"""Interface of sensors, facts that they need about the robot and the run, and random numbers for their noise."""
+"""Protocol of sensors, arguments of a sensor's constructor, and random numbers for noise."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -56,9 +56,9 @@ class SensorView(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class SensorSetting:
-    """Facts that a sensor needs about the robot and the run: the second argument of each sensor's constructor.
+    """Robot and run of a sensor: the second argument of each sensor's constructor.
 
-    name:     name of the sensor in the robot's file, which is also in its readings
+    name:     name of the sensor in the robot's file and in its readings
     period:   time between two readings in ticks
     seconds:  time between two readings in s
     rng:      random generator of this sensor
@@ -79,30 +79,30 @@ class SensorSetting:
 class Sensor(Protocol):
     """Takes readings of one type at a fixed rate.
 
-    *Given* the same world and generator *then* the same readings, bit for bit.
-    *Given* noise *then* no two scans or inertial readings of a robot at rest are equal; without noise, all are equal.
-    *Given* a reading *then* nothing changes it later.
+    *Given* the same world and generator *then* the sensor returns the same readings, bit for bit.
+    *Given* noise *then* no two scans or IMU readings of a robot at rest are equal; without noise, all are equal.
+    *Given* a returned reading *then* the sensor does not change it later.
     """
 
     @property
     def name(self) -> str:
-        """Name of the sensor, as faults refer to it."""
+        """Name of the sensor. The faults of a scenario refer to a sensor by this name."""
         ...
 
     @property
     def period(self) -> int:
-        """Ticks between two readings."""
+        """Number of ticks between two readings."""
         ...
 
     def read(self, tick: int) -> Reading:
-        """Return the reading at the current `tick`. Called every `period` ticks in order."""
+        """Return the reading at the current `tick`. Called every `period` ticks, in order of time."""
         ...
 
 
 class NormalStream:
-    """Standard normal random numbers that are drawn from a generator in batches, to save time.
+    """Standard normal random numbers, drawn from a generator in batches to save time.
 
-    The numbers are the same as if drawn one by one. Nothing else may use the generator.
+    The numbers are the same as without batches. Nothing else may use the generator.
     """
 
     def __init__(self, rng: np.random.Generator) -> None:

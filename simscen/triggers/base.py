@@ -1,4 +1,4 @@
-"""Base class of conditions, combinations of conditions, and Trigger, the entry `when` of an event in YAML."""
+"""Base class of conditions, combinations of conditions, and the trigger (`when` in YAML) of an event or a fault."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Condition(ABC):
-    """Condition on the state of the run. It keeps no state of its own and draws no random numbers."""
+    """Condition on the state of the run. Has no state itself and draws no random numbers."""
 
     is_robot_specific: ClassVar[bool] = True
     """Whether a scenario with several robots must name the robot of this condition (key `robot`)."""
@@ -41,7 +41,7 @@ class AnyCondition(Choice):
     time: Annotated[Condition | None, LazySpec("simscen.triggers.timing", "Time")] = None
     robot_within: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "RobotWithin")] = None
     robot_in: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "RobotIn")] = None
-    travelled: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "Travelled")] = None
+    travelled: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "HasTravelled")] = None
     speed_below: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "SpeedBelow")] = None
     speed_above: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "SpeedAbove")] = None
     distance_remaining: Annotated[Condition | None, LazySpec("simscen.triggers.robot_state", "DistanceRemaining")] = (
@@ -62,7 +62,7 @@ class AnyCondition(Choice):
     waypoint: Annotated[Condition | None, LazySpec("simscen.triggers.events", "Waypoint")] = None
     replan: Annotated[Condition | None, LazySpec("simscen.triggers.events", "Replan")] = None
     recovery: Annotated[Condition | None, LazySpec("simscen.triggers.events", "RecoveryStatus")] = None
-    collision: Annotated[Condition | None, LazySpec("simscen.triggers.events", "Collided")] = None
+    collision: Annotated[Condition | None, LazySpec("simscen.triggers.events", "HasCollided")] = None
     pedestrian: Annotated[Condition | None, LazySpec("simscen.triggers.events", "PedestrianStatus")] = None
     event: Annotated[Condition | None, LazySpec("simscen.triggers.events", "EventStatus")] = None
     all: Annotated[list[AnyCondition], Field(min_length=1, max_length=50)] | None = None
@@ -74,25 +74,25 @@ class AnyCondition(Choice):
     for_: PositiveDuration | None = Field(default=None, alias="for")
     """Time for which the condition must be true without interruption before it counts as true; default: none."""
     robot: RobotName | None = None
-    """The robot that the condition is for, if there are several; default: the only one."""
+    """Name of the robot whose state the condition tests, in a scenario with several robots."""
 
     @property
-    def inner(self) -> list[AnyCondition]:
+    def operands(self) -> list[AnyCondition]:
         """The conditions under `all`, `any`, or `not`; [] for a single condition."""
         return self.all or self.any or ([self.not_] if self.not_ is not None else [])
 
-    def parts(self) -> Iterator[AnyCondition]:
+    def walk(self) -> Iterator[AnyCondition]:
         """Yield this condition and all nested conditions, at any depth."""
         yield self
-        for condition in self.inner:
-            yield from condition.parts()
+        for operand in self.operands:
+            yield from operand.walk()
 
     def situation_of_robot(self, now: Situation) -> Situation:
-        """Return the situation from the point of view of `robot`, or `now` itself if `robot` is None."""
+        """Return the situation of the robot `self.robot`; `now` itself if it is None."""
         return now if self.robot is None else now.of(self.robot)
 
     def holds(self, now: Situation) -> bool:
-        """Return whether the condition is true in the current situation, regardless of `for` (see ConditionState).
+        """Return whether the condition is true in the current situation, without `for` (see ConditionState).
 
         Raises RunError if a condition of a plug-in does not return a boolean.
         """
@@ -113,15 +113,15 @@ class AnyCondition(Choice):
 
 
 class Trigger(AnyCondition):
-    """Condition that starts an event or fault, with the edge, delay, maximum number, and probability of the starts."""
+    """Condition that starts an event or a fault, with the number, delay, and probability of the starts."""
 
     modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot", "edge", "delay", "times", "probability"})
 
     edge: Literal["rising", "falling"] = "rising"
-    """Start the event or fault when the condition becomes true (rising) or false (falling)."""
+    """Start the event or fault when the condition becomes true (rising edge) or false (falling edge)."""
     delay: Duration = 0.0
     """Delay between the edge and the start."""
     times: Annotated[int, Field(ge=1, le=10_000)] = 1
-    """Maximum number of starts. An edge while the fault is active counts, but does not start it again."""
+    """Maximum number of starts. An edge during an active fault counts as a start, but has no effect."""
     probability: Probability = 1.0
     """Probability that an edge starts the event or fault. The random draw depends on the seed."""

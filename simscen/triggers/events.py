@@ -13,19 +13,21 @@ from simscen.spec.places import DisturbanceName, GoalName, MovableName, ObjectNa
 from simscen.triggers.base import Condition
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
+"""Required number of logged events."""
 COMPLETION_KINDS = frozenset({EventKind.GOAL_REACHED, EventKind.GOAL_PASSED})
+"""Kinds of events that complete a goal."""
 
 
 def _count_events(now: Situation, kind: EventKind, name: str | None) -> int:
-    """Return the number of logged events with this kind and name. With the name None, events of all names count."""
+    """Return the number of logged events with this kind and name; with any name if `name` is None."""
     return sum(e.kind == kind and name in (None, e.name) for e in now.events)
 
 
 class EventStatus(Spec, Condition):
     """True once another event or a fault of this scenario has started or ended, or a mark has been set.
 
-    Use it for disturbances that follow each other: the lidar goes silent, and a second later a person steps in the way.
-    A mark is a named time in the log, set by the action `mark`.
+    Use the condition for disturbances that follow each other: the lidar goes silent, and a second later a person steps
+    in the way. A mark is a named time in the log, set by the action `mark`.
 
     Example: `when: {event: {name: pallet falls, status: started}}`
     """
@@ -35,7 +37,7 @@ class EventStatus(Spec, Condition):
     name: DisturbanceName
     """The `name` of the event, fault, or mark; an unnamed fault is called `<sensor>.<fault>`, e.g. `lidar.off`."""
     status: Literal["started", "ended"] = "started"
-    """The required status of the event or fault; a mark has none."""
+    """The required status of the event or fault; ignored for a mark."""
 
     def holds(self, now: Situation) -> bool:
         kinds = [EventKind(f"{source}.{self.status}") for source in ("event", "fault")]
@@ -49,7 +51,7 @@ class Replan(Spec, Condition):
     """
 
     count: Count = 1
-    """Number of replans."""
+    """Required number of replans."""
 
     def holds(self, now: Situation) -> bool:
         plans = (event for event in now.events if event.kind == EventKind.PLAN_MADE)
@@ -73,7 +75,7 @@ class RecoveryStatus(Spec, Condition):
         return _count_events(now, EventKind(f"recovery.{self.status}"), self.name) >= self.count
 
 
-class Collided(Spec, Condition):
+class HasCollided(Spec, Condition):
     """True once the robot has collided with something.
 
     Example: `when: {collision: {}}`
@@ -107,8 +109,8 @@ class GoalStatus(Spec, Condition):
 class Waypoint(Spec, Condition):
     """True once the robot has reported `count` waypoints as reached or passed.
 
-    Use it for disturbances at a certain point of a tour: after the second shelf, a door closes. The count continues
-    over all loops of the tour.
+    Use the condition for disturbances at a certain point of a tour: after the second shelf, a door closes. The count
+    continues over all loops of the tour.
 
     Example: `when: {waypoint: {count: 2}}`
     """
@@ -116,7 +118,7 @@ class Waypoint(Spec, Condition):
     name: GoalName | None = None
     """Count only this goal, in any loop (`shelf#2`: in the second loop); default: all goals."""
     count: Count = 1
-    """Number of waypoints."""
+    """Required number of waypoints."""
 
     def holds(self, now: Situation) -> bool:
         return (
@@ -127,7 +129,7 @@ class Waypoint(Spec, Condition):
 class PedestrianStatus(Spec, Condition):
     """True once a pedestrian has reacted to a robot, stopped reacting, or reached one of the pedestrian's goals.
 
-    Use it, for example, for a door that opens when a pedestrian arrives.
+    Use the condition, for example, for a door that opens when a pedestrian arrives.
 
     Example: `when: {pedestrian: {name: anna, status: reacted}}`
     """

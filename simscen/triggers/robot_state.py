@@ -43,7 +43,8 @@ class SpeedAbove(Value[PositiveSpeed], Condition):
 class TurningAbove(Value[PositiveAngularSpeed], Condition):
     """True while the true turn rate of the robot, in either direction, is greater than the given one (rad/s).
 
-    Use it for disturbances in a turn: a scan distorted by the motion, odometry that slips, a person in a blind corner.
+    Use the condition for disturbances in a turn: a scan distorted by the motion, slipping wheels, a person in a blind
+    corner.
 
     Example: `when: {turning_above: 30 deg/s}`
     """
@@ -64,10 +65,10 @@ class TurningBelow(Value[PositiveAngularSpeed], Condition):
         return abs(now.twist.wz) < self.root
 
 
-class Travelled(Value[NonNegativeLength], Condition):
-    """True once the robot has truly driven the given distance since the start, or in `then` since the previous step.
+class HasTravelled(Value[NonNegativeLength], Condition):
+    """True once the robot has driven the given distance since the start; in `then`, since the previous step.
 
-    Kidnapping does not count.
+    The distance is measured with the true pose, and does not include kidnapping.
 
     Example: `when: {travelled: 2.5 m}`
     """
@@ -113,8 +114,8 @@ class LocalizationError(Value[NonNegativeLength], Condition):
 class LocalizationLost(Spec, Condition):
     """True while the estimated pose has a large error or, with `std`, a large reported uncertainty.
 
-    Use it for disturbances while the robot navigates with a wrong pose, for example after kidnapping or slip. The
-    condition is false while there is no estimated pose.
+    Use the condition for disturbances while the robot navigates with a wrong pose, for example after kidnapping or
+    slip. The condition is false while there is no estimated pose.
 
     Example: `when: {localization_lost: {tolerance: 0.5 m, yaw_tolerance: 30 deg}, for: 1 s}`
     """
@@ -169,7 +170,7 @@ class RobotWithin(Spec, Condition):
     region: RegionName | None = None
     """Name of a region of the world."""
     distance: NonNegativeLength
-    """Maximum distance from the robot's center to the point, the region, or the origin of the object."""
+    """Maximum distance from the robot's center to the point, to the region, or to the origin of the object."""
 
     @model_validator(mode="after")
     def _check_target(self) -> "RobotWithin":
@@ -187,8 +188,8 @@ class RobotWithin(Spec, Condition):
 class ClearanceBelow(Value[PositiveLength], Condition):
     """True while the distance between the robot's hull and the nearest obstacle is less than the given one.
 
-    Walls, objects, and other robots are obstacles. The distance is measured at `physics.truth_rate`. Use the condition
-    for disturbances in narrow places: a scan that drops out in a doorway, a push beside a shelf.
+    Walls, objects, and other robots are obstacles. The distance is measured at the rate `physics.truth_rate`. Use the
+    condition for disturbances in narrow places: a lidar failure in a doorway, a push beside a shelf.
 
     Example: `when: {clearance_below: 30 cm}`
     """

@@ -56,7 +56,7 @@ def impossible_steps(loaded: LoadedScenario) -> Iterator[CheckProblem]:
         if earliest[number] >= limit > own and earliest[step.after] < limit:
             reason = f"its sequence takes at least {earliest[number]:g} s, but the time limit is {limit:g} s"
             yield CheckProblem(keys, f"`{step.name}` can never happen: {reason}", warning=not step.required)
-        for part in step.when.parts():
+        for part in step.when.walk():
             name = getattr(part.event, "name", None)
             if name in run.earlier_steps(step):
                 message = f"`{step.name}` waits for `{name}`, which has already happened; a step waits for new events"

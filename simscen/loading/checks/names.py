@@ -188,7 +188,7 @@ def _conditions_without_robot(condition: "AnyCondition", keys: Keys, faults: Con
             yield from _conditions_without_robot(part, (*keys, key, number), faults)
     if condition.not_ is not None:
         yield from _conditions_without_robot(condition.not_, (*keys, "not"), faults)
-    if condition.inner:
+    if condition.operands:
         return
     if condition.chosen.is_robot_specific or (condition.kind == "event" and condition.chosen.name in faults):
         yield *keys, condition.kind

@@ -135,8 +135,8 @@ class ConditionState:
 
     def __init__(self, test: AnyCondition) -> None:
         self._test = test
-        has_durations = any(part.for_ is not None for inner in test.inner for part in inner.parts())
-        self._parts = [ConditionState(inner) for inner in test.inner] if has_durations else []
+        has_durations = any(part.for_ is not None for operand in test.operands for part in operand.walk())
+        self._parts = [ConditionState(operand) for operand in test.operands] if has_durations else []
         self._since: int | None = None
 
     def holds(self, now: Situation) -> bool:
