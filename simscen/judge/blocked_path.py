@@ -12,39 +12,44 @@ from simscen.core.records.trace import Trace
 from simscen.judge.movable_objects import MovableObject
 
 Diagnosis = tuple[list[str], set[str]]
-"""Sentences on causes, and names of the disturbances that they mention ("" for an object that no event changed)."""
-
+"""(sentences on causes, names of the disturbances in the sentences). The name "" stands for an object that no event
+spawned or moved."""
 
 SEARCH_STEP_M = 0.005
 """Distance between the points of a passage at which its free width is computed."""
 NEGLIGIBLE_WIDTH_M = 0.02
 """Smaller widths and changes of widths are ignored."""
-ON_PATH_DISTANCE_M = 0.5
+MAX_PATH_DISTANCE_M = 0.5
 """Maximum distance from the nearest passage up to which a robot counts as on the path."""
 
 
 def diagnose_blocked_path(
     trace: Trace, case: Case, goal: str, tick: int, objects: Sequence[MovableObject]
 ) -> Diagnosis:
-    """Return a sentence on the passage of the shortest path to `goal` that objects narrow the most.
+    """Return a sentence on the narrowest passage of the shortest path to `goal` that objects narrow or close.
 
-    A passage is closed if the inscribed circle of the robot cannot pass. It is narrowed if the robot cannot turn there.
+    Objects close a passage if the inscribed circle of the robot does not fit through. They narrow it if the
+    circumscribed circle does not fit, so that the robot cannot turn there.
     """
     circumscribed_radius = max((math.hypot(x, y) for x, y in case.footprint), default=case.inscribed_radius)
-    needed, turning = 2 * case.inscribed_radius, 2 * circumscribed_radius
-    widths = [(free_width(passage, objects), passage) for passage in _remaining_passages(trace, case, goal, tick)]
-    narrowed = [(left, passage) for left, passage in widths if left < min(turning, passage.width - NEGLIGIBLE_WIDTH_M)]
+    robot_width, turning_width = 2 * case.inscribed_radius, 2 * circumscribed_radius
+    narrowed = []
+    for passage in _remaining_passages(trace, case, goal, tick):
+        width = free_width(passage, objects)
+        if width < min(turning_width, passage.width - NEGLIGIBLE_WIDTH_M):
+            narrowed.append((width, passage))
     if not narrowed:
         return [], set()
-    left, passage = min(narrowed, key=lambda pair: (pair[0], pair[1].width))
-    blocking = _blocking_objects(passage, objects, max(needed, left + NEGLIGIBLE_WIDTH_M))
-    verb = "closes" if left < needed else "narrows"
+    width, passage = min(narrowed, key=lambda pair: (pair[0], pair[1].width))
+    blocking = _blocking_objects(passage, objects, max(robot_width, width + NEGLIGIBLE_WIDTH_M))
+    verb = "closes" if width < robot_width else "narrows"
     named = " and ".join(each.describe(trace) for each in blocking)
     text = (
         f"{named} {verb if len(blocking) == 1 else verb[:-1]} {passage.description} on the shortest path: "
-        f"{f'{left:.2f} m are' if left >= NEGLIGIBLE_WIDTH_M else 'nothing is'} left, the robot is {needed:.2f} m wide"
+        f"{f'{width:.2f} m are' if width >= NEGLIGIBLE_WIDTH_M else 'nothing is'} left, "
+        f"the robot is {robot_width:.2f} m wide"
     )
-    return [text], {each.event for each in blocking}
+    return [text], {each.event_name for each in blocking}
 
 
 def free_width(passage: Passage, objects: Sequence[MovableObject]) -> float:
@@ -57,21 +62,24 @@ def free_width(passage: Passage, objects: Sequence[MovableObject]) -> float:
     return 2 * float(np.min(distances, axis=0).max())
 
 
-def _blocking_objects(passage: Passage, objects: Sequence[MovableObject], needed: float) -> list[MovableObject]:
-    """Return the last object that alone leaves less than `needed` m, or else all objects that narrow the passage."""
-    single = [each for each in objects if free_width(passage, [each]) < needed]
+def _blocking_objects(passage: Passage, objects: Sequence[MovableObject], width: float) -> list[MovableObject]:
+    """Return the last spawned object that alone leaves less than `width` m.
+
+    If there is no such object, return all objects that narrow the passage.
+    """
+    single = [each for each in objects if free_width(passage, [each]) < width]
     return single[-1:] or [each for each in objects if free_width(passage, [each]) < passage.width - NEGLIGIBLE_WIDTH_M]
 
 
 def _remaining_passages(trace: Trace, case: Case, goal: str, tick: int) -> list[Passage]:
     """Return the passages ahead of the robot on the path to `goal`; all passages if the robot is not on this path."""
-    found = [passage for passage in case.passages if passage.goal == goal]
-    if not found or not len(trace.truth):
-        return found
-    here = trace.place(tick)
-    nearest = min(range(len(found)), key=lambda k: distance_to_segment(*here, *found[k].ends))
-    if distance_to_segment(*here, *found[nearest].ends) > ON_PATH_DISTANCE_M:
-        return found
-    ends, later = found[nearest].ends, found[nearest + 1 :]
-    passed = later and signed_double_area(*ends, here) * signed_double_area(*ends, later[0].middle) > 0
-    return later if passed else found[nearest:]
+    passages = [passage for passage in case.passages if passage.goal == goal]
+    if not passages or not len(trace.truth):
+        return passages
+    robot = trace.place(tick)
+    nearest = min(range(len(passages)), key=lambda k: distance_to_segment(*robot, *passages[k].ends))
+    if distance_to_segment(*robot, *passages[nearest].ends) > MAX_PATH_DISTANCE_M:
+        return passages
+    ends, later = passages[nearest].ends, passages[nearest + 1 :]
+    has_passed = later and signed_double_area(*ends, robot) * signed_double_area(*ends, later[0].middle) > 0
+    return later if has_passed else passages[nearest:]

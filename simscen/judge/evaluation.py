@@ -32,9 +32,9 @@ def judge(
 
 
 def required_evidence(entry: AnyCriterion) -> frozenset[Evidence]:
-    """Return the evidence (kinds of recorded information) that a criterion needs; all kinds if its evidence is None."""
-    own = getattr(entry.chosen, "evidence", None)
-    return frozenset(Evidence) if own is None else frozenset(own)
+    """Return the evidence (kinds of recorded information) that a criterion needs; all kinds if it declares none."""
+    declared = getattr(entry.chosen, "evidence", None)
+    return frozenset(Evidence) if declared is None else frozenset(declared)
 
 
 def missing_evidence_reason(required: Set[Evidence], coverage: LogCoverage) -> str:
@@ -51,7 +51,7 @@ def partial_evidence_reason(required: Set[Evidence], coverage: LogCoverage) -> s
 def findings_defect(findings: object) -> str:
     """Return a description of what is wrong with the findings of a criterion; "" if they are valid."""
     if not isinstance(findings, Sequence) or not findings:
-        return "it checked nothing"
+        return "it returned no findings"
     return next((defect for finding in findings if (defect := _defect(finding))), "")
 
 
@@ -79,15 +79,15 @@ def _findings(entry: AnyCriterion, trace: Trace, case: Case, coverage: LogCovera
     return _without_pass(findings, "in an empty log") if _is_empty(trace) else tuple(findings)
 
 
-def _error(entry: AnyCriterion, what: str) -> Finding:
-    """Return the finding for a criterion that failed with the error `what`."""
-    return Finding(Status.ERROR, entry.kind, f"{what}{entry.plugin_suffix}", "a judgment")
+def _error(entry: AnyCriterion, message: str) -> Finding:
+    """Return the finding for a criterion that could not judge the run."""
+    return Finding(Status.ERROR, entry.kind, f"{message}{entry.plugin_suffix}", "a judgment")
 
 
-def _without_pass(findings: Sequence[Finding], because: str) -> tuple[Finding, ...]:
-    """Return the findings; each pass becomes inconclusive, with the reason `because` after its measured value."""
+def _without_pass(findings: Sequence[Finding], reason: str) -> tuple[Finding, ...]:
+    """Return the findings. Each pass becomes inconclusive, with the reason after the measured value."""
     return tuple(
-        replace(finding, status=Status.INCONCLUSIVE, measured=f"{finding.measured} {because}")
+        replace(finding, status=Status.INCONCLUSIVE, measured=f"{finding.measured} {reason}")
         if finding.status is Status.PASS
         else finding
         for finding in findings

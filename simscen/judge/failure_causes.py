@@ -49,7 +49,7 @@ def _with_causes(criterion: str, finding: Finding, trace: Trace, case: Case) -> 
 def causes(criterion: str, tick: int, trace: Trace, case: Case) -> list[str]:
     """Return at most MAX_LINES lines about the likely causes of the failure of a criterion at `tick`."""
     lines: list[str] = []
-    named: set[str] = set()
+    mentioned: set[str] = set()
     diagnoses: list[Diagnosis] = []
     if criterion in GOAL_CRITERIA:
         diagnoses.append(diagnose_goal_failure(trace, case, tick))
@@ -60,24 +60,24 @@ def causes(criterion: str, tick: int, trace: Trace, case: Case) -> list[str]:
         diagnoses.append(diagnose_localization(trace, tick, error_is_reported))
     for sentences, names in diagnoses:
         lines += [f"why: {text}" for text in sentences]
-        named |= names
+        mentioned |= names
     disturbances = (*_recent_faults(trace, tick), *_recent_events(trace, tick))
-    lines += [f"meanwhile: {text}" for name, text in disturbances if name not in named]
+    lines += [f"meanwhile: {text}" for name, text in disturbances if name not in mentioned]
     return lines[:MAX_LINES]
 
 
 RECENT_FAULT_S, RECENT_EVENT_S = 3.0, 5.0
-"""Time for which a fault is listed after its end, and time for which an event is listed after it happened."""
+"""Maximum age of a disturbance in a "meanwhile" line: time since the end of a fault, and time since an event."""
 
 
 def _recent_faults(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
     """Yield name and description of each fault that had an effect and was active at or shortly before `tick`."""
     effects = [event for event in trace.of_kind(EventKind.FAULT_TOOK_EFFECT) if event.tick <= tick]
     for start in trace.of_kind(EventKind.FAULT_STARTED):
-        ends = [event.tick for event in trace.of_kind(EventKind.FAULT_ENDED) if _is_same_entry(event, start)]
+        ends = [event.tick for event in trace.of_kind(EventKind.FAULT_ENDED) if _is_same_fault(event, start)]
         end = next((end for end in ends if end > start.tick), None)
         if not any(
-            _is_same_entry(start, event) and start.tick <= event.tick and (end is None or event.tick <= end)
+            _is_same_fault(start, event) and start.tick <= event.tick and (end is None or event.tick <= end)
             for event in effects
         ):
             continue
@@ -89,8 +89,9 @@ def _recent_faults(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
             yield start.name, f"{start.name} had ended {trace.seconds(tick - end):.2f} s before, {after}"
 
 
-def _is_same_entry(one: Event, other: Event) -> bool:
-    return (one.name, one.data.get("entry")) == (other.name, other.data.get("entry"))
+def _is_same_fault(event: Event, other: Event) -> bool:
+    """Return whether both events are about the same fault: equal name and equal index in the scenario (`entry`)."""
+    return (event.name, event.data.get("entry")) == (other.name, other.data.get("entry"))
 
 
 def _recent_events(trace: Trace, tick: int) -> Iterator[tuple[str, str]]:
@@ -116,20 +117,20 @@ def diagnose_collision(trace: Trace, tick: int) -> Diagnosis:
     hits = {hit.name: hit for hit in trace.of_kind(EventKind.COLLISION_STARTED) if hit.tick == tick}
     touched = [each for each in movable_objects(trace, tick) if each.name in hits]
     described = [(each, _describe_hit(trace, each, hits[each.name])) for each in touched]
-    return [text for _, text in described if text], {each.event for each, text in described if text}
+    return [text for _, text in described if text], {each.event_name for each, text in described if text}
 
 
 def _describe_hit(trace: Trace, touched: MovableObject, hit: Event) -> str:
-    """Return a sentence on how an object came to touch the robot; "" if it stands still and no event changed it."""
-    ago = f"{trace.seconds(hit.tick - touched.since):.2f} s before"
+    """Return a sentence on how an object came to touch the robot; "" if no event changed the object and it stands."""
+    ago = f"{trace.seconds(hit.tick - touched.change_tick):.2f} s before"
     parts = []
-    if touched.event:
+    if touched.event_name:
         if touched.was_moved:
             change = "moved it"
         else:
-            distance = touched.distance(np.array([trace.place(touched.since)]))[0]
+            distance = touched.distance(np.array([trace.place(touched.change_tick)]))[0]
             change = f"spawned it {distance:.2f} m from the robot's center"
-        parts.append(f"event `{touched.event}` had {change} {ago}")
+        parts.append(f"event `{touched.event_name}` had {change} {ago}")
     if (speed := _speed(trace, touched, hit.tick)) >= OBJECT_MOVING_SPEED_M_S:
         parts.append(f"it moved at {speed:.2f} m/s")
     if hit.data.get("robot_caused") is False and parts:
@@ -138,12 +139,12 @@ def _describe_hit(trace: Trace, touched: MovableObject, hit: Event) -> str:
 
 
 def _speed(trace: Trace, touched: MovableObject, tick: int) -> float:
-    """Return the mean speed of an object in m/s in OBJECT_SPEED_WINDOW_S before `tick`, but after its last change."""
+    """Return the mean speed of an object in m/s over OBJECT_SPEED_WINDOW_S before `tick`, or since its last change."""
     samples = trace.objects.get(touched.name)
     if samples is None:
         return 0.0
     # The sample at the tick of a change, such as a teleportation, precedes the change.
-    later = samples.ticks[samples.ticks > touched.since]
+    later = samples.ticks[samples.ticks > touched.change_tick]
     begin = max(tick - round(OBJECT_SPEED_WINDOW_S * trace.tick_rate), int(later[0])) if len(later) else tick
     if begin >= tick:
         return 0.0
@@ -152,9 +153,9 @@ def _speed(trace: Trace, touched: MovableObject, tick: int) -> float:
 
 
 ODOMETRY_FAULTS = frozenset({"bias", "slip", "scale", "drift", "noise"})
-"""Kinds of faults that leave an error in the odometry after their end."""
+"""Kinds of faults whose effect on the odometry pose remains after the end of the fault."""
 ODOMETRY_TARGETS = frozenset({"Odometry", WHEELS})
-"""Values of `affects` for which these faults falsify the odometry."""
+"""Values of `affects` for which the ODOMETRY_FAULTS falsify the odometry."""
 LOST_DISTANCE_M = 0.5
 """Localization error from which a robot counts as lost."""
 
@@ -162,13 +163,13 @@ LOST_DISTANCE_M = 0.5
 def diagnose_localization(trace: Trace, tick: int, error_is_reported: bool) -> Diagnosis:
     """Return sentences on a large localization error and its causes, and the names of the causing disturbances.
 
-    If `error_is_reported`, the failed finding states the error, so that no sentence repeats it.
+    If `error_is_reported`, the failed finding already states the error, and no sentence repeats it.
     """
     error = _position_error(trace, tick)
     if not error >= LOST_DISTANCE_M:  # also for nan: unknown
         return [], set()
-    lines = [] if error_is_reported else [f"its estimated position was {error:.2f} m from the true one"]
-    named: set[str] = set()
+    lines = [] if error_is_reported else [f"the estimated position was {error:.2f} m from the true position"]
+    causing: set[str] = set()
     current_event = ""
     for event in trace.events:
         if event.tick > tick:
@@ -180,15 +181,15 @@ def diagnose_localization(trace: Trace, tick: int, error_is_reported: bool) -> D
         elif event.kind == EventKind.ROBOT_PLACED:
             ago = trace.seconds(tick - event.tick)
             lines.append(f"event `{current_event}` had moved the robot elsewhere {ago:.2f} s before")
-            named.add(current_event)
-        elif event.kind == EventKind.FAULT_TOOK_EFFECT and (what := _falsified_quantity(trace, event.name)):
-            lines.append(f"{event.name} falsified {what} from t = {trace.seconds(event.tick):.2f} s on")
-            named.add(event.name)
-    return lines, named
+            causing.add(current_event)
+        elif event.kind == EventKind.FAULT_TOOK_EFFECT and (quantity := _falsified_quantity(trace, event.name)):
+            lines.append(f"{event.name} falsified {quantity} from t = {trace.seconds(event.tick):.2f} s on")
+            causing.add(event.name)
+    return lines, causing
 
 
 def _position_error(trace: Trace, tick: int) -> float:
-    """Return the distance in m between the estimated and the true position; nan if one of them is unknown."""
+    """Return the distance in m between the estimated and the true position; nan if either position is unknown."""
     if not len(trace.belief) or not len(trace.truth):
         return math.nan
     bx, by = trace.belief.at(np.array([tick]))[0, :2].tolist()
@@ -197,11 +198,11 @@ def _position_error(trace: Trace, tick: int) -> float:
 
 
 def _falsified_quantity(trace: Trace, fault: str) -> str:
-    """Return the quantity that a fault falsified: "its belief", "its odometry", or "" for other quantities."""
+    """Return the quantity that a fault falsified: "the belief", "the odometry", or "" for other quantities."""
     starts = [event.data for event in trace.of_kind(EventKind.FAULT_STARTED) if event.name == fault]
     if not starts:
         return ""
-    affects = starts[0].get("affects", "Odometry")  # older logs lack it
+    affects = starts[0].get("affects", "Odometry")  # older logs have no `affects`
     if affects == BELIEF:
-        return "its belief"
-    return "its odometry" if affects in ODOMETRY_TARGETS and starts[0].get("fault") in ODOMETRY_FAULTS else ""
+        return "the belief"
+    return "the odometry" if affects in ODOMETRY_TARGETS and starts[0].get("fault") in ODOMETRY_FAULTS else ""

@@ -1,4 +1,4 @@
-"""Texts of findings and disturbances for reports, and relative margins (margins divided by limits)."""
+"""Text of findings and disturbances for reports, and relative margins (margins divided by limits)."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -14,16 +14,16 @@ GOALS_REACHED = "goals_reached"
 MAX_TIMES_SHOWN = 5
 """Maximum number of times that are listed for a repeated disturbance."""
 _RELATIONS = {"≤ ": ("≤ ", "> "), "≥ ": ("≥ ", "< "), "< ": ("< ", "≥ "), "> ": ("> ", "≤ ")}
-"""Signs between a measured value and its limit, by the start of the limit: if the limit is kept, and if not."""
+"""Signs for "value sign limit", by the start of the limit: (sign if the limit holds, sign if it is violated)."""
 
 
 def comparison(finding: Finding) -> str:
     """Return the comparison of the measured value with the limit, e.g. "0.84 s > 0.50 s after lidar.off"."""
     if finding.status in (Status.INCONCLUSIVE, Status.ERROR):
         return f"{finding.status.value}: {finding.measured}"
-    holds, violated = _RELATIONS.get(finding.limit[:2], ("", ""))
-    if holds:
-        relation = holds if finding.status is Status.PASS else violated
+    sign_if_held, sign_if_violated = _RELATIONS.get(finding.limit[:2], ("", ""))
+    if sign_if_held:
+        relation = sign_if_held if finding.status is Status.PASS else sign_if_violated
         return f"{finding.measured} {relation}{finding.limit[2:]}"
     is_sufficient = finding.status is Status.PASS or not finding.limit
     return finding.measured if is_sufficient else f"{finding.measured}; expected {finding.limit}"
@@ -39,10 +39,10 @@ def time_and_place(finding: Finding, tick_rate: int) -> str:
 
 def subject(verdict: Verdict, finding: Finding) -> str:
     """Return the criterion and the checked item, e.g. "goals_reached: goal shelf"."""
-    if verdict.criterion == DISTURBANCE:  # its ID, the name of an event or fault, could be mistaken for a criterion
+    if verdict.criterion == DISTURBANCE:  # the ID is the name of an event or fault, and looks like a criterion
         return finding.what
-    rest = finding.what.removeprefix(verdict.criterion).removeprefix(":").strip()
-    return f"{verdict.id}: {rest}" if rest else verdict.id
+    item = finding.what.removeprefix(verdict.criterion).removeprefix(":").strip()
+    return f"{verdict.id}: {item}" if item else verdict.id
 
 
 def sentence(verdict: Verdict, finding: Finding, tick_rate: int) -> str:
@@ -97,7 +97,9 @@ def run_margin(result: RunResult) -> float:
         tightest = _tightest_finding(result.verdicts)
         return 1.0 if tightest is None else max(0.0, relative_margin(tightest[1]))
     failed = [finding for verdict in result.verdicts for finding in verdict.findings if finding.status is Status.FAIL]
-    margins = [relative_margin(one) for one in failed if one.margin is not None and isfinite(one.margin)]
+    margins = [
+        relative_margin(finding) for finding in failed if finding.margin is not None and isfinite(finding.margin)
+    ]
     return max(-1.0, min(margins)) if margins and min(margins) < 0 else -1.0
 
 
@@ -105,13 +107,13 @@ def _tightest_finding(verdicts: Sequence[Verdict]) -> tuple[Verdict, Finding] | 
     """Return the passed finding with the smallest relative margin, with its verdict; see `tightest_margin`."""
     findings = [(v, f) for v in verdicts for f in v.findings if f.status is Status.PASS and not _is_about_arrival(v, f)]
     # A margin without value and unit is in multiples of the `scale` of a condition, and therefore relative.
-    has_size = [(v, f) for v, f in findings if f.unit or f.value is None]
-    measured = [(v, f) for v, f in has_size if f.margin is not None and isfinite(f.margin)]
-    return min(measured, key=lambda pair: relative_margin(pair[1]), default=None)
+    comparable = [(v, f) for v, f in findings if f.unit or f.value is None]
+    with_margin = [(v, f) for v, f in comparable if f.margin is not None and isfinite(f.margin)]
+    return min(with_margin, key=lambda pair: relative_margin(pair[1]), default=None)
 
 
 def _is_about_arrival(verdict: Verdict, finding: Finding) -> bool:
-    """Return whether the finding is on the distance or heading error at a goal, or on the waiting time there."""
+    """Return whether the finding is about the distance, heading error, or waiting time at a goal."""
     return verdict.criterion == GOALS_REACHED and not (finding.unit == "s" and finding.limit.startswith("≤"))
 
 

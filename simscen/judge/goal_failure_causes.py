@@ -15,8 +15,8 @@ from simscen.criteria.goal_outcomes import GoalOutcome, goal_outcomes, outcome_s
 from simscen.judge.blocked_path import Diagnosis, diagnose_blocked_path
 from simscen.judge.movable_objects import MovableObject, movable_objects
 
-NEAR_ROBOT_M = 0.3
-"""Maximum distance between the robot and an object that may block the robot."""
+MAX_NEARBY_GAP_M = 0.3
+"""Maximum gap between the inscribed circle of the robot and an object that may block the robot."""
 
 
 def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> Diagnosis:
@@ -26,20 +26,20 @@ def diagnose_goal_failure(trace: Trace, case: Case, tick: int) -> Diagnosis:
         return [], set()
     goal, objects = outcome.goal, movable_objects(trace, tick)
     lines = [*_unreachable_goal(case, goal), *_robot_hold(trace, tick), *_touched_objects(trace, tick)]
-    named: set[str] = set()
+    mentioned: set[str] = set()
     for sentences, events in (
         _occupied_goal(trace, case, goal, objects),
         diagnose_blocked_path(trace, case, goal.name, tick, objects),
         _nearby_object(trace, case, tick, objects),
     ):
-        if "" in events or not events <= named:  # one sentence for each event is enough
+        if "" in events or not events <= mentioned:  # one sentence for each event is enough
             lines += sentences
-            named |= events
-    return [*(lines or _reported_failure(trace, outcome, tick)), *_failed_recoveries(trace, outcome, tick)], named
+            mentioned |= events
+    return [*(lines or _reported_failure(trace, outcome, tick)), *_failed_recoveries(trace, outcome, tick)], mentioned
 
 
 def _current_goal(trace: Trace, case: Case, tick: int) -> GoalOutcome | None:
-    """Return the outcome of the last goal that was accepted until `tick`; None if it was reached or canceled."""
+    """Return the outcome of the last goal that started until `tick`; None if this goal was reached or canceled."""
     started = [outcome for outcome in goal_outcomes(trace, case) if outcome_start(outcome) <= tick]
     if not started:
         return None
@@ -60,65 +60,69 @@ def _unreachable_goal(case: Case, goal: Goal) -> list[str]:
 
 
 def _robot_hold(trace: Trace, tick: int) -> list[str]:
-    """Return a sentence with the reported reason if a part of the stack, such as a monitor, has stopped the robot."""
+    """Return a sentence on the part of the stack that has stopped the robot, such as the collision monitor, and why."""
     events = trace.of_kind(EventKind.ROBOT_HELD, EventKind.ROBOT_RELEASED)
     earlier = [event for event in events if event.tick <= tick - (event.kind == EventKind.ROBOT_RELEASED)]
     if not earlier or earlier[-1].kind != EventKind.ROBOT_HELD:
         return []
     last = earlier[-1]
     when = f"as reported at t = {trace.seconds(last.tick):.2f} s"
-    return [f"its {last.name.replace('_', ' ')} has stopped it, {when}: {last.data.get('message', '')}"]
+    return [f"the {last.name.replace('_', ' ')} has stopped the robot, {when}: {last.data.get('message', '')}"]
 
 
 def _reported_failure(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
-    """Return a sentence with the stack's message if it gave up the goal, and with the recoveries before."""
+    """Return a sentence with the message of a stack that gave up the goal, and with the recoveries before."""
     end = outcome.end
-    if end is None or end.tick > tick or error_code_name(end) == ErrorCode.NAVIGATE_TIMEOUT.name:  # it has no reason
+    # A timeout has no message with a reason.
+    if end is None or end.tick > tick or error_code_name(end) == ErrorCode.NAVIGATE_TIMEOUT.name:
         return []
     message = end.data.get("message")
     if not message:
         return []
     tried = [e.name for e in trace.of_kind(EventKind.RECOVERY_STARTED) if outcome_start(outcome) <= e.tick <= tick]
-    return [f"it gave up and reported: {message}" + (f"; {', '.join(tried)} had not helped" if tried else "")]
+    return [f"the stack gave up and reported: {message}" + (f"; {', '.join(tried)} had not helped" if tried else "")]
 
 
 def _failed_recoveries(trace: Trace, outcome: GoalOutcome, tick: int) -> list[str]:
     """Return a sentence on the recoveries that failed on the way to this goal, with their error codes."""
     ended = [e for e in trace.of_kind(EventKind.RECOVERY_ENDED) if outcome_start(outcome) <= e.tick <= tick]
     failed = Counter(f"{e.name} with {error_code_name(e)}" for e in ended if e.data.get("outcome") == "failed")
-    counted = (what if times == 1 else f"{what} {times} times" for what, times in failed.items())
+    counted = (text if count == 1 else f"{text} {count} times" for text, count in failed.items())
     return [f"recoveries failed: {', '.join(counted)}"] if failed else []
 
 
 def _touched_objects(trace: Trace, tick: int) -> list[str]:
     """Return sentences on the objects that the robot touches at `tick`."""
-    since: dict[str, int] = {}
+    start_ticks: dict[str, int] = {}
     for event in trace.of_kind(EventKind.COLLISION_STARTED, EventKind.COLLISION_ENDED):
         if event.tick <= tick and event.kind == EventKind.COLLISION_STARTED:
-            since.setdefault(event.name, event.tick)
+            start_ticks.setdefault(event.name, event.tick)
         elif event.tick <= tick:
-            since.pop(event.name, None)
-    return [f"it had touched {name or 'something'} since t = {trace.seconds(at):.2f} s" for name, at in since.items()]
+            start_ticks.pop(event.name, None)
+    return [
+        f"the robot had touched {name or 'something'} since t = {trace.seconds(start):.2f} s"
+        for name, start in start_ticks.items()
+    ]
 
 
 def _occupied_goal(trace: Trace, case: Case, goal: Goal, objects: list[MovableObject]) -> Diagnosis:
-    """Return a sentence on an object that occupies the goal."""
+    """Return a sentence on an object that is nearer to the goal than the inscribed radius of the robot."""
     place = np.array([[goal.pose.x, goal.pose.y]])
     for each in objects:
         distance = float(each.distance(place)[0])
         if distance < case.inscribed_radius:
             where = "on" if distance == 0 else f"{distance:.2f} m from the center of"
-            return [f"{each.describe(trace)} stands {where} goal {goal.name}"], {each.event}
+            return [f"{each.describe(trace)} stands {where} goal {goal.name}"], {each.event_name}
     return [], set()
 
 
 def _nearby_object(trace: Trace, case: Case, tick: int, objects: list[MovableObject]) -> Diagnosis:
-    """Return a sentence on the object nearest to the robot, if it is within NEAR_ROBOT_M."""
+    """Return a sentence on the object nearest to the robot, if the gap is at most MAX_NEARBY_GAP_M."""
     if not objects or not len(trace.truth):
         return [], set()
     place = np.array([trace.place(tick)])
     gaps = ((float(each.distance(place)[0]) - case.inscribed_radius, each) for each in objects)
     gap, nearest = min(gaps, key=lambda pair: pair[0])
-    if not gap <= NEAR_ROBOT_M:  # also for nan
+    if not gap <= MAX_NEARBY_GAP_M:  # also for nan
         return [], set()
-    return [f"{nearest.describe(trace)} was {max(gap, 0.0):.2f} m from the robot"], {nearest.event}
+    return [f"{nearest.describe(trace)} was {max(gap, 0.0):.2f} m from the robot"], {nearest.event_name}

@@ -33,15 +33,17 @@ def apply_expectation(
 ) -> tuple[Outcome, Verdict | None]:
     """Return the outcome of a run that is `expected` to fail, and a verdict on this expectation.
 
-    If nothing is expected, if `outcome` is an error, or if the log is not complete, `outcome` remains unchanged and
-    there is no verdict.
+    If no failure is expected, if `outcome` is an error, or if the log is not complete, return `outcome` and no verdict.
 
-    As with pytest's `xfail(strict=True)`, the outcome is FAILED_AS_EXPECTED if a criterion fails, otherwise FAILED. If
-    the expectation lists criteria, it is also FAILED if one of them passes or if another criterion does not pass.
+    As with pytest's `xfail(strict=True)`, the outcome is FAILED_AS_EXPECTED if a criterion fails, otherwise FAILED.
 
-    The list can also name disturbances that must not happen. `happened` are the names of all disturbances that did. If
-    a listed one happened, the outcome is FAILED, unless another disturbance of the same name is missing. A missing
-    disturbance that is not listed is an unexpected failure.
+    `expected.criteria` can list criteria and disturbances. The outcome is then also FAILED in these cases:
+
+    - A listed criterion passes, or a criterion that is not listed does not pass.
+    - A listed disturbance happened, unless another disturbance of the same name did not. `happened` are the names of
+      all disturbances that happened.
+
+    Without this list, any criterion can fail. A required disturbance that is not listed must always happen.
     """
     if expected is None or outcome is Outcome.ERROR or not is_complete:
         return outcome, None
@@ -50,21 +52,23 @@ def apply_expectation(
     failed = [verdict for verdict in covered if verdict.status is Status.FAIL]
     excused = [verdict for verdict in covered if verdict.status is not Status.PASS]
     ids = {verdict.id for verdict in verdicts}
+    # A disturbance that did not happen has a verdict.
     unexpected = [f"{name} happened" for name in expected.criteria if name in happened and name not in ids]
     if passed := [verdict for verdict in covered if verdict.status is Status.PASS and expected.criteria]:
         unexpected.insert(0, f"{_names(passed)} passed")
     limit = f"a failure: {expected.reason}"
     name = unique_name(EXPECTED, ids)
     if unexpected or not failed:
-        nothing = f"nothing failed, {_names(excused)} undecided" if excused else "everything passed"
-        measured = ", ".join(unexpected) or nothing
+        no_failure = f"nothing failed, {_names(excused)} undecided" if excused else "everything passed"
+        measured = ", ".join(unexpected) or no_failure
         return Outcome.FAILED, Verdict(EXPECTED, name, "fail", (missed(EXPECTED, measured, limit),))
-    others = [verdict for verdict in decisive if verdict.status is not Status.PASS and verdict not in excused]
+    not_excused = [verdict for verdict in decisive if verdict.status is not Status.PASS and verdict not in excused]
     verdict = Verdict(EXPECTED, name, "fail", (held(EXPECTED, f"{_names(failed)} failed", limit),))
-    return (Outcome.FAILED if others else Outcome.FAILED_AS_EXPECTED), verdict
+    return (Outcome.FAILED if not_excused else Outcome.FAILED_AS_EXPECTED), verdict
 
 
 def _is_expected_to_fail(verdict: Verdict, expected: ExpectedFailure) -> bool:
+    """Return whether the criterion is listed; without a list, whether the verdict is not about a disturbance."""
     return verdict.id in expected.criteria if expected.criteria else verdict.criterion != DISTURBANCE
 
 

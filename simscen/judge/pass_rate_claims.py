@@ -16,7 +16,7 @@ def evaluate_claim(claim: PassRate, results: Sequence[RunResult]) -> ClaimResult
     """Return the result of a claim. `results` are in the order of their seeds.
 
     A sequential test ends at the first run that decides the claim; later runs do not count. A crash or timeout of the
-    stack under test counts as a failed run. Any other error blocks the claim, also in a run that does not count.
+    stack under test counts as a failed run. Any other error blocks the claim, even in a run after the decision.
     """
     outcomes = [result.outcome is Outcome.PASSED for result in results if is_counted(result)]
     errors = len(results) - len(outcomes)
@@ -38,20 +38,20 @@ def evaluate_claim(claim: PassRate, results: Sequence[RunResult]) -> ClaimResult
 
 
 def is_counted(result: RunResult) -> bool:
-    """Return whether a run counts for the pass rate: a judged run, or a run that the stack under test ended."""
+    """Return whether a run counts for the pass rate: a judged run, or one with a crash or timeout of the stack."""
     return result.outcome is not Outcome.ERROR or (result.error is not None and result.error.by_stack)
 
 
 def decide(claim: PassRate, outcomes: Sequence[bool]) -> tuple[int, ClaimStatus]:
-    """Return the number of runs after which the claim is decided, and the decision. If it is undecided, all runs count.
+    """Return the number of runs that decide the claim, and the decision; all runs and UNDECIDED without a decision.
 
-    `outcomes` are True for passed runs, in order, and at most `claim.max_runs`.
+    `outcomes` has one entry for each run, in order: True if the run passed. It has at most `claim.max_runs` entries.
     """
     if claim.method == "fixed":
         runs = len(outcomes)
         is_complete = runs == claim.max_runs
-        return runs, _by_limits(claim, sum(outcomes), runs) if is_complete else ClaimStatus.UNDECIDED
-    test = _by_likelihood_ratio if claim.method == "sprt" else _by_mixture
+        return runs, _decide_by_limits(claim, sum(outcomes), runs) if is_complete else ClaimStatus.UNDECIDED
+    test = _decide_by_likelihood_ratio if claim.method == "sprt" else _decide_by_anytime_limits
     passed = 0
     for runs, has_passed in enumerate(outcomes, start=1):
         passed += has_passed
@@ -61,28 +61,28 @@ def decide(claim: PassRate, outcomes: Sequence[bool]) -> tuple[int, ClaimStatus]
     return len(outcomes), ClaimStatus.UNDECIDED
 
 
-def _by_limits(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
+def _decide_by_limits(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
     """Return the decision of the method `fixed`, which uses the `clopper_pearson_limits`."""
     low, high = clopper_pearson_limits(passed, runs, claim.confidence)
-    # The limit can be equal to `min`, except for rounding: 10 % with a confidence of 90 % after 1 of 1 runs.
+    # isclose: the exact limit can equal `min`, such as 10 % for 1 of 1 runs with a confidence of 90 %.
     if low >= claim.min or math.isclose(low, claim.min):
         return ClaimStatus.HELD
     return ClaimStatus.REFUTED if high < claim.min else ClaimStatus.UNDECIDED
 
 
-def _by_mixture(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
+def _decide_by_anytime_limits(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
     """Return the decision of the method `anytime`: undecided while `min` is within the `anytime_limits`."""
     if _is_compatible(claim.min, passed, runs, claim.confidence):
         return ClaimStatus.UNDECIDED
     return ClaimStatus.HELD if passed > claim.min * runs else ClaimStatus.REFUTED
 
 
-def _by_likelihood_ratio(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
+def _decide_by_likelihood_ratio(claim: PassRate, passed: int, runs: int) -> ClaimStatus:
     """Return the decision of the method `sprt`, which compares the likelihoods of the rates `target` and `min`.
 
     (Wald: Sequential Tests of Statistical Hypotheses, 1945.)
     """
-    # The thresholds 1 / alpha and beta bound each error rate. Wald's approximation (1 - beta) / alpha bounds their sum.
+    # The thresholds 1 / alpha and beta bound each error rate. Wald's (1 - beta) / alpha bounds only the sum of both.
     assert claim.target is not None
     ratio = passed * math.log(claim.target / claim.min)
     ratio += (runs - passed) * math.log((1 - claim.target) / (1 - claim.min))

@@ -13,7 +13,7 @@ from simscen.core.records.verdict import Finding, Status, Verdict
 from simscen.judge.finding_text import sentence
 
 FORMAT = 2
-"""Version of the format. Other versions are rejected."""
+"""Version of the format of result.json. Files of other versions are rejected."""
 
 
 def to_json(result: RunResult) -> str:
@@ -108,7 +108,7 @@ _TYPES: dict[str, type] = {
     "undefined": dict,
     "events": dict,
 }
-"""Types of the values that the reports use without a check."""
+"""Types of values by key. These values are checked here, because the reports do not check them."""
 
 
 def read_key(data: dict[str, Any]) -> RunKey:
@@ -118,24 +118,26 @@ def read_key(data: dict[str, Any]) -> RunKey:
     return RunKey(intern(data["scenario"]), data["seed"], variation, intern(stack_name))
 
 
-def _disturbance_data(one: DisturbanceOutcome, tick_rate: int) -> dict[str, Any]:
+def _disturbance_data(outcome: DisturbanceOutcome, tick_rate: int) -> dict[str, Any]:
     return {
-        **asdict(one.disturbance),
-        "fired": list(one.fired),
-        "times": [tick / tick_rate for tick in one.fired],
-        "happened": one.happened,
-        "effect": one.effect,
-        "tick": one.tick,
+        **asdict(outcome.disturbance),
+        "fired": list(outcome.fired),
+        "times": [tick / tick_rate for tick in outcome.fired],
+        "happened": outcome.happened,
+        "effect": outcome.effect,
+        "tick": outcome.tick,
     }
 
 
 def _read_disturbance(data: dict[str, Any]) -> DisturbanceOutcome:
-    ordered = Disturbance(data["name"], data["kind"], data["when"], data["required"], data["line"], data.get("after"))
-    return DisturbanceOutcome(ordered, tuple(data["fired"]), data["happened"], data["effect"], data["tick"])
+    disturbance = Disturbance(
+        data["name"], data["kind"], data["when"], data["required"], data["line"], data.get("after")
+    )
+    return DisturbanceOutcome(disturbance, tuple(data["fired"]), data["happened"], data["effect"], data["tick"])
 
 
 def verdict_data(verdict: Verdict, line: int, tick_rate: int) -> dict[str, Any]:
-    """Return a verdict with its findings as JSON data. `line` is the criterion's line in the scenario, 0 if unknown."""
+    """Return a verdict and its findings as JSON data. `line` is the criterion's line in the scenario; 0 if unknown."""
     return {
         "criterion": verdict.criterion,
         "id": verdict.id,

@@ -37,6 +37,9 @@ def judge_run(
     the signals that it needs have gaps.
 
     path:      scenario file
+    criteria:  criteria to evaluate, in the order of the verdicts
+    trace:     recorded states and events of the run
+    case:      what the criteria know about the scenario, such as goals and disturbances
     lines:     line of each criterion in the scenario file; () if the criteria come from another file
     coverage:  evidence that the log contains, and for which part of the run
     metrics:   additional metrics of plug-ins

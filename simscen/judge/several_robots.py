@@ -17,7 +17,7 @@ from simscen.judge.outcome import apply_expectation
 
 T = TypeVar("T")
 SUCCESS = "success"
-"""Name of the success metric (1 or 0), which the run and each robot have."""
+"""Name of the success metric (1 or 0) of a run and of each robot."""
 WORLD_EVENT_PREFIXES = ("object.", "pedestrian.", "floor.", "event.", "mark", "run.")
 """Prefixes of the kinds of events of the world, which the trace of each robot contains."""
 
@@ -28,15 +28,19 @@ def combine_robots(
     """Return the result of a run from the results and traces of its robots, by name of the robot.
 
     The run passes if all robots pass. Verdicts, metrics, and faults of a robot get the name `robot/name`. Events of the
-    world and verdicts on them are listed once. The metric `success` of the run is 1 if it is 1 for all robots with
-    goals. `expected` is the expected failure of the run; None to expect success.
+    world and verdicts on events are listed once. The metric `success` of the run is 1 if it is 1 for all robots with
+    goals. The error is the one of the first robot with an error. `expected` is the expected failure of the run; None to
+    expect success.
     """
     first = next(iter(results.values()))
-    shared = {one.disturbance.name for one in first.disturbances if one.disturbance.kind == "event"}
-    judged = [(verdict, line) for verdict, line in first.verdicts_with_lines if _is_about_world(verdict, shared)]
+    event_names = {one.disturbance.name for one in first.disturbances if one.disturbance.kind == "event"}
+    judged = [pair for pair in first.verdicts_with_lines if _is_about_event(pair[0], event_names)]
     for name, result in results.items():
-        own = [pair for pair in result.verdicts_with_lines if not _is_about_world(pair[0], shared)]
-        judged += [(_with_robot_name(verdict, name), line) for verdict, line in own]
+        judged += [
+            (_with_robot_name(verdict, name), line)
+            for verdict, line in result.verdicts_with_lines
+            if not _is_about_event(verdict, event_names)
+        ]
     verdicts = tuple(verdict for verdict, _ in judged)
     outcomes = [result.outcome for result in results.values()]
     worst = next((each for each in (Outcome.ERROR, Outcome.FAILED) if each in outcomes), Outcome.PASSED)
@@ -64,7 +68,7 @@ def combine_robots(
         lines=tuple(line for _, line in judged) if first.lines else (),
         metrics={SUCCESS: success, **_with_robot_names({name: result.metrics for name, result in results.items()})},
         undefined=_with_robot_names({name: result.undefined for name, result in results.items()}),
-        events=_events(traces),
+        events=_event_counts(traces),
         disturbances=disturbances,
         error=errors[0] if errors else None,
         reason="" if expected is None else expected.reason,
@@ -79,16 +83,17 @@ def _with_robot_name(verdict: Verdict, robot: str) -> Verdict:
     return replace(verdict, id=f"{robot}/{verdict.id}", findings=findings)
 
 
-def _is_about_world(verdict: Verdict, events: set[str]) -> bool:
-    """Return whether the verdict is on a missing event. `events` are the names of all events of the scenario."""
-    return verdict.criterion == DISTURBANCE and not events.isdisjoint((verdict.id, verdict.id.rpartition("#")[0]))
+def _is_about_event(verdict: Verdict, event_names: set[str]) -> bool:
+    """Return whether the verdict is about one of these events, which did not happen."""
+    return verdict.criterion == DISTURBANCE and not event_names.isdisjoint((verdict.id, verdict.id.rpartition("#")[0]))
 
 
-def _with_robot_names(parts: Mapping[str, Mapping[str, T]]) -> dict[str, T]:
-    return {f"{name}/{key}": value for name, part in parts.items() for key, value in part.items()}
+def _with_robot_names(values: Mapping[str, Mapping[str, T]]) -> dict[str, T]:
+    """Return values, given by robot and name, by `robot/name`."""
+    return {f"{robot}/{name}": value for robot, by_name in values.items() for name, value in by_name.items()}
 
 
-def _events(traces: Mapping[str, Trace]) -> dict[str, int]:
+def _event_counts(traces: Mapping[str, Trace]) -> dict[str, int]:
     """Return the number of events by kind. Events of the world count once.
 
     The spawning of robots, which are objects in the traces of the other robots, does not count.

@@ -46,7 +46,7 @@ class StudyPlan:
 
     @property
     def has_fixed_runs(self) -> bool:
-        """True if the number of runs does not depend on their outcomes."""
+        """True if the number of runs does not depend on the outcomes of the runs."""
         return not self.stops_early and (self.claim is None or self.claim.method == "fixed")
 
 
@@ -57,7 +57,7 @@ def evaluate_study(plan: StudyPlan, results: Iterable[RunResult]) -> Study:
     passed = sum(result.outcome is Outcome.PASSED for result in counted)
     margins = {result.key: _margins(result) for result in counted}
     limits = None
-    if counted and plan.is_random:  # a study that can stop at any run needs limits that are valid after each run
+    if counted and plan.is_random:  # if the study can stop after any run, its limits must be valid after each run
         limits = (
             wilson_interval(passed, len(counted))
             if plan.has_fixed_runs
@@ -87,36 +87,38 @@ def in_seed_order(results: Iterable[RunResult]) -> list[RunResult]:
 
 def _margins(result: RunResult) -> dict[str, tuple[float, str]]:
     """Return the smallest margin of each criterion and its unit, by verdict ID."""
-    found: dict[str, tuple[float, str]] = {}
+    smallest: dict[str, tuple[float, str]] = {}
     for verdict in result.verdicts:
         margins = [
-            (one.margin, one.unit) for one in verdict.findings if one.margin is not None and math.isfinite(one.margin)
+            (finding.margin, finding.unit)
+            for finding in verdict.findings
+            if finding.margin is not None and math.isfinite(finding.margin)
         ]
         if margins:
-            found[verdict.id] = min(margins)
-    return found
+            smallest[verdict.id] = min(margins)
+    return smallest
 
 
 def _worst(margins: Mapping[RunKey, Mapping[str, tuple[float, str]]]) -> dict[str, tuple[RunKey, float, str]]:
-    """Return the run with the smallest margin, this margin, and its unit, by verdict ID."""
+    """Return (run, margin, unit of the margin) of the run with the smallest margin, by verdict ID."""
     worst: dict[str, tuple[RunKey, float, str]] = {}
-    for key, own in margins.items():
-        for criterion, (margin, unit) in own.items():
-            if criterion not in worst or margin < worst[criterion][1]:
-                worst[criterion] = key, margin, unit
+    for key, run_margins in margins.items():
+        for verdict_id, (margin, unit) in run_margins.items():
+            if verdict_id not in worst or margin < worst[verdict_id][1]:
+                worst[verdict_id] = key, margin, unit
     return dict(sorted(worst.items()))
 
 
 def _rates(plan: StudyPlan, results: Sequence[RunResult]) -> Iterable[RateRow]:
     """Yield the pass rate for each value or range of values of each parameter.
 
-    The rates have no confidence limits if the runs are not random or if their number depends on their outcomes.
+    The rates have no confidence limits if the runs are not random, or if the number of runs depends on the outcomes.
     """
     has_limits = plan.is_random and plan.has_fixed_runs
-    for path in _paths(plan):
+    for path in _parameter_paths(plan):
         values = [plan.values.get(result.key, {}).get(path) for result in results]
         groups: dict[str, list[bool]] = defaultdict(list)
-        ranks: dict[str, tuple[int, float, str]] = {}  # labels are sorted by their smallest number, texts after numbers
+        ranks: dict[str, tuple[int, float, str]] = {}  # sort key of a label: its smallest number; texts follow numbers
         for label, value, result in zip(_labels(values), values, results, strict=True):
             groups[label].append(result.outcome is Outcome.PASSED)
             number = si_number(value)
@@ -173,25 +175,25 @@ def _effects(
 
     The p-values are adjusted by Holm's correction.
     """
-    found = []
-    for path in _paths(plan):
-        for criterion in sorted({criterion for own in margins.values() for criterion in own}):
+    effects = []
+    for path in _parameter_paths(plan):
+        for criterion in sorted({criterion for run_margins in margins.values() for criterion in run_margins}):
             keys = [result.key for result in results if criterion in margins[result.key]]
             values = [plan.values.get(key, {}).get(path) for key in keys]
             effect = _effect(values, [margins[key][criterion][0] for key in keys])
             if effect is not None:
-                found.append(ParameterEffect(path, criterion, *effect[:2], len(keys), effect[2]))
-    adjusted = holm([one.p for one in found])
-    effects = [replace(one, p=p) for one, p in zip(found, adjusted, strict=True)]
+                effects.append(ParameterEffect(path, criterion, *effect[:2], len(keys), effect[2]))
+    adjusted = holm([one.p for one in effects])
+    effects = [replace(one, p=p) for one, p in zip(effects, adjusted, strict=True)]
     return tuple(sorted(effects, key=lambda one: (one.p, -abs(one.effect), one.path, one.criterion)))
 
 
 def _effect(values: Sequence[Any], margins: Sequence[float]) -> tuple[float, float, bool] | None:
-    """Return the effect of a parameter on a margin, its p-value, and whether the values are numbers.
+    """Return (effect of a parameter on a margin, p-value, True if the values are numbers).
 
-    For numbers, the effect is Spearman's rank correlation. For other values, it is epsilon squared of the
-    Kruskal-Wallis test. Returns None if there are too few runs, if all values or all margins are equal, or if values
-    that are not numbers have at most two runs each on average.
+    For numbers, the effect is Spearman's rank correlation. For other values, the effect is epsilon squared of the
+    Kruskal-Wallis test. Returns None if there are fewer than MIN_RUNS_FOR_EFFECTS runs, if all values or all margins
+    are equal, or if values that are not numbers have at most two runs each on average.
     """
     texts = [value_text(value) for value in values]
     if len(margins) < MIN_RUNS_FOR_EFFECTS or len(set(texts)) < 2 or len(set(margins)) < 2:
@@ -217,13 +219,14 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _paths(plan: StudyPlan) -> list[str]:
+def _parameter_paths(plan: StudyPlan) -> list[str]:
+    """Return the paths in the scenario of all varied parameters, sorted."""
     return sorted({path for values in plan.values.values() for path in values})
 
 
 def _pair_coverage(plan: StudyPlan, results: Sequence[RunResult]) -> float | None:
     """Return the share of all pairs of values of two parameters that occurred; None without pairwise testing."""
-    paths = _paths(plan)
+    paths = _parameter_paths(plan)
     if not plan.is_designed_in_pairs or len(paths) < 2:
         return None
     rows = [[value_text(plan.values[result.key].get(path)) for path in paths] for result in results]

@@ -38,7 +38,7 @@ def reported_violations(run: RunFinished) -> list[Violation]:
     """
     found = []
     for verdict, line in run.result.verdicts_with_lines:
-        unchecked = Finding(Status.ERROR, verdict.criterion, "it checked nothing", "")
+        unchecked = Finding(Status.ERROR, verdict.criterion, "it returned no findings", "")
         for finding in violations(verdict) if verdict.findings else [unchecked]:
             message = one_line(sentence(verdict, finding, run.result.tick_rate))
             found.append(Violation(verdict, line, message, tuple(one_line(text) for text in finding.detail)))

@@ -92,8 +92,8 @@ FINDING = "Finding(Status.{}, 'mine', '1', '2', {})"
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("return []", "it checked nothing (criterion `mine` of mines 0.3)"),
-        ("return None", "it checked nothing"),
+        ("return []", "it returned no findings (criterion `mine` of mines 0.3)"),
+        ("return None", "it returned no findings"),
         ("return [None]", "it returned an invalid finding of type NoneType"),
         (
             f"return [{FINDING.format('PASS', 'float(chr(110) + chr(97) + chr(110))')}]",

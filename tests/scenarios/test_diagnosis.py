@@ -59,7 +59,8 @@ faults: [{sensor: lidar, off: {}, when: {time: 4 s}}]
 pass: [{goals_reached: {}}]
 """,
         "goals_reached",
-        "why: its collision monitor has stopped it, as reported at t = 5.25 s: lidar `lidar` has been silent for 1.35",
+        "why: the collision monitor has stopped the robot, as reported at t = 5.25 s: lidar `lidar` has been silent "
+        "for 1.35",
     ),
 }
 

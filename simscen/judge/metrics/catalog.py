@@ -97,7 +97,7 @@ METRICS: dict[str, Metric] = {
     "mean_jerk": Metric(
         "m/s^3", "Mean of |v[k+1] - 2 v[k] + v[k-1]| / dt^2, v = true speed over ground.", evidence=_MOTION
     ),
-    "max_jerk": Metric("m/s^3", "Largest value of the jerk in mean_jerk.", evidence=_MOTION),
+    "max_jerk": Metric("m/s^3", "Largest jerk, computed as for mean_jerk.", evidence=_MOTION),
     "sparc": Metric(
         "", "Spectral arc length of the speed over ground; 0 = smooth.", "Balasubramanian et al. 2015", evidence=_MOTION
     ),
@@ -124,8 +124,18 @@ METRICS: dict[str, Metric] = {
         "Hall 1966, HuNavSim",
         evidence=_PEOPLE,
     ),
-    "intrusion_personal": Metric("", "The same from 0.45 m to below 1.2 m.", "Hall 1966, HuNavSim", evidence=_PEOPLE),
-    "intrusion_social": Metric("", "The same from 1.2 m to below 3.6 m.", "Hall 1966, HuNavSim", evidence=_PEOPLE),
+    "intrusion_personal": Metric(
+        "",
+        "Share of the time with the gap to the nearest pedestrian from 0.45 m to below 1.2 m.",
+        "Hall 1966, HuNavSim",
+        evidence=_PEOPLE,
+    ),
+    "intrusion_social": Metric(
+        "",
+        "Share of the time with the gap to the nearest pedestrian from 1.2 m to below 3.6 m.",
+        "Hall 1966, HuNavSim",
+        evidence=_PEOPLE,
+    ),
     "collisions": Metric("", "Number of contacts that began.", "Arena", evidence={Evidence.CONTACTS}),
     "contact_time": Metric("s", "Time with at least one contact.", evidence={Evidence.CONTACTS}),
     "replans": Metric("", "Number of plans made for another reason than a new goal.", evidence={Evidence.PLANNING}),

@@ -23,10 +23,10 @@ COMPARED_METRICS = (
 HIGHER_IS_BETTER = frozenset({"min_clearance"})
 """Metrics for which a higher value is better. For all other COMPARED_METRICS, a lower value is better."""
 METRICS_OF_ALL_PAIRS = frozenset({"collisions"})
-"""Metrics that are compared in all pairs without errors, also if a robot reaches its last goal in only one run."""
+"""Metrics that are compared in all pairs without errors, even if a robot reaches its last goal in only one run."""
 ALL_SCENARIOS = "all scenarios"
 """Name that stands for all scenarios together."""
-_SEED = 1
+_BOOTSTRAP_SEED = 1
 """Seed of the bootstrap confidence intervals."""
 
 Pair = tuple[RunResult, RunResult]
@@ -58,8 +58,8 @@ def compare_sessions(
 def comparison_key(key: RunKey, session: str) -> RunKey:
     """Return the key by which a run of a session is compared with runs of another session.
 
-    The session takes the place of the stack, and the stack becomes part of the name of the scenario. The keys of
-    repetitions are returned unchanged.
+    In this key, the name of the session replaces the name of the stack, which becomes part of the name of the scenario.
+    The keys of repetitions are returned unchanged.
     """
     if key.is_repetition:
         return key
@@ -68,28 +68,31 @@ def comparison_key(key: RunKey, session: str) -> RunKey:
 
 
 def _compare(results: Iterable[RunResult], stacks: Mapping[str, str], significance: Significance) -> Comparison:
-    """Compare the first stack or session with each other one. `stacks` are values or folders by name."""
+    """Compare the first stack or session with each of the others.
+
+    `stacks` are the values of stacks or the output folders of sessions, by name of the stack or session.
+    """
     runs = {one.key: one for one in results if not one.key.is_repetition and one.outcome is not Outcome.SKIPPED}
     baseline, *others = stacks
     counts: dict[str, dict[str, Counter[Outcome]]] = {}
     for key, run in runs.items():
-        own = counts.setdefault(key.test, {name: Counter() for name in stacks})
-        if key.stack_name in own:
-            own[key.stack_name][_own_outcome(run)] += 1
+        test_counts = counts.setdefault(key.test, {name: Counter() for name in stacks})
+        if key.stack_name in test_counts:
+            test_counts[key.stack_name][_outcome_without_expectation(run)] += 1
     return Comparison(
         stacks,
         {
             scenario: {
                 name: OutcomeCounts(count[Outcome.PASSED], count[Outcome.FAILED], count[Outcome.ERROR])
-                for name, count in own.items()
+                for name, count in test_counts.items()
             }
-            for scenario, own in sorted(counts.items())
+            for scenario, test_counts in sorted(counts.items())
         },
         tuple(_compare_with_baseline(runs, baseline, other, significance) for other in others),
     )
 
 
-def _own_outcome(run: RunResult) -> Outcome:
+def _outcome_without_expectation(run: RunResult) -> Outcome:
     """Return the outcome that the run would have if no failure were expected."""
     if run.outcome is Outcome.ERROR:
         return Outcome.ERROR
@@ -102,62 +105,66 @@ def _own_outcome(run: RunResult) -> Outcome:
 def _compare_with_baseline(
     runs: Mapping[RunKey, RunResult], baseline: str, other: str, significance: Significance
 ) -> BaselineComparison:
-    first, second = (
+    baseline_runs, other_runs = (
         {(key.test, key.seed): run for key, run in sorted(runs.items()) if key.stack_name == name}
         for name in (baseline, other)
     )
-    pairs = [(first[test_and_seed], second[test_and_seed]) for test_and_seed in first if test_and_seed in second]
+    pairs = [
+        (run, other_runs[test_and_seed]) for test_and_seed, run in baseline_runs.items() if test_and_seed in other_runs
+    ]
     completed = [pair for pair in pairs if all(run.outcome is not Outcome.ERROR for run in pair)]
-    same_arrival = [(one, two) for one, two in completed if _arrived(one) == _arrived(two)]
+    same_arrival = [(one, two) for one, two in completed if _arrived_robots(one) == _arrived_robots(two)]
     flips = tuple(flip for pair in completed if (flip := _flip(pair)))
-    won = sum(flip.passed == other for flip in flips)
+    improvements = sum(flip.passed == other for flip in flips)
     names = _compared_names(completed)
     return BaselineComparison(
         stack=other,
         pairs=len(completed),
         error_pairs=len(pairs) - len(completed),
-        unpaired_runs=len(first.keys() ^ second.keys()),
+        unpaired_runs=len(baseline_runs.keys() ^ other_runs.keys()),
         pairs_with_different_arrivals=len(completed) - len(same_arrival),
         flips=flips,
-        p=sign_test(won, len(flips) - won),
+        p=sign_test(improvements, len(flips) - improvements),
         differences=tuple(
-            found
+            difference
             for name in names
-            if (found := _difference(name, _comparable(name, completed, same_arrival))) is not None
+            if (difference := _difference(name, _comparable_pairs(name, completed, same_arrival))) is not None
         ),
         changes=significant_changes(_samples(completed, same_arrival, names), significance),
     )
 
 
 def _by_scenario(pairs: Iterable[Pair]) -> dict[str, list[Pair]]:
-    found: dict[str, list[Pair]] = {}
+    """Return the pairs by scenario and variation."""
+    groups: dict[str, list[Pair]] = {}
     for pair in pairs:
-        found.setdefault(pair[0].key.test, []).append(pair)
-    return found
+        groups.setdefault(pair[0].key.test, []).append(pair)
+    return groups
 
 
 def _samples(completed: Sequence[Pair], same_arrival: Sequence[Pair], names: Iterable[str]) -> Iterator[PairedSample]:
     """Yield the samples to test: the pass rate of all runs, and the pass rate and each metric by scenario.
 
-    `completed` are the pairs without errors. In the pairs `same_arrival`, the same robots reach their last goals.
+    `completed` are the pairs without errors. `same_arrival` are those of them in which the same robots reach their last
+    goals in both runs.
     """
     scenarios = _by_scenario(completed)
     if len(scenarios) > 1:
         scenarios = {ALL_SCENARIOS: list(completed), **scenarios}
-    for scenario, own in scenarios.items():
-        passed = [(_passed_as_number(one), _passed_as_number(two)) for one, two in own]
+    for scenario, pairs in scenarios.items():
+        passed = [(_passed_as_number(baseline), _passed_as_number(other)) for baseline, other in pairs]
         yield PairedSample(scenario, PASS_RATE, "", passed, higher_is_better=True)
     for name in names:
-        direction = _base_name(name) in HIGHER_IS_BETTER if _base_name(name) in COMPARED_METRICS else None
-        for scenario, own in _by_scenario(_comparable(name, completed, same_arrival)).items():
-            yield PairedSample(scenario, name, _metric_unit(name), _paired_values(name, own), direction)
+        higher_is_better = _base_name(name) in HIGHER_IS_BETTER if _base_name(name) in COMPARED_METRICS else None
+        for scenario, pairs in _by_scenario(_comparable_pairs(name, completed, same_arrival)).items():
+            yield PairedSample(scenario, name, _metric_unit(name), _paired_values(name, pairs), higher_is_better)
 
 
 def _passed_as_number(run: RunResult) -> float:
-    return float(_own_outcome(run) is Outcome.PASSED)
+    return float(_outcome_without_expectation(run) is Outcome.PASSED)
 
 
-def _comparable(name: str, completed: Sequence[Pair], same_arrival: Sequence[Pair]) -> Sequence[Pair]:
+def _comparable_pairs(name: str, completed: Sequence[Pair], same_arrival: Sequence[Pair]) -> Sequence[Pair]:
     """Return the pairs in which a metric can be compared: `completed` or `same_arrival`, see METRICS_OF_ALL_PAIRS."""
     return completed if _base_name(name) in METRICS_OF_ALL_PAIRS else same_arrival
 
@@ -178,30 +185,30 @@ def _metric_unit(name: str) -> str:
 
 
 def _compared_names(pairs: Sequence[Pair]) -> list[str]:
-    """Return the names of the COMPARED_METRICS of the runs, grouped by robot, and then those of metrics of plug-ins."""
+    """Return the names of the metrics to compare: COMPARED_METRICS by robot, and then the metrics of plug-ins."""
     names = {name for pair in pairs for run in pair for name in run.metrics}
     compared = [name for name in names if _base_name(name) in COMPARED_METRICS]
     compared.sort(key=lambda name: (name.rpartition("/")[0], COMPARED_METRICS.index(_base_name(name))))
     return [*compared, *sorted(name for name in names if _base_name(name) not in METRICS)]
 
 
-def _arrived(run: RunResult) -> set[str]:
+def _arrived_robots(run: RunResult) -> set[str]:
     """Return the names of the robots that reached their last goals. A single robot has the name ""."""
     times = {name: value for name, value in run.metrics.items() if _base_name(name) == "time_to_goal"}
     return {name.rpartition("/")[0] for name, value in times.items() if value is not None}
 
 
 def _flip(pair: Pair) -> Flip | None:
-    """Return the flip if only one run of the pair passed, otherwise None."""
+    """Return the flip if only one run of the pair passed; otherwise None."""
     one, two = pair
-    if _own_outcome(one) is _own_outcome(two):
+    if _outcome_without_expectation(one) is _outcome_without_expectation(two):
         return None
-    good, bad = (one, two) if _own_outcome(one) is Outcome.PASSED else (two, one)
-    return Flip(one.key.test, one.key.seed, good.key.stack_name, bad.key.stack_name, _first_violation(bad))
+    passed, failed = (one, two) if _outcome_without_expectation(one) is Outcome.PASSED else (two, one)
+    return Flip(one.key.test, one.key.seed, passed.key.stack_name, failed.key.stack_name, _first_violation(failed))
 
 
 def _first_violation(run: RunResult) -> str:
-    """Return the first violation of a run as text, or why the run ended if there is none."""
+    """Return the first violation of a run as text; if there is no violation, the reason why the run ended."""
     sentences = [
         sentence(verdict, finding, run.tick_rate)
         for verdict in run.verdicts
@@ -213,7 +220,7 @@ def _first_violation(run: RunResult) -> str:
 
 
 def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
-    """Return the difference of a metric; None if no pair has the metric."""
+    """Return the difference of a metric between the runs of the pairs; None if no pair has the metric in both runs."""
     known = _paired_values(name, pairs)
     if not known:
         return None
@@ -226,7 +233,7 @@ def _difference(name: str, pairs: Sequence[Pair]) -> MetricDifference | None:
         baseline=sum(one for one, _ in known) / len(known),
         value=sum(two for _, two in known) / len(known),
         difference=sum(differences) / len(known),
-        interval=bootstrap_mean_interval(differences, Streams(_SEED).generator(f"comparison.{name}")),
+        interval=bootstrap_mean_interval(differences, Streams(_BOOTSTRAP_SEED).generator(f"comparison.{name}")),
         lower=lower,
         equal=len(known) - lower - higher,
         higher=higher,

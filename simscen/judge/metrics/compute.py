@@ -28,7 +28,7 @@ from simscen.judge.evaluation import missing_evidence_reason, partial_evidence_r
 from simscen.judge.metrics.catalog import METRICS
 from simscen.judge.metrics.trajectory import PATH_METRICS, POSE_METRICS, Values, path_metrics, pose_metrics
 
-STANDING_SPEED_M_S, STANDING_TURN_RATE_RAD_S = 0.01, 0.02
+MAX_STANDING_SPEED_M_S, MAX_STANDING_TURN_RATE_RAD_S = 0.01, 0.02
 """Speed and absolute turn rate below which a robot stands still."""
 
 BARN_OPTIMAL_SPEED_M_S = 2.0
@@ -39,10 +39,10 @@ PERSON_SPACES = {
     "personal": (INTIMATE_SPACE_M, PERSONAL_SPACE_M),
     "social": (PERSONAL_SPACE_M, SOCIAL_SPACE_M),
 }
-"""Hall's spaces around a person: smallest and largest distance in m."""
+"""Hall's spaces around a person: (smallest distance in m, distance in m at which the space ends)."""
 
 NO_GOALS = "the robot has no goals"
-"""Reason why a robot without goals has no `success`."""
+"""Reason why the metric `success` is undefined for a robot without goals."""
 
 _SHORTEST_PATH_METRICS = ("barn_score", "shortest_length", "path_length_ratio", "spl", "soft_spl")
 _NAVIGATION_METRICS = ("success", "path_length", "time_to_goal", *_SHORTEST_PATH_METRICS)
@@ -51,7 +51,7 @@ _MOTION_METRICS = ("max_speed", "time_not_moving", "mean_jerk", "max_jerk", *_SM
 _CLEARANCE_METRICS = ("min_clearance", "mean_clearance")
 _PEOPLE_METRICS = ("min_person_distance", *(f"intrusion_{space}" for space in PERSON_SPACES))
 _EVENT_METRICS = ("collisions", "contact_time", "replans", "recoveries")
-"""Names of metrics that are computed together."""
+"""Groups of metrics. The metrics of a group are computed together."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def _metric_values(found: Values) -> MetricValues:
 
 
 def _compute_or_explain(names: Sequence[str], compute: Callable[[], Values]) -> Values:
-    """Return the metrics `names` from `compute`, or for each of them the reason why it cannot be computed."""
+    """Return the metrics from `compute`; if it raises InvalidTrace or MissingEvidence, this reason for all `names`."""
     try:
         return compute()
     except (InvalidTrace, MissingEvidence) as reason:
@@ -99,7 +99,7 @@ def _compute_or_explain(names: Sequence[str], compute: Callable[[], Values]) -> 
 
 
 def _insufficient_evidence(required: Set[Evidence], coverage: LogCoverage) -> str:
-    """Return as text which required evidence the log lacks for the run or a part of it; "" if nothing is missing."""
+    """Return as text which evidence is missing for the run or for a part of the run; "" if nothing is missing."""
     return missing_evidence_reason(required, coverage) or partial_evidence_reason(required, coverage)
 
 
@@ -172,7 +172,7 @@ def _motion_metrics(trace: Trace, case: Case) -> Values:
     if not len(linear):
         return dict.fromkeys(_MOTION_METRICS, "the true velocity was not recorded")
     speeds = linear.values[:, 0]
-    is_standing = (speeds < STANDING_SPEED_M_S) & (turning.values[:, 0] < STANDING_TURN_RATE_RAD_S)
+    is_standing = (speeds < MAX_STANDING_SPEED_M_S) & (turning.values[:, 0] < MAX_STANDING_TURN_RATE_RAD_S)
     durations = np.diff(np.append(linear.ticks, trace.end)) / trace.tick_rate
     return {
         "max_speed": float(speeds.max()),
@@ -233,9 +233,11 @@ def person_metrics(trace: Trace, case: Case) -> Values:
     durations = np.diff(np.append(trace.truth.ticks, trace.end))
     total = max(int(durations.sum()), 1)
     shares = [float(durations[(low <= gaps) & (gaps < high)].sum()) / total for low, high in PERSON_SPACES.values()]
-    nearest = float(gaps.min())
-    least: float | str = nearest if np.isfinite(nearest) else "no pedestrian was present at any sample of the truth"
-    return dict(zip(_PEOPLE_METRICS, (least, *shares), strict=True))
+    smallest = float(gaps.min())
+    min_gap: float | str = (
+        smallest if math.isfinite(smallest) else "no pedestrian was present at any sample of the truth"
+    )
+    return dict(zip(_PEOPLE_METRICS, (min_gap, *shares), strict=True))
 
 
 def add_plugin_metrics(

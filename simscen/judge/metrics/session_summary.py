@@ -18,11 +18,11 @@ class SessionSummary:
         success_interval: 95 % Wilson interval of the success rate.
         spl: Mean of the metric `spl` over all robots.
         soft_spl: Mean of the metric `soft_spl` over all robots.
-        spl_runs: Number of values of `spl`.
+        spl_runs: Number of values of `spl`, one for each robot of each run.
         collisions: Number of collisions of all robots whose collisions are known.
-        kilometers: Distance driven by these robots.
-        hours: Simulated time of these robots.
-        measured_runs: Number of runs with such robots.
+        kilometers: Distance driven by these robots, in km.
+        hours: Simulated time of these robots, in h.
+        measured_runs: Number of runs with at least one robot whose collisions are known.
     """
 
     runs: int
@@ -44,7 +44,7 @@ class SessionSummary:
 
     @property
     def collisions_per_hour(self) -> float | None:
-        """Collisions per hour; None if they are unknown, or without simulated time."""
+        """Collisions per hour; None if they are unknown or no time was simulated."""
         return None if self.collisions is None or not self.hours else self.collisions / self.hours
 
 
@@ -99,8 +99,11 @@ class SessionSummaryBuilder:
 class _RunNumbers(NamedTuple):
     """Numbers of one run that the statistics of a session need.
 
-    Tuples have one value for each robot that has the metric; `path_lengths` and `robot_seconds`, the simulated time of
-    all robots together, are of the robots with known `collisions`. `success` is None if it is unknown.
+    success:        1 if all robots with goals succeeded, otherwise 0; None if unknown
+    spl, soft_spl:  value of each robot that has the metric
+    collisions:     number of collisions of each robot, if it is known
+    path_lengths:   driven distance in m of the robots with known collisions
+    robot_seconds:  simulated time in s of these robots, summed over the robots
     """
 
     success: float | None

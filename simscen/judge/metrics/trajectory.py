@@ -59,10 +59,10 @@ def heading_change(trace: Trace) -> float:
 def _irregularity(trace: Trace, total_turn: float) -> float | str:
     """Return `total_turn` minus the turns of the first plan to each goal in rad, or why this is undefined."""
     starts = [event.tick for event in trace.of_kind(EventKind.GOAL_ACCEPTED)]
-    first = [next((plan for plan in trace.plans if plan.tick >= start), None) for start in starts]
-    if not starts or None in first:
+    first_plans = [next((plan for plan in trace.plans if plan.tick >= start), None) for start in starts]
+    if not starts or None in first_plans:
         return "no goal was accepted, or a goal has no plan to compare with"
-    headings = [plan.points[:, 2] for plan in first if plan is not None]
+    headings = [plan.points[:, 2] for plan in first_plans if plan is not None]
     return max(0.0, total_turn - sum(float(np.abs(wrap_array(np.diff(yaw))).sum()) for yaw in headings))
 
 
@@ -95,7 +95,7 @@ def _curvature(segments: list[Array]) -> Values:
 
 
 def _resample(segment: Array) -> Array:
-    """Return a subset of the points with distances of at least CURVATURE_SPACING_M."""
+    """Return a subset of the points (n, 2) in which consecutive points are at least CURVATURE_SPACING_M apart."""
     indices = [0]
     xs, ys = segment[:, 0].tolist(), segment[:, 1].tolist()
     for k in range(1, len(xs)):
@@ -138,7 +138,10 @@ def _error_statistics(name: str, errors: Array, weights: Array) -> Values:
 
 
 def _median(values: Array, weights: Array) -> float:
-    """Return the weighted median: half of the weight belongs to lower values. Between two values, return their mean."""
+    """Return the weighted median: half of the weight belongs to lower values.
+
+    If the half lies exactly between two values, return the mean of these values.
+    """
     order = np.argsort(values)
     below = np.cumsum(weights[order])
     first, second = (np.searchsorted(below, below[-1] / 2, side=side) for side in ("left", "right"))
@@ -150,17 +153,17 @@ def _relative_errors(trace: Trace) -> Values:
 
     Between the samples i and j, the robot drove at least RPE_DELTA_M, and was not teleported.
     """
-    believed, true = trace.belief.values, interpolate_poses(truth(trace), trace.belief.ticks)
+    estimated, true = trace.belief.values, interpolate_poses(truth(trace), trace.belief.ticks)
     teleported = frozenset(teleport_samples(trace, trace.belief.ticks))
     i, j = _pairs(np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1), teleported)
     if not len(i):
         return {
-            f"rpe_{kind}_{one}": f"the robot drove less than {RPE_DELTA_M:g} m"
-            for kind in _KINDS
-            for one in _STATISTICS
+            f"rpe_{part}_{statistic}": f"the robot drove less than {RPE_DELTA_M:g} m"
+            for part in _POSE_PARTS
+            for statistic in _STATISTICS
         }
-    moved_true, moved_believed = _between(true[i], true[j]), _between(believed[i], believed[j])
-    error, weights = _between(moved_true, moved_believed), np.ones(len(i))
+    true_motion, estimated_motion = _relative_poses(true[i], true[j]), _relative_poses(estimated[i], estimated[j])
+    error, weights = _relative_poses(true_motion, estimated_motion), np.ones(len(i))
     return {
         **_error_statistics("rpe_trans", np.hypot(error[:, 0], error[:, 1]), weights),
         **_error_statistics("rpe_rot", np.abs(wrap_array(error[:, 2])), weights),
@@ -170,7 +173,7 @@ def _relative_errors(trace: Trace) -> Values:
 def _pairs(steps: Array, teleported: Set[int]) -> tuple[list[int], list[int]]:
     """Return the first and the second index of pairs of samples between which the robot drove at least RPE_DELTA_M.
 
-    `steps` are the distances in m between consecutive samples. A new pair begins at each of the samples `teleported`.
+    `steps` are the distances in m between consecutive samples. A new pair begins at each sample in `teleported`.
     """
     pairs: list[tuple[int, int]] = []
     first, length = 0, 0.0
@@ -181,10 +184,10 @@ def _pairs(steps: Array, teleported: Set[int]) -> tuple[list[int], list[int]]:
         elif length >= RPE_DELTA_M:
             pairs.append((first, k))
             first, length = k, 0.0
-    return [one for one, _ in pairs], [other for _, other in pairs]
+    return [first for first, _ in pairs], [second for _, second in pairs]
 
 
-def _between(origin: Array, poses: Array) -> Array:
+def _relative_poses(origin: Array, poses: Array) -> Array:
     """Return poses (n, 3 or more columns) relative to `origin` (n, 3)."""
     c, s = np.cos(origin[:, 2]), np.sin(origin[:, 2])
     dx, dy = (poses - origin)[:, :2].T
@@ -201,9 +204,9 @@ def _nees(trace: Trace) -> float | str:
     )
 
 
-_KINDS = ("trans", "rot")
+_POSE_PARTS = ("trans", "rot")
 POSE_METRICS = (
-    *(f"{error}_{kind}_{one}" for error in ("ape", "rpe") for kind in _KINDS for one in _STATISTICS),
+    *(f"{error}_{part}_{name}" for error in ("ape", "rpe") for part in _POSE_PARTS for name in _STATISTICS),
     "ape_trans_final",
     "nees",
 )

@@ -77,7 +77,7 @@ def _criteria(scene: Scene) -> list[CriterionRow]:
         is_warning = verdict.severity == "warn" and verdict.status is not Status.PASS
         color = palette.AMBER if is_warning else palette.STATUS_COLORS[verdict.status]
         if finding is None:
-            rows.append((verdict.status, color, _wrap(f"{printable(verdict.id)}: checked nothing")))
+            rows.append((verdict.status, color, _wrap(f"{printable(verdict.id)}: no findings")))
             continue
         failed = verdict.status is not Status.PASS
         where = time_and_place(finding, scene.result.tick_rate) if failed else ""

@@ -117,10 +117,10 @@ GOOD = Finding(Status.PASS, "value", "1 m", "≥ 0 m", 1.0, "m", 1.0)
 @pytest.mark.parametrize(
     ("findings", "defect"),
     [
-        (None, "it checked nothing"),
-        ([], "it checked nothing"),
-        ({GOOD}, "it checked nothing"),
-        ((GOOD for _ in range(1)), "it checked nothing"),
+        (None, "it returned no findings"),
+        ([], "it returned no findings"),
+        ({GOOD}, "it returned no findings"),
+        ((GOOD for _ in range(1)), "it returned no findings"),
         ([GOOD, "fine"], "it returned an invalid finding of type str"),
         ([replace(GOOD, status="pass?")], "it returned an invalid finding of type Finding"),
         ([replace(GOOD, what=1)], "a text of its finding is not a string"),

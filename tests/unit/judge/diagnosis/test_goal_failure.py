@@ -38,7 +38,7 @@ def test_current_contact_is_named_with_its_start():
     touches = [[3, "collision.started", "sill", {}], [4, "collision.ended", "sill", {}]]
     assert why("stuck", touches) == []
     assert why("stuck", [*touches, [6, "collision.started", "sill", {}]]) == [
-        "why: it had touched sill since t = 6.00 s"
+        "why: the robot had touched sill since t = 6.00 s"
     ]
     assert why("stuck", [[6, "collision.started", "sill", {}]], at=5) == []
 
@@ -111,7 +111,7 @@ def test_passage_as_wide_as_the_robot_is_not_too_narrow():
 
 def test_contact_starting_at_the_tick_counts_and_ending_does_not():
     touches = [[6, "collision.started", "sill", {}], [8, "collision.ended", "sill", {}]]
-    assert why("stuck", touches, at=6) == ["why: it had touched sill since t = 6.00 s"]
+    assert why("stuck", touches, at=6) == ["why: the robot had touched sill since t = 6.00 s"]
     assert why("stuck", touches, at=8) == []
 
 
@@ -127,9 +127,8 @@ def test_object_within_thirty_centimeters_is_reported():
 def test_reason_for_waiting_of_the_stack_is_named():
     held = [2, "robot.held", "collision_monitor", {"message": "scans of lidar `lidar` come late"}]
     (line,) = why("goals_reached", [held])
-    assert (
-        line == "why: its collision monitor has stopped it, as reported at t = 2.00 s: scans of lidar `lidar` come late"
-    )
+    reason = "scans of lidar `lidar` come late"
+    assert line == f"why: the collision monitor has stopped the robot, as reported at t = 2.00 s: {reason}"
     assert why("goals_reached", [held, [4, "robot.released", "collision_monitor"]]) == []
 
 
@@ -141,7 +140,7 @@ def test_message_of_the_stack_is_quoted_only_without_another_cause():
         trace = synthetic_trace({**STATIONARY, "events": [*given_up, *events]})
         return causes("result", 2400, trace, synthetic_case(CASE))
 
-    assert causes_with() == ["why: it gave up and reported: no room to turn; spin, wait had not helped"]
+    assert causes_with() == ["why: the stack gave up and reported: no room to turn; spin, wait had not helped"]
     assert "said" not in "".join(causes_with(*box(1, "crate", 5, 0, 0.6, 2.0, "crate falls")))
 
 

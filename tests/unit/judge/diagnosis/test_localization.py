@@ -8,7 +8,7 @@ def test_kidnapping_explains_a_localization_error():
     far = {"belief": {"offset": [2.0, 0, 0]}}
     case = {"goals": [GOAL]}
     assert why("goals_reached", events, case=case, **far) == [
-        "why: its estimated position was 2.00 m from the true one",
+        "why: the estimated position was 2.00 m from the true position",
         "why: event `carried off` had moved the robot elsewhere 4.00 s before",
     ]
     assert why("localization_error", events, case=case, **far) == [
@@ -23,7 +23,7 @@ def test_kidnapping_explains_a_localization_error():
 def test_odometry_fault_explains_a_localization_error_after_it_has_ended():
     lost = {"case": {"goals": [GOAL]}, "belief": {"offset": [0, 0.8, 0]}}
     assert why("localization_error", slip(1, 1.5, 2), **lost) == [
-        "why: odom.slip falsified its odometry from t = 1.50 s on"
+        "why: odom.slip falsified the odometry from t = 1.50 s on"
     ]
     assert why("localization_error", slip(1, 1.5, 2, "lidar.off", "off"), **lost) == []
 
@@ -31,19 +31,19 @@ def test_odometry_fault_explains_a_localization_error_after_it_has_ended():
 def test_belief_faults_explain_a_localization_error_and_lidar_faults_do_not():
     lost = {"case": {"goals": [GOAL]}, "belief": {"offset": [0, 0.8, 0]}}
     jump = slip(1, 1.5, 2, "localizer.jump", "jump", affects="Belief")
-    assert why("localization_error", jump, **lost) == ["why: localizer.jump falsified its belief from t = 1.50 s on"]
+    assert why("localization_error", jump, **lost) == ["why: localizer.jump falsified the belief from t = 1.50 s on"]
     assert why("localization_error", slip(1, 1.5, 2, "lidar.bias", "bias", affects="Scan"), **lost) == []
     scaled = slip(1, 1.5, 2, "odom.scale", "scale", affects="Odometry")
-    assert why("localization_error", scaled, **lost) == ["why: odom.scale falsified its odometry from t = 1.50 s on"]
+    assert why("localization_error", scaled, **lost) == ["why: odom.scale falsified the odometry from t = 1.50 s on"]
 
 
 def test_error_of_half_a_meter_counts_as_lost():
     case = {"goals": [GOAL]}
     at_one = {"seconds": 10, "truth": [[0, 0, 1]]}
     half = why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0.5, 0, 0]})
-    assert half == ["why: its estimated position was 0.50 m from the true one"]
+    assert half == ["why: the estimated position was 0.50 m from the true position"]
     assert why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0, 0.8, 0]}) == [
-        "why: its estimated position was 0.80 m from the true one"
+        "why: the estimated position was 0.80 m from the true position"
     ]
     assert why("goals_reached", [], trace=at_one, case=case, belief={"offset": [0.49, 0, 0]}) == []
 

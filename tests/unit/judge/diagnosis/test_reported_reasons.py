@@ -44,7 +44,7 @@ def test_report_of_a_failed_goal_counts_from_its_tick_on():
     )
     assert _reported_failure(trace, outcome, 6 * SECOND - 1) == []
     assert _reported_failure(trace, outcome, 6 * SECOND) == [
-        "it gave up and reported: no valid path; clear, spin had not helped"
+        "the stack gave up and reported: no valid path; clear, spin had not helped"
     ]
 
 
