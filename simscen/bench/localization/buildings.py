@@ -25,7 +25,8 @@ def wall_boxes(
 ) -> Array:
     """Return the boxes (n, 4) of a wall along x or y with the center line from `start` to `end`. All lengths are in m.
 
-    `openings` are sorted intervals (begin, end) of the distance from `start`.
+    `start` is the end with the smaller coordinate. `openings` are gaps in the wall: sorted intervals (begin, end) of
+    the distance from `start`.
     """
     along = 0 if start[1] == end[1] else 1
     edges = [start[along], *(start[along] + edge for opening in openings for edge in opening), end[along]]
@@ -56,6 +57,7 @@ def box_distances(rows: Array, point: Sequence[float]) -> Array:
 
 FLOOR_LENGTH_RANGE_M, FLOOR_DEPTH_RANGE_M, CORRIDOR_WIDTH_RANGE_M = (41.0, 48.0), (17.0, 24.0), (1.8, 2.6)
 ROOM_WIDTH_RANGE_M, DOOR_WIDTH_RANGE_M, WALL_THICKNESS_RANGE_M = (3.2, 8.5), (0.95, 1.3), (0.12, 0.2)
+"""Ranges of the random dimensions of a building."""
 GLASS_WALL_FRACTION = 0.15
 """Fraction of the rooms that have a glass wall to the corridor."""
 CONNECTING_DOOR_FRACTION = 0.3
@@ -71,8 +73,8 @@ class Building:
     """An office floor. All lengths are in m.
 
     size:      length along x and depth along y
-    middle:    x of the wall between the left and the right half. The corridor connects both halves. In few buildings, a
-               gap behind the back wall of a room connects them, too
+    middle:    x of the border between the left and the right half. The corridor crosses the border; in a few
+               buildings, a gap behind the back wall of a room crosses it as well
     walls:     boxes (n, 4), as in box_array
     glass:     boxes (n, 4) of the glass walls
     furniture: boxes (n, 4)
@@ -92,7 +94,8 @@ class Building:
 def generate_building(number: int, right_half_version: int = 0) -> Building:
     """Return the building with this number. The result depends on the arguments only.
 
-    `right_half_version` selects the rooms and the furniture of the right half, to simulate a rebuilt floor.
+    `right_half_version` selects the rooms and the furniture of the right half: 0 for the original ones, and any other
+    number for a right half that was rebuilt.
     """
     streams = Streams(number)
     rng = streams.generator("floor")
@@ -119,8 +122,8 @@ def _generate_half(
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Return walls, glass, furniture, rooms, and doors, as in Building, of one half of a floor.
 
-    `ends` are the smallest and largest x of the half. `wall_ys` are the y of outer wall, corridor wall, corridor wall,
-    and outer wall, in ascending order.
+    `ends` are the smallest and largest x of the half. `wall_ys` are the y of the lower outer wall, the two corridor
+    walls, and the upper outer wall.
     """
     walls, glass, furniture, rooms, doors = ([np.empty((0, k))] for k in (4, 4, 4, 2, 2))
     for outer, inner in ((wall_ys[0], wall_ys[1]), (wall_ys[3], wall_ys[2])):

@@ -12,10 +12,10 @@ from simscen.bench.localization.consistency import (
     Consistency,
     Interval,
     anees_bounds,
+    correlated_anees_bounds,
     fraction_in_ellipsoid,
-    grouped_anees_bounds,
 )
-from simscen.bench.localization.generated_logs import CIRCUMSTANCES, KIDNAPPED_AT_S, Log, generate_log
+from simscen.bench.localization.generated_logs import CIRCUMSTANCES, KIDNAPPING_TIME_S, Log, generate_log
 from simscen.bench.localization.log_evaluation import (
     LocalizationResult,
     PoseErrors,
@@ -44,7 +44,7 @@ CONSISTENCY_CIRCUMSTANCES = ("clean", "slipping", "tracked", "outdated", "half")
 """Circumstances for which `Consistency` is computed: all except an unknown start and kidnapping."""
 RELOCALIZATION_LIMIT_S = 60.0
 """Time limit for localizing the robot after an unknown start or a kidnapping."""
-LOST_M, FOUND_M = 1.0, 0.5
+LOST_ERROR_M, FOUND_ERROR_M = 1.0, 0.5
 """Position error above which the robot counts as lost, and below which it counts as found again."""
 CHECK_TIMES_S = (15.0, 30.0, 45.0, 60.0, 75.0)
 """Times in a log at which the NEES is computed."""
@@ -59,7 +59,7 @@ ROBOT = RobotModel(
     linear_deceleration=1.0,
     angular_acceleration=2.0,
 )
-"""Robot model that AMCL requires. The logs do not depend on the robot model."""
+"""Robot model that AMCL requires. The generated logs do not depend on it."""
 
 
 @dataclass(frozen=True)
@@ -69,10 +69,11 @@ class Trial:
     building:     number of the building
     number:       number of the drive in the building
     circumstance: a key of CIRCUMSTANCES
-    tracked:      whether the position error never exceeded LOST_M
+    tracked:      whether the position error never exceeded LOST_ERROR_M
     median:       median position error in m
     largest:      largest position error in m
-    found:        seconds from start or kidnapping until the robot was found and not lost again; None if never
+    found:        time in s from the start, or from the kidnapping, until the position error fell below FOUND_ERROR_M
+                  and the robot was not lost again; None if this never happened
     nees:         NEES of the first belief at or after each of CHECK_TIMES_S
     ms:           CPU time per scan in ms
     slowest_ms:   CPU time of the slowest message in ms
@@ -99,7 +100,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class SuccessRate:
-    """Success on `count` out of `of` logs. `interval` is the bootstrap interval of the rate, over buildings."""
+    """Success on `count` out of `of` logs. `interval` is the interval of the rate, by bootstrap over buildings."""
 
     count: int
     of: int
@@ -129,7 +130,7 @@ class ParameterSetResults:
 def run_buildings(
     buildings: Sequence[int], names: Sequence[str], workers: int
 ) -> Iterator[Mapping[str, Sequence[Trial]]]:
-    """Yield the trials of one building after the other, by name of the parameter set.
+    """Call `run_building` for each building in parallel processes, and yield the results in the order of `buildings`.
 
     `names` are keys of PARAMETER_SETS. Everything except CPU times is deterministic.
     """
@@ -151,12 +152,12 @@ def run_building(building: int, names: Sequence[str]) -> Mapping[str, Sequence[T
 def run_trial(log: Log, localizer: Localizer, seed: int) -> Trial:
     """Run a localizer on a log. Everything except CPU times is deterministic."""
     localized, errors = localize_in_log(log, localizer, seed)
-    truth = log.sensed.truth
+    truth = log.recording.truth
     rows = np.searchsorted(localized.times, CHECK_TIMES_S)
     pose_errors = localized.poses[rows] - truth[rows]
     pose_errors[:, 2] = wrap_array(pose_errors[:, 2])
     i, k = np.triu_indices(3)
-    lost_at = KIDNAPPED_AT_S if log.circumstance == "kidnapped" else 0.0
+    search_start = KIDNAPPING_TIME_S if log.circumstance == "kidnapped" else 0.0
     return Trial(
         building=log.building,
         number=log.number,
@@ -164,7 +165,7 @@ def run_trial(log: Log, localizer: Localizer, seed: int) -> Trial:
         tracked=not errors.lost,
         median=float(np.median(errors.distance)),
         largest=float(errors.distance.max()),
-        found=_time_found(errors.times - lost_at, errors.distance),
+        found=_time_found(errors.times - search_start, errors.distance),
         nees=tuple(nees(pose_errors, localized.covariances[rows][:, i, k]).tolist()),
         ms=localized.cpu_s * 1e3 / localized.scan_count,
         slowest_ms=localized.slowest_reading_s * 1e3,
@@ -174,17 +175,21 @@ def run_trial(log: Log, localizer: Localizer, seed: int) -> Trial:
 def localize_in_log(log: Log, localizer: Localizer, seed: int) -> tuple[LocalizationResult, PoseErrors]:
     """Run a localizer on a log, and return its beliefs and their errors."""
     surroundings = Surroundings(ROBOT, log.map, TICK_RATE_HZ)
-    localized = localize(log.sensed, StackSpec(localizer=localizer), surroundings, log.estimate, seed)
-    errors = compare_with_reference(localized, log.sensed, LOST_M)
+    localized = localize(log.recording, StackSpec(localizer=localizer), surroundings, log.estimate, seed)
+    errors = compare_with_reference(localized, log.recording, LOST_ERROR_M)
     assert errors is not None  # a generated log has a reference from its first reading to its last
     return localized, errors
 
 
 def _time_found(times: Array, distance: Array) -> float | None:
-    """Return the first of `times` >= 0 with an error below FOUND_M, after the last error above LOST_M; None if none."""
-    lost = np.flatnonzero((distance > LOST_M) & (times >= 0))
+    """Return the first of `times` at which the robot was found and not lost again; None if there is none.
+
+    `times` (n,) are in s, relative to the start or the kidnapping; negative times are ignored. `distance` (n,) are the
+    position errors in m.
+    """
+    lost = np.flatnonzero((distance > LOST_ERROR_M) & (times >= 0))
     begin = int(lost[-1]) + 1 if len(lost) else int(np.searchsorted(times, 0.0))
-    near = np.flatnonzero(distance[begin:] < FOUND_M)
+    near = np.flatnonzero(distance[begin:] < FOUND_ERROR_M)
     return max(0.0, float(times[begin + near[0]])) if len(near) else None
 
 
@@ -206,7 +211,7 @@ def _consistency(trials: Sequence[Trial]) -> Consistency:
     values = [value for trial in trials for value in trial.nees]
     return Consistency(
         anees=float(np.mean(values)),
-        bounds=grouped_anees_bounds(_means_by_building(trials, [float(np.mean(trial.nees)) for trial in trials])),
+        bounds=correlated_anees_bounds(_means_by_building(trials, [float(np.mean(trial.nees)) for trial in trials])),
         inside=fraction_in_ellipsoid(values),
         anees_by_time=np.mean([trial.nees for trial in trials], axis=0).tolist(),
         bounds_by_time=anees_bounds(len(trials)),

@@ -58,21 +58,21 @@ def drive_between_rooms(
 def _waypoints(
     floor: Building, paths: ShortestPaths, rng: np.random.Generator, alternates_halves: bool
 ) -> Iterator[Array]:
-    """Yield without end the vertices (2,) of shortest paths between random points in rooms. Raises EnclosedStart."""
+    """Yield endlessly the vertices (2,) of shortest paths between random points in rooms. Raises EnclosedStart."""
     position: Array | None = None
-    right, failed = False, 0
+    is_right, failed_count = False, 0
     while True:
-        side = (floor.rooms[:, 0] > floor.middle) == right
-        rooms = floor.rooms[side] if alternates_halves else floor.rooms
+        in_half = (floor.rooms[:, 0] > floor.middle) == is_right
+        rooms = floor.rooms[in_half] if alternates_halves else floor.rooms
         target = rooms[rng.integers(len(rooms))] + rng.normal(0, 0.8, 2)
         start = target if position is None else position
         path = paths.path(Pose2(*start), Pose2(*target))
-        failed = failed + 1 if path is None else 0
-        if failed > MAX_FAILED_GOALS:  # furniture blocks the door of this room
+        failed_count = failed_count + 1 if path is None else 0
+        if failed_count > MAX_FAILED_GOALS:  # furniture blocks the door of this room
             raise EnclosedStart(tuple(start))
         if path is not None:
             yield from path[:1] if position is None else path[1:]
-            position, right = path[-1], not right
+            position, is_right = path[-1], not is_right
 
 
 def mapping_tour(floor: Building) -> Array:
@@ -95,7 +95,7 @@ def mapping_tour(floor: Building) -> Array:
 
 MEAN_SLIP_INTERVAL_S = 25.0
 """Mean time from the end of one slip to the start of the next."""
-SLIP_DURATION_S = (0.3, 1.5)
+SLIP_DURATION_RANGE_S = (0.3, 1.5)
 """Shortest and longest duration of a slip."""
 
 
@@ -153,33 +153,35 @@ def _slip_factors(count: int, has_slip: bool, rng: np.random.Generator) -> Array
         return factor
     row = int(rng.exponential(MEAN_SLIP_INTERVAL_S) / STEP_S)
     while row < count:
-        end = row + max(1, int(rng.uniform(*SLIP_DURATION_S) / STEP_S))
+        end = row + max(1, int(rng.uniform(*SLIP_DURATION_RANGE_S) / STEP_S))
         factor[row:end] = rng.uniform(0.9, 1.4)
         row = end + int(rng.exponential(MEAN_SLIP_INTERVAL_S) / STEP_S)
     return factor
 
 
-ROOM_WALK_M = 2.5
+WALKING_AREA_SIDE_M = 2.5
 """Side of the square around the center of a room in which a person walks."""
 WALKING_SPEED_M_S = 1.1
 """Walking speed, which is multiplied by a random factor from 0.4 to 1.2 for each person."""
 
 
-def simulate_people(floor: Building, count: int, seconds: float, people: int, rng: np.random.Generator) -> Array:
-    """Return poses (count, people, 3) of `people` persons at `count` times that are `seconds` apart.
+def simulate_people(
+    floor: Building, time_count: int, interval: float, people_count: int, rng: np.random.Generator
+) -> Array:
+    """Return the poses (time_count, people_count, 3) of people at times that are `interval` seconds apart.
 
     Half of the people walk in the corridor, half in rooms. Each person walks back and forth on a random line, also
     through the robot and furniture.
     """
-    times = np.arange(count) * seconds
+    times = np.arange(time_count) * interval
     corridor = float(np.median(floor.doors[:, 1]))
     tracks = []
-    for person in range(people):
+    for person in range(people_count):
         if person % 2:
             ends = np.array([[2.0, corridor], [floor.size[0] - 2.0, corridor]]) + rng.normal(0, 0.2, (2, 2))
         else:
             center = floor.rooms[rng.integers(len(floor.rooms))]
-            ends = center + rng.uniform(-ROOM_WALK_M, ROOM_WALK_M, (2, 2)) / 2
+            ends = center + rng.uniform(-WALKING_AREA_SIDE_M, WALKING_AREA_SIDE_M, (2, 2)) / 2
         length = float(np.hypot(*(ends[1] - ends[0])))
         walked = times * WALKING_SPEED_M_S * rng.uniform(0.4, 1.2) + rng.uniform(0, 2 * length)
         returning = walked % (2 * length) > length
@@ -192,14 +194,14 @@ def simulate_people(floor: Building, count: int, seconds: float, people: int, rn
 
 LEG_RADIUS_M, LEG_OFFSET_M = 0.07, 0.14
 """Radius of a leg, and distance of the leg from the center of the person."""
-LEG_RANGE_M = 15.0
+MAX_LEG_DISTANCE_M = 15.0
 """Distance from the lidar beyond which legs are ignored."""
 GLASS_TRANSMISSION = 0.8
 """Probability that a beam passes through glass."""
 
 
 class PartlyTransparentScene:
-    """Ray caster for a building with glass, which a beam passes with the probability GLASS_TRANSMISSION."""
+    """Ray caster for a building with glass. A beam passes through glass with the probability GLASS_TRANSMISSION."""
 
     def __init__(self, floor: Building, furniture: Array) -> None:
         """Take the floor, and boxes (n, 4) of the furniture that replaces the furniture of the floor."""
@@ -228,7 +230,8 @@ def beam_angles(spec: Lidar) -> Array:
 def occlude_by_people(people: Array, poses: Array, angles: Array, ranges: Array) -> Array:
     """Return the ranges (n, b) of scans among people. Beams that hit a leg end there.
 
-    `people` are the poses (n, p, 3) of p people, `poses` (n, 3) of the lidar. `angles` (b,) of the beams are in rad.
+    `people` (n, p, 3) are the poses of p people at the time of each scan, and `poses` (n, 3) the poses of the lidar.
+    `angles` (b,) are the beam angles in rad, and `ranges` (n, b) the ranges in m without people.
     """
     offset = np.stack((-np.sin(people[..., 2]), np.cos(people[..., 2])), axis=-1) * LEG_OFFSET_M
     legs = np.concatenate((people[..., :2] + offset, people[..., :2] - offset), axis=1) - poses[:, None, :2]
@@ -237,7 +240,7 @@ def occlude_by_people(people: Array, poses: Array, angles: Array, ranges: Array)
     result: Array = np.array(ranges)
     for leg in range(legs.shape[1]):
         x, y = legs[:, leg, :1], legs[:, leg, 1:]
-        near = np.hypot(x, y)[:, 0] < LEG_RANGE_M
+        near = np.hypot(x, y)[:, 0] < MAX_LEG_DISTANCE_M
         along = c[near] * x[near] + s[near] * y[near]
         half_chord_squared = LEG_RADIUS_M**2 - np.square(x[near]) - np.square(y[near]) + np.square(along)
         hits = (half_chord_squared >= 0) & (along > 0)

@@ -44,7 +44,8 @@ OCCUPIED_FRACTION = 0.25
 def draw_map(poses: Array, angles: Array, ranges: Array, size: tuple[float, float]) -> OccupancyGrid:
     """Draw a map, as SLAM does, from scans with `ranges` (n, b) in m and beam `angles` (b,) in rad.
 
-    `poses` (n, 3) are lidar poses. `size` is the length and depth of the floor in m. Cells without a beam are unknown.
+    `poses` (n, 3) are lidar poses. `size` is the length and depth of the floor in m. Cells that no beam reaches are
+    unknown.
     """
     width, height = (int(np.ceil((edge + 2 * MAP_MARGIN_M) / CELL_M)) for edge in size)
     heading = poses[:, 2:] + angles
@@ -76,18 +77,21 @@ def left_half(grid: OccupancyGrid, middle: float) -> OccupancyGrid:
 
 
 LIDARS = ((181, 5.0), (361, 5.0), (181, 10.0), (361, 10.0))
-"""Number of beams over 180°, and scans per second, as of the SICK LMS in public logs. Drives use them in turn."""
+"""Lidars that the drives use in turn: number of beams over 180°, and scans per second.
+
+The values are those of the SICK LMS in public logs.
+"""
 LIDAR_MOUNT = Pose2(0.1, 0.0, 0.0)
 """Pose of the lidar in the base frame."""
 PEOPLE_COUNT = 8
 """Number of people on a floor."""
-LOG_DURATION_S, KIDNAPPED_AT_S = 90.0, 30.0
+LOG_DURATION_S, KIDNAPPING_TIME_S = 90.0, 30.0
 MAPPING_POSE_STD = (0.02, 0.02, 0.004)
 """Standard deviations (x in m, y in m, yaw in rad) of the pose errors with which the map is drawn."""
 CIRCUMSTANCES = {
     "tracked": "known start",
     "clean": "known start, odometry with random errors only, no people, furniture as on the map",
-    "slipping": "as clean, but with systematic odometry errors and slipping wheels",
+    "slipping": "as `clean`, but with systematic odometry errors and slipping wheels",
     "unknown": "unknown start",
     "outdated": "known start; the right half of the floor was rebuilt after the map was made",
     "half": "known start; the map ends at the middle of the floor",
@@ -105,7 +109,7 @@ class Log:
     building:     number of the building
     number:       number of the drive in the building
     circumstance: a key of CIRCUMSTANCES
-    sensed:       sensor readings and true poses
+    recording:    sensor readings and true poses
     map:          map for the localizer
     estimate:     initial pose estimate for the localizer
     """
@@ -113,7 +117,7 @@ class Log:
     building: int
     number: int
     circumstance: str
-    sensed: LocalizationLog
+    recording: LocalizationLog
     map: OccupancyGrid
     estimate: Estimate
 
@@ -134,29 +138,29 @@ def generate_log(building: int, number: int, circumstance: str, seconds: float =
     odometry = simulate_odometry(truth, errors, rng)
     if circumstance == "kidnapped":
         after, _ = _drive_in_furniture(floor, circumstance, seconds, rng, furniture)
-        row = int(KIDNAPPED_AT_S / STEP_S)
+        row = int(KIDNAPPING_TIME_S / STEP_S)
         odometry_after = simulate_odometry(after, OdometryErrors(), rng)
         last = Pose2(*odometry[row])
         continued = [last.compose(Pose2(*pose)) for pose in odometry_after[: len(truth) - row].tolist()]
         odometry = np.vstack((odometry[:row], continued))
         truth = np.vstack((truth[:row], after[: len(truth) - row]))
-    scan_every = round(1 / rate / STEP_S)
-    poses = truth[::scan_every]
+    poses_per_scan = round(1 / rate / STEP_S)
+    poses = truth[::poses_per_scan]
     lidar_poses = np.array([Pose2(*pose).compose(LIDAR_MOUNT) for pose in poses.tolist()])
     angles = beam_angles(lidar)
     ranges = PartlyTransparentScene(floor, furniture).distances(lidar_poses, angles, lidar.max_range, rng)
     if circumstance not in UNCHANGED_CIRCUMSTANCES:
-        people = simulate_people(floor, len(poses), scan_every * STEP_S, PEOPLE_COUNT, rng)
+        people = simulate_people(floor, len(poses), poses_per_scan * STEP_S, PEOPLE_COUNT, rng)
         ranges = occlude_by_people(people, lidar_poses, angles, ranges)
     ranges = add_lidar_noise(ranges, lidar, rng)
-    readings = _readings(odometry, ranges, scan_every, lidar)
+    readings = _readings(odometry, ranges, poses_per_scan, lidar)
     ticks = np.round(np.arange(len(truth)) * STEP_S * TICK_RATE_HZ).astype(np.int64)
     grid = building_map(building)
     return Log(
         building=building,
         number=number,
         circumstance=circumstance,
-        sensed=LocalizationLog(readings, ticks, truth),
+        recording=LocalizationLog(readings, ticks, truth),
         map=left_half(grid, floor.middle) if circumstance == "half" else grid,
         estimate=Estimate(None if circumstance == "unknown" else Pose2(*truth[0].tolist())),
     )
@@ -167,8 +171,8 @@ def _drive_in_furniture(
 ) -> tuple[Array, Array]:
     """Return the true poses (k, 3) of a drive, and boxes (n, 4) of the furniture.
 
-    Without `furniture`, the furniture is chosen for the circumstance. If the furniture encloses the robot, furniture
-    and drive are chosen again.
+    If `furniture` is None, the furniture is chosen for the circumstance. If the furniture encloses the robot, a new
+    drive is generated, with new furniture if `furniture` is None.
     """
     while True:
         current = furniture
@@ -190,16 +194,19 @@ def building_map(building: int) -> OccupancyGrid:
     return draw_map(poses + rng.normal(0, MAPPING_POSE_STD, poses.shape), angles, ranges, floor.size)
 
 
-def _readings(odometry: Array, ranges: Array, scan_every: int, lidar: Lidar) -> list[Odometry | Scan]:
-    """Return an odometry message for each pose, and a scan after the first and each further `scan_every`-th one."""
+def _readings(odometry: Array, ranges: Array, poses_per_scan: int, lidar: Lidar) -> list[Odometry | Scan]:
+    """Return an odometry message for each pose (k, 3), and a scan after every `poses_per_scan`-th of these messages.
+
+    `ranges` (n, b) are the ranges of the scans in m. The first scan follows the first odometry message.
+    """
     readings: list[Odometry | Scan] = []
     increment = lidar.field_of_view / (lidar.beams - 1)
     for row, pose in enumerate(odometry.tolist()):
         tick = round(row * STEP_S * TICK_RATE_HZ)
         readings.append(Odometry("odom", tick, Pose2(*pose), Twist()))
-        if row % scan_every == 0:
+        if row % poses_per_scan == 0:
             readings.append(
-                Scan("lidar", tick, ranges[row // scan_every], -lidar.field_of_view / 2, increment, lidar.min_range,
+                Scan("lidar", tick, ranges[row // poses_per_scan], -lidar.field_of_view / 2, increment, lidar.min_range,
                      lidar.max_range, LIDAR_MOUNT)
             )  # fmt: skip
     return readings

@@ -20,7 +20,7 @@ from simscen.stack.setting import Setting
 from simscen.stack.validation.components import CheckedLocalizer
 
 MAX_GAP_S = 1.0
-"""Time between two consecutive reference poses up to which all beliefs between them are compared."""
+"""Maximum time between two consecutive reference poses, so that all beliefs between the poses are compared."""
 MAX_TIME_DIFFERENCE_S = 0.05
 """Maximum time between a belief and the nearest reference pose in a gap longer than MAX_GAP_S."""
 
@@ -47,7 +47,7 @@ class LocalizationResult:
 
 @dataclass(frozen=True)
 class LostInterval:
-    """Interval from `since` to `until` in s in which the robot was lost. `until` is None for an interval to the end."""
+    """Interval from `since` to `until` in s in which the robot was lost; `until` is None if it was lost to the end."""
 
     since: float
     until: float | None
@@ -61,14 +61,14 @@ class PoseErrors:
     distance: position errors (n,) in m
     yaw:      signed yaw errors (n,) in rad
     lost:     intervals in which the robot was lost
-    compared: fraction of all beliefs that could be compared with a reference pose
+    compared_fraction: fraction of all beliefs that could be compared with a reference pose
     """
 
     times: Array
     distance: Array
     yaw: Array
     lost: Sequence[LostInterval]
-    compared: float
+    compared_fraction: float
 
     def figures(self) -> dict[str, float]:
         """Return by name the median, RMSE, largest, and last position error in m, and the RMSE of the yaw in rad."""
@@ -134,7 +134,7 @@ def compare_with_reference(
 
 
 def lost_intervals(times: Array, lost: Array) -> list[LostInterval]:
-    """Return the intervals of `times` (n,) in which the array `lost` (n,) is true."""
+    """Return the intervals of `times` (n,) in which `lost` (n,) is true. An interval ends when `lost` becomes false."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], lost.astype(np.int8), [0]))))
     return [
         LostInterval(float(times[begin]), float(times[end]) if end < len(times) else None)

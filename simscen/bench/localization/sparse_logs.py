@@ -28,11 +28,11 @@ LOCALIZERS: Mapping[str, AmclParameters] = {
 """Variants of AMCL to compare, by name."""
 SEED_COUNT = 5
 """Number of seeds with which each localizer runs on each log."""
-SCAN_SPACING_M, SCAN_SPACING_RAD = 1.0, 0.5
+MIN_SCAN_SPACING_M, MIN_SCAN_SPACING_RAD = 1.0, 0.5
 """Minimum translation, or minimum rotation, between two scans of a sparse log."""
 DURATION_S = 180.0
 """Duration of a log before it is shortened to end after a turn."""
-END_TURN_RAD = 1.0
+MIN_END_TURN_RAD = 1.0
 """Minimum rotation over the last three scans of a log that ends after a turn."""
 MISSED_TURN_FRACTION, MISSED_TURN_STD_RAD = 0.05, 0.6
 """Fraction of the scans after which odometry misses a turn, and standard deviation of the missed angle.
@@ -57,7 +57,7 @@ class SparseTrial:
     """Result of one localizer with one seed on one log. The names of the fields are keys of the JSON output.
 
     `kind` is a key of KINDS, `localizer` a key of LOCALIZERS. `median` is the median position error in m, and `end` is
-    the last position error in m. `lost` is true if any position error exceeded LOST_M of campaign.py.
+    the last position error in m. `lost` is true if any position error exceeded LOST_ERROR_M of campaign.py.
     """
 
     kind: str
@@ -70,32 +70,36 @@ class SparseTrial:
 
 
 def thin_scans(log: Log, ends_after_turn: bool) -> Log:
-    """Return the log with all odometry messages, but only with scans SCAN_SPACING_M or SCAN_SPACING_RAD apart.
+    """Return the log with fewer scans, at least MIN_SCAN_SPACING_M or MIN_SCAN_SPACING_RAD apart.
 
-    With `ends_after_turn`, the log ends at the last scan after a turn of END_TURN_RAD, if there is such a turn.
+    With `ends_after_turn`, the log ends at the last scan that follows a turn of MIN_END_TURN_RAD. Without such a turn,
+    the log is not shortened.
     """
     readings: list[Odometry | Scan] = []
     selected: list[tuple[int, Pose2]] = []  # tick and odometry of each selected scan
     odometry, end = Pose2(0.0, 0.0, 0.0), 0
-    for reading in log.sensed.readings:
+    for reading in log.recording.readings:
         if isinstance(reading, Odometry):
             odometry = reading.pose
         elif isinstance(reading, Scan):
             if selected:
                 last = selected[-1][1]
                 turned = abs(wrap(odometry.yaw - last.yaw))
-                if last.distance(odometry) < SCAN_SPACING_M and turned < SCAN_SPACING_RAD:
+                if last.distance(odometry) < MIN_SCAN_SPACING_M and turned < MIN_SCAN_SPACING_RAD:
                     continue
             selected.append((reading.tick, odometry))
-            if len(selected) > 2 and abs(wrap(odometry.yaw - selected[-3][1].yaw)) > END_TURN_RAD:
+            if len(selected) > 2 and abs(wrap(odometry.yaw - selected[-3][1].yaw)) > MIN_END_TURN_RAD:
                 end = reading.tick
         readings.append(reading)
     if not ends_after_turn or not end:
-        return replace(log, sensed=replace(log.sensed, readings=readings))
-    until_end = log.sensed.ticks <= end
-    sensed = LocalizationLog([reading for reading in readings if reading.tick <= end], log.sensed.ticks[until_end],
-                             log.sensed.truth[until_end])  # fmt: skip
-    return replace(log, sensed=sensed)
+        return replace(log, recording=replace(log.recording, readings=readings))
+    until_end = log.recording.ticks <= end
+    recording = LocalizationLog(
+        [reading for reading in readings if reading.tick <= end],
+        log.recording.ticks[until_end],
+        log.recording.truth[until_end],
+    )
+    return replace(log, recording=recording)
 
 
 def with_missed_turns(log: Log) -> Log:
@@ -103,7 +107,7 @@ def with_missed_turns(log: Log) -> Log:
     rng = Streams(log.building).generator("missed turns")
     readings: list[Odometry | Scan] = []
     previous, reported, turn = Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 0.0), 0.0
-    for reading in log.sensed.readings:
+    for reading in log.recording.readings:
         if isinstance(reading, Odometry):
             step, previous = previous.between(reading.pose), reading.pose
             reported, turn = reported.compose(Pose2(step.x, step.y, step.yaw + turn)), 0.0
@@ -111,7 +115,7 @@ def with_missed_turns(log: Log) -> Log:
         elif isinstance(reading, Scan):
             turn = float(rng.normal(0.0, MISSED_TURN_STD_RAD)) if rng.random() < MISSED_TURN_FRACTION else 0.0
             readings.append(reading)
-    return replace(log, sensed=replace(log.sensed, readings=readings))
+    return replace(log, recording=replace(log.recording, readings=readings))
 
 
 def generate_sparse_log(kind: str, building: int) -> Log:
@@ -143,7 +147,7 @@ def run_sparse_log(kind: str, building: int) -> Sequence[SparseTrial]:
 def sparse_table(trials: Sequence[SparseTrial]) -> list[tuple[str, ...]]:
     """Return a table with a header row, a row for each kind of log, and a column for each localizer.
 
-    A cell has the number of lost trials, the median of their median errors, and the median of their final errors.
+    A cell has the number of lost trials, and the medians over all trials of the median error and of the final error.
     """
     rows = [("log", *LOCALIZERS)]
     for kind in KINDS:

@@ -21,7 +21,7 @@ START, GOAL = Pose2(-2.25, 3.0, 1.57), Pose2(-2.25, 13.0, 1.57)
 """Start and goal of the robot in BARN."""
 
 LOCALIZER = "{type: slip_ekf, rotation_noise: 0.5, match_scans: true}"
-"""YAML of a localizer with distances from the wheels, rotations from the gyroscope, and laser scan matching."""
+"""YAML of a localizer that combines wheel odometry, the gyroscope, and the matching of laser scans."""
 COSTMAP = "{obstacle_max_range: 8 m, raytrace_max_range: 10 m, update_frequency: 10 Hz}"
 """YAML of the costmap parameters for mapless drives."""
 TUNED_STACK = f"""\
@@ -78,7 +78,7 @@ def _parse_rows(file: Path, rows: Iterable[dict[str, str]]) -> Iterable[BarnWorl
         except (TypeError, ValueError) as error:
             raise UsageError(f"{file}, line {number}: {error}") from error
         if not 0.0 < length < math.inf:
-            raise UsageError(f"{file}, line {number}: a path is longer than 0 m, not {length:g}")
+            raise UsageError(f"{file}, line {number}: `ref_path_len` must be a length above 0 m, not {length:g}")
         yield BarnWorld(file.parent / f"world_{world}.world", length)
 
 
@@ -110,9 +110,10 @@ def _pose_yaml(pose: Pose2) -> str:
 def write_barn_challenge(
     folder: Path, dataset: Path, seeds: Sequence[int], variant: str = "", stack: str = TUNED_STACK
 ) -> Experiment:
-    """Write a drive in each world of BARN. Raises UsageError if `dataset`, the folder with the worlds, is invalid.
+    """Write a drive in each world of BARN. `dataset` is the folder with the worlds.
 
-    `stack` are the YAML lines below `stack:`. `variant` is the name of this stack; "" for TUNED_STACK.
+    `stack` are the YAML lines below `stack:`. `variant` is the name of this stack; "" for TUNED_STACK. Raises
+    UsageError if the list of the worlds is missing or invalid.
     """
     name = f"BARN, {variant}" if variant else "BARN"
     drives = []

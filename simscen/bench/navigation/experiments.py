@@ -1,7 +1,7 @@
 """Experiments of `simscen bench nav`. An experiment is a list of drives: scenario files, each with its seeds.
 
-The functions `write_…` of this folder write scenario files to `folder` and return the experiments. All random values of
-a generated field or drive are derived from its number.
+The functions `write_…` of this package write scenario files to the folder `folder`, and return the experiments. All
+random values of a generated field or drive are derived from its number.
 """
 
 import json
@@ -17,7 +17,7 @@ class Drive:
     """Scenario file with the seeds of its runs.
 
     `reference_length` is the length in m of the reference path for the BARN score; None without a score. `world` is the
-    name of the world, by which runs are grouped; a drive with the name "" is a group of its own.
+    name of the world, by which runs are grouped for confidence intervals; "" for a world that no other drive uses.
     """
 
     file: Path
@@ -30,6 +30,8 @@ class Drive:
 class Experiment:
     """Drives that form one row of the result table.
 
+    name:                  name in the result table
+    drives:                scenario files with their seeds
     root:                  folder of all scenario files
     world_path:            folders for `--world-path`
     measures_localization: whether the errors of the pose estimates are measured as well
@@ -52,9 +54,10 @@ def write_text(file: Path, text: str) -> Path:
 
 
 def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str, Any], folder: Path) -> Experiment:
-    """Write a copy of an experiment with a new name. `stack` is the value of the key `stack` in its scenarios.
+    """Write a copy of an experiment whose scenarios have the further parameters `stack`. `name` is its name.
 
-    The new scenarios, in `folder`, extend the original scenarios. The key `localizer` is ignored for mapless drives.
+    The new scenarios are written to `folder`, and extend the original scenarios. `stack` is the value of their key
+    `stack`. Its key `localizer` is ignored for mapless drives.
     """
     drives = []
     stack = {key: value for key, value in stack.items() if not (experiment.is_mapless and key == "localizer")}

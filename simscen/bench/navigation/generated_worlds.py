@@ -129,20 +129,24 @@ HALL_WIDTH_M = 2.4
 
 
 def write_two_robots(folder: Path, numbers: Iterable[int]) -> Experiment:
-    """Write one scenario for each number, which is its seed: two robots meet in a corridor."""
+    """Write a scenario for each number in which two robots meet in a corridor. The number is also the seed."""
     return _numbered_drives("two robots in a corridor", folder, "corridor", _meeting_scenario, numbers)
 
 
 def write_ramps(folder: Path, numbers: Iterable[int]) -> Experiment:
-    """Write one scenario for each number, which is its seed: a robot drives up a ramp, along a platform, and down."""
+    """Write a scenario for each number in which a robot drives over a platform between two ramps.
+
+    The number is also the seed.
+    """
     return _numbered_drives("ramps", folder, "ramp", _ramp_scenario, numbers)
 
 
 def _numbered_drives(
-    name: str, folder: Path, stem: str, scenario: Callable[[int], str], numbers: Iterable[int]
+    name: str, folder: Path, stem: str, scenario_yaml: Callable[[int], str], numbers: Iterable[int]
 ) -> Experiment:
+    """Write the scenario `scenario_yaml(number)` for each number. Its file is `<stem>_<number>.scenario.yaml`."""
     files = {number: folder / f"{stem}_{number}.scenario.yaml" for number in numbers}
-    drives = (Drive(write_text(file, scenario(number)), [number]) for number, file in files.items())
+    drives = (Drive(write_text(file, scenario_yaml(number)), [number]) for number, file in files.items())
     return Experiment(name, tuple(drives), folder)
 
 
@@ -150,7 +154,7 @@ def _meeting_scenario(number: int) -> str:
     rng, length = Streams(number).generator("corridor"), MEETING_CORRIDOR_LENGTH_M
     width = float(rng.uniform(*MEETING_CORRIDOR_WIDTH_RANGE_M))
     max_offset = width / 2 - 0.35
-    west, east = rng.uniform(-max_offset, max_offset, 2).tolist()
+    west_offset, east_offset = rng.uniform(-max_offset, max_offset, 2).tolist()
     return f"""\
 simscen: 1
 name: two robots meet in {width:.2f} m
@@ -160,11 +164,11 @@ world:
     - {{name: corridor, points: [[0, 0], [{length:g}, 0], [{length:g}, {width:.3f}], [0, {width:.3f}], [0, 0]]}}
 robots:
   eastbound:
-    pose: {{x: 1.0, y: {width / 2 + west:.3f}}}
-    goals: [{{name: east, pose: {{x: {length - 1:g}, y: {width / 2 + east:.3f}}}}}]
+    pose: {{x: 1.0, y: {width / 2 + west_offset:.3f}}}
+    goals: [{{name: east, pose: {{x: {length - 1:g}, y: {width / 2 + east_offset:.3f}}}}}]
   westbound:
-    pose: {{x: {length - 1:g}, y: {width / 2 + east:.3f}, yaw: 180 deg}}
-    goals: [{{name: west, pose: {{x: 1.0, y: {width / 2 + west:.3f}, yaw: 180 deg}}}}]
+    pose: {{x: {length - 1:g}, y: {width / 2 + east_offset:.3f}, yaw: 180 deg}}
+    goals: [{{name: west, pose: {{x: 1.0, y: {width / 2 + west_offset:.3f}, yaw: 180 deg}}}}]
 time_limit: 120 s
 pass:
   - goals_reached: {{}}
@@ -175,9 +179,11 @@ pass:
 def _ramp_scenario(number: int) -> str:
     rng = Streams(number).generator("ramp")
     slope, height = float(rng.uniform(*RAMP_SLOPE_RANGE_DEG)), float(rng.uniform(*RAMP_HEIGHT_RANGE_M))
-    ramp_length, flat = height / float(np.tan(np.radians(slope))), float(rng.uniform(1.5, 3.0))
-    top, below = (3.0 + ramp_length, 3.0 + ramp_length + flat), 3.0 + 2 * ramp_length + flat
-    end, y = below + 3.0, float(rng.uniform(0.6, HALL_WIDTH_M - 0.6))
+    ramp_length, platform_length = height / float(np.tan(np.radians(slope))), float(rng.uniform(1.5, 3.0))
+    platform_start = 3.0 + ramp_length
+    platform_end = platform_start + platform_length
+    down_end = platform_end + ramp_length
+    hall_end, y = down_end + 3.0, float(rng.uniform(0.6, HALL_WIDTH_M - 0.6))
     hall = HALL_WIDTH_M
     middle, size = hall / 2, f"width: {hall - 0.1:g}, height: {height:.4f}"
     return f"""\
@@ -185,16 +191,16 @@ simscen: 1
 name: a ramp of {slope:.1f} degrees
 world:
   simscen: 1
-  walls: [{{name: hall, points: [[0, 0], [{end:.3f}, 0], [{end:.3f}, {hall:g}], [0, {hall:g}], [0, 0]]}}]
+  walls: [{{name: hall, points: [[0, 0], [{hall_end:.3f}, 0], [{hall_end:.3f}, {hall:g}], [0, {hall:g}], [0, 0]]}}]
   ramps:
-    - {{name: up, start: [3, {middle:g}], end: [{top[0]:.4f}, {middle:g}], {size}}}
-    - {{name: down, start: [{below:.4f}, {middle:g}], end: [{top[1]:.4f}, {middle:g}], {size}}}
+    - {{name: up, start: [3, {middle:g}], end: [{platform_start:.4f}, {middle:g}], {size}}}
+    - {{name: down, start: [{down_end:.4f}, {middle:g}], end: [{platform_end:.4f}, {middle:g}], {size}}}
   obstacles:
     - name: platform
-      box: [{flat:.4f}, {hall - 0.1:g}, {height:.4f}]
-      pose: {{x: {sum(top) / 2:.4f}, y: {middle:g}}}
+      box: [{platform_length:.4f}, {hall - 0.1:g}, {height:.4f}]
+      pose: {{x: {(platform_start + platform_end) / 2:.4f}, y: {middle:g}}}
 robot: {{pose: {{x: 1.0, y: {y:.3f}}}}}
-goals: [{{pose: {{x: {end - 1:.3f}, y: {middle:g}}}}}]
+goals: [{{pose: {{x: {hall_end - 1:.3f}, y: {middle:g}}}}}]
 time_limit: 120 s
 pass:
   - goals_reached: {{}}

@@ -65,10 +65,10 @@ events:
 def write_localization_experiments(
     folder: Path, worlds: Path, tour_seeds: Sequence[int], lost_seeds: Sequence[int]
 ) -> list[Experiment]:
-    """Write the experiments LOCALIZATION_EXPERIMENTS in the world house.world.yaml of the folder `worlds`.
+    """Write the LOCALIZATION_EXPERIMENTS in the world `house.world.yaml` of the folder `worlds`.
 
-    The experiment "tour" has the seeds `tour_seeds`. The other experiments have the seeds `lost_seeds`, and are omitted
-    if there are none.
+    The experiment "tour" has the seeds `tour_seeds`, and the others the seeds `lost_seeds`. If `lost_seeds` is empty,
+    only "tour" is written.
     """
 
     def drive(stem: str, text: str, seeds: Sequence[int]) -> Drive:

@@ -34,7 +34,7 @@ MIN_PATH_LENGTH_M = 8.0
 START, GOAL = Pose2(11.0, 0.0, 3.14159), Pose2(-9.0, 0.0, 3.14159)
 """Start of the robot in DynaBARN, 1 m outside of the arena, and goal of the robot inside."""
 STACK = TUNED_STACK.replace(", match_scans: true", "")
-"""TUNED_STACK without scan matching, because moving objects disturb it."""
+"""YAML lines of `stack:`: TUNED_STACK without scan matching, which moving objects would disturb."""
 MAX_ATTEMPTS = 1000
 """Maximum number of random draws for a path."""
 
@@ -99,12 +99,12 @@ def _random_path(rng: np.random.Generator) -> Array:
 
 def _polynomial_in_arena(rng: np.random.Generator) -> Array:
     """Return points (n, 2) along a random polynomial y(x): the longest piece within the arena."""
-    order = int(rng.integers(DEGREE_RANGE[0], DEGREE_RANGE[1] + 1))
-    # Spread over the arena, so that the polynomial does not oscillate between points that nearly coincide.
-    edges = np.linspace(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, order + 2)
+    degree = int(rng.integers(DEGREE_RANGE[0], DEGREE_RANGE[1] + 1))
+    # The points are spread over the arena, because a polynomial through points close together oscillates.
+    edges = np.linspace(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, degree + 2)
     x_points = rng.uniform(edges[:-1], edges[1:])
     polynomial = np.polynomial.Polynomial.fit(
-        x_points, rng.uniform(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, order + 1), order
+        x_points, rng.uniform(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, degree + 1), degree
     )
     x = np.linspace(-ARENA_HALF_WIDTH_M, ARENA_HALF_WIDTH_M, 401)
     y = polynomial(x)

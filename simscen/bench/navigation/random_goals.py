@@ -104,13 +104,13 @@ def write_random_goals(
 
 
 def write_degraded_sensing(
-    folder: Path, worlds: Mapping[str, BuiltWorld], first: int, world_path: tuple[Path, ...] = ()
+    folder: Path, worlds: Mapping[str, BuiltWorld], seed: int, world_path: tuple[Path, ...] = ()
 ) -> list[Experiment]:
     """Write one experiment for each of STRENGTHS. It has one drive for each world and each of FAULTS.
 
-    `worlds` and `world_path` are as in `write_random_goals`. `first` is the seed of all runs, and selects the drives.
+    `worlds` and `world_path` are as in `write_random_goals`. `seed` is the seed of all runs, and selects the drives.
     """
-    faults = dict(enumerate(FAULTS, start=FIRST_FAULTY_DRIVE + first * len(FAULTS)))
+    faults = dict(enumerate(FAULTS, start=FIRST_FAULTY_DRIVE + seed * len(FAULTS)))
     drives_by_world = {world: list(random_drives(built, ROBOT_RADIUS_M, faults)) for world, built in worlds.items()}
     experiments = []
     for level, strength in enumerate(STRENGTHS):
@@ -121,7 +121,7 @@ def write_degraded_sensing(
                 template, values = FAULTS[fault]
                 text = scenario_text(f"{fault}, {strength}", world, drive, [template.replace("…", values[level])])
                 file = folder / strength / f"{_file_stem(fault)}_{_file_stem(world)}.scenario.yaml"
-                drives.append(Drive(write_text(file, text), [first], world=world))
+                drives.append(Drive(write_text(file, text), [seed], world=world))
         experiments.append(Experiment(f"degraded sensing, {strength}", tuple(drives), folder, world_path))
     return experiments
 

@@ -1,4 +1,4 @@
-"""Summary of runs of `simscen bench nav` by the scores that published benchmarks define, and comparison of two stacks.
+"""Summary of the runs of `simscen bench nav` with the scores of published benchmarks, and comparison of two stacks.
 
 An experiment has several drives (scenarios). Each drive is run with several seeds. A trial is one of these runs.
 """
@@ -141,7 +141,7 @@ def success_interval(trials: Sequence[Trial]) -> Interval | None:
 
 
 def mean(values: Sequence[float | None]) -> float | None:
-    """Return the mean of all values except None; None if there are none."""
+    """Return the mean of all values except None; None without such values."""
     known = [value for value in values if value is not None]
     return sum(known) / len(known) if known else None
 
@@ -241,7 +241,10 @@ class ExperimentComparison:
 
 
 def compare_experiment(experiment: str, baseline: Sequence[Trial], other: Sequence[Trial]) -> ExperimentComparison:
-    """Compare the trials of two stacks. Raises ValueError if their numbers, or worlds or seeds of a pair, differ."""
+    """Compare the trials of two stacks, which must have the same worlds and seeds in the same order.
+
+    Raises ValueError otherwise.
+    """
     pairs = list(zip(baseline, other, strict=True))
     if any(first.world != second.world or first.run.key.seed != second.run.key.seed for first, second in pairs):
         raise ValueError(f"{experiment}: the runs are not of the same drives")
@@ -263,9 +266,14 @@ def compare_experiment(experiment: str, baseline: Sequence[Trial], other: Sequen
 def _difference(
     pairs: Sequence[TrialPair], measure: Callable[[Trial], float | None], is_rate: bool = False
 ) -> Difference | None:
-    """Return the difference of a measure; None if no pair has two values. `is_rate` selects the kind of interval."""
-    both = ((first.world, measure(first), measure(second)) for first, second in pairs)
-    differences = ClusteredMean.from_pairs((world, b - a) for world, a, b in both if a is not None and b is not None)
+    """Return the difference of a measure; None if no pair has two values.
+
+    If `is_rate` is true, the interval is a `rate_difference_interval`.
+    """
+    measured = ((first.world, measure(first), measure(second)) for first, second in pairs)
+    differences = ClusteredMean.from_pairs(
+        (world, b - a) for world, a, b in measured if a is not None and b is not None
+    )
     if differences.mean is None:
         return None
     return Difference(differences.mean, differences.rate_difference_interval() if is_rate else differences.interval())

@@ -39,7 +39,7 @@ def measure_growth(rounds: int, report_progress: ProgressCallback) -> Measuremen
                 time_run(prepared)  # the first run pays for caches
                 runs = [time_run(prepared) for _ in range(rounds)]
                 costs = [1e3 * run.cpu / run.simulated for run in runs]
-                figures[f"{count} {quantity}"] = Measurement.of(costs, "ms per simulated second")
+                figures[f"{count} {quantity}"] = Measurement.from_rounds(costs, "ms per simulated second")
     return figures
 
 
@@ -49,7 +49,7 @@ def write_scaled_patrol(folder: Path, quantity: str, count: int) -> Path:
     match quantity:
         case "obstacles":
             text = text.replace("  obstacles:\n", "  obstacles:\n" + _crates(count, ""))
-        case "objects":  # these could be pushed
+        case "objects":  # the robot can push these crates
             text = text.replace("  objects:\n", "  objects:\n" + _crates(count, ", mass: 5 kg"))
         case "moving objects":
             move = ", move: {{through: [[{end_x}, {y}]], speed: 0.2 m/s, repeat: back_and_forth}}"

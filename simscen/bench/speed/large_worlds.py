@@ -139,7 +139,7 @@ def _obj_text(solids: list[Solid]) -> str:
 def _mesh_model(number: int, x: float, y: float) -> str:
     mesh = f"<mesh><uri>mesh_{number % 4}.obj</uri></mesh>"
     return (
-        f'<model name="thing {number}"><pose>{x} {y} 0 0 0 {number}</pose><link name="body">'
+        f'<model name="chair {number}"><pose>{x} {y} 0 0 0 {number}</pose><link name="body">'
         "<inertial><mass>5</mass></inertial>"
         f'<collision name="c"><geometry>{mesh}</geometry></collision></link></model>'
     )

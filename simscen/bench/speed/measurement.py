@@ -1,4 +1,4 @@
-"""Measured figure of a benchmark, and stopwatch for the parts of a run."""
+"""Measured value of a benchmark, and stopwatch for the parts of a run."""
 
 import statistics
 import time
@@ -11,7 +11,7 @@ from typing import Any
 class Measurement:
     """Measured `value` in `unit`, which is "" for a ratio or count.
 
-    `rounds` are the values of repeated measurements; () for a single one. `value` is their median.
+    `rounds` are the values of repeated measurements, of which `value` is the median; () for a single measurement.
     """
 
     value: float
@@ -20,7 +20,7 @@ class Measurement:
     more_is_better: bool = False
 
     @classmethod
-    def of(cls, rounds: Sequence[float], unit: str) -> "Measurement":
+    def from_rounds(cls, rounds: Sequence[float], unit: str) -> "Measurement":
         """Return the measurement with the median of these rounds as its value."""
         return cls(statistics.median(rounds), unit, tuple(rounds))
 

@@ -37,7 +37,7 @@ class Overhead:
 
     run:       CPU time in ms of a run of SHORT_RUN_S in this process
     outside_simulation: the part of `run` outside the simulation, in ms: setup, log file, and verdicts
-    process:   CPU time in ms of such a run in its own process, from the fork on, including its picture
+    process:   CPU time in ms of the same run in its own process, from the fork on, including its picture
     wall:      wall time in ms of the run in its own process
     memory:    maximum memory in MB of the run in its own process
     preparing: CPU time in ms for preparing the scenario: world, map, and shortest paths
@@ -58,14 +58,14 @@ class Overhead:
     def figures(self) -> Measurements:
         """Median of each field by printed name."""
         return {
-            f"a run of {SHORT_RUN_S} s": Measurement.of(self.run, "ms"),
-            "of that outside the simulation": Measurement.of(self.outside_simulation, "ms"),
-            "the same as a process": Measurement.of(self.process, "ms"),
-            "the same as a process, wall time": Measurement.of(self.wall, "ms"),
-            "preparing a scenario": Measurement.of(self.preparing, "ms"),
-            "start of a session": Measurement.of(self.start, "ms"),
-            "simscen validate": Measurement.of(self.validate, "ms"),
-            "memory of a worker": Measurement.of(self.memory, "MB"),
+            f"a run of {SHORT_RUN_S} s": Measurement.from_rounds(self.run, "ms"),
+            "of that outside the simulation": Measurement.from_rounds(self.outside_simulation, "ms"),
+            "the same as a process": Measurement.from_rounds(self.process, "ms"),
+            "the same as a process, wall time": Measurement.from_rounds(self.wall, "ms"),
+            "preparing a scenario": Measurement.from_rounds(self.preparing, "ms"),
+            "start of a session": Measurement.from_rounds(self.start, "ms"),
+            "simscen validate": Measurement.from_rounds(self.validate, "ms"),
+            "memory of a worker": Measurement.from_rounds(self.memory, "MB"),
         }
 
 
@@ -154,7 +154,8 @@ def _child_cpu_ms(*arguments: str) -> float:
 class ExternalStackCost:
     """Mean wall time in µs that a run waits for the stack per beat (recorded tick), over `cycles` beats.
 
-    `in_process_us` is for a stack in the process of the run, `external_us` for a stack in another process.
+    `in_process_us` is for a stack in the process of the run, `external_us` for a stack in another process. The names of
+    the fields are keys of the JSON output.
     """
 
     cycles: int
@@ -168,7 +169,7 @@ class ExternalStackCost:
 
 
 def measure_external(rounds: int) -> ExternalStackCost:
-    """Run PATROL `rounds` times with the stack in this process, and `rounds` times with the stack in another one."""
+    """Run PATROL `rounds` times with the stack in this process, and as often with the stack in another process."""
     prepared = prepare(load_scenario(PATROL, PATROL.parent))
     in_process = [_wait_per_beat(prepared) for _ in range(rounds)]
     external = [_wait_per_beat(with_external_reference(prepared)) for _ in range(rounds)]

@@ -30,6 +30,7 @@ from simscen.worlds.raycasting.ray_scene import RayScene
 PATROL = Path(__file__).parents[2] / "data" / "bench" / "patrol.scenario.yaml"
 """Scenario of most speed benchmarks: a robot drives among racks and a moving cart in a hall."""
 SEED = 1
+"""Seed of all measured runs."""
 ProgressCallback = Callable[[str], None]
 """Function that is called at the start of each measurement, with its name."""
 OBSTACLE_FIELD_BEAMS = 720
@@ -75,7 +76,7 @@ class PatrolTimes:
         return statistics.median(self.ratios)
 
     @property
-    def factor(self) -> float:
+    def real_time_factor(self) -> float:
         """Simulated seconds per CPU second."""
         return self.simulated / self.cpu
 
@@ -128,7 +129,7 @@ def _measure_parts(prepared: PreparedScenario, cpu: float) -> dict[str, float]:
 
 
 def time_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> RunTimes:
-    """Run a scenario, and return the times from setup to verdicts. `watch` measures the parts of the run."""
+    """Run a scenario, and return the times from setup to verdicts. `watch`, if given, measures the parts of the run."""
     gc.collect()
     gc.freeze()  # as the fork server does, so that older objects are not searched for garbage
     previous = gc.get_threshold()
@@ -148,7 +149,7 @@ def time_run(prepared: PreparedScenario, watch: Stopwatch | None = None) -> RunT
 def _watch_parts(watch: Stopwatch, setup: RunSetup, listeners: Sequence[MomentSink]) -> Sequence[MomentSink]:
     """Let `watch` measure the parts of a run. Return no further listeners.
 
-    `listeners` are the listeners of the run so far: trace (the recorded states) and log.
+    `listeners` are the existing listeners of the run: trace (the recorded states) and log.
     """
     (agent,) = setup.robots
     watch.watch("physics", setup.simulation, "step")

@@ -71,7 +71,7 @@ def command(
         figures[f"step among {field.obstacles} obstacles"] = Measurement(field.step_us, "µs")
     figures["cycle with the stack as a process"] = Measurement(external.external_us, "µs")
     sections = {
-        "patrol": {**asdict(patrol), "real_time_factor": patrol.factor, "ratio_to_bare": patrol.ratio},
+        "patrol": {**asdict(patrol), "real_time_factor": patrol.real_time_factor, "ratio_to_bare": patrol.ratio},
         "overhead": asdict(overhead),
         "fields": [asdict(field) for field in fields],
         "external": {**asdict(external), "ratio": external.ratio},
@@ -84,8 +84,11 @@ def _patrol_figures(patrol: "PatrolTimes") -> Measurements:
     rounds = {"patrol": patrol.cpu_rounds, "PyBullet alone": patrol.baseline_rounds, **patrol.part_rounds}
     scale, unit = 1e3 / patrol.simulated, "ms per simulated second"
     return {
-        "patrol, times PyBullet alone": Measurement.of(patrol.ratios, ""),
-        **{name: Measurement.of([scale * seconds for seconds in times], unit) for name, times in rounds.items()},
+        "patrol, times PyBullet alone": Measurement.from_rounds(patrol.ratios, ""),
+        **{
+            name: Measurement.from_rounds([scale * seconds for seconds in times], unit)
+            for name, times in rounds.items()
+        },
     }
 
 
@@ -96,7 +99,7 @@ def _patrol_lines(patrol: "PatrolTimes", rounds: int) -> list[str]:
     spread = f"{min(patrol.ratios):.2f} … {max(patrol.ratios):.2f} in single rounds"
     return [
         f"patrol of {patrol.simulated:g} s, all features, one core",
-        f"  {patrol.factor:.0f} times real time ({patrol.cpu:.2f} s of CPU time, median of {rounds})",
+        f"  {patrol.real_time_factor:.0f} times real time ({patrol.cpu:.2f} s of CPU time, median of {rounds})",
         f"  {ratio} ({patrol.baseline:.2f} s; {spread})",
         f"    {'':{width}}  share   ms per simulated second   times PyBullet alone",
         *(

@@ -151,12 +151,12 @@ def _lines(localized: LocalizationResult, errors: PoseErrors | None, lost: float
     figures = errors.figures()
     distances = ", ".join(f"{name} {figures[name]:.3f} m" for name in ("median", "rmse", "max", "final"))
     lines += [f"error: {distances}", f"heading: rmse {figures['yaw_rmse']:.4f} rad"]
-    if errors.compared < MIN_COMPARED_FRACTION:
-        lines.append(f"compared with the reference: {errors.compared:.1%} of the beliefs")
+    if errors.compared_fraction < MIN_COMPARED_FRACTION:
+        lines.append(f"compared with the reference: {errors.compared_fraction:.1%} of the beliefs")
     for interval in errors.lost:
         end = "to the end" if interval.until is None else f"to {interval.until:.1f} s"
         lines.append(f"lost (more than {lost:g} m off) from {interval.since:.1f} s {end}")
-    restriction = "" if errors.compared >= MIN_COMPARED_FRACTION else ", as far as compared"
+    restriction = "" if errors.compared_fraction >= MIN_COMPARED_FRACTION else ", as far as compared"
     return lines if errors.lost else [*lines, f"never lost (more than {lost:g} m off){restriction}"]
 
 
@@ -167,7 +167,7 @@ def _document(localized: LocalizationResult, errors: PoseErrors | None, seed: in
     columns = (errors.times.tolist(), errors.distance.tolist(), errors.yaw.tolist())
     return document | {
         "error": errors.figures(),
-        "compared": errors.compared,
+        "compared": errors.compared_fraction,
         "error_over_time": list(zip(*columns, strict=True)),
         "lost": [{"since": interval.since, "until": interval.until} for interval in errors.lost],
     }

@@ -24,7 +24,7 @@ def test_a_scenario_of_the_challenge_is_valid(tmp_path: Path) -> None:
         ("world,length\n1,12\n", "no column 'ref_path_len'"),
         ("world,ref_path_len\n1,12\n2,far\n", "line 3: could not convert string to float: 'far'"),
         ("world,ref_path_len\n1\n", "line 2: "),
-        ("world,ref_path_len\n1,-3\n", "line 2: a path is longer than 0 m, not -3"),
+        ("world,ref_path_len\n1,-3\n", "line 2: `ref_path_len` must be a length above 0 m, not -3"),
         ("world,ref_path_len\n", "lists no worlds"),
     ],
 )

@@ -39,15 +39,17 @@ def test_rebuilt_floor_differs_only_right_of_the_center() -> None:
 
 def test_generated_log_is_reproducible_collision_free_and_has_odometry_drift() -> None:
     made, again = short("tracked"), generate_log(2001, 1, "tracked", seconds=15.0)
-    assert np.array_equal(made.sensed.truth, again.sensed.truth)
+    assert np.array_equal(made.recording.truth, again.recording.truth)
     assert (
-        min(box_distances(generate_building(2001).walls, pose[:2]).min() for pose in made.sensed.truth[::20].tolist())
+        min(
+            box_distances(generate_building(2001).walls, pose[:2]).min() for pose in made.recording.truth[::20].tolist()
+        )
         > 0.25
     )
-    scans = [one for one in made.sensed.readings if isinstance(one, Scan)]
+    scans = [one for one in made.recording.readings if isinstance(one, Scan)]
     assert {len(one.ranges) for one in scans} == {361}
-    odometry = [one.pose for one in made.sensed.readings if isinstance(one, Odometry)]
-    truth = made.sensed.truth
+    odometry = [one.pose for one in made.recording.readings if isinstance(one, Odometry)]
+    truth = made.recording.truth
     driven = np.hypot(*np.diff(truth[:, :2], axis=0).T).sum()
     text = sum(a.distance(b) for a, b in pairwise(odometry))
     assert 0.002 < abs(text / driven - 1) < 0.3
@@ -69,8 +71,8 @@ def test_a_robot_is_tracked_with_raw_odometry_and_found_on_a_floor_of_forty_mete
 ) -> None:
     made = short(circumstance)
     spec = StackSpec(localizer=ScanMatchingAmcl.model_validate({"parameters": parameters}))
-    localized = localize(made.sensed, spec, Surroundings(ROBOT, made.map, TICK_RATE_HZ), made.estimate, 1)
-    errors = compare_with_reference(localized, made.sensed, 1.0)
+    localized = localize(made.recording, spec, Surroundings(ROBOT, made.map, TICK_RATE_HZ), made.estimate, 1)
+    errors = compare_with_reference(localized, made.recording, 1.0)
     assert errors is not None
     assert errors.distance[-40:].max() < 0.3
     assert circumstance == "unknown" or not errors.lost

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from simscen.bench.localization.consistency import anees_bounds, fraction_in_ellipsoid, grouped_anees_bounds
+from simscen.bench.localization.consistency import anees_bounds, correlated_anees_bounds, fraction_in_ellipsoid
 from simscen.core.geometry import Array
 from simscen.criteria.trace_signals.estimation_errors import nees
 
@@ -50,7 +50,7 @@ def test_bounds_over_buildings_contain_only_a_consistent_filter(shared: float) -
 
     def kept(times: float) -> float:
         campaigns = (values * times).mean(axis=2)
-        limits = [grouped_anees_bounds(campaign.tolist()) for campaign in campaigns]
+        limits = [correlated_anees_bounds(campaign.tolist()) for campaign in campaigns]
         return float(np.mean([low < one.mean() < high for one, (low, high) in zip(campaigns, limits, strict=True)]))
 
     assert 0.92 < kept(1.0) < 0.98
@@ -66,12 +66,12 @@ def test_independent_bounds_are_too_narrow_for_correlated_logs() -> None:
 
 
 def test_two_buildings_give_no_bounds() -> None:
-    assert grouped_anees_bounds([2.0, 4.0]) is None
-    assert grouped_anees_bounds([2.0, 4.0, float("inf")]) is None
+    assert correlated_anees_bounds([2.0, 4.0]) is None
+    assert correlated_anees_bounds([2.0, 4.0, float("inf")]) is None
 
 
 def test_bounds_over_buildings_are_those_of_students_t_for_the_logarithm() -> None:
-    low, high = grouped_anees_bounds([2.0, 3.0, 4.0]) or (0.0, 0.0)
+    low, high = correlated_anees_bounds([2.0, 3.0, 4.0]) or (0.0, 0.0)
     assert np.log((low / 3.0, high / 3.0)) == pytest.approx((-0.8281, 0.8281), abs=1e-3)  # 4.3027 / (3 √3)
 
 

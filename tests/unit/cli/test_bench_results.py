@@ -13,8 +13,8 @@ from simscen.core.errors import UsageError
 
 BEFORE = Result(
     {
-        "patrol": Measurement.of((36.0, 40.0, 35.0), "ms per simulated second"),
-        "log": Measurement.of((3.0, 3.2), "ms per simulated second"),
+        "patrol": Measurement.from_rounds((36.0, 40.0, 35.0), "ms per simulated second"),
+        "log": Measurement.from_rounds((3.0, 3.2), "ms per simulated second"),
         "suite: runs a minute": Measurement(50.0, "", (), more_is_better=True),
         "scan": Measurement(0.0, "ms"),
     },
@@ -23,8 +23,8 @@ BEFORE = Result(
 )
 AFTER = Result(
     {
-        "patrol": Measurement.of((18.0, 17.0, 20.0), "ms per simulated second"),
-        "log": Measurement.of((3.1, 3.3), "ms per simulated second"),
+        "patrol": Measurement.from_rounds((18.0, 17.0, 20.0), "ms per simulated second"),
+        "log": Measurement.from_rounds((3.1, 3.3), "ms per simulated second"),
         "suite: runs a minute": Measurement(100.0, "", (), more_is_better=True),
         "step": Measurement(14.0, "µs"),
     },
@@ -58,7 +58,7 @@ def test_judgment_respects_direction_and_needs_two_rounds() -> None:
         Measurement(20.5, "", (20.0, 21.0), more_is_better=True),
     )
     assert (judgment(few, many), judgment(many, few)) == ("better", "worse")
-    assert judgment(few, Measurement.of((20.0,), "")) == ""
+    assert judgment(few, Measurement.from_rounds((20.0,), "")) == ""
 
 
 def test_zero_before_has_no_ratio() -> None:
