@@ -30,7 +30,7 @@ FIRMWARE_RATE_HZ = 60
 class RobotPlacement(NamedTuple):
     """Body and initial pose of a robot.
 
-    `obstacles` is the part of the static world that counts for its clearance (None: all).
+    `obstacles` is the part of the static world that counts for the clearance of the robot (None: all of it).
     """
 
     body: RobotBody
@@ -39,7 +39,10 @@ class RobotPlacement(NamedTuple):
 
 
 class Simulation:
-    """Physics of one run. Create it in the process that uses it, and call `close` after use."""
+    """Physics of one run. Create a simulation in the process that uses it, and call `close` after use.
+
+    A movable object is given as a `Body`; `simscen.sim.objects` calls it an actor.
+    """
 
     def __init__(
         self,
@@ -68,8 +71,9 @@ class Simulation:
         self._scene = scene = Scene(client, tick_rate, walls, terrain, actors, render_scene)
         firmware_period = max(1, round(tick_rate / FIRMWARE_RATE_HZ))
         self.robots: dict[str, Robot] = {}
-        for name, (body, pose, own_obstacles) in sorted(robots.items()):
-            obstacles = static if own_obstacles is None else own_obstacles
+        """Robots by name, sorted."""
+        for name, (body, pose, counted) in sorted(robots.items()):
+            obstacles = static if counted is None else counted
             period = firmware_period / tick_rate
             self.robots[name] = Robot(name, scene, static, obstacles, body, pose, period, clearance_range, visual_shape)
         actors.add_all((terrain.raise_to_ground(body) for body in sorted(bodies, key=lambda body: body.name)), 0)
@@ -109,25 +113,25 @@ class Simulation:
             self._scene.actors.remove(name)
 
     def move(self, name: str, path: MotionPath) -> None:
-        """Let a body follow a path from now on. It cannot be pushed any more. Raises KeyError for an unknown name."""
+        """Let a body follow a path from now on. Nothing can push it any more. Raises KeyError for an unknown name."""
         with self._stepper.change():
             self._scene.actors.move(name, path, self.tick)
 
     def place(self, name: str, pose: Pose2) -> None:
-        """Place a body at rest at `pose`, and end its path. It keeps its initial height above the ground.
+        """Place a body at rest at `pose`, and end its path. The body keeps its initial height above the ground.
 
         Raises KeyError for an unknown name.
         """
-        before = self._scene.actors.bodies()[name].pose
-        old_ground, new_ground = self._scene.terrain.heights(np.array([before[:2], pose[:2]])).tolist()
+        initial = self._scene.actors.bodies()[name].pose
+        old_ground, new_ground = self._scene.terrain.heights(np.array([initial[:2], pose[:2]])).tolist()
         with self._stepper.change():
-            self._scene.actors.place(name, Pose3.planar(pose, before.z - old_ground + new_ground), self.tick)
+            self._scene.actors.place(name, Pose3.planar(pose, initial.z - old_ground + new_ground), self.tick)
 
     def push_object(self, name: str, impulse: tuple[float, float], seconds: float = 0.0) -> None:
         """Apply an impulse (N s, world frame) to a body, spread over `seconds`.
 
-        The push begins one tick later, because the body may sleep. Has no effect on a body that does not exist or
-        cannot be pushed.
+        The push begins one tick later, because a sleeping body must wake first. Has no effect on a body that does not
+        exist or cannot be pushed.
         """
         actors = self._scene.actors
         actors.wake(name)
@@ -141,7 +145,7 @@ class Simulation:
     def push_robot(self, name: str, impulse: tuple[float, float], seconds: float = 0.0) -> None:
         """Apply an impulse (N s, world frame) at a robot's center of mass, spread over `seconds` from now on.
 
-        Without `seconds`, the step that begins now has the whole impulse.
+        If `seconds` is 0, the step that begins now applies the whole impulse.
         """
         push = self.robots[name].push
         if seconds:
@@ -158,7 +162,10 @@ class Simulation:
             self._scene.actors.follow(body.name, path, max_speed, self.tick)
 
     def follow(self, name: str, path: MotionPath, max_speed: float) -> None:
-        """Let a body of `add_steered_body` follow a path from its pose on, at no more than `max_speed` m/s."""
+        """Let a body that `add_steered_body` added follow a path, which must begin at the pose of the body.
+
+        The path must not exceed `max_speed` m/s.
+        """
         self._scene.actors.follow(name, path, max_speed, self.tick)
 
     # Observing the world

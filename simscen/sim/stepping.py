@@ -23,7 +23,10 @@ Push = Callable[[tuple[float, float]], None]
 
 @dataclass(frozen=True)
 class TimedPush:
-    """Push that lasts several ticks: calls `push(impulse)` at each tick from `start_tick` to `end_tick - 1`."""
+    """Push that lasts several ticks: calls `push(impulse)` at each tick from `start_tick` to `end_tick - 1`.
+
+    `impulse` is the impulse of one tick in N s, in the world frame.
+    """
 
     push: Push
     impulse: tuple[float, float]
@@ -34,9 +37,9 @@ class TimedPush:
 class Stepper:
     """Steps a scene with its robots. Add, remove, or place objects and robots only in the context `change`.
 
-    Three measures save time. While no robot can touch anything, only the physics and the firmware of the robots run.
-    Walls are created in the engine when a robot or a pushable object can reach them. Actors (movable objects) that
-    cannot be pushed collide only from the time on at which a robot is near.
+    Three optimizations save time. While no robot can touch anything, only the physics and the firmware of the robots
+    run. Walls are created in the engine when a robot or a pushable object can reach them. Actors (movable objects) that
+    cannot be pushed start to collide when a robot comes near.
     """
 
     def __init__(self, scene: Scene, robots: Iterable[Robot], firmware_period: int) -> None:
@@ -72,7 +75,7 @@ class Stepper:
         """Simulate `ticks` ticks."""
         scene, until = self._scene, self._scene.tick + ticks
         has_pushable = scene.actors.has_pushable
-        if has_pushable or not scene.actors.is_engine_complete:
+        if has_pushable or scene.actors.has_deferred:
             period = self._rest_update_period if has_pushable else self._activation_period
             for due in range(scene.tick - scene.tick % period + period, until + 1, period):
                 self._step_uninterrupted(due - scene.tick)
@@ -87,18 +90,18 @@ class Stepper:
     def _step_uninterrupted(self, ticks: int) -> None:
         """Simulate `ticks` ticks without the periodic updates that `step` makes.
 
-        The loop does everything that a tick can need. Spans of ticks without pushes, changed friction, and possible
-        contact need only `_step_without_contact`.
+        The loop handles periodic calls, pushes, changed friction, and contact. `_step_without_contact` simulates the
+        ticks that need none of these, because it is faster.
         """
         scene, no_contact_before = self._scene, -1
-        until, is_plain = scene.tick + ticks, not (self._pushes or self._periodic_call or scene.floor)
-        if is_plain and (no_contact_before := self._no_contact_before(ticks)) >= until:
+        until, is_undisturbed = scene.tick + ticks, not (self._pushes or self._periodic_call or scene.floor)
+        if is_undisturbed and (no_contact_before := self._no_contact_before(ticks)) >= until:
             self._step_without_contact(until)
             return
         while scene.tick < until:
             if scene.tick >= no_contact_before:
                 no_contact_before = self._no_contact_before(ticks)
-            if is_plain and scene.tick < no_contact_before:
+            if is_undisturbed and scene.tick < no_contact_before:
                 self._step_without_contact(min(until, no_contact_before))
                 continue
             if self._periodic_call is not None and scene.tick % self._periodic_call[0] == 0:
@@ -131,9 +134,10 @@ class Stepper:
         scene.tick = tick
 
     def _no_contact_before(self, ticks: int) -> int:
-        """Return a tick before which no contact is possible; not in the future if contact is possible in the next step.
+        """Return a tick before which no robot can touch anything, and no object on a path can push another object.
 
-        Also creates the walls that pushable objects can reach within `ticks`.
+        If such a contact is possible in the next step, the tick is not in the future. Also creates the walls that
+        pushable objects can reach within `ticks`.
         """
         actors = self._scene.actors
         if not actors.has_pushable:
@@ -147,24 +151,24 @@ class Stepper:
         return min(no_contact_before, no_push_before)
 
     def _step_with_contact(self) -> None:
-        """Simulate one tick: first move the objects that follow a path, afterwards record the contacts of robots."""
+        """Simulate one tick: move the objects that follow a path, step, and record the contacts of robots."""
         scene = self._scene
         # If no robot can touch anything, only objects can touch each other.
-        with_robots = scene.tick >= min([robot.no_contact_before for robot in self._robots])
-        if with_robots:
+        can_touch_robots = scene.tick >= min([robot.no_contact_before for robot in self._robots])
+        if can_touch_robots:
             self._activate_actors()
-        scene.actors.begin_step(scene.tick, all_scripted=with_robots)
-        if with_robots:
+        scene.actors.begin_step(scene.tick, all_scripted=can_touch_robots)
+        if can_touch_robots:
             motions = {robot.base.id: robot.before_contact_step() for robot in self._robots}
             if not scene.walls.is_complete:
                 self._build_walls(1)
             motions |= scene.actors.motions(scene.tick)
         pybullet.stepSimulation(scene.client)
         scene.tick += 1
-        if with_robots:
+        if can_touch_robots:
             for robot in self._robots:
                 robot.after_contact_step(motions)
-        scene.actors.end_step(scene.tick, all_scripted=with_robots)
+        scene.actors.end_step(scene.tick, all_scripted=can_touch_robots)
 
     def _build_walls(self, ticks: int) -> None:
         """Create the walls that robots may touch now, and the walls that pushable objects can reach within `ticks`."""
@@ -177,15 +181,15 @@ class Stepper:
                 for robot in self._robots:
                     robot.add_bodies(dict.fromkeys(new_walls))
 
-    def _activate_actors(self, moved: float = REQUERY_DISTANCE_M) -> None:
-        """Let deferred actors near robots collide. These are movable objects that cannot collide yet, to save time.
+    def _activate_actors(self, min_moved: float = REQUERY_DISTANCE_M) -> None:
+        """Let the deferred actors near robots collide.
 
-        Skips robots that have moved less than `moved` m since their last query.
+        Skips robots that have moved less than `min_moved` m since their last query.
         """
         actors = self._scene.actors
-        if actors.is_engine_complete:
+        if not actors.has_deferred:
             return
-        queries = [robot.make_query() for robot in self._robots if robot.distance_since_query >= moved]
+        queries = [robot.make_query() for robot in self._robots if robot.distance_since_query >= min_moved]
         if queries and (activated := actors.activate_near(queries, self._scene.tick)):
             for robot in self._robots:
                 robot.add_bodies(activated)
@@ -198,7 +202,7 @@ class Stepper:
         for robot in self._robots:
             robot.compute_deferred()
         yield
-        self._activate_actors(moved=0.0)
+        self._activate_actors(min_moved=0.0)
         for robot in self._robots:
             robot.on_change(self._robots)
 

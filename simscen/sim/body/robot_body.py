@@ -70,7 +70,7 @@ class RobotBody:
 def assemble_body(
     spec: RobotSpec, parts: tuple[Solid, ...], wheels: tuple[Wheel, ...], chassis: MassProperties
 ) -> RobotBody:
-    """Return the body of a robot from the solids of its hull, its wheels, and the mass properties of its chassis.
+    """Return the body of a robot. `parts` are the solids of the hull.
 
     Adds boxes around the wheels (see `wheel_guards`), motors, and casters for a differential drive. If the
     specification has neither footprint nor radius, the footprint is the outline of the hull.
@@ -80,8 +80,8 @@ def assemble_body(
     casters: tuple[Solid, ...] = ()
     if spec.drive.type == "differential":
         chassis, casters = add_casters(chassis, outline, min(wheel.radius for wheel in wheels))
-    given = None if spec.footprint is None else tuple((x, y) for x, y in spec.footprint)
-    corners = circle(spec.radius) if spec.radius is not None else given or outline
+    specified = None if spec.footprint is None else tuple((x, y) for x, y in spec.footprint)
+    corners = circle(spec.radius) if spec.radius is not None else specified or outline
     wheels = add_motors(wheels, spec.drive, chassis.mass + sum(wheel.inertia.mass for wheel in wheels))
     return RobotBody(spec.name, hull, casters, wheels, chassis, _counterclockwise(corners), spec.radius, spec.drive,
                      spec.limits, spec.hull_friction)  # fmt: skip

@@ -30,7 +30,7 @@ CASTER_GAP_M = 0.001
 UNEVEN_CASTER_GAP_RATIO = math.tan(math.radians(8))
 """Height of the unloaded caster above uneven ground, divided by its distance from the axle.
 
-The gap keeps the wheels on the ground at the foot of a ramp. The robot tips by 8° before this caster carries weight.
+The gap keeps the wheels on the ground at the foot of a ramp. The robot tips by 8° before the caster carries weight.
 """
 
 
@@ -75,10 +75,10 @@ def wheels_for_drive(drive: Drive, mass: float) -> tuple[Wheel, ...]:
     inertia = wheel_inertia(WHEEL_MASS_RATIO * mass, drive.wheel_radius, drive.wheel_width)
     half = drive.wheel_separation / 2
     return tuple(
-        Wheel(f"{axle}_{side}", x, y, drive.wheel_radius, drive.wheel_width, inertia, is_driven=not steered,
-              is_steered=steered)
+        Wheel(f"{axle}_{side}", x, y, drive.wheel_radius, drive.wheel_width, inertia, is_driven=not is_steered,
+              is_steered=is_steered)
         for axle, x in axles.items()
-        for steered in [isinstance(drive, Ackermann) and axle == "front"]
+        for is_steered in [isinstance(drive, Ackermann) and axle == "front"]
         for side, y in (("left", half), ("right", -half))
     )  # fmt: skip
 
@@ -129,10 +129,10 @@ def add_casters(
 ) -> tuple[MassProperties, tuple[Solid, ...]]:
     """Return the chassis and two casters, one in front of the axle and one behind it.
 
-    The loaded caster touches the ground. It is the front one if the center of mass is in front of the axle by more than
-    MIN_MASS_OFFSET_RATIO, otherwise the rear one. The other caster is CASTER_GAP_M above the ground. If the center of
-    mass is too near to the axle, it is shifted towards the loaded caster (see MIN_MASS_OFFSET_RATIO). `outline` is the
-    outline of the hull from above.
+    The loaded caster touches the ground. The front caster is loaded if the center of mass is in front of the axle by
+    more than MIN_MASS_OFFSET_RATIO, otherwise the rear caster. The other caster is CASTER_GAP_M above the ground. A
+    center of mass too near to the axle is shifted towards the loaded caster (see MIN_MASS_OFFSET_RATIO). `outline` is
+    the outline of the hull from above.
     """
     radius = 0.5 * wheel_radius
     front = 0.9 * (max(x for x, _ in outline) - radius)
@@ -142,8 +142,8 @@ def add_casters(
     if abs(center[0]) < MIN_MASS_OFFSET_RATIO * abs(loaded):
         center[0] = MIN_MASS_OFFSET_RATIO * loaded
     gaps = {front: CASTER_GAP_M, rear: CASTER_GAP_M} | {loaded: 0.0}
-    balls = tuple(Solid(Sphere(radius), Pose3(x, 0.0, radius + gap), "caster") for x, gap in gaps.items())
-    return MassProperties(chassis.mass, center, chassis.tensor), balls
+    casters = tuple(Solid(Sphere(radius), Pose3(x, 0.0, radius + gap), "caster") for x, gap in gaps.items())
+    return MassProperties(chassis.mass, center, chassis.tensor), casters
 
 
 def casters_for_uneven_ground(casters: Sequence[Solid]) -> tuple[Solid, ...]:

@@ -26,7 +26,7 @@ class PyBulletBaseline:
         triangulate: Triangulate,
     ) -> None:
         self._client = client = pybullet.connect(pybullet.DIRECT)
-        engine.set_physics_parameters(client, 240, 10)
+        engine.set_physics_parameters(client, tick_rate=240, solver_iterations=10)  # the defaults of Simulation
         ground = self._create_body(pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client))
         pybullet.setCollisionFilterGroupMask(ground, -1, engine.GROUND, engine.EVERYTHING, physicsClientId=client)
         if isinstance(static, TriangleMesh):
@@ -49,7 +49,10 @@ class PyBulletBaseline:
             pybullet.stepSimulation(self._client)
 
     def scan(self, directions: Array, min_range: float, max_range: float, height: float) -> None:
-        """Cast rays along unit vectors (n, 2) at a height in m, from `min_range` to `max_range` m from the robot."""
+        """Cast rays along unit vectors (n, 2) at a height in m, from `min_range` to `max_range` m from the robot.
+
+        Discards the hits, because only the duration is measured.
+        """
         origin = (self._pose.x, self._pose.y)
         starts, ends = np.full((2, len(directions), 3), height)
         starts[:, :2], ends[:, :2] = origin + min_range * directions, origin + max_range * directions

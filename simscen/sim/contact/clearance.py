@@ -22,7 +22,7 @@ from simscen.sim.scene.scene import Scene
 CONTACT_TOLERANCE_M = 0.002
 """Clearance up to which contact is possible, because corners of shapes are rounded by up to 0.4 mm."""
 SPEED_GAIN_RATIO = 1.25
-"""Factor by which the speed of a robot may exceed its present speed and its limits within SPEED_HORIZON_S."""
+"""Factor by which a robot may exceed both its present speed and its speed limit within SPEED_HORIZON_S."""
 CLOSING_SPEED_MARGIN_M_S = 0.1
 """Safety margin of the upper bound of closing speeds."""
 
@@ -72,20 +72,21 @@ class Clearance:
         self.bounding_radius = SHAPE_MARGIN_M + self._extent
         """Radius in m of the robot's bounding sphere around its base frame."""
         self.contact_radius = self.bounding_radius + CLEARANCE_RANGE_M
-        """Radius in m around its base frame within which actors must be able to collide."""
+        """Radius in m around the robot's base frame within which actors must be able to collide."""
         self.distance_radius = max(self.contact_radius, self.bounding_radius + max_range)
-        """Radius in m around its base frame within which actors must be in the engine, to measure their distances."""
+        """Radius in m around the robot's base frame within which the engine must measure the distances of actors."""
         is_uneven = bool(scene.terrain and base.ground_links)
         # Wheels can also hit the solids that they roll on.
-        touching = replace(robot, casters=(*robot.casters, *robot.tires)) if is_uneven else robot
-        self._static_distance = StaticDistance(static, touching, max_range)
+        robot_with_tires = replace(robot, casters=(*robot.casters, *robot.tires)) if is_uneven else robot
+        self._static_distance = StaticDistance(static, robot_with_tires, max_range)
         self._obstacle_distance = StaticDistance(obstacles, robot, max_range) if is_uneven else self._static_distance
         self._max_range = max_range
         self._push_tick = -1
         self._static_names: dict[tuple[int, int, int], str] = {}
         """Names of touched static solids, by the position of the contact in cm."""
-        first = robot.hull[0]
-        self._hull_center = first.pose.apply(hull_points(first.shape).mean(axis=0))
+        first_solid = robot.hull[0]
+        self._hull_center = first_solid.pose.apply(hull_points(first_solid.shape).mean(axis=0))
+        """A point inside the hull in the base frame."""
         # A closed concave surface around the initial pose is a building, because no robot starts inside an obstacle.
         enclosing = self._static_distance.enclosing_solids(self._center_point())
         self._buildings = [k for k in enclosing if not self._static_distance.is_convex(k)]
@@ -97,7 +98,7 @@ class Clearance:
         self._measured_tick = self.no_contact_before = -1
         self._static_nearest: _StaticMeasurement | None = None
         self._deferrable_until = -1
-        """Latest tick at which a deferred period may end."""
+        """Latest tick of the sample that follows a deferred sample."""
         self._actors.set_no_contact_before(self._base.id, self.no_contact_before)
         self.enclosed_by: str | None = None
         """Name of the object that encloses the whole robot, or None."""
@@ -113,12 +114,14 @@ class Clearance:
     def measure(self, tick: int, period: int = NEVER) -> float:
         """Return the clearance in m at the current `tick`, at most `max_range`; negative inside an object.
 
-        `period` is the number of ticks until the next call. Updates `no_contact_before` if it is before the next call.
+        `period` is the number of ticks until the next call. Updates `no_contact_before` if this tick is before the next
+        call.
         """
         if self._measured_tick == tick:
             return self._distance
         pose = self._state().pose
         self._distance = gap = self._search(tick, pose, self._obstacle_distance)
+        # The robot can also touch ramps, which do not count for the clearance.
         if self._obstacle_distance is not self._static_distance:
             gap = min(gap, self._search(tick, pose, self._static_distance))
         self._measured_tick = tick
@@ -173,7 +176,7 @@ class Clearance:
         nearest, point = min(self._max_range, static.distance(pose)), pose[:3]
         # The top of a tilted robot extends beyond its radius.
         ground_radius = SHAPE_MARGIN_M + self._radius + 2 * self._height * math.hypot(pose.qx, pose.qy)
-        for other in self._actors.prepare_nearby(
+        for actor_id in self._actors.prepare_nearby(
             self._base.id,
             point,
             distance=nearest + self.bounding_radius,
@@ -181,7 +184,9 @@ class Clearance:
             tick=tick,
         ):
             for link in self._base.hull_links:
-                contacts = pybullet.getClosestPoints(self._base.id, other, nearest, link, physicsClientId=self._client)
+                contacts = pybullet.getClosestPoints(
+                    self._base.id, actor_id, nearest, link, physicsClientId=self._client
+                )
                 nearest = min((contact[CONTACT_DISTANCE] for contact in contacts), default=nearest)
         for robot in self.others:
             nearest = min(nearest, self._distance_to_robot(robot, point, nearest))

@@ -13,7 +13,7 @@ END_DELAY_S = 0.1
 MIN_CAUSING_SPEED_M_S = 0.02
 """Smallest speed at which a robot counts as the cause of a collision.
 
-This is its speed in any direction if the object cannot move, otherwise its speed along the contact normal.
+If the object cannot move, the speed of the robot in any direction counts, otherwise only its speed towards the object.
 """
 
 
@@ -83,7 +83,7 @@ class CollisionTracker:
             else:
                 collision.last_tick, collision.impulse = tick, collision.impulse + contact.impulse
         self._end_collisions(
-            tick, sorted(name for name, one in self._ongoing.items() if tick - one.last_tick >= self._end_delay)
+            tick, sorted(name for name, each in self._ongoing.items() if tick - each.last_tick >= self._end_delay)
         )
 
     def end_all(self, tick: int) -> None:

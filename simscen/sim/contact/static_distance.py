@@ -53,9 +53,10 @@ class StaticDistance:
         self._mesh, self._max_range = static, max_range
         radius, self._height = outline.radius_and_height(robot.collision_solids)
         self._radius, self._extent = radius + EXTENT_MARGIN_M, math.hypot(radius, self._height)
-        self._hull = collision_shapes.create_robot_shapes(self._client, robot.collision_solids)
+        self._hull_shapes = collision_shapes.create_robot_shapes(self._client, robot.collision_solids)
         self._parts = parts_of(static)
         self._shape_pairs: dict[int, list[tuple[int, int]]] = {}
+        """Pairs (robot, part) of shape ids by part."""
         self._others: list[PartBound] = []
         """Heap of the parts near the robot, without the nearest part."""
         self._travel = 0.0
@@ -94,7 +95,7 @@ class StaticDistance:
         # The top of a tilted robot extends beyond its radius.
         radius = self._radius + 2 * self._height * math.hypot(*self._pose[3:5])
         limit = min(nearest, self._max_range)
-        # Comparing sums rather than differences makes the loop end: each bound of `limit` fails its condition.
+        # The sum `limit + travel` is compared, because rounding of a difference could repeat the loop forever.
         while others and others[0][0] < limit + travel:
             _, part, rectangle = others[0]
             left, low, right, high = rectangle
@@ -117,7 +118,7 @@ class StaticDistance:
         """Return the distance to one part; inf above `max_distance`."""
         pairs = self._shape_pairs.get(part)
         if pairs is None:
-            pairs = self._shape_pairs[part] = list(itertools.product(self._hull, self._build_shapes(part)))
+            pairs = self._shape_pairs[part] = list(itertools.product(self._hull_shapes, self._build_shapes(part)))
         position, quaternion, client = self._pose[:3], self._pose[3:], self._client
         nearest = math.inf
         for hull, shape in pairs:
@@ -145,9 +146,10 @@ class StaticDistance:
         )
 
     def _build_shapes(self, part: int) -> list[int]:
+        """Create the shapes of a part; return their ids."""
         vertices, hulls, solid = self._mesh.vertices, self._mesh.hulls, int(self._parts.solids[part])
-        if hulls and (own := hulls[solid]):
-            return [collision_shapes.create_convex_shape(self._client, vertices[own])]
+        if hulls and (hull := hulls[solid]):
+            return [collision_shapes.create_convex_shape(self._client, vertices[hull])]
         faces = self._mesh.faces[self._parts.faces(part)]
         if len(self._parts.parts_of_solid(solid)) == 1 and is_convex(mesh := submesh(vertices, faces)):
             return [collision_shapes.create_convex_shape(self._client, mesh.vertices)]
@@ -158,13 +160,15 @@ class StaticDistance:
         return [k for k in self._parts.solids_around(point) if k not in exclude and self._encloses(k, point)]
 
     def _encloses(self, solid: int, point: Vector) -> bool:
+        """Return whether a solid encloses a point; for a large solid, first tries a line that crosses few parts."""
         parts, vertices = self._parts, self._mesh.vertices
-        own_parts = parts.parts_of_solid(solid)
-        if len(own_parts) > 1:
-            low, high = parts.low[own_parts.start : own_parts.stop], parts.high[own_parts.start : own_parts.stop]
+        solid_parts = parts.parts_of_solid(solid)
+        if len(solid_parts) > 1:
+            rows = slice(solid_parts.start, solid_parts.stop)
+            low, high = parts.low[rows], parts.high[rows]
             tilt = max(LINE_TILT) * max(high[:, 2].max() - point[2], point[2] - low[:, 2].min())
             is_on_line = ((low[:, :2] - tilt <= point[:2]) & (point[:2] <= high[:, :2] + tilt)).all(axis=1)
-            on_line = [parts.faces(part) for part, on in zip(own_parts, is_on_line.tolist(), strict=True) if on]
+            on_line = [parts.faces(part) for part, is_on in zip(solid_parts, is_on_line.tolist(), strict=True) if is_on]
             faces = np.concatenate([np.empty(0, np.int64), *on_line])
             is_enclosed = encloses_along_line(vertices[self._mesh.faces[faces]], point)
             if is_enclosed is not None:

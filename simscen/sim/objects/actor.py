@@ -63,7 +63,7 @@ class Actor:
     """Whether the path can be replaced at any time, as for pedestrians."""
     body_id: int | None = None
     """Body id in the engine; None if the actor is not in the engine."""
-    collides: bool = False
+    can_collide: bool = False
     """Whether the actor is in the engine and can collide."""
     engine_pose: Pose3 | None = None
     """Pose at which the actor was last placed in the engine."""
@@ -116,25 +116,25 @@ class Actor:
         return pose
 
     def path_velocity(self, tick: int, tick_rate: int) -> tuple[Vector, float]:
-        """Return the velocity in m/s and turn rate in rad/s on its path until the next tick; 0 if the path jumps."""
-        pose, following = self.path_pose(tick, tick_rate), self.path_pose(tick + 1, tick_rate)
-        vx, vy = (following.x - pose.x) * tick_rate, (following.y - pose.y) * tick_rate
+        """Return the velocity in m/s and turn rate in rad/s on the path until the next tick; 0 if the path jumps."""
+        pose, next_pose = self.path_pose(tick, tick_rate), self.path_pose(tick + 1, tick_rate)
+        vx, vy = (next_pose.x - pose.x) * tick_rate, (next_pose.y - pose.y) * tick_rate
         if math.hypot(vx, vy) > MAX_STEP_M * tick_rate:  # a jump of the path is a teleportation, not a motion
             return (0.0, 0.0, 0.0), 0.0
-        return (vx, vy, 0.0), wrap(following.yaw - pose.yaw) * tick_rate
+        return (vx, vy, 0.0), wrap(next_pose.yaw - pose.yaw) * tick_rate
 
     def ground_radius(self, pose: Pose3) -> float:
-        """Return the radius in m of a disc around its origin that contains it at `pose`, seen from above."""
+        """Return the radius in m of a disc around the origin of the body that contains its outline from above."""
         height = math.sqrt(self.bounding_radius**2 - self.cylinder_radius**2)
         return min(self.bounding_radius, self.cylinder_radius + 2 * height * math.hypot(pose.qx, pose.qy))
 
     def distance_to(self, point: Vector, pose: Pose3) -> float:
-        """Return the distance in m from a point to its origin, at `pose` or at `engine_pose`, whichever is nearer."""
+        """Return the distance in m from a point to `pose` or `engine_pose`, whichever is nearer."""
         distance = math.dist(pose[:3], point)
         return distance if self.engine_pose is None else min(distance, math.dist(self.engine_pose[:3], point))
 
     def set_engine_pose(self, client: int, pose: Pose3) -> None:
-        """Set its pose in the engine, if it is in the engine."""
+        """Set the pose of the actor in the engine. Has no effect if the actor is not in the engine."""
         if self.body_id is not None and pose != self.engine_pose:
             self.engine_pose = pose
             pybullet.resetBasePositionAndOrientation(self.id, pose[:3], pose[3:], client)
@@ -164,7 +164,10 @@ class ActorBuilder:
         self._triangulate, self._visual_shape = triangulate, visual_shape
 
     def make_actor(self, body: Body, tick: int, is_steered: bool = False) -> Actor:
-        """Return an actor that is not in the engine yet. Raises RunError if its path is too fast."""
+        """Return an actor that is not in the engine yet, whose path begins at `tick`.
+
+        Raises RunError if the path is too fast.
+        """
         radius, height = radius_and_height(body.solids)
         if body.path is not None and (step := largest_step(body.path, 1 / self._tick_rate, radius)) > MAX_STEP_M:
             raise RunError("invalid", too_fast_message(body.name, step))
@@ -179,7 +182,7 @@ class ActorBuilder:
 
     def enable_collisions(self, actor: Actor, tick: int) -> None:
         """Let an actor collide; creates it in the engine if necessary."""
-        if actor.collides:
+        if actor.can_collide:
             return
         if actor.body_id is None:
             self._create(actor, tick)
@@ -187,21 +190,25 @@ class ActorBuilder:
             engine.enable_collisions(self._client, actor.id)
             if actor.path is not None:
                 actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
-        actor.collides = True
+        actor.can_collide = True
 
     def add_without_collisions(self, actor: Actor, tick: int) -> None:
-        """Create an actor in the engine, only to measure distances and for rendering, unless it is in the engine."""
+        """Create an actor in the engine without collisions, to measure distances and for rendering.
+
+        Has no effect if the actor is in the engine already.
+        """
         if actor.body_id is None:
             self._create(actor, tick)
             engine.disable_collisions(self._client, actor.id)
 
     def _create(self, actor: Actor, tick: int) -> None:
+        """Create the body of an actor in the engine, at its pose at `tick`."""
         client, body, visual = self._client, actor.body, self._visual_shape
         shape = collision_shapes.create_body_shape(client, body.solids, actor.is_pushable, self._triangulate)
         if actor.is_pushable:
-            frame = inertia_of_solids(body.solids, body.mass).principal()
-            actor.center_from_base = frame[1].inverse()
-            actor.body_id = engine.create_rigid_body(client, body.mass, shape, body.pose, frame, FRICTION, visual)
+            inertia = inertia_of_solids(body.solids, body.mass).principal()
+            actor.center_from_base = inertia[1].inverse()
+            actor.body_id = engine.create_rigid_body(client, body.mass, shape, body.pose, inertia, FRICTION, visual)
         elif actor.path is None:
             actor.body_id = engine.create_static_body(client, shape, visual, body.pose, FRICTION)
         else:
@@ -211,5 +218,5 @@ class ActorBuilder:
         if actor.path is None:
             actor.engine_pose = body.pose
         else:
-            # Setting the pose again makes it bit-identical to that of an actor that has been there before.
+            # Setting the pose again makes it bit-identical to the pose of an actor that was created earlier.
             actor.set_engine_pose(client, actor.path_pose(tick, self._tick_rate))

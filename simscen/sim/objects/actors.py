@@ -41,7 +41,7 @@ class Actors:
         self._is_rendered = is_rendered
         self._actors: dict[str, Actor] = {}
         self._no_contact_before: dict[int, int] = {}
-        """For each robot's body id, the tick before which it cannot touch any actor."""
+        """For each robot's body id, the tick before which the robot cannot touch any actor."""
         self._nearby: dict[int, NearbyActors] = {}
         """Actors near each robot, by the robot's body id."""
         self._rest_poses = RestPoses()
@@ -51,17 +51,17 @@ class Actors:
         """Update the lists of actors, discard cached results, and wake all pushable actors."""
         actors = self._actors.values()
         self._scripted = [actor for actor in actors if actor.path is not None]
-        self._scripted_colliding = [actor for actor in self._scripted if actor.collides]
+        self._scripted_colliding = [actor for actor in self._scripted if actor.can_collide]
         self._scripted_speed = max((actor.max_speed for actor in self._scripted), default=0.0)
         """Upper bound of the speed of all scripted actors in m/s."""
         self._pushable = [actor for actor in actors if actor.is_pushable]
         self._deferred: DeferredActors | None = None
-        self._deferred_count = sum(not actor.collides for actor in actors)
+        self._deferred_count = sum(not actor.can_collide for actor in actors)
         self.poses = ActorPoses(self._client, self._tick_rate, self._actors, self._no_contact_before)
         self._broad_phase = BroadPhase(self._client, self._tick_rate, self._scripted, self._pushable)
         self._nearby.clear()
         for actor in self._pushable:
-            engine.wake(self._client, actor.id)  # it may have stood on a removed object
+            engine.wake(self._client, actor.id)  # the actor may have stood on a removed object
 
     # Adding, removing, and changing actors
 
@@ -80,18 +80,18 @@ class Actors:
         """Create in the engine all actors that cannot be deferred; if actors are rendered, create all actors."""
         self._actors = dict(sorted(self._actors.items()))
         actors = self._actors.values()
-        none_deferred = any(actor.is_pushable for actor in actors)
+        can_defer = not any(actor.is_pushable for actor in actors)
         for actor in actors:
-            if none_deferred or actor.is_steered:
+            if actor.is_steered or not can_defer:
                 self._builder.enable_collisions(actor, tick)
             elif self._is_rendered:
                 self._builder.add_without_collisions(actor, tick)
         self._update_lists()
 
     @property
-    def is_engine_complete(self) -> bool:
-        """Whether no actor is deferred."""
-        return not self._deferred_count
+    def has_deferred(self) -> bool:
+        """Whether any actor is deferred."""
+        return bool(self._deferred_count)
 
     def activate_near(self, queries: Iterable[ProximityQuery], tick: int) -> dict[int, str | None]:
         """Let the deferred actors near robots collide, and add actors to the engine to measure their distances.
@@ -99,7 +99,7 @@ class Actors:
         Returns the names of these actors by body id.
         """
         if self._deferred is None:
-            self._deferred = DeferredActors([actor for actor in self._actors.values() if not actor.collides])
+            self._deferred = DeferredActors([actor for actor in self._actors.values() if not actor.can_collide])
         activated, measured = self._deferred.activate_near(queries)
         for actor in activated:
             self._builder.enable_collisions(actor, tick)
@@ -107,7 +107,7 @@ class Actors:
             self._builder.add_without_collisions(actor, tick)
         if activated:
             self._deferred_count -= len(activated)
-            self._scripted_colliding = [actor for actor in self._scripted if actor.collides]
+            self._scripted_colliding = [actor for actor in self._scripted if actor.can_collide]
         return {actor.id: actor.body.name for actor in (*activated, *measured)}
 
     def remove(self, name: str) -> None:
@@ -119,7 +119,7 @@ class Actors:
             self._update_lists()
 
     def move(self, name: str, path: MotionPath, tick: int) -> None:
-        """Let a body follow a path from `tick` on; it cannot be pushed any more."""
+        """Let a body follow a path from `tick` on. Nothing can push it any more."""
         actor = self._actors[name]
         self.add(replace(actor.body, pose=self.poses.at(tick)[name], mass=0.0, path=path), tick)
 
@@ -178,7 +178,7 @@ class Actors:
         """Put bodies to sleep after the next step."""
         for body_id in body_ids:
             engine.put_to_sleep(self._client, body_id)
-        self.poses.query_again()
+        self.poses.invalidate()
 
     def update_rest_poses(self, tick: int) -> None:
         """Record the poses of pushable actors that have not moved since the last call."""
@@ -195,9 +195,10 @@ class Actors:
         self._broad_phase.invalidate(tick)
 
     def no_push_before(self, tick: int, robot_speed: Callable[[], float]) -> int:
-        """Return a tick before which no scripted actor can push anything, or -1 if one may do so in the next step.
+        """Return a tick before which no scripted actor can push anything; -1 if this is possible in the next step.
 
-        Wakes the pushable actors that may be touched soon. `robot_speed` returns an upper bound in m/s for all robots.
+        Wakes the pushable actors that may be touched soon. `robot_speed` returns an upper bound in m/s of the speed of
+        all robots.
         """
         if not (self._scripted and self._pushable):
             return NEVER
@@ -230,17 +231,17 @@ class Actors:
         for actor in self._scripted_colliding if all_scripted else self._broad_phase.near_contact:
             actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
 
-    def move_rendered(self, tick: int) -> None:
-        """Set the poses of all scripted actors in the engine, also of deferred actors."""
+    def update_rendered_poses(self, tick: int) -> None:
+        """Set the poses of all scripted actors in the engine, including deferred actors, to render an image."""
         for actor in self._scripted:
             actor.set_engine_pose(self._client, actor.path_pose(tick, self._tick_rate))
 
     def motions(self, tick: int) -> dict[int, BodyMotion]:
-        """Return the motions of all actors that collide and can move, by body id. Their rotation is ignored."""
+        """Return the motions of all actors that can collide and move, by body id. Their rotation is ignored."""
         scripted = {actor.id: actor.path_velocity(tick, self._tick_rate)[0] for actor in self._scripted_colliding}
-        pushed = {actor.id: pybullet.getBaseVelocity(actor.id, self._client)[0] for actor in self._pushable}
-        none = (0.0, 0.0, 0.0)
-        return {body_id: BodyMotion(none, linear, none) for body_id, linear in {**scripted, **pushed}.items()}
+        pushable = {actor.id: pybullet.getBaseVelocity(actor.id, self._client)[0] for actor in self._pushable}
+        zero = (0.0, 0.0, 0.0)
+        return {body_id: BodyMotion(zero, linear, zero) for body_id, linear in {**scripted, **pushable}.items()}
 
     # Bodies
 

@@ -50,9 +50,9 @@ def find_candidates(scripted: BoundingDiscs, pushable: BoundingDiscs, hit_speed:
     distances = np.linalg.norm(scripted.centers[:, np.newaxis] - pushable.centers, axis=2)
     gaps = distances - scripted.radii[:, np.newaxis] - pushable.radii - 2 * SHAPE_MARGIN_M
     closing_speeds = scripted.speeds[:, np.newaxis] + np.maximum(pushable.speeds, hit_speed)
-    near = gaps < NEAR_CONTACT_S * closing_speeds
-    if near.any():
-        return CollisionCandidates(_indices(near.any(axis=1)), _indices(near.any(axis=0)), NEAR_CONTACT_S)
+    is_near = gaps < NEAR_CONTACT_S * closing_speeds
+    if is_near.any():
+        return CollisionCandidates(_indices(is_near.any(axis=1)), _indices(is_near.any(axis=0)), NEAR_CONTACT_S)
     return CollisionCandidates((), (), min(SPEED_HORIZON_S, float((gaps / closing_speeds).min(initial=math.inf))))
 
 
@@ -79,18 +79,18 @@ class BroadPhase:
         """Discard the result, because something is pushed during the step that begins at `tick`."""
         self.valid_until, self._push_tick = -1, tick
 
-    def update(self, tick: int, robot_speed: float, poses: Mapping[str, Pose3], is_asleep: bool) -> bool:
-        """Wake the pushable actors that a scripted actor may touch soon; return whether there are any.
+    def update(self, tick: int, robot_speed: float, poses: Mapping[str, Pose3], are_pushable_asleep: bool) -> bool:
+        """Wake the pushable actors that a scripted actor may touch soon; return whether there are such actors.
 
-        Also sets the poses of all scripted actors in the engine. `robot_speed` is an upper bound in m/s for all robots.
-        `is_asleep` states whether all pushable actors sleep.
+        Also sets the poses of all scripted actors in the engine. `robot_speed` is an upper bound in m/s of the speed of
+        all robots. `are_pushable_asleep` states whether all pushable actors sleep.
         """
         moving = list[Actor]()
         for actor in self._scripted:
             actor.set_engine_pose(self._client, poses[actor.body.name])
             if not actor.is_parked((tick - actor.path_start_tick) / self._tick_rate, SPEED_HORIZON_S):
                 moving.append(actor)
-        if self._pushable_discs is None or not is_asleep:
+        if self._pushable_discs is None or not are_pushable_asleep:
             self._pushable_discs = BoundingDiscs.of(
                 (poses[a.body.name][:3], a.bounding_radius, a.speed_bound(self._client)) for a in self._pushable
             )

@@ -24,7 +24,7 @@ class ActorPoses:
     def __init__(
         self, client: int, tick_rate: int, actors: Mapping[str, Actor], no_contact_before: Mapping[int, int]
     ) -> None:
-        """Take all actors by name, and for each robot's body id the tick before which it cannot touch any actor."""
+        """Take all actors by name, and the ticks before which the robots cannot touch any actor, by body id."""
         self._client, self._tick_rate, self._actors = client, tick_rate, actors
         self._no_contact_before = no_contact_before
         self._scripted = [actor for actor in actors.values() if actor.path is not None]
@@ -34,7 +34,7 @@ class ActorPoses:
         self.resting_since: int | None = None
         """Tick of the last query at which a pushable actor moved.
 
-        None if one may be pushed before the next query, and before the first query.
+        None before the first query, and if a pushable actor may be pushed before the next query.
         """
         self._ticks_until_asleep = math.ceil(2 * engine.SLEEP_DELAY_S * tick_rate)
         self._moved = list(self._pushable)
@@ -71,8 +71,8 @@ class ActorPoses:
         assert actor.center_and_pose is not None
         return actor.center_and_pose[1]
 
-    def query_again(self) -> None:
-        """Query all poses in the next call of `at`, because an actor was put to sleep."""
+    def invalidate(self) -> None:
+        """Let the next call of `at` query all poses again, because an actor was put to sleep."""
         self._tick = None
 
     def are_pushable_asleep(self, tick: int) -> bool:

@@ -12,18 +12,18 @@ from simscen.sim.objects.actor import Actor
 EXTRA_RADIUS_M = 2.0
 """Additional search radius, so that later searches can reuse the list of nearby actors."""
 REQUERY_DISTANCE_M = 1.0
-"""Distance that a robot moves after which the result of its last query of deferred actors is invalid."""
+"""Distance that a robot may move before the result of its last query of deferred actors becomes invalid."""
 ACTIVATION_PERIOD_S = 0.05
-"""Period in which the Stepper checks whether a robot must query again. In this time, a robot with at most 10 m/s moves
-no farther than REQUERY_DISTANCE_M - EARLY_QUERY_DISTANCE_M."""
+"""Period in which the Stepper checks whether a robot must query again. In this time, a robot at 10 m/s moves by
+REQUERY_DISTANCE_M - EARLY_QUERY_DISTANCE_M."""
 EARLY_QUERY_DISTANCE_M = 0.5
-"""Distance that a robot moves after which it queries again at the next check, before its last result is invalid."""
+"""Distance that a robot has moved when it queries again at a check, while its last result is still valid."""
 ROUNDING_MARGIN_M = 1e-3
 """Upper bound of rounding errors in the distances of deferred actors."""
 
 
 class NearbyActors(NamedTuple):
-    """The actors within `distance` m of `point` at `tick`, and all pushable actors unless they sleep.
+    """The actors within `distance` m of `point` at `tick`, and all pushable actors that are awake.
 
     asleep_since:  tick since when all pushable actors have been at rest; None if any of them is awake
     resting:       the same actors, each with its position (x, y) and the radius of its outline on the ground in m; None
@@ -69,9 +69,9 @@ class NearbyActors(NamedTuple):
 
         `travel` is an upper bound in m of the motion of any actor since `tick`.
         """
-        free = self.distance - math.dist(point, self.point) - travel
+        distance_to_others = self.distance - math.dist(point, self.point) - travel
         distances = (actor.distance_to(point, poses[actor.body.name]) - actor.bounding_radius for actor in self.actors)
-        return min([free, *distances])
+        return min([distance_to_others, *distances])
 
 
 def find_nearby(
@@ -82,7 +82,10 @@ def find_nearby(
     tick: int,
     asleep_since: int | None,
 ) -> NearbyActors:
-    """Return the actors within `distance` + EXTRA_RADIUS_M of a point at the current `tick`."""
+    """Return the actors within `distance` + EXTRA_RADIUS_M of a point at the current `tick`.
+
+    `asleep_since` is described in NearbyActors.
+    """
     distance += EXTRA_RADIUS_M
     is_awake = asleep_since is None
     nearby = tuple(
@@ -113,14 +116,15 @@ class ProximityQuery(NamedTuple):
 class DeferredActors:
     """Actors that cannot collide in the engine yet, because no robot has come near their path.
 
-    They stand still or follow a fixed path. An actor is activated before a robot can reach any point of its path, and
-    then stays active.
+    Deferred actors stand still or follow a fixed path. An actor is activated before a robot can reach any point of this
+    path, and then stays active.
     """
 
     def __init__(self, actors: Sequence[Actor]) -> None:
         self._actors = actors
         segments = np.array([segment for actor in actors for segment in actor.segments])
         self._owners = np.repeat(np.arange(len(actors)), [len(actor.segments) for actor in actors])
+        """Index of the actor of each segment."""
         self._starts, self._directions = segments[:, :2], segments[:, 2:4] - segments[:, :2]
         self._squared_lengths = np.maximum((self._directions**2).sum(axis=1), 1e-12)
         bounding_radii = np.array([actor.bounding_radius for actor in actors])[self._owners]
@@ -129,7 +133,7 @@ class DeferredActors:
         self._is_measured = np.zeros(len(actors), dtype=np.bool_)
 
     def activate_near(self, queries: Iterable[ProximityQuery]) -> tuple[list[Actor], list[Actor]]:
-        """Return the newly activated actors, and the other actors that must be added to the engine to be measured.
+        """Return the newly activated actors, and other actors that the engine needs only to measure their distances.
 
         The results are valid until a robot has moved by REQUERY_DISTANCE_M.
         """

@@ -40,7 +40,7 @@ class RestDetector:
 
 
 class RestPoses:
-    """Rest poses of pushable objects: poses that they had at two consecutive updates, or at the first update."""
+    """Rest poses of pushable objects: poses that an object had at two consecutive updates, or at the first update."""
 
     def __init__(self) -> None:
         self.poses: Mapping[str, Pose3] = {}

@@ -28,9 +28,9 @@ def build_drive(
     """
     client, drive = scene.client, body.drive
     if isinstance(drive, Omnidirectional | Mecanum):
-        base = PlanarBase(client, body, pose, visual_shape)
-        planar_drive = MecanumDrive if isinstance(drive, Mecanum) else OmnidirectionalDrive
-        return base, planar_drive(base, body, period)
-    vehicle = WheeledBase(client, body, pose, scene.terrain, 1 / scene.tick_rate, visual_shape)
-    wheel_drive = AckermannDrive if isinstance(drive, Ackermann) else DifferentialDrive
-    return vehicle, wheel_drive(client, vehicle, body, period)
+        planar_base = PlanarBase(client, body, pose, visual_shape)
+        planar_drive_class = MecanumDrive if isinstance(drive, Mecanum) else OmnidirectionalDrive
+        return planar_base, planar_drive_class(planar_base, body, period)
+    wheeled_base = WheeledBase(client, body, pose, scene.terrain, 1 / scene.tick_rate, visual_shape)
+    wheel_drive_class = AckermannDrive if isinstance(drive, Ackermann) else DifferentialDrive
+    return wheeled_base, wheel_drive_class(client, wheeled_base, body, period)

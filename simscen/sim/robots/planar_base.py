@@ -17,11 +17,11 @@ from simscen.sim.robots.velocity_ramp import VelocityRamp
 
 MAX_FORCE_PER_WEIGHT = 0.7
 """Largest motor force divided by the weight of the robot."""
-IDENTITY = (0.0, 0.0, 0.0, 1.0)
+IDENTITY_QUATERNION = (0.0, 0.0, 0.0, 1.0)
 CARRIER_COUNT = 2
 """Number of links without a shape between the world and the hull: one for each of the joints along x and y."""
 CARRIER_MASS_KG = 0.001
-"""Mass of each carrier, and of each link of the hull except the first, because the engine requires one."""
+"""Mass of each carrier, and of each link of the hull except the first, because the engine requires a mass."""
 
 
 class PlanarBase:
@@ -33,32 +33,34 @@ class PlanarBase:
         wheels = [wheel.inertia.transformed(Pose3(wheel.x, wheel.y, wheel.radius)) for wheel in body.wheels]
         total = combine([body.chassis, *wheels]) if wheels else body.chassis
         moments, base_from_center = total.principal()
-        hulls = collision_shapes.create_robot_shapes(client, body.collision_solids)
-        extra = len(hulls) - 1
+        hull_shapes = collision_shapes.create_robot_shapes(client, body.collision_solids)
+        extra_count = len(hull_shapes) - 1
         self.id: int = pybullet.createMultiBody(
             0,
-            linkMasses=[CARRIER_MASS_KG] * CARRIER_COUNT + [body.mass] + [CARRIER_MASS_KG] * extra,
-            linkCollisionShapeIndices=[-1] * CARRIER_COUNT + hulls,
-            linkVisualShapeIndices=[-1] * CARRIER_COUNT + [visual_shape] * len(hulls),
-            linkPositions=[(0, 0, 0)] * (CARRIER_COUNT + len(hulls)),
-            linkOrientations=[IDENTITY] * (CARRIER_COUNT + len(hulls)),
-            linkInertialFramePositions=[(0, 0, 0)] * CARRIER_COUNT + [base_from_center.position] + [(0, 0, 0)] * extra,
-            linkInertialFrameOrientations=[IDENTITY] * CARRIER_COUNT
+            linkMasses=[CARRIER_MASS_KG] * CARRIER_COUNT + [body.mass] + [CARRIER_MASS_KG] * extra_count,
+            linkCollisionShapeIndices=[-1] * CARRIER_COUNT + hull_shapes,
+            linkVisualShapeIndices=[-1] * CARRIER_COUNT + [visual_shape] * len(hull_shapes),
+            linkPositions=[(0, 0, 0)] * (CARRIER_COUNT + len(hull_shapes)),
+            linkOrientations=[IDENTITY_QUATERNION] * (CARRIER_COUNT + len(hull_shapes)),
+            linkInertialFramePositions=[(0, 0, 0)] * CARRIER_COUNT
+            + [base_from_center.position]
+            + [(0, 0, 0)] * extra_count,
+            linkInertialFrameOrientations=[IDENTITY_QUATERNION] * CARRIER_COUNT
             + [base_from_center.quaternion]
-            + [IDENTITY] * extra,
-            linkParentIndices=[0, 1, 2] + [3] * extra,
+            + [IDENTITY_QUATERNION] * extra_count,
+            linkParentIndices=[0, 1, 2] + [3] * extra_count,
             linkJointTypes=[pybullet.JOINT_PRISMATIC] * CARRIER_COUNT
             + [pybullet.JOINT_REVOLUTE]
-            + [pybullet.JOINT_FIXED] * extra,
-            linkJointAxis=[(1, 0, 0), (0, 1, 0), (0, 0, 1)] + [(0, 0, 1)] * extra,
+            + [pybullet.JOINT_FIXED] * extra_count,
+            linkJointAxis=[(1, 0, 0), (0, 1, 0), (0, 0, 1)] + [(0, 0, 1)] * extra_count,
             physicsClientId=client,
         )
         self.joints = (0, 1, 2)
-        self.hull_links = tuple(range(2, 2 + len(hulls)))
+        self.hull_links = tuple(range(2, 2 + len(hull_shapes)))
         self.ground_links: Mapping[int, float] = {}
         """Always empty, because the base does not touch the ground."""
         pybullet.changeDynamics(self.id, 2, localInertiaDiagonal=moments, physicsClientId=client)
-        for link in range(2 + len(hulls)):
+        for link in range(2 + len(hull_shapes)):
             pybullet.changeDynamics(
                 self.id, link, lateralFriction=body.hull_friction, restitution=0.0, linearDamping=0, angularDamping=0,
                 jointDamping=0, physicsClientId=client,
@@ -117,6 +119,7 @@ class OmnidirectionalDrive:
     """Drive that follows any twist. Its encoders measure the motion of the base over the ground, in the base frame."""
 
     def __init__(self, base: PlanarBase, body: RobotBody, period: float) -> None:
+        """Take the base that the drive moves. `period` is the time in s between two calls of `advance`."""
         self._base, self._period = base, period
         self._ramp = VelocityRamp(body.limits, period, is_holonomic=True)
         self._traveled = (0.0, 0.0, 0.0)
@@ -155,9 +158,9 @@ class OmnidirectionalDrive:
 
     def _update_encoders(self) -> None:
         """Add the motion since the last update, which is assumed to be an arc (logarithm in SE(2))."""
-        now = self._base.pose()
-        step, turn = self._last_pose.between(now), wrap(now.yaw - self._last_pose.yaw)
-        self._last_pose = now
+        pose = self._base.pose()
+        step, turn = self._last_pose.between(pose), wrap(pose.yaw - self._last_pose.yaw)
+        self._last_pose = pose
         half = turn / 2
         scale = half / math.tan(half) if abs(half) > 1e-9 else 1.0
         forward, left = scale * step.x + half * step.y, scale * step.y - half * step.x
@@ -168,12 +171,12 @@ class OmnidirectionalDrive:
 class MecanumDrive(OmnidirectionalDrive):
     """Drive with four mecanum wheels that never slip.
 
-    The firmware uses the wheel dimensions in the drive's specification. The real wheels of a URDF can differ.
+    The firmware uses the wheel dimensions in the drive's specification. The actual wheels of a URDF can differ.
     """
 
     def __init__(self, base: PlanarBase, body: RobotBody, period: float) -> None:
         assert isinstance(body.drive, Mecanum)
-        self._firmware, self._wheels = body.drive.wheels, _real_wheels(body)
+        self._specified_wheels, self._wheels = body.drive.wheels, _actual_wheels(body)
         super().__init__(base, body, period)
 
     def encoders(self) -> tuple[float, ...]:
@@ -181,11 +184,11 @@ class MecanumDrive(OmnidirectionalDrive):
         return self._wheels.speeds(Twist(*super().encoders()))
 
     def _actual_velocity(self, velocity: Twist) -> Twist:
-        return self._wheels.motion(self._firmware.speeds(velocity))
+        return self._wheels.motion(self._specified_wheels.speeds(velocity))
 
 
-def _real_wheels(body: RobotBody) -> MecanumWheels:
-    """Return the mean dimensions of the body's wheels."""
+def _actual_wheels(body: RobotBody) -> MecanumWheels:
+    """Return mecanum wheels with the mean dimensions of the body's wheels."""
     assert isinstance(body.drive, Mecanum)
     return MecanumWheels(
         radius=float(np.mean([wheel.radius for wheel in body.wheels])),

@@ -70,6 +70,7 @@ class Robot:
         self._names: dict[int, str | None] = {}
         """Names of all bodies that the robot can touch, by body id (None: a wall)."""
         self._query_point: Vector = (math.inf, math.inf, math.inf)
+        """Position of the robot at the last call of `make_query`."""
 
     # Driving and observing
 
@@ -87,7 +88,7 @@ class Robot:
     def sample(self, period: int) -> Truth | DeferredTruth:
         """Return the true state, or a sample whose clearance is computed later if that is possible.
 
-        Take the next sample at most `period` ticks later. Raises RunError if the physics has diverged.
+        The caller must take the next sample at most `period` ticks later. Raises RunError if the physics has diverged.
         """
         tick = self._scene.tick
         state = self._checked_state(tick)
@@ -119,6 +120,7 @@ class Robot:
         return state
 
     def _truth(self, tick: int, state: RobotState, period: int = NEVER) -> Truth:
+        """Return the true state with its clearance. `period` is the number of ticks until the next call."""
         clearance = self.clearance.measure(tick, period)
         if self._collisions.has_contact_at(tick):
             clearance = min(clearance, 0.0)  # surfaces in contact can have a tiny distance
@@ -180,7 +182,7 @@ class Robot:
         """Return colors (height, width, 3) and depths (height, width) in m; see `SensorView.image`."""
         render_scene = self._scene.render_scene
         assert render_scene is not None, "the simulation was built without images"
-        self._scene.actors.move_rendered(self._scene.tick)
+        self._scene.actors.update_rendered_poses(self._scene.tick)
         render_scene.update(self.bodies_and_poses())
         return render_image(self._scene.client, self.base_pose().compose(mount), width, height, field_of_view, far)
 
@@ -208,12 +210,12 @@ class Robot:
         self.others = tuple(robot for robot in robots if robot is not self)
         self.clearance.others = [robot.clearance for robot in self.others]
         self.bodies = {**scene.actors.bodies(), **{robot.name: robot.body for robot in self.others}}
-        others = {robot.base.id: robot.name for robot in self.others}
+        robot_names = {robot.base.id: robot.name for robot in self.others}
         self._names = {
             **dict.fromkeys(scene.walls.bodies),
             **scene.terrain.names,
             **scene.actors.names_by_id(),
-            **others,
+            **robot_names,
         }
         self.clearance.invalidate()
 
@@ -246,7 +248,7 @@ class Robot:
         return BodyMotion(state.pose.position, state.linear, state.angular)
 
     def after_contact_step(self, motions: Mapping[int, BodyMotion]) -> None:
-        """Record the robot's contacts after a step. `motions` has the motions of all bodies before it, by body id."""
+        """Record the robot's contacts after a step. `motions` has the motions of all bodies before the step, by id."""
         tick, clearance, motion = self._scene.tick, self.clearance, motions[self.base.id]
         if not self._collisions.is_colliding and tick <= clearance.no_contact_before:
             return

@@ -21,6 +21,7 @@ class RobotState(NamedTuple):
     @property
     def twist(self) -> Twist:
         """The velocity in the base frame: forward (m/s), left (m/s), and turn rate (rad/s)."""
+        # Both velocities are rotated by the inverse of the quaternion (x, y, z, w), written out for speed.
         (_, _, _, x, y, z, w), (a, b, c), (f, g, h) = self
         x, y, z = -x, -y, -z
         p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)

@@ -16,7 +16,9 @@ class VelocityRamp:
         self._speed_up_step = limits.linear_acceleration * period
         self._slow_down_step = (limits.linear_deceleration or limits.linear_acceleration) * period
         self._turn_step = limits.angular_acceleration * period
-        self._command = self.target = STOP
+        self._command = STOP
+        self.target = STOP
+        """The last command, within the limits of speed."""
         self.velocity = STOP
 
     def command(self, twist: Twist) -> None:

@@ -12,7 +12,7 @@ from simscen.sim.robots.wheeled_base import WheeledBase
 
 MAX_HOLD_SPEED_M_S = 0.1
 """Largest rim speed at which the motors hold the position of a wheel. A faster wheel is braked first."""
-STEERING_RATE_RAD_S = 3.2
+MAX_STEERING_RATE_RAD_S = 3.2
 """Largest steering rate; the value is from F1TENTH cars (f1tenth_gym, sv_max; O'Kelly et al. 2020)."""
 MIN_STEERING_SPEED_M_S = 0.01
 """Commanded speed below which the steering angle does not change."""
@@ -21,11 +21,12 @@ MIN_STEERING_SPEED_M_S = 0.01
 class WheelDrive:
     """Motors of the driven wheels. Each subclass computes the wheel speeds from the velocity of the base."""
 
-    def __init__(self, client: int, vehicle: WheeledBase, body: RobotBody, period: float) -> None:
+    def __init__(self, client: int, base: WheeledBase, body: RobotBody, period: float) -> None:
+        """Take the base that the motors move. `period` is the time in s between two calls of `advance`."""
         assert isinstance(body.drive, Differential | SkidSteer | Ackermann)
-        self._client, self._robot, self._radius = client, vehicle.id, body.drive.wheel_radius
+        self._client, self._robot, self._radius = client, base.id, body.drive.wheel_radius
         self._ramp = VelocityRamp(body.limits, period, is_holonomic=False)
-        wheels = [(wheel, joint) for wheel, joint in zip(body.wheels, vehicle.joints, strict=True) if wheel.is_driven]
+        wheels = [(wheel, joint) for wheel, joint in zip(body.wheels, base.joints, strict=True) if wheel.is_driven]
         wheels.sort(key=lambda pair: not pair[0].is_left)
         self._joints = [joint for _, joint in wheels]
         self._torques = [wheel.stall_torque for wheel, _ in wheels]
@@ -91,12 +92,12 @@ class WheelDrive:
 class DifferentialDrive(WheelDrive):
     """Differential or skid-steer drive: all wheels on a side turn at the same speed."""
 
-    def __init__(self, client: int, vehicle: WheeledBase, body: RobotBody, period: float) -> None:
+    def __init__(self, client: int, base: WheeledBase, body: RobotBody, period: float) -> None:
         drive = body.drive
         assert isinstance(drive, Differential | SkidSteer)
         scale = drive.turning_scale if isinstance(drive, SkidSteer) else 1.0
         self._half_separation = drive.wheel_separation * scale / 2
-        super().__init__(client, vehicle, body, period)
+        super().__init__(client, base, body, period)
 
     def _wheel_speeds(self) -> tuple[float, float]:
         vx, _, wz = self._ramp.velocity
@@ -111,16 +112,16 @@ class AckermannDrive(WheelDrive):
     section 3.3).
     """
 
-    def __init__(self, client: int, vehicle: WheeledBase, body: RobotBody, period: float) -> None:
+    def __init__(self, client: int, base: WheeledBase, body: RobotBody, period: float) -> None:
         assert isinstance(body.drive, Ackermann)
         self._drive = body.drive
-        self._max_steering_step = STEERING_RATE_RAD_S * period
+        self._max_steering_step = MAX_STEERING_RATE_RAD_S * period
         self._steering = 0.0
-        steered = [pair for pair in zip(body.wheels, vehicle.joints, strict=True) if pair[0].is_steered]
+        steered = [pair for pair in zip(body.wheels, base.joints, strict=True) if pair[0].is_steered]
         self._knuckles = [joint for _, joint in steered]
         self._lateral_ratios = [wheel.y / body.drive.wheel_base for wheel, _ in steered]
         self._servo_torque = 0.5 * body.mass * GRAVITY_M_S2 * body.drive.wheel_radius
-        super().__init__(client, vehicle, body, period)
+        super().__init__(client, base, body, period)
         # The front wheels roll freely.
         rolling = [joint + 1 for joint in self._knuckles]
         pybullet.setJointMotorControlArray(
@@ -144,6 +145,7 @@ class AckermannDrive(WheelDrive):
             super().advance()
 
     def _set_steering(self) -> None:
+        """Set the target angles of the steering joints for the present steering angle of the bicycle model."""
         tangent = math.tan(self._steering)
         angles = [math.atan(tangent / (1 - tangent * ratio)) for ratio in self._lateral_ratios]
         pybullet.setJointMotorControlArray(
@@ -159,5 +161,6 @@ class AckermannDrive(WheelDrive):
 
     def _wheel_speeds(self) -> tuple[float, float]:
         speed = self._ramp.velocity.vx
-        skew = math.tan(self._steering) * self._drive.wheel_separation / (2 * self._drive.wheel_base)
-        return speed * (1 - skew) / self._radius, speed * (1 + skew) / self._radius
+        # Relative difference between the speeds of the right rear wheel and of the center of the rear axle.
+        right_excess = math.tan(self._steering) * self._drive.wheel_separation / (2 * self._drive.wheel_base)
+        return speed * (1 - right_excess) / self._radius, speed * (1 + right_excess) / self._radius

@@ -14,7 +14,7 @@ from simscen.sim.bullet import collision_shapes, engine, pybullet
 from simscen.sim.robots.robot_state import RobotState
 from simscen.sim.scene.terrain import MIN_NORMAL_Z_CASTER, MIN_NORMAL_Z_WHEEL, Terrain
 
-IDENTITY = (0.0, 0.0, 0.0, 1.0)
+IDENTITY_QUATERNION = (0.0, 0.0, 0.0, 1.0)
 _new = tuple.__new__
 """Creates a named tuple without the call overhead of its class."""
 KNUCKLE_MASS_RATIO = 0.2
@@ -48,14 +48,16 @@ class WheeledBase:
         shape that the renderer shows.
         """
         self._client, self._terrain = client, terrain
-        moments, self._base_from_center = body.chassis.principal()
+        moments, self._base_from_center = body.chassis.principal()  # center: frame of the principal axes
         self._center = self._base_from_center.position
         self._center_from_base = self._base_from_center.inverse()
-        self._is_aligned = self._center_from_base.quaternion == IDENTITY
+        self._is_aligned = self._center_from_base.quaternion == IDENTITY_QUATERNION
+        """Whether the principal axes of inertia are parallel to the axes of the base frame."""
         casters = casters_for_uneven_ground(body.casters) if terrain else body.casters
         self.id, self.joints, self.hull_links = _create_multibody(client, body, casters, tick_seconds, visual_shape)
         on_ground = [(caster.pose.x, caster.pose.y) for caster in body.casters if not caster_gap(caster)]
         self._supports = np.array([*((wheel.x, wheel.y) for wheel in body.wheels), *on_ground])
+        """Points (n, 2) in the base frame at which wheels and casters touch flat ground."""
         pybullet.changeDynamics(self.id, -1, localInertiaDiagonal=moments, physicsClientId=client)
         self._wheels: dict[int, Vector] = {}
         """Positions of the wheels in the base frame on the ground, by link."""
@@ -64,7 +66,7 @@ class WheeledBase:
             self._wheels[link] = (wheel.x, wheel.y, 0.0)
             self._set_up_wheel(wheel, link)
         self.ground_links = dict.fromkeys(self._wheels, MIN_NORMAL_Z_WHEEL)
-        """Smallest z of the contact normal with uneven ground, for each link of a wheel or caster."""
+        """For each link of a wheel or caster, the smallest z of a contact normal that means standing on the ground."""
         if casters:
             self.ground_links[self.hull_links[-1]] = MIN_NORMAL_Z_CASTER
         self._frictions = dict.fromkeys(self._wheels, 1.0)
@@ -153,9 +155,9 @@ def _create_multibody(
         linkCollisionShapeIndices=[link.shape for link in links],
         linkVisualShapeIndices=[visual_shape] * len(links),
         linkPositions=[link.position for link in links],
-        linkOrientations=[IDENTITY] * len(links),
+        linkOrientations=[IDENTITY_QUATERNION] * len(links),
         linkInertialFramePositions=[(0, 0, 0)] * len(links),
-        linkInertialFrameOrientations=[IDENTITY] * len(links),
+        linkInertialFrameOrientations=[IDENTITY_QUATERNION] * len(links),
         linkParentIndices=[link.parent for link in links],
         linkJointTypes=[link.joint for link in links],
         linkJointAxis=[link.axis for link in links],
@@ -172,7 +174,15 @@ def _create_multibody(
 
 
 class _Link(NamedTuple):
-    """Link for PyBullet's createMultiBody; parent 0 is the base, and parent k + 1 is link k."""
+    """Link for PyBullet's createMultiBody.
+
+    mass:      mass in kg
+    shape:     id of the collision shape; -1 without shape
+    position:  position in m of the link in the frame of its parent
+    parent:    0 for the base, k + 1 for the link with the index k
+    joint:     PyBullet's type of the joint to the parent
+    axis:      axis of the joint in the frame of the link
+    """
 
     mass: float
     shape: int
@@ -194,10 +204,10 @@ def _wheel_links(client: int, wheel: Wheel, index: int, max_roll: float) -> list
 
 
 def _wheel_shape(client: int, wheel: Wheel, max_roll: float) -> int:
-    """Create the contact shape of a wheel that rolls at most `max_roll` m in one step: a sphere.
+    """Create a sphere as the contact shape of a wheel that rolls at most `max_roll` m in one step.
 
-    For a fast wheel, adds a tiny second sphere on the axle, a pin. It enlarges the extent of the shape, so that Bullet
-    discards outdated contact points (see CONTACT_BREAKING_RATIO).
+    For a fast wheel, adds a tiny second sphere on the axle, a pin. The pin enlarges the extent of the shape, so that
+    Bullet discards outdated contact points (see CONTACT_BREAKING_RATIO).
     """
     pin_distance = min(
         ROLL_MARGIN_FACTOR * max_roll / engine.CONTACT_BREAKING_RATIO, 2 * abs(wheel.y) + wheel.radius / 2

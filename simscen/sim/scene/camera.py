@@ -57,8 +57,8 @@ class _VisualBody:
 class RenderScene:
     """Visual bodies of all triangle meshes: the static world, and movable objects that are not PyBullet primitives.
 
-    PyBullet's renderer does not show collision shapes that are triangle meshes. The bodies are created with the first
-    image.
+    PyBullet's renderer does not show collision shapes that are triangle meshes. The visual bodies are created with the
+    first image.
     """
 
     def __init__(self, client: int, static: TriangleMesh, triangulate: Triangulate) -> None:
@@ -66,15 +66,15 @@ class RenderScene:
         self._is_built = False
         self._visuals: dict[str, _VisualBody] = {}
 
-    def update(self, moving: Mapping[str, tuple[Body, Pose3]]) -> None:
+    def update(self, objects: Mapping[str, tuple[Body, Pose3]]) -> None:
         """Show the movable objects, given by name with their current poses; remove all other movable objects."""
         if not self._is_built:
             self._is_built = True
             engine.disable_collisions(self._client, engine.create_ground_plane(self._client))
             self._create_bodies(self._static.vertices, self._static.faces)
-        for name in [name for name in self._visuals if name not in moving]:
+        for name in [name for name in self._visuals if name not in objects]:
             self._remove(name)
-        for name, (body, pose) in moving.items():
+        for name, (body, pose) in objects.items():
             if not collision_shapes.are_primitives(body.solids):
                 self._place(name, body, pose)
 
@@ -91,6 +91,7 @@ class RenderScene:
             )
 
     def _remove(self, name: str) -> None:
+        """Remove the visual bodies of an object, if any."""
         visual = self._visuals.pop(name, None)
         for body_id in visual.body_ids if visual else ():
             pybullet.removeBody(body_id, physicsClientId=self._client)

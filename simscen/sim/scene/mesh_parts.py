@@ -21,7 +21,7 @@ class MeshParts:
     """Parts of a static mesh, sorted by solid. A solid with few faces is one part; a larger solid is split into tiles.
 
     Part k belongs to the solid with the index `solids[k]`, and has the face indices `order[starts[k]:starts[k + 1]]`.
-    Its bounding box is from `low[k]` to `high[k]` (x, y, z) in m.
+    The bounding box of part k is from `low[k]` to `high[k]` (x, y, z) in m.
     """
 
     order: Indices

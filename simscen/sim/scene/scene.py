@@ -10,7 +10,10 @@ from simscen.sim.scene.walls import Walls
 
 @dataclass(eq=False)
 class Scene:
-    """Engine client, static world, and movable objects, which all robots share. A tick is one physics step."""
+    """Engine client, static world, and movable objects, which all robots share. A tick is one physics step.
+
+    `tick_rate` is in Hz. `render_scene` is None if the simulation has no images.
+    """
 
     client: int
     tick_rate: int

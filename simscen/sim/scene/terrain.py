@@ -19,7 +19,7 @@ MIN_NORMAL_Z_WHEEL, MIN_NORMAL_Z_CASTER = 0.6, 0.1
 
 
 class Terrain:
-    """Solids of a static world that wheels can roll on, as bodies in the engine. An instance is true if there are any.
+    """Solids of a static world that wheels can roll on, as bodies in the engine. False if there are no such solids.
 
     `names` has the names of the solids by body id.
     """
@@ -44,6 +44,7 @@ class Terrain:
         return bool(self.names)
 
     def _add(self, static: TriangleMesh, solid: int) -> None:
+        """Create the solid with the index `solid` in the engine."""
         # A convex solid becomes one shape, so that a wheel on a ramp does not bump into edges between triangles.
         faces = static.faces[static.owners == solid]
         mesh = submesh(static.vertices, faces)
@@ -82,7 +83,7 @@ class Terrain:
     def standing_pose(self, pose: Pose2, supports: Array) -> Pose3:
         """Return the 3D pose of a robot that stands at `pose` on the ground, tilted like the ground below it.
 
-        `supports` (n, 2) are the points of its wheels and casters in the base frame. No support is below the ground.
+        `supports` (n, 2) are the points of wheels and casters in the base frame. No support is below the ground.
         """
         heights = self.heights(pose.apply(supports))
         if len(supports) < 3 or not np.ptp(heights):
@@ -98,11 +99,13 @@ class Terrain:
 class FloorFriction:
     """Named patches of the floor with their own friction coefficients; a newer patch covers older patches.
 
-    A wheel gets the friction of the patch below it. On a ramp, the engine multiplies it by the friction of the ramp.
+    A wheel gets the friction of the patch below the wheel. On a ramp, the engine multiplies this friction by the
+    friction of the ramp.
     """
 
     def __init__(self) -> None:
         self._patches: dict[str, tuple[Patch, tuple[float, float, float, float]]] = {}
+        """Patches with their bounding boxes (min x, min y, max x, max y) in m, by name, oldest first."""
         self._has_expired = False
 
     def __bool__(self) -> bool:
@@ -123,8 +126,8 @@ class FloorFriction:
 
     def friction(self, x: float, y: float) -> float:
         """Return the friction coefficient of the newest patch at a point in m, or 1 if there is no patch."""
-        found = 1.0
+        coefficient = 1.0
         for patch, (left, low, right, high) in self._patches.values():
             if left <= x <= right and low <= y <= high and polygon_contains(patch.outline, (x, y)):
-                found = patch.friction
-        return found
+                coefficient = patch.friction
+        return coefficient

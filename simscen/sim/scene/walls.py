@@ -38,6 +38,7 @@ class Walls:
     def __init__(self, client: int, mesh: TriangleMesh) -> None:
         self._client, self._vertices = client, mesh.vertices
         self._built: dict[int, _BuiltDisc] = {}
+        """Disc of the last `build_near` for each body, by body id."""
         self._is_missing = np.zeros(0, dtype=np.bool_)
         self.bodies: list[int] = []
         if len(mesh.faces) > SMALL_WORLD_FACES:
