@@ -19,23 +19,25 @@ from simscen.core.records.run_result import RunKey
 FORMAT_VERSION = "1"
 """Version of the log format. Logs of another version are rejected."""
 RUN_RECORD = "simscen"
-"""Name of the metadata record at the start of a log with the description of the run."""
+"""Name of the metadata record with the description of the run, at the start of a log."""
 STACK_RECORD = "simscen.stack"
-"""Name of the metadata record at the end of the log with facts about the external stacks."""
+"""Name of the metadata record with facts about the external stacks, at the end of a log."""
+END_RECORD = "simscen.end"
+"""Name of the metadata record with the last tick and the message counts, at the end of a complete log."""
+COUNT_PREFIX = "messages:"
+"""Start of the keys of END_RECORD that count messages. The topic follows."""
 _FACT_PREFIX = "fact."
+"""Start of the keys of RUN_RECORD that contain `LogHeader.facts`."""
 STACK_FACT = "stack"
 """Key of `LogHeader.facts`: value of the option --stack."""
 STACK_NAME_FACT = "variation"
 """Key of `LogHeader.facts`: name of the stack if stacks are compared. The key must stay as in older logs."""
 VARIATION_FACT = "varied"
-"""Key of `LogHeader.facts`: variation of the scenario."""
+"""Key of `LogHeader.facts`: variation of the scenario. The key must stay as in older logs."""
 ROBOTS_KEY, RESOLUTION_KEY, ORIGIN_KEY = "robots", "map.resolution", "map.origin"
-"""Keys of the metadata record "simscen": the names of several robots, and the resolution and origin of a map."""
-END_RECORD, COUNT_PREFIX = "simscen.end", "messages:"
-"""Name of the metadata record at the end of a complete log, and prefix of its keys for the numbers of messages by
-topic."""
+"""Keys of RUN_RECORD: the names of several robots, and the resolution and origin of a map."""
 RESERVED_FILES = CASE_FILE, SCENARIO_FILE, RESULT_FILE = "case.json", "scenario.yaml", "result.json"
-"""Names of attachments that are reserved for simscen."""
+"""Names of attachments that are reserved for simscen: the Case, the scenario, and the result of the run."""
 _MEDIA_TYPES = {
     ".json": "application/json",
     ".pgm": "image/x-portable-graymap",
@@ -60,12 +62,12 @@ class LogHeader:
         scenario: Resolved YAML text of the scenario.
         map: Map that the stack receives; None without a map.
         robot_description: URDF of the robot.
-        mounts: Poses of the sensors on the robot's base, by sensor name. A lidar that is missing here has its
-            pose in each scan.
-        sensors: Class names of readings ("Scan", …) by sensor name. Empty if read from a log.
-        files: Attachments by name.
+        mounts: Poses of the sensors on the robot's base, by sensor name. The pose of any other lidar is in its scans.
+        sensors: Class name of the readings ("Scan", …) of each sensor, by sensor name. Empty if read from a log.
+        files: Additional attachments by name.
         facts: Additional metadata as text by key.
-        robots: Headers of several robots by name; empty for a single robot. The other attributes are of the first one.
+        robots: Header of each robot by name if there are several robots; empty for a single robot. With several
+            robots, the other attributes describe the first one.
     """
 
     name: str
@@ -87,7 +89,7 @@ class LogHeader:
 
 
 def case_to_json(case: Case) -> str:
-    """Return a Case as JSON, in which infinity is the string "Infinity"."""
+    """Return a Case as JSON without `labels` and `objects`. In the JSON, infinity is the string "Infinity"."""
     return str(to_json(case, inf_nan_mode="strings", indent=1, exclude={"labels", "objects"}), "utf-8")
 
 
@@ -104,12 +106,12 @@ def case_from_json(text: str | bytes) -> Case:
 
 
 def media_type(name: str) -> str:
-    """Return the media type for a file name, which does not depend on the operating system."""
+    """Return the media type for a file name. Unlike the module mimetypes, it is the same on all operating systems."""
     return _MEDIA_TYPES.get(PurePosixPath(name).suffix, "application/octet-stream")
 
 
 def run_metadata(header: LogHeader, clock: Clock) -> dict[str, str]:
-    """Return the metadata record "simscen", which includes the exact resolution and origin of each map."""
+    """Return the content of RUN_RECORD, which includes the exact resolution and origin of each map."""
     metadata = {
         "format": FORMAT_VERSION,
         "scenario": header.name,
@@ -131,28 +133,31 @@ def _map_facts(header: LogHeader) -> dict[str, str]:
 
 
 def robot_metadata(run_metadata: Mapping[str, str], robot: str) -> dict[str, str]:
-    """Return the metadata record "simscen" for one of several robots, with the resolution and origin of its map."""
-    own = {
+    """Return the content of RUN_RECORD for one of several robots, with the resolution and origin of the robot's map."""
+    map_facts = {
         fact: run_metadata[f"{robot}.{fact}"]
         for fact in (RESOLUTION_KEY, ORIGIN_KEY)
         if f"{robot}.{fact}" in run_metadata
     }
-    return {**run_metadata, **own}
+    return {**run_metadata, **map_facts}
 
 
 def stack_facts(facts: Mapping[str, str], robot: str) -> dict[str, str]:
-    """Return the facts about the external stack of one of several robots. `facts` has `ROBOT.` before each key."""
+    """Return the facts about the external stack of one of several robots.
+
+    `facts` are the facts about the stacks of all robots. In `facts`, each key starts with `ROBOT.`.
+    """
     prefix = f"{robot}."
     return {name.removeprefix(prefix): fact for name, fact in facts.items() if name.startswith(prefix)}
 
 
 def extra_facts(run_metadata: Mapping[str, str]) -> dict[str, str]:
-    """Return `LogHeader.facts` from the metadata record "simscen"."""
+    """Return `LogHeader.facts` from the content of RUN_RECORD."""
     return {name[len(_FACT_PREFIX) :]: value for name, value in run_metadata.items() if name.startswith(_FACT_PREFIX)}
 
 
 def attachments(header: LogHeader) -> dict[str, bytes]:
-    """Return the attachments of the log by name. Raises ValueError if one of `header.files` has a reserved name."""
+    """Return all attachments of the log by name. Raises ValueError if one of `header.files` has a reserved name."""
     cases = {f"{name}/{CASE_FILE}": case_to_json(robot.case).encode() for name, robot in header.robots.items()}
     files = cases or {CASE_FILE: case_to_json(header.case).encode()}
     if header.scenario:
@@ -163,7 +168,7 @@ def attachments(header: LogHeader) -> dict[str, bytes]:
 
 
 SCENERY_FILE = "scenery.json"
-"""Name of the attachment with the Scenery: objects that pictures and markers show in addition to the trace."""
+"""Name of the attachment with the Scenery: objects that pictures and markers show but the trace does not contain."""
 _SCENERIES = TypeAdapter(Scenery)
 
 

@@ -57,11 +57,11 @@ class Log:
 
     Attributes:
         header: Description of the run.
-        trace: Signals and events of the only or first robot.
+        trace: Signals and events of the robot, or of the first one of several robots.
         result: Content of result.json; "" if the run was not judged.
         complete: False if the run was aborted. The trace then ends with the last message.
-        robots: Contents for several robots by name; empty for a single robot.
-        sensors: Messages that are not part of the trace; empty unless requested.
+        robots: Contents of each robot by name if there are several robots; empty for a single robot.
+        sensors: Messages that are not part of the trace; empty unless requested by `with_sensors`.
         coverage: Evidence that the log lacks because messages were removed after the recording.
         stack: Facts about the external stack, as in stack.json; empty for the reference stack and an aborted run.
     """
@@ -82,7 +82,7 @@ class Log:
 
 
 def read_run(path: Path, with_sensors: bool = False) -> Log:
-    """Read a log with `read_log`. Raises InvalidInput also if the log has no ground truth."""
+    """Read a log with `read_log`. In addition, raises InvalidInput if the log has no ground truth."""
     log = read_log(path, with_sensors=with_sensors)
     if not len(log.trace.truth):
         raise invalid_log(path, "SC803", "the log has no ground truth: its run was aborted before the first step")
@@ -94,8 +94,8 @@ def read_log(path: "str | Path", partial: bool | None = None, with_sensors: bool
 
     Raises InvalidInput if the file cannot be read, is not a log of simscen, is damaged, or is truncated.
 
-    partial:       whether a truncated log is accepted; None to accept it if the name ends with `.partial.mcap`
-    with_sensors:  whether to keep the messages that are not part of the trace
+    partial:       whether to accept a truncated log; None to accept it only if the name ends with `.partial.mcap`
+    with_sensors:  whether to read the messages that are not part of the trace
     """
     path = Path(path)
     accept_truncated = path.name.endswith(PARTIAL_SUFFIX) if partial is None else partial
@@ -112,8 +112,7 @@ def read_log(path: "str | Path", partial: bool | None = None, with_sensors: bool
             for (name, trace), robot in zip(contents.traces().items(), contents.robots.values(), strict=True)
         }
         trace, result = contents.trace(), contents.result()
-        own = contents.sensors, contents.coverage(), contents.stack
-        return Log(header, trace, result, complete, robots, *own)
+        return Log(header, trace, result, complete, robots, contents.sensors, contents.coverage(), contents.stack)
 
 
 def _read(stream: IO[bytes], contents: LogContents) -> bool:

@@ -1,4 +1,4 @@
-"""Recovery of the log of an aborted run: adds the index, which other tools need."""
+"""Recovery of the log of an aborted run: adds the MCAP index, which other tools need."""
 
 import os
 from pathlib import Path
@@ -16,26 +16,26 @@ from simscen.record.topics import MessageType
 
 
 def recover(path: Path) -> bool:
-    """Rewrite a log with an index, and return True. Return False if the log already has an index.
+    """Rewrite a log with an index, and return True. Leave a log that has an index unchanged, and return False.
 
     Raises InvalidInput if the file cannot be read or is not a log of simscen. Raises RunError of kind "output" if the
     new file cannot be written.
     """
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    part_path = path.with_name(f".{path.name}.{os.getpid()}.part")
     with unreadable_log_as_invalid_input(path):
         try:
             with open_log(path) as stream:
                 if _ends_with_magic(stream):
                     return False
-                with part.open("wb") as file:
+                with part_path.open("wb") as file:
                     _copy(stream, file)
-            part.replace(path)
+            part_path.replace(path)
         except OSError as error:
-            if part.exists():
-                raise write_error(part, error) from error
+            if part_path.exists():
+                raise write_error(part_path, error) from error
             raise
         finally:
-            part.unlink(missing_ok=True)
+            part_path.unlink(missing_ok=True)
     return True
 
 
@@ -51,7 +51,7 @@ def _ends_with_magic(stream: IO[bytes]) -> bool:
 
 
 def _copy(stream: IO[bytes], file: IO[bytes]) -> None:
-    """Write all complete records of a log of simscen to `file`, followed by an index."""
+    """Write all complete records of a log of simscen to `file`, and an index after them."""
     writer: McapWriter | None = None
     is_simscen_log = False
     types: dict[int, MessageType] = {}
@@ -66,7 +66,7 @@ def _copy(stream: IO[bytes], file: IO[bytes]) -> None:
             case records.Schema():
                 types[record.id] = MessageType(record.name, record.data.decode(), "")
             case records.Channel():
-                channels[record.id] = writer.channel(record.topic, types[record.schema_id], record.metadata)
+                channels[record.id] = writer.add_channel(record.topic, types[record.schema_id], record.metadata)
             case records.Message():
                 if not is_simscen_log:
                     raise NotSimscenLog("another program recorded it; recover it with `mcap recover`")
@@ -77,7 +77,7 @@ def _copy(stream: IO[bytes], file: IO[bytes]) -> None:
                 writer.add_metadata(record.name, record.metadata)
                 is_simscen_log |= record.name == RUN_RECORD
             case _:
-                pass  # indexes are written again
+                pass  # the writer creates new indexes
     if writer is None:
         raise NotSimscenLog("it has no header")
     writer.finish()

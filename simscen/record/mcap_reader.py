@@ -1,4 +1,4 @@
-"""Readers of all records of an MCAP file, or only of its attached result."""
+"""Reading of MCAP files: all records, or only the attached result."""
 
 import errno
 import json
@@ -33,7 +33,7 @@ def open_log(path: Path) -> IO[bytes]:
 
 
 def is_mcap(stream: IO[bytes]) -> bool:
-    """Return whether a file begins with the MCAP magic bytes. The stream is at its start before and afterwards."""
+    """Return whether a file begins with the MCAP magic bytes. The stream must be at its start, and stays there."""
     magic = stream.read(len(MAGIC))
     stream.seek(0)
     return magic == MAGIC
@@ -52,16 +52,16 @@ def attached_result(path: Path) -> dict[str, Any] | None:
 
 
 class RecordReader:
-    """Iterates over all records of an MCAP file, including those inside chunks.
+    """Iterates over all records of an MCAP file, including records inside chunks.
 
-    The iteration ends before a truncated record. `is_truncated` is then True. The iteration raises exceptions of the
-    mcap library for bytes that are not MCAP, and ValueError for a chunk above MAX_RECORD_BYTES.
+    The iteration ends before a truncated record, and sets `is_truncated` to True. The iteration raises exceptions of
+    the mcap library for bytes that are not MCAP, and ValueError for a chunk above MAX_RECORD_BYTES.
     """
 
     def __init__(self, stream: IO[bytes]) -> None:
         # The library does not detect a truncated record. StreamReader accepts any object with a `read` method.
-        exact: Any = _ExactStream(stream)
-        self._reader = StreamReader(exact, emit_chunks=True, validate_crcs=True, record_size_limit=MAX_RECORD_BYTES)
+        source: Any = _ExactStream(stream)
+        self._reader = StreamReader(source, emit_chunks=True, validate_crcs=True, record_size_limit=MAX_RECORD_BYTES)
         self.is_truncated = False
 
     def __iter__(self) -> Iterator[records.McapRecord]:
@@ -76,7 +76,7 @@ class RecordReader:
 
 
 def _decompressed(chunk: records.Chunk) -> records.Chunk:
-    """Return a chunk, decompressed if it uses lz4.
+    """Return an lz4 chunk without compression, and any other chunk unchanged.
 
     Raises ValueError if the chunk is damaged or has more than MAX_RECORD_BYTES.
     """
@@ -84,12 +84,12 @@ def _decompressed(chunk: records.Chunk) -> records.Chunk:
         raise ValueError(f"a chunk has more than {MAX_RECORD_BYTES >> 20} MiB of messages")
     if chunk.compression != "lz4":
         return chunk
-    try:  # the library would decompress it without a limit
+    try:  # the mcap library would decompress lz4 without a size limit
         data = LZ4FrameDecompressor().decompress(chunk.data, max_length=chunk.uncompressed_size + 1)
     except RuntimeError as error:
         raise ValueError(f"a chunk cannot be decompressed: {error}") from error
     if len(data) != chunk.uncompressed_size:
-        raise ValueError("a chunk does not have the size in its header")
+        raise ValueError("a chunk does not have the size that its header states")
     return replace(chunk, compression="", data=data)
 
 

@@ -8,11 +8,11 @@ from simscen.core.errors import RunError
 from simscen.core.records.trace import Moment
 
 MOMENT_DELAY_S = 0.9
-"""Maximum simulated time for which moments are buffered. Buffered moments are lost if the process is killed."""
+"""Maximum simulated time for which moments are buffered. The buffered moments are lost if the process is killed."""
 
 
 class MomentSink(Protocol):
-    """Receives the moments of a robot in order: a recorder, a trace builder, or a progress display."""
+    """Receiver of the moments of a robot in order, such as a recorder, a trace builder, or a progress display."""
 
     def append(self, moment: Moment) -> None:
         """Process one moment."""
@@ -28,9 +28,10 @@ class Flushable(Protocol):
 
 
 class MomentBuffer:
-    """Buffers the moments of all robots, and passes them on in batches, which is faster.
+    """Buffers the moments of all robots, and passes the moments on in batches, which is faster.
 
-    As a context manager, it flushes the buffer if an exception leaves the context.
+    If an exception leaves the context of this context manager, the buffer is flushed. The context manager does not
+    flush after a normal end.
     """
 
     def __init__(self, ticks: int, file: Flushable | None = None) -> None:
@@ -39,16 +40,16 @@ class MomentBuffer:
         self._file = file
         self.ticks, self.next_flush_tick = ticks, 0
 
-    def sink(self, *logs: MomentSink) -> MomentSink:
-        """Return a sink that passes the moments of one robot to each of `logs`."""
-        return _BufferedSink(self, logs)
+    def sink(self, *sinks: MomentSink) -> MomentSink:
+        """Return a sink that buffers the moments of one robot, and passes each moment to all `sinks` when flushed."""
+        return _BufferedSink(self, sinks)
 
     def flush(self) -> None:
         """Pass on all buffered moments."""
         pending, self.pending = self.pending, []
-        for logs, moment in pending:
-            for log in logs:
-                log.append(moment)
+        for sinks, moment in pending:
+            for sink in sinks:
+                sink.append(moment)
         if self._file is not None:
             self._file.flush_if_due()
 
@@ -66,13 +67,13 @@ class MomentBuffer:
 class _BufferedSink:
     """Adds the moments of one robot to a MomentBuffer."""
 
-    def __init__(self, buffer: MomentBuffer, logs: tuple[MomentSink, ...]) -> None:
-        self._buffer, self._logs = buffer, logs
+    def __init__(self, buffer: MomentBuffer, sinks: tuple[MomentSink, ...]) -> None:
+        self._buffer, self._sinks = buffer, sinks
 
     def append(self, moment: Moment) -> None:
-        """Buffer a moment, and flush the buffer if it is due."""
+        """Buffer a moment, and flush the buffer when its period is over."""
         buffer, tick = self._buffer, moment.tick
-        buffer.pending.append((self._logs, moment))
+        buffer.pending.append((self._sinks, moment))
         if tick >= buffer.next_flush_tick:
             buffer.next_flush_tick = tick + buffer.ticks
             buffer.flush()

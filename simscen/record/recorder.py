@@ -19,9 +19,9 @@ from simscen.record.publishers.robot import RobotPublisher
 class Recorder:
     """Context manager that writes the moments (records of single ticks) of all robots to a log.
 
-    `header` describes the run. `target` is the path of the log, or a sink for its bytes. A log file has a partial name
-    until `close`, and keeps this name if the run is aborted. Methods raise RunError of kind "output" if the log cannot
-    be written.
+    `target` is the path of the log, or a sink for the bytes of the log. `header` describes the run. The name of a log
+    file ends with `.partial.mcap` until `close`. It keeps this name if the run is aborted. Methods raise RunError of
+    kind "output" if the log cannot be written.
     """
 
     def __init__(self, target: "str | Path | Sink", clock: Clock, header: LogHeader) -> None:
@@ -47,13 +47,13 @@ class Recorder:
         self.flush_if_due()
 
     def flush_if_due(self) -> None:
-        """Write the buffered messages to the file if there are enough."""
+        """Write the buffered messages to the file if they are large enough or cover enough time."""
         self._writer.flush_if_due()
 
     def close(self, end_tick: int, result: str = "", stack: Mapping[str, str] | None = None) -> None:
         """Write the last records, and give the file its final name.
 
-        `result` is the content of result.json. `stack` are the facts about external stacks. Both are optional.
+        `result` is the content of result.json, or "" if there is none. `stack` are facts about external stacks.
         """
         if result:
             self._writer.add_attachment(log_header.RESULT_FILE, "application/json", result.encode())
@@ -75,7 +75,7 @@ class Recorder:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         if self._file is not None:
-            if not self._file.failed:
+            if not self._file.has_failed:
                 with suppress(RunError):  # the exception that aborted the run is more important
                     self._writer.finish()
             self._file.abandon()

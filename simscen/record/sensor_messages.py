@@ -16,37 +16,39 @@ from simscen.record.messages.event_text import EVENT_LOGGER
 from simscen.record.trace_builder import to_planar
 
 LoggedMessages = list[tuple[int, bytes]]
-"""Pairs of the tick of logging and a serialized message."""
+"""List of pairs: tick of logging, and serialized message."""
 
 
 @dataclass(eq=False)
 class SensorMessages:
-    """Serialized messages of one robot, which are decoded on request.
+    """Serialized messages of one robot, and methods that decode them.
 
     Attributes:
-        time: Clock of the log.
-        scans: Messages by topic.
-        costmaps: Messages by topic.
-        mounts: Poses of lidars on the base, by frame.
-        lines: Messages of /rosout, including simscen's own lines.
+        clock: Clock of the log.
+        scans: Scans by topic.
+        particles: Particle clouds.
+        local_plans: Local plans.
+        costmaps: Costmaps by topic.
+        mounts: Poses of sensors on the base, by the name of the sensor's frame in the stack.
+        log_lines: Messages of /rosout, including the lines that simscen writes for its events.
         stamps_are_run_times: Whether stamps count from the start of the run. If not, use the ticks of logging.
         frames: Names of the robot's frames in the log. Decoded messages have the frame names of the stack instead.
     """
 
-    time: Clock = field(default_factory=lambda: Clock(1))
+    clock: Clock = field(default_factory=lambda: Clock(1))
     scans: dict[str, LoggedMessages] = field(default_factory=dict)
     particles: LoggedMessages = field(default_factory=list)
     local_plans: LoggedMessages = field(default_factory=list)
     costmaps: dict[str, LoggedMessages] = field(default_factory=dict)
     mounts: dict[str, Pose3] = field(default_factory=dict)
-    lines: LoggedMessages = field(default_factory=list)
+    log_lines: LoggedMessages = field(default_factory=list)
     stamps_are_run_times: bool = True
     frames: RobotFrames = field(default_factory=RobotFrames)
 
     def handler(self, topic: str, message_type: str) -> Callable[[int, bytes], None] | None:
-        """Return a function (tick of logging, serialized message) that stores a message of a topic.
+        """Return a function that stores a message of a topic; None if messages of the topic are not stored.
 
-        Returns None if messages of the topic are not stored.
+        The arguments of the function are the tick of logging and the serialized message.
         """
         if message_type == topics.SCAN_TYPE:
             return _append_to(self.scans.setdefault(topic, []))
@@ -65,7 +67,7 @@ class SensorMessages:
         limits = scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max
         mount = self.mounts.get(frame, Pose3())
         tilted = None if mount.is_level else mount
-        return level_scan(Scan(frame, self.time.tick_at(scan.stamp), scan.ranges, *limits, mount.plane, tilted))
+        return level_scan(Scan(frame, self.clock.tick_at(scan.stamp), scan.ranges, *limits, mount.plane, tilted))
 
     def decode_particles(self, data: bytes) -> Array:
         """Decode a ParticleCloud to poses (n, 3) x, y, yaw."""
@@ -76,8 +78,8 @@ class SensorMessages:
         return decode.path(MessageReader(data)).poses[:, :2]
 
     def stack_lines(self) -> list[tuple[int, LogLine]]:
-        """Return the log lines of an external stack with their ticks."""
-        decoded = [(tick, decode.log_line(MessageReader(data))) for tick, data in self.lines]
+        """Return the log lines of an external stack, each with its tick of logging."""
+        decoded = [(tick, decode.log_line(MessageReader(data))) for tick, data in self.log_lines]
         return [(tick, line) for tick, line in decoded if line.name != EVENT_LOGGER]
 
     def decode_costmap(self, data: bytes) -> tuple[str, OccupancyGrid]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class Topic(NamedTuple):
-    """A topic and its message type. `latched` means transient local durability."""
+    """Topic with its message type. `latched` means transient local durability."""
 
     name: str
     type: str
@@ -44,8 +44,8 @@ IMU_TYPE = "sensor_msgs/msg/Imu"
 IMAGE_TYPE = "sensor_msgs/msg/Image"
 BUMPER_TYPE = "std_msgs/msg/Bool"
 
-# Metadata version 8 of rosbag2: enums are the integers of rmw, which all versions of rosbag2 read. Older versions
-# reject the names of version 9. The profile is: keep last 10 (1 if latched), reliable, no deadlines.
+# Format of metadata version 8 of rosbag2: enums are the integers of rmw, which all versions of rosbag2 read. Versions
+# before 9 reject names of enums. The profile is: keep last 10 (1 if latched), reliable, no deadlines.
 _QOS = """\
 - history: 1
   depth: {depth}
@@ -71,7 +71,13 @@ def qos(latched: bool) -> str:
 
 
 class MessageType(NamedTuple):
-    """Message type: full name, definition including nested types (ros2msg), and type hash (REP 2016)."""
+    """ROS message type.
+
+    Attributes:
+        name: Full name, such as "nav_msgs/msg/Path".
+        definition: Text of the .msg file and of all nested types, in the format `ros2msg` of MCAP.
+        hash: Type hash as in REP 2016.
+    """
 
     name: str
     definition: str

@@ -1,7 +1,7 @@
 """Builder of the Trace (signals and events) of a run, and the tables in which the signals are collected.
 
-A TraceBuilder collects signals from moments (records of single ticks), and the log reader from messages. Both convert
-the same quaternions to yaw with the same function, so that both traces are equal to the bit.
+A TraceBuilder collects signals from moments (records of single ticks). The log reader collects signals from messages.
+Both convert the same quaternions to yaw with `to_planar`, so that their traces are equal to the bit.
 """
 
 import math
@@ -27,20 +27,22 @@ _pack_tick = struct.Struct("d").pack
 class SignalBuffer:
     """Growing table of a signal. Each row has a tick and `width` numbers.
 
-    `rows` are the bytes of all rows. `pack` converts the numbers of a row to bytes.
+    Attributes:
+        rows: Bytes of all rows.
+        pack: Function that converts the tick and the numbers of a row to bytes.
     """
 
     def __init__(self, width: int) -> None:
-        self._width = width + 1
+        self._row_length = width + 1
         self.pack = struct.Struct(f"{width + 1}d").pack
         self.rows = bytearray()
 
     def add(self, tick: int, *values: float) -> None:
-        """Append a row."""
+        """Append a row with `width` values."""
         self.rows += self.pack(tick, *values)
 
     def append(self, tick: int, values: Array) -> None:
-        """Append a row with the `width` numbers of an array of any shape."""
+        """Append a row with the `width` numbers of an array. The array may have any shape."""
         self.rows += _pack_tick(tick)
         self.rows += values.tobytes()
 
@@ -57,13 +59,16 @@ class SignalBuffer:
 
     def columns(self) -> tuple[Ticks, Array]:
         """Return ticks (n,) and values (n, width)."""
-        table = np.frombuffer(bytes(self.rows)).reshape(-1, self._width)
+        table = np.frombuffer(bytes(self.rows)).reshape(-1, self._row_length)
         return table[:, 0].astype(np.int64), table[:, 1:]
 
 
 def exact_planar_poses(points: Array) -> Array:
-    """Return poses (n, 7) of points (n, 3) x, y, yaw, equal to the poses of Pose3.planar to the last bit."""
-    # The log contains the poses of Pose3.planar. The sine of numpy is slightly different.
+    """Return the poses (n, 7) of points (n, 3) x, y, yaw. They are equal to the poses of Pose3.planar to the last bit.
+
+    A pose is x, y, z and a quaternion x, y, z, w.
+    """
+    # The log contains the poses of Pose3.planar. Sines of numpy can differ from sines of math in the last bit.
     poses = np.zeros((len(points), 7))
     poses[:, :2] = points[:, :2]
     halves = np.where(np.isfinite(points[:, 2]), points[:, 2] / 2, np.nan).tolist()
@@ -80,17 +85,18 @@ def to_planar(poses: Array) -> Array:
 class TraceRows:
     """Collected signals and events of a run.
 
-    A pose has seven columns: x, y, z and a quaternion x, y, z, w.
+    A pose has seven columns: x, y, z in m and a quaternion x, y, z, w. A twist has three columns in the base frame:
+    vx and vy in m/s, wz in rad/s.
 
     Attributes:
-        truth: True pose, vx, vy, wz.
+        truth: True pose in the world frame, and true twist.
         clearance: Clearance in m.
-        belief: Estimated pose, and its covariance xx, xy, xyaw, yy, yyaw, yawyaw.
-        odometry: Pose.
-        command: vx, vy, wz.
-        objects: Poses of moving objects, by name.
+        belief: Estimated pose in the map frame, and its covariance xx, xy, xyaw, yy, yyaw, yawyaw.
+        odometry: Pose in the odom frame.
+        command: Commanded twist.
+        objects: Poses of moving objects in the world frame, by name.
         scans: Ticks at which the stack received a scan.
-        plans: Tick and poses (n, 7) of each plan.
+        plans: Tick and poses (n, 7) in the map frame of each plan.
         events: Events in order.
     """
 
@@ -101,34 +107,34 @@ class TraceRows:
         self.odometry = SignalBuffer(7)
         self.command = SignalBuffer(3)
         self.objects: dict[str, SignalBuffer] = {}
-        self._joint: dict[tuple[str, ...], SignalBuffer] = {}
+        self._joint_objects: dict[tuple[str, ...], SignalBuffer] = {}
         self.scans: list[int] = []
         self.plans: list[tuple[int, Array]] = []
         self.events: list[Event] = []
 
     def object(self, name: str) -> SignalBuffer:
-        """Return the buffer of a moving object, and create it if necessary."""
+        """Return the buffer of a moving object. Create the buffer if the object is new."""
         buffer = self.objects.get(name)
         if buffer is None:
             buffer = self.objects[name] = SignalBuffer(7)
         return buffer
 
     def joint_objects(self, names: tuple[str, ...]) -> SignalBuffer:
-        """Return the joint buffer of objects that move together. A row has the poses of all these objects."""
-        buffer = self._joint.get(names)
+        """Return the joint buffer of several objects. A row has the poses of all these objects at one tick."""
+        buffer = self._joint_objects.get(names)
         if buffer is None:
-            buffer = self._joint[names] = SignalBuffer(7 * len(names))
+            buffer = self._joint_objects[names] = SignalBuffer(7 * len(names))
         return buffer
 
     def split_joint_objects(self) -> None:
         """Move the poses from joint buffers to the buffers of single objects, sorted by tick."""
-        for names, buffer in self._joint.items():
+        for names, buffer in self._joint_objects.items():
             ticks, poses = buffer.columns()
             for column, name in enumerate(names):
                 self.object(name).extend(ticks, poses[:, 7 * column : 7 * column + 7])
-        for name in {name: None for names in self._joint for name in names}:
+        for name in {name: None for names in self._joint_objects for name in names}:
             self.objects[name].sort()
-        self._joint.clear()
+        self._joint_objects.clear()
 
     def trace(self, tick_rate: int, end: int) -> Trace:
         """Return the Trace until the tick `end`."""
@@ -140,17 +146,18 @@ class TraceRows:
             velocity=Samples(truth_ticks, truth[:, 7:]),
             clearance=Samples(*self.clearance.columns()),
             belief=Samples(belief_ticks, np.column_stack((to_planar(belief), belief[:, 7:]))),
-            odometry=_poses(self.odometry),
+            odometry=_planar_samples(self.odometry),
             command=Samples(*self.command.columns()),
             scans=np.unique(np.array(self.scans, dtype=np.int64)),
             plans=tuple(Path(to_planar(poses), tick) for tick, poses in self.plans),
             events=tuple(self.events),
-            objects={name: _poses(self.objects[name]) for name in sorted(self.objects)},
+            objects={name: _planar_samples(self.objects[name]) for name in sorted(self.objects)},
             end=end,
         )
 
 
-def _poses(buffer: SignalBuffer) -> Samples:
+def _planar_samples(buffer: SignalBuffer) -> Samples:
+    """Return the samples x, y, yaw of a buffer of poses."""
     ticks, poses = buffer.columns()
     return Samples(ticks, to_planar(poses))
 
@@ -159,15 +166,18 @@ class TraceBuilder:
     """Builds the Trace of a robot from its moments. The Trace is equal to the Trace that `read_log` reads."""
 
     def __init__(self, clock: Clock, thinning: Thinning | None = None) -> None:
-        """Start an empty trace. `thinning` selects the samples to keep. A RobotPublisher of the robot can share it."""
+        """Start an empty trace. `thinning` selects the samples to keep, and may be the Thinning of a RobotPublisher."""
         self._clock = clock
         self._thinning = Thinning(clock.rate) if thinning is None else thinning
         self._rows = TraceRows()
-        self._truth, self._odometry, self._belief = SignalBuffer(11), SignalBuffer(3), SignalBuffer(9)
-        """Their columns are: pose, twist, and clearance; x, y, yaw; x, y, yaw, and covariance.
-
-        Appending is faster than to the buffers of TraceRows. `finish` converts their rows to rows of TraceRows.
-        """
+        # These buffers need no quaternions and are therefore faster than the buffers of TraceRows. `finish` converts
+        # the rows to rows of TraceRows.
+        self._truth = SignalBuffer(11)
+        """Pose, twist, and clearance."""
+        self._odometry = SignalBuffer(3)
+        """x, y, yaw."""
+        self._belief = SignalBuffer(9)
+        """x, y, yaw, and covariance."""
 
     def append(self, moment: Moment) -> None:
         """Add one moment. Moments must be added in the order of their ticks."""
@@ -197,11 +207,12 @@ class TraceBuilder:
             for event in (*moment.events, *decision.events):
                 rows.events.append(event_text.from_json(event_text.to_json(event)))
 
-    def _add_objects(self, tick: int, moved: Mapping[str, Pose3]) -> None:
-        if type(moved) is PosesAtTick:
-            self._rows.joint_objects(moved.predicted.names).append(tick, moved.table)
+    def _add_objects(self, tick: int, poses: Mapping[str, Pose3]) -> None:
+        """Add the poses of objects by name."""
+        if type(poses) is PosesAtTick:
+            self._rows.joint_objects(poses.predicted.names).append(tick, poses.table)
             return
-        for name, pose in moved.items():
+        for name, pose in poses.items():
             buffer = self._rows.object(name)
             buffer.rows += buffer.pack(tick, *pose)
 

@@ -16,7 +16,7 @@ _COLUMNS = {
     "odometry": _POSE,
     "command": ("vx", "vy", "wz"),
 }
-"""Names of the columns of each signal. All other signals are poses."""
+"""Names of the columns of each signal. Signals that are missing here have the columns _POSE."""
 
 Difference = tuple[int, str]
 """Tick and description of a difference."""
@@ -25,8 +25,8 @@ Difference = tuple[int, str]
 def first_difference(first: Trace, second: Trace) -> str | None:
     """Return a description of the first difference of two traces; None if the traces are equal to the bit.
 
-    If several fields differ at the first tick, describes the field that comes first in this order: truth, velocity,
-    clearance, odometry, objects, scans, belief, command, plans, events.
+    If several fields differ at this tick, describe the first of them in this order: truth, velocity, clearance,
+    odometry, objects, scans, belief, command, plans, events.
     """
     if first.tick_rate != second.tick_rate:
         return f"tick rate: {first.tick_rate} against {second.tick_rate} Hz"
@@ -38,7 +38,7 @@ def first_difference(first: Trace, second: Trace) -> str | None:
 
 
 def _differences(first: Trace, second: Trace) -> Iterator[Difference]:
-    """Yield the first difference of each signal, all differences of plans and events, and a difference of the ends."""
+    """Yield the first difference of each signal, all differences of plans and events, and different ends of the run."""
     for name in ("truth", "velocity", "clearance", "odometry"):
         yield from _sample_differences(name, getattr(first, name), getattr(second, name))
     empty = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
@@ -67,7 +67,7 @@ def _differences(first: Trace, second: Trace) -> Iterator[Difference]:
 
 
 def _describe_events(first: Event, second: Event) -> str:
-    """Return a description of two different events, with their ticks and data if kind and name are equal."""
+    """Return a description of two different events. If kind and name are equal, describe the ticks and the data."""
     if (first.kind, first.name) != (second.kind, second.name):
         return f"event: {first.kind} {first.name} against {second.kind} {second.name}"
     values = f"tick {first.tick} {dict(first.data)} against tick {second.tick} {dict(second.data)}"
@@ -75,7 +75,10 @@ def _describe_events(first: Event, second: Event) -> str:
 
 
 def _sample_differences(name: str, first: Samples, second: Samples) -> Iterator[Difference]:
-    """Yield the first row that differs in at least one bit (nan equals nan, but 0.0 differs from -0.0)."""
+    """Yield the first difference of a signal: a row that differs in at least one bit, or an additional row.
+
+    nan equals nan, but 0.0 differs from -0.0.
+    """
     n = min(len(first), len(second))
     if not n:
         yield from _length_difference(name, first.ticks.tolist(), second.ticks.tolist())
@@ -109,13 +112,14 @@ def _length_difference(name: str, first: list[int], second: list[int]) -> Iterat
 
 
 POSE_TOLERANCE_M_RAD = 1e-5
-"""Tolerance for true poses in m and rad."""
+"""Maximum difference of true poses that `first_pose_difference` ignores, in m and rad."""
 
 
 def first_pose_difference(first: Trace, second: Trace) -> str | None:
     """Return a description of the first difference of true poses above POSE_TOLERANCE_M_RAD; None without a difference.
 
-    Without one, different ends of the runs or numbers of poses are described. Used for runs on different processors.
+    If all poses agree, describe different ends of the runs or different numbers of poses. This comparison is for runs
+    on different processors.
     """
     if first.tick_rate != second.tick_rate:
         return f"tick rate: {first.tick_rate} against {second.tick_rate} Hz"
@@ -128,8 +132,8 @@ def first_pose_difference(first: Trace, second: Trace) -> str | None:
     if len(rows):
         tick = int(first.truth.ticks[rows[0]])
         x, y, yaw = distance[rows[0]].tolist()
-        when = f"tick {tick} (t = {first.seconds(tick):.3f} s)"
-        return f"{when}: the true pose differs by {x:.2g} m, {y:.2g} m, {yaw:.2g} rad"
+        time = f"tick {tick} (t = {first.seconds(tick):.3f} s)"
+        return f"{time}: the true pose differs by {x:.2g} m, {y:.2g} m, {yaw:.2g} rad"
     if first.end != second.end:
         return f"the runs end at ticks {first.end} and {second.end}"
     if len(first.truth) != len(second.truth):

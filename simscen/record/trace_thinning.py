@@ -16,30 +16,32 @@ STANDSTILL_RATE_HZ = 1
 
 
 class Thinning:
-    """Selects the samples to keep. `rate` is the number of ticks per second.
+    """Selects the samples to keep. `tick_rate` is the number of ticks per second.
 
-    `sensors` are the class names of readings ("Odometry", …) by sensor name. The readings of the first odometry sensor
-    are kept; if `sensors` has none, those of the sensor that delivers first.
+    Changed commands and changed poses of objects are always kept. Odometry is kept only from one sensor: the first
+    odometry sensor in `sensors`, or else the sensor of the first odometry reading. `sensors` are the class names of
+    readings ("Odometry", …) by sensor name.
 
-    Changed commands and changed poses of objects are always kept. Repeated calls for the same tick return the same
-    result.
+    Repeated calls for the same tick return the same result.
     """
 
-    def __init__(self, rate: int, sensors: Mapping[str, str] = MappingProxyType({})) -> None:
-        self._command_period = max(1, rate // COMMAND_RATE_HZ)
-        self._standstill_period = max(1, rate // STANDSTILL_RATE_HZ)
+    def __init__(self, tick_rate: int, sensors: Mapping[str, str] = MappingProxyType({})) -> None:
+        self._command_period = max(1, tick_rate // COMMAND_RATE_HZ)
+        self._standstill_period = max(1, tick_rate // STANDSTILL_RATE_HZ)
         self._command: Twist | None = None
         self._command_kept_tick = 0
         self._command_checked_tick = -1
-        self._odometry = next((name for name, kind in sensors.items() if kind == Odometry.__name__), None)
+        self._odometry_sensor = next((name for name, kind in sensors.items() if kind == Odometry.__name__), None)
         self._kept_poses: dict[str, tuple[int, Pose3]] = {}
+        """Last kept pose of each object, with its tick, by object name."""
         self._previous_poses: Mapping[str, Pose3] | None = None
         """Poses of the previous sample. If the next sample is the same Python object, nothing has moved."""
         self._standstill_due_tick = 0
+        """Tick from which the poses of stationary objects must be checked again."""
         self._selected_tick = -1
         self._selected: Mapping[str, Pose3] = {}
         self._all_kept: tuple[int, PosesAtTick] | None = None
-        """The previous sample if all its objects were kept. It is added to `_kept_poses` only when needed."""
+        """Tick and poses of the previous sample if all its poses were kept. Added to `_kept_poses` only if needed."""
 
     def keeps_command(self, tick: int, command: Twist) -> bool:
         """Return whether to keep the command of this tick."""
@@ -50,10 +52,10 @@ class Thinning:
         return self._command_kept_tick == tick
 
     def keeps_odometry(self, odometry: Odometry) -> bool:
-        """Return whether to keep a reading."""
-        if self._odometry is None:
-            self._odometry = odometry.sensor
-        return odometry.sensor == self._odometry
+        """Return whether to keep an odometry reading."""
+        if self._odometry_sensor is None:
+            self._odometry_sensor = odometry.sensor
+        return odometry.sensor == self._odometry_sensor
 
     def objects_to_keep(self, tick: int, truth: Truth) -> Mapping[str, Pose3]:
         """Return the poses of objects to keep at this tick, by object name."""
@@ -81,7 +83,7 @@ class Thinning:
         return previous.predicted is predicted and previous.row == objects.row - 1 and predicted.all_moved[objects.row]
 
     def _changed_objects(self, tick: int, objects: Mapping[str, Pose3]) -> dict[str, Pose3]:
-        """Return the poses that have changed, or were last kept a period of STANDSTILL_RATE_HZ ago."""
+        """Return the poses that have changed since they were last kept, or were not kept for STANDSTILL_RATE_HZ."""
         kept = dict[str, Pose3]()
         is_stationary = objects is self._previous_poses
         if is_stationary and tick < self._standstill_due_tick:
@@ -100,15 +102,15 @@ class Thinning:
 
 
 class Throttle:
-    """Limiter of a topic to `rate` messages per second of simulated time."""
+    """Limits a topic to `rate` messages per second of simulated time."""
 
-    def __init__(self, ticks_per_second: int, rate: int) -> None:
-        self._period = max(1, ticks_per_second // rate)
-        self._next: int | None = None
+    def __init__(self, tick_rate: int, rate: int) -> None:
+        self._period = max(1, tick_rate // rate)
+        self._next_tick: int | None = None
 
     def passes(self, tick: int) -> bool:
         """Return whether a message may be written at this tick. If so, a new period begins."""
-        if self._next is not None and tick < self._next:
+        if self._next_tick is not None and tick < self._next_tick:
             return False
-        self._next = tick + self._period
+        self._next_tick = tick + self._period
         return True

@@ -66,7 +66,7 @@ class LogPublisher:
             name = topic.name if topic == CLOCK else self._namespace + topic.name
             kind = load_message_types()[topic.type]
             metadata = {"offered_qos_profiles": qos(topic.latched), "topic_type_hash": kind.hash}
-            channel = self._channels[topic.name] = self._writer.channel(name, kind, metadata)
+            channel = self._channels[topic.name] = self._writer.add_channel(name, kind, metadata)
         return channel
 
 
@@ -87,7 +87,7 @@ class _ChunkBatchWriter(BatchWriter):
         chunk = self._chunk
         start = chunk.size
         end = start + self._size
-        if end > chunk.limit:
+        if end > chunk.max_size:
             super().write(time, *fields)
             return
         self._pack(chunk.view, start, time, *fields)
@@ -100,7 +100,7 @@ class _ChunkBatchWriter(BatchWriter):
         parts: list[bytes | Slot] = []
         for topic, message in self._layouts:
             channel = self._publisher.channel(topic)
-            parts += channel.record(message)
+            parts += channel.record_parts(message)
             self._offsets.append((channel, self._size))
             self._size += MESSAGE_HEADER_BYTES + len(message.buffer)
             self._chunk = channel.chunk

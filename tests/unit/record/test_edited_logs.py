@@ -208,7 +208,7 @@ REFUSED: dict[str, tuple[Edit, str]] = {
     ),
     "two descriptions": (
         lambda parts: parts.metadata.append(("simscen", parts.record("simscen") | {"tick_rate": "500"})),
-        "two metadata records `simscen`; a log that was merged from several cannot be judged",
+        "two metadata records `simscen`; a log that was merged from several logs cannot be judged",
     ),
     "two ends": (lambda parts: parts.metadata.append(parts.metadata[-1]), "two metadata records `simscen.end`"),
     "two cases": (lambda parts: parts.attachments.append(parts.attachments[0]), "two attachments case.json"),

@@ -24,8 +24,8 @@ MESSAGES = [(1 + i % 3, 1000 * (i // 2), random.Random(i).randbytes(300)) for i 
 
 def ours() -> bytes:
     stream = io.BytesIO()
-    writer = McapWriter(stream, "ros2", "simscen", chunk_size=1 << 16)
-    channels = [writer.channel(f"/t{n}", TEXT, {"key": str(n)}) for n in range(3)]
+    writer = McapWriter(stream, "ros2", "simscen", max_chunk_size=1 << 16)
+    channels = [writer.add_channel(f"/t{n}", TEXT, {"key": str(n)}) for n in range(3)]
     writer.add_attachment("a.txt", "text/plain", b"hello")
     writer.add_metadata("facts", {"seed": "7"})
     for number, time, data in MESSAGES:
@@ -99,8 +99,8 @@ def test_chunks_and_their_index_equal_those_of_the_mcap_library() -> None:
 
 def test_message_larger_than_a_chunk_closes_the_current_chunk() -> None:
     stream = io.BytesIO()
-    writer = McapWriter(stream, "ros2", "simscen", chunk_size=1000)
-    channel = writer.channel("/t", TEXT, {})
+    writer = McapWriter(stream, "ros2", "simscen", max_chunk_size=1000)
+    channel = writer.add_channel("/t", TEXT, {})
     payloads = [b"small", random.Random(1).randbytes(10_000), random.Random(2).randbytes(30_000), b"after"]
     for time, data in enumerate(payloads):
         channel.write(time, data)
@@ -115,7 +115,7 @@ def test_message_larger_than_a_chunk_closes_the_current_chunk() -> None:
 def test_file_without_messages_is_valid() -> None:
     stream = io.BytesIO()
     writer = McapWriter(stream, "ros2", "simscen")
-    writer.channel("/t", TEXT, {})
+    writer.add_channel("/t", TEXT, {})
     writer.finish()
     stream.seek(0)
     assert list(make_reader(stream, validate_crcs=True).iter_messages()) == []
@@ -132,7 +132,7 @@ def test_batched_messages_have_the_same_bytes_as_single_ones() -> None:
 
     def written(together: bool) -> bytes:
         stream = io.BytesIO()
-        writer = McapWriter(stream, "ros2", "simscen", chunk_size=5000)
+        writer = McapWriter(stream, "ros2", "simscen", max_chunk_size=5000)
         out = LogPublisher(writer)
         block = out.batch_writer(layouts) if together else BatchWriter(out, layouts)
         for time in range(100):
