@@ -1,1 +1,1 @@
-"""Pass criteria: their specifications, and how they judge the trace of a run."""
+"""Criteria of `pass`: their specifications, and the evaluation of the trace of a run."""

@@ -1,4 +1,4 @@
-"""Base classes of criteria (Criterion) and of plug-in metrics (Measure), and the entry of `metrics`."""
+"""Base classes of criteria (Criterion) and of plug-in metrics (Measure), and the model of an entry of `metrics`."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class Criterion(ABC):
 
     @property
     def evidence(self) -> frozenset[Evidence] | None:
-        """Kinds of information that the log must contain; None for everything that simscen records."""
+        """Kinds of information that the log must contain; None if all kinds that simscen records are needed."""
         return None
 
     @abstractmethod
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
-        """Return one finding for each bound that was checked; at least one, because an empty list is an error."""
+        """Return one finding for each bound that was checked. An empty list is an error."""
 
 
 class Measure(ABC):
@@ -52,12 +52,12 @@ class Measure(ABC):
 
     @property
     def evidence(self) -> frozenset[Evidence] | None:
-        """Kinds of information that the log must contain; None for everything that simscen records."""
+        """Kinds of information that the log must contain; None if all kinds that simscen records are needed."""
         return None
 
     @abstractmethod
     def measure(self, trace: Trace, case: Case) -> float | str:
-        """Return the value in SI units, which must be finite; or a text that states why the run has no value."""
+        """Return a finite value in SI units, or a text that states why the run has no value."""
 
 
 class AnyMeasure(Choice):

@@ -61,8 +61,8 @@ class Clearance(Spec, Criterion):
         return [at_least("clearance", float(distances[k]), self.min, "m", at=at)]
 
 
-DRIVING_SPEED_M_S = 0.1
-"""Minimum speed of a driving robot for `while_driving`."""
+MIN_DRIVING_SPEED_M_S = 0.1
+"""Speed that a robot must exceed to count as driving for `while_driving`."""
 
 
 class PersonalSpace(Spec, Criterion):
@@ -75,7 +75,8 @@ class PersonalSpace(Spec, Criterion):
         the border of Hall's intimate space.
     Source: Hall 1966; the space intrusions of HuNavSim and of Francis et al. 2023, with the gap between surfaces.
 
-    Inconclusive if the run had no pedestrians, or with `while_driving`, none while the robot drove.
+    Inconclusive if no pedestrian was present. With `while_driving`, also inconclusive if pedestrians were present only
+    while the robot stood.
 
     Example: `personal_space: {min: 0.3 m, while_driving: true}`
     """
@@ -98,7 +99,7 @@ class PersonalSpace(Spec, Criterion):
             gaps = pedestrian_gap(trace, case)
             if self.while_driving:
                 speeds = sample_and_hold(trace, speed(trace), "velocity")[:, 0]
-                gaps = np.where(speeds > DRIVING_SPEED_M_S, gaps, np.inf)
+                gaps = np.where(speeds > MIN_DRIVING_SPEED_M_S, gaps, np.inf)
         except MissingEvidence as reason:
             return [undecided("distance to people", str(reason), limit)]
         nearest = int(np.argmin(gaps))

@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from simscen.core.records.case import Case
     from simscen.core.records.trace import Samples, Trace
 
-MOVING_SPEED_M_S = 0.1
-"""Minimum speed of a robot that causes a contact, as in the CollisionTest of CARLA."""
+MIN_CAUSING_SPEED_M_S = 0.1
+"""Speed that a robot must exceed to cause a contact, as in the CollisionTest of CARLA."""
 
 LOOKBACK_S = 0.1
-"""Time before a contact in which the robot must reach MOVING_SPEED_M_S to have caused the contact."""
+"""Time before a contact in which the robot must exceed MIN_CAUSING_SPEED_M_S to have caused the contact."""
 
 MAX_DETAILS = 5
 """Maximum number of contacts that a finding lists."""
@@ -39,14 +39,14 @@ class Collisions(Spec, Criterion):
 
     What is measured: the number of contacts that begin between the robot and anything but the ground, and the impulse
         of each contact: the sum over all physics steps from its beginning to its end.
-    When it fails: there are more contacts than `max`, or one has an impulse above `max_impulse`.
+    When it fails: there are more contacts than `max`, or a contact has an impulse above `max_impulse`.
     Why this: the physics engine reports all contacts. Arena counts scans with ranges below the robot's radius instead,
         which misses everything that the lidar does not see.
     Source: Arena's get_collisions, which also counts beginning contacts; ScenarioRunner's CollisionTest for
         `caused_by_robot`.
 
     With `people`, inconclusive if the run had no people. With `max_impulse`, inconclusive if a contact had not ended or
-    its impulse was not recorded, and no known impulse exceeds the limit.
+    its impulse was not recorded, unless another impulse exceeds the limit.
 
     Example: `collisions: {max: 0}`
     """
@@ -60,7 +60,7 @@ class Collisions(Spec, Criterion):
     people: bool = False
     """Count only contacts with people: pedestrians and members of crowds."""
     caused_by_robot: bool = False
-    """Count only contacts that a moving robot caused, and no contacts of a standing robot with a moving object."""
+    """Count only contacts of a moving robot, not contacts of a standing robot with a moving object."""
 
     @property
     def evidence(self) -> frozenset[Evidence]:
@@ -72,7 +72,7 @@ class Collisions(Spec, Criterion):
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return findings for the number of collisions and, with `max_impulse`, for the largest impulse.
 
-        Raises MissingEvidence if there is no object named `with`, or if the cause of a contact matters
+        Raises MissingEvidence if there is no object with the name given by `with`, or if the cause of a contact matters
         (`caused_by_robot`) and the trace has no velocity.
         """
         if self.object is not None:
@@ -127,7 +127,7 @@ class _Contact(NamedTuple):
 
     @property
     def impulse(self) -> object:
-        """Impulse as recorded, in N s; without an end, that of the first physics step. None if it was not recorded."""
+        """Recorded impulse in N s; if the end was not recorded, the impulse of the first physics step. May be None."""
         return (self.start if self.end is None else self.end).data.get("impulse")
 
 
@@ -164,12 +164,15 @@ def _max_point_speed(trace: Trace, case: Case) -> Samples:
     return replace(linear, values=linear.values + radius * turning.values)
 
 
-def _is_caused_by_robot(trace: Trace, hit: Event, speeds: Samples) -> bool:
-    """Return whether a point of the robot may have exceeded MOVING_SPEED_M_S within LOOKBACK_S before a contact."""
+def _is_caused_by_robot(trace: Trace, start: Event, speeds: Samples) -> bool:
+    """Return whether the robot may have exceeded MIN_CAUSING_SPEED_M_S shortly before a contact (LOOKBACK_S).
+
+    `start` is the event of the start of the contact, and `speeds` the result of `_max_point_speed`.
+    """
     # The newest sample before the window is included, because rare samples may leave the window empty.
-    since = round(hit.tick - LOOKBACK_S * trace.tick_rate)
-    first, last = np.searchsorted(speeds.ticks, (since, hit.tick), side="right").tolist()
-    return bool(speeds.values[max(first - 1, 0) : max(last, 1)].max() > MOVING_SPEED_M_S)
+    window_start = round(start.tick - LOOKBACK_S * trace.tick_rate)
+    first, last = np.searchsorted(speeds.ticks, (window_start, start.tick), side="right").tolist()
+    return bool(speeds.values[max(first - 1, 0) : max(last, 1)].max() > MIN_CAUSING_SPEED_M_S)
 
 
 def _describe_contact(trace: Trace, contact: _Contact) -> str:

@@ -49,18 +49,18 @@ class TimeToGoal(Spec, Criterion):
         """Return one finding for all goals. With `goal`, return one finding for each goal of this name."""
         outcomes = goal_outcomes(trace, case)
         if self.goal is not None:
-            own = [outcome for outcome in outcomes if matches_goal_name(outcome.goal.name, self.goal)]
-            if not own:
-                known = any(matches_goal_name(goal.name, self.goal) for goal in case.every_goal)
-                because = "never sent" if known else f"the scenario has no goal `{self.goal}`"
+            chosen = [outcome for outcome in outcomes if matches_goal_name(outcome.goal.name, self.goal)]
+            if not chosen:
+                is_known = any(matches_goal_name(goal.name, self.goal) for goal in case.every_goal)
+                because = "never sent" if is_known else f"the scenario has no goal `{self.goal}`"
                 return [undecided(f"goal {self.goal}", because)]
-            return [self._judge_time(trace, f"goal {outcome.goal.name}", outcome.accepted, outcome) for outcome in own]
+            return [self._judge_time(trace, f"goal {each.goal.name}", each.accepted_tick, each) for each in chosen]
         if not outcomes:
             return [undecided("time_to_goal", "the scenario has no goals")]
         required = [outcome for outcome in outcomes if outcome.must_be_reached]
         if not required:
             return [undecided("time_to_goal", "every goal was preempted or is expected to fail")]
-        unreached = [outcome for outcome in required if outcome.reached is None]
+        unreached = [outcome for outcome in required if outcome.reached_tick is None]
         decisive = unreached[0] if unreached else required[-1]
         return [self._judge_time(trace, "time_to_goal", first_acceptance(outcomes), decisive)]
 
@@ -74,8 +74,9 @@ class TimeToGoal(Spec, Criterion):
             if outcome.end is None and has_ended(trace):
                 return missed(what, "never reached", expected, (trace, trace.end), detail)
             return undecided(what, "the acceptance of the goal was not recorded", expected)
-        if outcome.reached is not None:
-            return at_most(what, trace.seconds(outcome.reached - start), self.max, "s", at=(trace, outcome.reached))
+        if outcome.reached_tick is not None:
+            elapsed = trace.seconds(outcome.reached_tick - start)
+            return at_most(what, elapsed, self.max, "s", at=(trace, outcome.reached_tick))
         if outcome.was_preempted:
             return undecided(what, outcome.summary)
         so_far = trace.seconds(trace.end - start)
@@ -99,9 +100,9 @@ class PathLength(Spec, Criterion):
     Source: HuNavSim and bench-mr for the length; SEAN's "path efficiency" for the ratio. SPL (Anderson 2018) is the
         inverse of the ratio, averaged over many runs.
 
-    The ratio is inconclusive if the shortest path is unknown or has no length: an event sends a goal or moves the robot
-    (`kidnap`), several goals have one name, or no path is known. It is also inconclusive if a goal was not reached,
-    unless the path is already too long.
+    The ratio is inconclusive if the shortest path is unknown: if an event sent a goal or moved the robot (`kidnap`), if
+    several goals have the same name, or if there is no path to a goal. It is also inconclusive if the shortest path has
+    no length, or if a goal was not reached, unless the path is already too long.
 
     Example: `path_length: {max_ratio: 1.4}`
     """
@@ -135,7 +136,8 @@ class PathLength(Spec, Criterion):
             return undecided(what, because, f"≤ {self.max_ratio:g}")
         limit = self.max_ratio * shortest
         context = f"({self.max_ratio:g} times the shortest path of {shortest:.2f} m)"
-        unreached = [one for one in goal_outcomes(trace, case) if one.reached is None and not one.expected_failure]
+        outcomes = goal_outcomes(trace, case)
+        unreached = [each for each in outcomes if each.reached_tick is None and not each.expected_failure]
         if unreached and path.length <= limit:
             name = unreached[0].goal.name
             return undecided(what, f"goal {name} was not reached, so the path is incomplete", context)
@@ -165,7 +167,7 @@ def shortest_path_length(trace: Trace, case: Case) -> tuple[float, str]:
 
 
 def _judge_length(trace: Trace, path: DrivenPath, what: str, limit: float, context: str = "") -> Finding:
-    """Return the finding for the length of a path, at the first tick above the limit, or else at the last tick."""
+    """Return the finding for the length of a path. Its tick is the first one above the limit, or else the last one."""
     decisive = int(np.argmax(path.travelled > limit)) if path.length > limit else len(path.ticks) - 1
     at = (trace, int(path.ticks[decisive])) if len(path.ticks) else None
     return at_most(what, path.length, limit, "m", at=at, context=context)

@@ -41,7 +41,10 @@ ErrorCodeValue = Annotated[ErrorCode, PlainValidator(parse_error_code), _ErrorCo
 
 
 def error_code_name(event: Event) -> str:
-    """Return the error code of an event: its name, or its number as text if ErrorCode lacks it; "NONE" without one."""
+    """Return the name of the error code of an event; "NONE" if the event has no error code.
+
+    If ErrorCode does not contain the code, return the number of the code as text.
+    """
     name, number = event.data.get("error_name"), event.data.get("error_code")
     if isinstance(name, str) and name:
         return name

@@ -66,11 +66,11 @@ class Replans(CountBounds, Criterion):
 
     What is measured: the number of plans that were made for another reason than a new goal.
     When it fails: the number is below `min` or above `max`.
-    Why this: a scenario that drops a pallet on the plan proves nothing unless the robot had to replan. A robot that
+    Why this: a scenario that drops a pallet on the plan proves something only if the robot had to replan. A robot that
         replans all the time does not follow any plan.
     Source: Nav2's navigate_to_pose_w_replanning trees.
 
-    Inconclusive if an external stack reports plans, but not why it made them, or a reached goal, but no plan.
+    Inconclusive if an external stack reports plans without a reason, or reports a reached goal but no plan.
 
     Example: `replans: {min: 1}`
     """

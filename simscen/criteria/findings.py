@@ -1,4 +1,4 @@
-"""Functions that create findings, the results of checks of one bound: passed, failed, or inconclusive.
+"""Functions that create findings. A finding is the result of checking one bound: passed, failed, or inconclusive.
 
 Common parameters:
 
@@ -66,19 +66,22 @@ def undecided(what: str, because: str, limit: str = "", detail: Sequence[str] = 
 
 
 def if_complete(trace: Trace, finding: Finding) -> Finding:
-    """Return the finding, or an inconclusive one if the log is truncated, so that the value may still change."""
+    """Return the finding if the log is complete.
+
+    If the log is truncated, return an inconclusive finding, because the value could still change.
+    """
     if trace.of_kind(EventKind.RUN_ENDED):
         return finding
     return undecided(finding.what, f"{finding.measured} so far", finding.limit)
 
 
 def missed(what: str, measured: str, limit: str, at: At = None, detail: Sequence[str] = ()) -> Finding:
-    """Return a failed finding with text alone: without margin and value."""
+    """Return a failed finding that has only text: no margin and no value."""
     return Finding(Status.FAIL, what, measured, limit, None, "", None, *_tick_and_place(at), detail=tuple(detail))
 
 
 def held(what: str, measured: str, limit: str, at: At = None) -> Finding:
-    """Return a passed finding with text alone: without margin and value."""
+    """Return a passed finding that has only text: no margin and no value."""
     return Finding(Status.PASS, what, measured, limit, None, "", None, *_tick_and_place(at))
 
 

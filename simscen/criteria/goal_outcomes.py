@@ -26,18 +26,18 @@ _ARRIVAL_KINDS = (EventKind.GOAL_REACHED, EventKind.GOAL_PASSED)
 class GoalOutcome:
     """Outcome of one goal, as reported by the robot.
 
-    `accepted` is the tick at which the robot accepted the goal; None if it did not. `end` is the event that ended the
-    goal; None if the goal did not end. `expected_failure` is the failure that the scenario expects: "failed", or the
-    name of an error code; "" if no failure is expected.
+    `accepted_tick` is the tick at which the robot accepted the goal; None if no acceptance was recorded. `end` is the
+    event that ended the goal; None if the goal did not end. `expected_failure` is the failure that the scenario
+    expects: "failed", or the name of an error code; "" if no failure is expected.
     """
 
     goal: Goal
-    accepted: int | None
+    accepted_tick: int | None
     end: Event | None
     expected_failure: str = ""
 
     @property
-    def reached(self) -> int | None:
+    def reached_tick(self) -> int | None:
         """Tick at which the robot reported the goal as reached or passed; None without such a report."""
         return self.end.tick if self.end is not None and self.end.kind in _ARRIVAL_KINDS else None
 
@@ -67,7 +67,7 @@ class GoalOutcome:
     def summary(self) -> str:
         """The outcome as text, e.g. "failed with NO_VALID_PATH"."""
         if self.end is None:
-            return "never accepted" if self.accepted is None else "still under way"
+            return "never accepted" if self.accepted_tick is None else "still under way"
         if self.was_preempted:
             return f"preempted by {self.end.data['preempted_by']}"
         code = self.end.data.get("error_name") or self.end.data.get("error_code")
@@ -81,25 +81,25 @@ def goal_outcomes(trace: Trace, case: Case) -> list[GoalOutcome]:
     the outcome of the next goal at which the robot stops, as Nav2 reports only whole actions.
     """
     reports = _reports_by_goal(trace)
-    unused = {name: iter(own) for name, own in reports.items()}
+    next_reports = {name: iter(goal_reports) for name, goal_reports in reports.items()}
     found = [
-        GoalOutcome(goal, *next(unused.get(goal.name, iter(())), _NO_REPORT), case.expected.get(goal.name, ""))
+        GoalOutcome(goal, *next(next_reports.get(goal.name, iter(())), _NO_REPORT), case.expected.get(goal.name, ""))
         for goal in case.goals
     ]
     found = [_with_outcome_of_next_stop(outcome, found[k + 1 :], reports) for k, outcome in enumerate(found)]
     for goal in case.sent:
-        own = reports.get(goal.name, [])
+        goal_reports = reports.get(goal.name, [])
         # A sent goal may preempt several poses of one drive at the same tick.
-        preempting = {event.tick for event in trace.events if event.data.get("preempted_by") == goal.name}
-        missing = [_NO_REPORT] * (len(preempting) - len(own))
-        found += [GoalOutcome(goal, *report) for report in (*own, *missing)]
+        preemption_ticks = {event.tick for event in trace.events if event.data.get("preempted_by") == goal.name}
+        missing = [_NO_REPORT] * (len(preemption_ticks) - len(goal_reports))
+        found += [GoalOutcome(goal, *report) for report in (*goal_reports, *missing)]
     return sorted(found, key=outcome_start)
 
 
 def outcome_start(outcome: GoalOutcome) -> float:
     """Return the tick at which the robot accepted the goal, or else the tick of its end; inf if both are unknown."""
-    if outcome.accepted is not None:
-        return outcome.accepted
+    if outcome.accepted_tick is not None:
+        return outcome.accepted_tick
     return math.inf if outcome.end is None else outcome.end.tick
 
 
@@ -108,21 +108,21 @@ def first_acceptance(outcomes: Sequence[GoalOutcome]) -> int | None:
 
     `outcomes` contains the outcomes of all goals in order. A goal that failed without an acceptance was rejected.
     """
-    first = next((each for each in outcomes if each.accepted is not None or each.reached is not None), None)
-    return None if first is None else first.accepted
+    first = next((each for each in outcomes if each.accepted_tick is not None or each.reached_tick is not None), None)
+    return None if first is None else first.accepted_tick
 
 
 def closest_approach(trace: Trace, outcome: GoalOutcome, outcomes: Sequence[GoalOutcome]) -> tuple[int, float]:
     """Return the tick at which the true position was nearest to a via pose, and the distance in m.
 
-    The search begins when the pose is accepted, and ends with the next goal at which the robot stops. `outcomes`
-    contains the outcomes of all goals in order.
+    Only the time from the acceptance of the via pose to the end of the next goal at which the robot stops counts; the
+    whole run if there is no sample in this time. `outcomes` contains the outcomes of all goals in order.
     """
     later = outcomes[outcomes.index(outcome) :]
     stop = next((each for each in later if not each.goal.via), None)
     last = trace.end if stop is None or stop.end is None else stop.end.tick
     poses = truth(trace)
-    first = 0 if outcome.accepted is None else outcome.accepted
+    first = 0 if outcome.accepted_tick is None else outcome.accepted_tick
     is_in_drive = (poses.ticks >= first) & (poses.ticks <= last)
     if not is_in_drive.any():
         is_in_drive = np.ones(len(poses.ticks), dtype=bool)
@@ -135,12 +135,16 @@ def closest_approach(trace: Trace, outcome: GoalOutcome, outcomes: Sequence[Goal
 def _with_outcome_of_next_stop(
     outcome: GoalOutcome, later: list[GoalOutcome], reports: Mapping[str, list[_Report]]
 ) -> GoalOutcome:
-    """Return the outcome; for a via pose without reports, the outcome of the next goal at which the robot stops."""
+    """Return `outcome`; for a via pose without reports, the outcome of the next goal at which the robot stops.
+
+    `later` contains the outcomes of the goals after this one.
+    """
     stop = next((each for each in later if not each.goal.via), None)
     if not outcome.goal.via or outcome.goal.name in reports or stop is None or stop.end is None:
         return outcome
-    kind = EventKind.GOAL_PASSED if stop.reached is not None else stop.end.kind
-    return replace(outcome, accepted=stop.accepted, end=replace(stop.end, kind=kind, name=outcome.goal.name))
+    kind = EventKind.GOAL_PASSED if stop.reached_tick is not None else stop.end.kind
+    end = replace(stop.end, kind=kind, name=outcome.goal.name)
+    return replace(outcome, accepted_tick=stop.accepted_tick, end=end)
 
 
 _Report = tuple[int | None, Event | None]

@@ -44,7 +44,7 @@ class GoalsReached(Spec, Criterion):
     When it fails: the robot did not report a goal as reached, reported it while the true pose was out of tolerance, or
         reported it later than `within`.
     Why this: the report of a robot is only as good as its localization. Arena uses only the report, and BARN only the
-        distance. Neither detects a lost robot that reports success.
+        distance. Neither compares the report with the true pose.
     Source: Nav2's SimpleGoalChecker for the tolerances; BARN challenge, run.py, for judging by the true pose.
 
     Example: `goals_reached: {goals: [shelf], tolerance: 0.3 m, within: 60 s}`
@@ -71,14 +71,14 @@ class GoalsReached(Spec, Criterion):
         """Return findings for distance, heading, and time of each reached goal, and one finding for each other goal."""
         outcomes = goal_outcomes(trace, case)
         names: Sequence[str | None] = self.goals or (None,)
-        chosen = [one for one in outcomes if any(matches_goal_name(one.goal.name, name) for name in names)]
+        chosen = [each for each in outcomes if any(matches_goal_name(each.goal.name, name) for name in names)]
         findings = self._judge_unsent(trace, case, {outcome.goal.name for outcome in chosen})
         if not chosen and not findings:
             return [undecided("goals_reached", "the scenario has no goals", "reached")]
         for outcome in chosen:
             if outcome.expected_failure and not outcome.was_preempted:
                 findings.append(_judge_expected_failure(trace, outcome))
-            elif outcome.reached is None:
+            elif outcome.reached_tick is None:
                 findings.append(self._judge_unreached(trace, outcome))
             else:
                 is_via = outcome.goal.via
@@ -90,7 +90,7 @@ class GoalsReached(Spec, Criterion):
             findings.append(undecided("goals_reached", "every goal was preempted", "reached"))
         return findings
 
-    def _judge_unsent(self, trace: Trace, case: Case, sent: set[str]) -> list[Finding]:
+    def _judge_unsent(self, trace: Trace, case: Case, sent_names: set[str]) -> list[Finding]:
         """Return one finding for each name in `goals` under which no goal was sent."""
         names = [goal.name for goal in case.every_goal]
         findings = []
@@ -98,7 +98,7 @@ class GoalsReached(Spec, Criterion):
             if not any(matches_goal_name(each, name) for each in names):
                 because, detail = f"the scenario has no goal `{name}`", [f"goals: {', '.join(names)}"]
                 findings.append(undecided(f"goal {name}", because, "reached", detail))
-            elif not any(matches_goal_name(each, name) for each in sent):
+            elif not any(matches_goal_name(each, name) for each in sent_names):
                 make_finding = missed if has_ended(trace) else undecided
                 findings.append(make_finding(f"goal {name}", "never sent", "reached"))
         return findings
@@ -106,7 +106,7 @@ class GoalsReached(Spec, Criterion):
     def _judge_unreached(self, trace: Trace, outcome: GoalOutcome) -> Finding:
         """Return the finding for a goal that the robot did not report as reached.
 
-        It fails, unless the goal was preempted, or unless the log is truncated.
+        The finding fails, unless the goal was preempted or the log is truncated.
         """
         what = f"goal {outcome.goal.name}"
         if outcome.end is None and not has_ended(trace):
@@ -125,10 +125,10 @@ class GoalsReached(Spec, Criterion):
 
     def _judge_reached(self, trace: Trace, outcome: GoalOutcome) -> list[Finding]:
         """Return findings for distance and heading at the report that the goal is reached."""
-        goal, tick = outcome.goal, outcome.reached
+        goal, tick = outcome.goal, outcome.reached_tick
         assert tick is not None
         what, pose = f"goal {goal.name}", true_pose(trace, tick)
-        details = _believed_distance(trace, goal, tick)
+        details = _describe_estimated_pose(trace, goal, tick)
         return [
             at_most(
                 what,
@@ -164,45 +164,48 @@ class GoalsReached(Spec, Criterion):
 def _judge_time(trace: Trace, outcome: GoalOutcome, within: float) -> Finding:
     """Return the finding for the time from the acceptance of a goal to the report that it is reached."""
     what = f"goal {outcome.goal.name} time"
-    if outcome.accepted is None or outcome.reached is None:
+    if outcome.accepted_tick is None or outcome.reached_tick is None:
         return undecided(what, "the acceptance of the goal was not recorded", f"≤ {within:.2f} s")
-    elapsed = trace.seconds(outcome.reached - outcome.accepted)
-    return at_most(what, elapsed, within, "s", at=(trace, outcome.reached))
+    elapsed = trace.seconds(outcome.reached_tick - outcome.accepted_tick)
+    return at_most(what, elapsed, within, "s", at=(trace, outcome.reached_tick))
 
 
 def _judge_expected_failure(trace: Trace, outcome: GoalOutcome) -> Finding:
+    """Return the finding for a goal with `expect`, which passes if the goal failed as expected."""
     expected = FAILED if outcome.expected_failure == FAILED else f"failed with {outcome.expected_failure}"
     if outcome.end is None and not has_ended(trace):
         return _truncated_log_finding(trace, outcome, expected)
     if outcome.failed_for_unknown_reason and outcome.expected_failure != FAILED:
         return undecided(f"goal {outcome.goal.name}", "failed, but the log has no error code", expected)
     at = (trace, trace.end if outcome.end is None else outcome.end.tick)
-    is_passed_via = outcome.goal.via and outcome.reached is not None  # the drive may fail after passing some poses
+    is_passed_via = outcome.goal.via and outcome.reached_tick is not None  # the drive may fail after some via poses
     make_finding = held if outcome.failed_as_expected or is_passed_via else missed
     return make_finding(f"goal {outcome.goal.name}", outcome.summary, expected, at)
 
 
 def _truncated_log_finding(trace: Trace, outcome: GoalOutcome, expected: str) -> Finding:
+    """Return the inconclusive finding for a goal that had not ended when the log stopped."""
     because = f"the log stops at t = {trace.seconds(trace.end):.2f} s, {outcome.summary}"
     return undecided(f"goal {outcome.goal.name}", because, expected)
 
 
 def _judge_wait(trace: Trace, case: Case, outcome: GoalOutcome, outcomes: list[GoalOutcome]) -> list[Finding]:
-    """Return the finding for the wait at a goal, which ends when the next goal of the scenario is accepted.
+    """Return a finding for the wait at a goal, which ends when the next goal of the scenario is accepted.
 
-    The list is empty if no wait is required, or if no goal was accepted afterwards.
+    The list is empty if no wait is required, or if no later goal was accepted.
     """
     later = next(
         (each for each in outcomes if outcome_start(each) > outcome_start(outcome) and each.goal in case.goals), None
     )
-    if not outcome.goal.wait or outcome.reached is None or later is None or later.accepted is None:
+    if not outcome.goal.wait or outcome.reached_tick is None or later is None or later.accepted_tick is None:
         return []
-    waited = trace.seconds(later.accepted - outcome.reached)
-    return [at_least(f"goal {outcome.goal.name} wait", waited, outcome.goal.wait, "s", at=(trace, later.accepted))]
+    waited = trace.seconds(later.accepted_tick - outcome.reached_tick)
+    at = (trace, later.accepted_tick)
+    return [at_least(f"goal {outcome.goal.name} wait", waited, outcome.goal.wait, "s", at=at)]
 
 
-def _believed_distance(trace: Trace, goal: Goal, tick: int) -> list[str]:
-    """Return a line with the distance of the estimated pose from the goal at `tick`; empty if it is unknown."""
+def _describe_estimated_pose(trace: Trace, goal: Goal, tick: int) -> list[str]:
+    """Return a line with the distance of the estimated pose from the goal at `tick`; no line without a belief."""
     if not len(trace.belief):
         return []
     x, y, yaw = check_samples(trace.belief, "the belief", trace).at(np.array([tick]))[0, :3].tolist()

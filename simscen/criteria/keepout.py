@@ -43,7 +43,8 @@ class Keepout(Spec, Criterion):
     Why this: a keepout filter affects the costmap of the planner, but recoveries and controllers can leave the plan.
     Source: Nav2's keepout filter tutorial.
 
-    Inconclusive if no cell of the mask is occupied. With `while_on`, also inconclusive if no event switched the zone.
+    Inconclusive if no cell of the mask is occupied. With `while_on`, also inconclusive if no event switched the zone,
+    or if the zone was never on for longer than `grace`.
 
     Example: `keepout: {region: wet floor, distance: 10 cm}`
     """
@@ -72,8 +73,8 @@ class Keepout(Spec, Criterion):
     @property
     def evidence(self) -> frozenset[Evidence]:
         """Evidence in the log that the criterion needs."""
-        switched = {Evidence.DISTURBANCES} if self.while_on else set()
-        return POSITION_EVIDENCE | {Evidence.FOOTPRINT, *switched}
+        disturbances = {Evidence.DISTURBANCES} if self.while_on else set()
+        return POSITION_EVIDENCE | {Evidence.FOOTPRINT, *disturbances}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return the finding for the smallest distance."""
@@ -92,12 +93,12 @@ class Keepout(Spec, Criterion):
         if not found:
             return [undecided(what, NEVER_ENABLED, limit)]
         distance, tick = min(found)
-        return [at_least(what, distance, self.distance, "m", at=(trace, tick), context="while it was on")]
+        return [at_least(what, distance, self.distance, "m", at=(trace, tick), context="while the zone was on")]
 
     def _distance_function(self, case: Case) -> DistanceFunction | str:
         """Return a function from poses (n, 3) to signed distances (n,) of the footprint from the region or mask.
 
-        If there is no region or mask, return the reason as text.
+        If the world has no such region, or the log no such mask with occupied cells, return the reason as text.
         """
         hull = case.footprint or POINT
         if self.region is None:
@@ -120,12 +121,13 @@ class Keepout(Spec, Criterion):
 def _smallest_distance(trace: Trace, poses: Samples, case: Case, distances: DistanceFunction) -> tuple[float, int]:
     """Return the smallest signed distance in m along the driven path, and its tick. Teleportation does not count.
 
-    An interval between two samples is bisected while it may contain a distance that is smaller by more than ACCURACY_M.
+    An interval between two samples is bisected as long as it may contain a distance that is smaller by more than
+    ACCURACY_M than the smallest one found. An unknown footprint is replaced by the inscribed circle.
     """
-    # While no point of the robot moves by more than d, the distance changes by at most d.
+    # While no point of the robot moves by more than s, the distance changes by at most s.
     radius = max(math.hypot(x, y) for x, y in case.footprint or POINT)
     yaw = np.unwrap(poses.values[:, 2])
-    states = np.column_stack((poses.values[:, :2], yaw, distances(poses.values), poses.ticks))
+    states = np.column_stack((poses.values[:, :2], yaw, distances(poses.values), poses.ticks))  # x, y, yaw, d, tick
     best = states[np.argmin(states[:, 3])]
     teleported = np.zeros(len(poses) + 1, dtype=bool)
     teleported[teleport_samples(trace, poses.ticks)] = True

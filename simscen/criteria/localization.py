@@ -35,10 +35,10 @@ if TYPE_CHECKING:
 class LocalizationError(Spec, Criterion):
     """The localization error of the robot stayed small.
 
-    What is measured: the distance between the estimated and the true position, and the heading error. Both are measured
-        whenever the stack publishes an estimated pose (belief), and continuously while its newest belief is over 1 s
-        old. In the root mean square, each belief counts once; old beliefs count at the usual rate of the beliefs. The
-        trajectories are not aligned, because an alignment would hide the error.
+    What is measured: the distance between the estimated and the true position, and the heading error, whenever the
+        stack publishes an estimated pose (belief), and continuously while the newest belief is over 1 s old. In the
+        root mean square, each belief counts once; while the newest belief is old, the error counts as often as beliefs
+        at the usual rate would. The trajectories are not aligned, because an alignment would hide the error.
     When it fails: the largest error, the root mean square, or the last error exceeds its bound. If the first belief is
         over 1 s later than `after`, only `final` can pass.
     Why this: a robot whose error is half a meter may reach goals in open space, but not near obstacles.
@@ -56,7 +56,7 @@ class LocalizationError(Spec, Criterion):
     max_yaw: PositiveAngle | None = None
     """Bound on the largest heading error."""
     after: Duration = 0.0
-    """Simulated time at which the evaluation begins. The filter can converge before."""
+    """Simulated time at which the evaluation begins, for example after the particle filter has converged."""
 
     @model_validator(mode="after")
     def _check_bounds(self) -> LocalizationError:
@@ -87,24 +87,25 @@ class LocalizationError(Spec, Criterion):
         findings = []
         if self.max is not None:
             largest = _judge_largest(trace, error, distances, "localization_error", self.max, "m")
-            findings.append(self._if_known_early(trace, first, largest))
+            findings.append(self._if_first_belief_in_time(trace, first, largest))
         if self.rmse is not None:
             rmse = root_mean_square(distances, error_weights(trace, error))
             bound = at_most("localization_error rmse", rmse, self.rmse, "m", context="(not aligned)")
-            findings.append(self._if_known_early(trace, first, if_complete(trace, bound)))
+            findings.append(self._if_first_belief_in_time(trace, first, if_complete(trace, bound)))
         if self.final is not None:
             at = (trace, int(error.ticks[-1]))
             bound = at_most("localization_error final", float(distances[-1]), self.final, "m", at=at)
             findings.append(if_complete(trace, bound))
         if self.max_yaw is not None:
             largest = _judge_largest(trace, error, angles, "localization_error yaw", self.max_yaw, "rad")
-            findings.append(self._if_known_early(trace, first, largest))
+            findings.append(self._if_first_belief_in_time(trace, first, largest))
         return findings
 
-    def _if_known_early(self, trace: Trace, first: int, finding: Finding) -> Finding:
-        """Return the finding, or an inconclusive one if it passes, but the `first` belief comes late.
+    def _if_first_belief_in_time(self, trace: Trace, first: int, finding: Finding) -> Finding:
+        """Return the finding. If it passes, but the first belief (at tick `first`) is late, it becomes inconclusive.
 
-        The evaluation begins at `after`, or at the first true pose if that is later.
+        The first belief is late if it comes more than BELIEF_TIMEOUT_S after the evaluation has begun. The evaluation
+        begins at `after`, or at the first true pose if this is later.
         """
         begin = max(self.after, trace.seconds(int(trace.truth.ticks[0])))
         if finding.status is not Status.PASS or first <= (begin + BELIEF_TIMEOUT_S) * trace.tick_rate:
@@ -152,19 +153,19 @@ class RelocalizedWithin(Spec, Criterion):
     @property
     def evidence(self) -> frozenset[Evidence]:
         """Evidence in the log that the criterion needs."""
-        started = {Evidence.DISTURBANCES} if self.after is not None else set()
-        return POSITION_EVIDENCE | {Evidence.BELIEF, *started}
+        disturbances = {Evidence.DISTURBANCES} if self.after is not None else set()
+        return POSITION_EVIDENCE | {Evidence.BELIEF, *disturbances}
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each start of `after`, or one for the start of the run."""
         error = pose_error(trace)
         if not len(error):
             return [undecided("relocalized_within", NO_BELIEF)]
-        happened = [Span(0, trace.end, False)] if self.after is None else spans(trace, self.after)
-        if not happened:
+        active_spans = [Span(0, trace.end, False)] if self.after is None else spans(trace, self.after)
+        if not active_spans:
             because, detail = never_started(trace, str(self.after))
             return [undecided("relocalized_within", because, self._limit_text, detail)]
-        return [self._judge_start(trace, span.start, error) for span in happened]
+        return [self._judge_start(trace, span.start, error) for span in active_spans]
 
     @property
     def _limit_text(self) -> str:
@@ -176,27 +177,30 @@ class RelocalizedWithin(Spec, Criterion):
 
     def _judge_start(self, trace: Trace, start: int, error: Samples) -> Finding:
         """Return the finding for the time from the tick `start` to the relocalization."""
-        later = error.ticks >= start
-        ticks, errors = error.ticks[later], error.values[later]
+        is_later = error.ticks >= start
+        ticks, errors = error.ticks[is_later], error.values[is_later]
         is_localized = (errors[:, 0] <= self.tolerance) & (errors[:, 1] <= self.yaw_tolerance)
         limit = start + self.time * trace.tick_rate
         if error.ticks[0] <= limit and is_localized[ticks <= limit].all():
             return undecided("relocalized_within", f"the robot was never lost {self._context_text}", self._limit_text)
         # Only samples after the loss count as relocalization.
-        lost = int(np.argmin(is_localized))
-        found, lasted = first_sustained(
-            ticks[lost:], is_localized[lost:], round(self.hold * trace.tick_rate), trace.end
+        first_lost = int(np.argmin(is_localized))
+        relocalized, lasted = first_sustained(
+            ticks[first_lost:], is_localized[first_lost:], round(self.hold * trace.tick_rate), trace.end
         )
-        tick = trace.end if found is None else found
+        tick = trace.end if relocalized is None else relocalized
         elapsed = trace.seconds(tick - start)
         if not lasted and elapsed <= self.time:
-            state = "still lost" if found is None else f"correct for only {trace.seconds(trace.end - tick):.2f} s"
-            because = (
-                f"the run was over at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)}), the belief {state}"
+            end = f"the run ended at t = {trace.seconds(trace.end):.2f} s ({end_reason(trace)})"
+            correct_s = trace.seconds(trace.end - tick)
+            state = (
+                "the robot was still lost"
+                if relocalized is None
+                else f"the belief had been correct for only {correct_s:.2f} s"
             )
-            return undecided("relocalized_within", because, self._limit_text)
+            return undecided("relocalized_within", f"{end}, when {state}", self._limit_text)
         detail = [f"the position error was at most {errors[:, 0].max():.2f} m, and {errors[-1, 0]:.2f} m at the end"]
-        if found is None:
+        if relocalized is None:
             detail.append("the robot never relocalized")
         return at_most(
             "relocalized_within", elapsed, self.time, "s", at=(trace, tick), context=self._context_text, detail=detail
@@ -207,11 +211,11 @@ class LocalizationConsistency(Spec, Criterion):
     """The covariance of the estimated pose matched its error.
 
     What is measured: the normalized estimation error squared (NEES) e' P⁻¹ e, where e is the error of the estimated
-        pose (x, y, yaw) and P is its covariance. One sample is taken per `every`. The average over the run is 3 if the
+        pose (x, y, yaw) and P is its covariance. The samples are `every` apart. Their average over the run is 3 if the
         covariance is correct.
     When it fails: the average is above its upper bound (the robot is overconfident), or a covariance is singular. With
-        `both_sides`, it also fails if the average is below its lower bound. A correct covariance keeps the bounds with
-        the given `probability`.
+        `both_sides`, it also fails if the average is below its lower bound. With a correct covariance, the average is
+        within the bounds with the given `probability`.
     Why this: a filter that is wrong but has a small covariance does not recover.
     Source: Bar-Shalom, Li, Kirubarajan 2001, section 5.4; filterpy's stats.NEES.
 
@@ -226,7 +230,7 @@ class LocalizationConsistency(Spec, Criterion):
     every: PositiveDuration = 5.0
     """Time between two samples."""
     after: Duration = 0.0
-    """Simulated time at which the evaluation begins. The filter can converge before."""
+    """Simulated time at which the evaluation begins, for example after the particle filter has converged."""
     both_sides: bool = False
     """Also fail if the covariance is too large."""
 
@@ -241,7 +245,7 @@ class LocalizationConsistency(Spec, Criterion):
         """Return the finding for the upper bound of the average, and with `both_sides` also for the lower bound."""
         if not len(pose_error(trace)):
             return [undecided("localization_consistency", NO_BELIEF)]
-        samples = self._sampled(trace)
+        samples = self._nees_at_regular_times(trace)
         if samples is None:
             return [undecided("localization_consistency", "the belief has no covariance")]
         if not len(samples):
@@ -259,12 +263,15 @@ class LocalizationConsistency(Spec, Criterion):
         return [if_complete(trace, finding) for finding in findings]
 
     def _bounds(self, count: int) -> tuple[float | None, float]:
-        """Return the lower and the upper bound of the average of `count` samples; no lower one without `both_sides`."""
+        """Return the lower and the upper bound of the average of `count` samples.
+
+        Without `both_sides`, the lower bound is None.
+        """
         if self.both_sides:
             return nees_mean_bounds(count, DIMENSIONS, self.probability)
         return None, chi2_quantile(self.probability, DIMENSIONS * count) / count
 
-    def _sampled(self, trace: Trace) -> Samples | None:
+    def _nees_at_regular_times(self, trace: Trace) -> Samples | None:
         """Return the NEES (n, 1) at regular times from the first belief after `after`; None without covariances.
 
         Each belief is used at most once.

@@ -21,7 +21,7 @@ class AnyCriterion(Choice):
     id: Name | None = None
     """Name of the verdict in reports; default: the key of the criterion."""
     severity: Literal["fail", "warn"] = "fail"
-    """Whether a violation fails the run or is only reported."""
+    """Effect of a violation: `fail` fails the run, `warn` only reports the violation."""
     then: Annotated[BaseModel | None, LazySpec("simscen.criteria.stl.condition", "Condition")] = None
     """Condition that must be true whenever the condition `whenever` is true."""
 
@@ -73,5 +73,5 @@ class AnyCriterion(Choice):
 
 def verdict_names(criteria: Sequence[AnyCriterion]) -> list[str]:
     """Return the verdict name of each criterion: its `id`, or its key. A repeated name gets a number: speed#2."""
-    used: set[str] = set()
-    return [unique_name(entry.id or entry.kind, used) for entry in criteria]
+    names: set[str] = set()
+    return [unique_name(entry.id or entry.kind, names) for entry in criteria]

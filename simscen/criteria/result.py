@@ -85,7 +85,10 @@ class ErrorCodeIs(Spec, Criterion):
 
 
 def _last(trace: Trace, *kinds: EventKind, name: str | None = None) -> Event | None:
-    """Return the last event of these kinds for the goal `name` (None for any name); None if there is no such event."""
+    """Return the last event of these kinds with the name of goal `name`; None if there is no such event.
+
+    If `name` is None, events with any name count.
+    """
     events = [event for event in trace.of_kind(*kinds) if matches_goal_name(event.name, name)]
     return events[-1] if events else None
 
@@ -132,46 +135,52 @@ class NoFalseSuccess(Spec, Criterion):
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return findings for all goals that were reported as reached, and for all false reports of SUCCEEDED."""
         outcomes = goal_outcomes(trace, case)
-        ended = trace.of_kind(EventKind.NAVIGATION_ENDED)
+        ends = trace.of_kind(EventKind.NAVIGATION_ENDED)
         names = {goal.name for goal in case.every_goal}
         arrivals = trace.of_kind(EventKind.GOAL_REACHED, EventKind.GOAL_PASSED)
         unknown = [event for event in arrivals if event.name not in names]
-        if not ended and not unknown and all(outcome.end is None for outcome in outcomes):
+        if not ends and not unknown and all(outcome.end is None for outcome in outcomes):
             return [undecided("no_false_success", "the robot reported nothing that could be false")]
-        findings = [self._judge_goal(trace, outcome, outcomes) for outcome in outcomes if outcome.reached is not None]
+        arrived = [outcome for outcome in outcomes if outcome.reached_tick is not None]
+        findings = [self._judge_goal(trace, outcome, outcomes) for outcome in arrived]
         findings += [
             undecided(f"goal {event.name}", "reported as reached, but the scenario has no such goal")
             for event in unknown
         ]
-        findings += [finding for k in range(len(ended)) if (finding := _judge_success(trace, case, outcomes, ended, k))]
+        findings += [finding for k in range(len(ends)) if (finding := _judge_success(trace, case, outcomes, ends, k))]
         return findings or [held("no_false_success", "no success was claimed", "no false success")]
 
     def _judge_goal(self, trace: Trace, outcome: GoalOutcome, outcomes: list[GoalOutcome]) -> Finding:
         """Return the finding for the true distance from a goal that the robot reported as reached or passed."""
-        assert outcome.reached is not None
+        assert outcome.reached_tick is not None
         if outcome.goal.via:
             tick, distance = closest_approach(trace, outcome, outcomes)
             context = "from the pose at the closest approach, which the robot reported passed"
         else:
-            tick = outcome.reached
+            tick = outcome.reached_tick
             distance = true_pose(trace, tick).distance(outcome.goal.pose)
             context = "from the goal when the robot reported it reached"
         return at_most(f"goal {outcome.goal.name}", distance, self.tolerance, "m", at=(trace, tick), context=context)
 
 
 def _judge_success(
-    trace: Trace, case: Case, outcomes: list[GoalOutcome], ended: tuple[Event, ...], k: int
+    trace: Trace, case: Case, outcomes: list[GoalOutcome], ends: tuple[Event, ...], k: int
 ) -> Finding | None:
-    """Return a failed finding if the robot falsely reported SUCCEEDED at the k-th end of navigation, otherwise None.
+    """Return a failed finding if the robot falsely reported SUCCEEDED at the k-th of the `ends` of navigation.
 
     The report is false if a goal since the previous end of navigation was not reached. The first end of navigation
-    covers all goals of the scenario.
+    covers all goals of the scenario. Return None if the report is true, or if the robot did not report SUCCEEDED.
     """
-    end = ended[k]
+    end = ends[k]
     if end.name != "SUCCEEDED":
         return None
-    own = [each for each in outcomes if _end_index(each, ended) == k or (k == 0 and each.goal in case.goals)]
-    unreached = [each for each in own if each.must_be_reached and (each.reached is None or each.reached > end.tick)]
+    unreached = [
+        outcome
+        for outcome in outcomes
+        if (_end_index(outcome, ends) == k or (k == 0 and outcome.goal in case.goals))
+        and outcome.must_be_reached
+        and (outcome.reached_tick is None or outcome.reached_tick > end.tick)
+    ]
     if not unreached:
         return None
     names = ", ".join(outcome.goal.name for outcome in unreached)
@@ -179,7 +188,10 @@ def _judge_success(
     return missed("result", "SUCCEEDED", expected, (trace, end.tick), [f"not reached: {names}"])
 
 
-def _end_index(outcome: GoalOutcome, ended: tuple[Event, ...]) -> int | None:
-    """Return the index of the first end of navigation after a goal was accepted; None if there is none."""
+def _end_index(outcome: GoalOutcome, ends: tuple[Event, ...]) -> int | None:
+    """Return the index of the first of the `ends` of navigation after the start of a goal, or at or after its end.
+
+    Return None if there is no such end of navigation.
+    """
     end_tick = math.inf if outcome.end is None else outcome.end.tick
-    return next((k for k, end in enumerate(ended) if outcome_start(outcome) < end.tick or end_tick <= end.tick), None)
+    return next((k for k, end in enumerate(ends) if outcome_start(outcome) < end.tick or end_tick <= end.tick), None)

@@ -35,8 +35,8 @@ class Smoothness(Spec, Criterion):
     Source: Balasubramanian et al. 2015 and the authors' code for SPARC and LDLJ. HuNavSim and Arena also report
         jerk: HuNavSim as a first difference, Arena without the time step.
 
-    SPARC is sensitive to slow oscillation, LDLJ to stops. Both depend on the duration, so that only runs with the same
-    drive can be compared. Both are inconclusive for a robot that never moved.
+    SPARC is sensitive to slow oscillation, LDLJ to stops. SPARC and LDLJ depend on the duration of the drive: compare
+    only runs of the same drive. SPARC and LDLJ are inconclusive if the robot never moved.
 
     Example: `smoothness: {max_acceleration: 1 m/s^2, max_jerk: 60 m/s^3}`
     """
@@ -77,6 +77,7 @@ class Smoothness(Spec, Criterion):
 
 
 def _judge_largest(trace: Trace, case: Case, name: SignalName, limit: float, unit: str) -> Finding:
+    """Return the finding for the largest magnitude of the signal `name`."""
     try:
         values = read_signal(name, trace, case, {})
     except MissingEvidence as reason:

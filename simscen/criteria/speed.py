@@ -28,15 +28,16 @@ class Speed(Spec, Criterion):
 
     What is measured: the largest true speed over ground and the largest true turn rate, over the whole run, or while
         the robot's center is in a region. With a mask of speed limits, also the difference between the true speed and
-        the limit at the robot's true center. At each time, the highest limit within `grace` before and after counts.
+        the limit at the robot's true center. At each time, the highest limit within `grace` before and after this time
+        counts.
     When it fails: the speed is above `max`, the turn rate is above `max_turn_rate`, or the speed is more than
         `tolerance` above the limit of the mask.
     Why this: on slopes, by slip, or by overshoot, a robot can exceed the limits that its controller is given.
     Source: ScenarioRunner's MaxVelocityTest.
 
     Inconclusive if the robot was never in the region, or if no stay in limited cells of the mask was longer than twice
-    the `grace`. With `while_on`, also inconclusive if the zone was never on for longer than `grace`, or the robot was
-    not in it then.
+    the `grace`. With `while_on`, also inconclusive if the zone was never on for longer than `grace`, or if the robot
+    was not in the zone during this time.
 
     Example: `speed: {max: 0.5 m/s}`
     """
@@ -48,8 +49,8 @@ class Speed(Spec, Criterion):
     in_: RegionName | None = Field(default=None, alias="in")
     """Check only while the robot's center is in the region with this name."""
     while_on: bool = False
-    """Check only while the limit in the region is enabled by the action `speed_zone`, beginning after the time
-    `grace`. Default: check the whole run."""
+    """Check only while the limit in the region is enabled by the action `speed_zone`; the check begins `grace` after
+    the limit is enabled. Default: check the whole run."""
     mask: SpeedMask | None = None
     """Filter mask of speed limits: file, type, base and multiplier, as in `stack.speed_mask`.
 
@@ -60,8 +61,8 @@ class Speed(Spec, Criterion):
     """Maximum speed above a limit of the mask; only with `mask`."""
     grace: Duration = 1.0
     """Time that the robot may take to slow down after it enters cells of the mask with a lower limit, or after a zone
-    is enabled. It may also accelerate this long before it leaves such cells. Only with `mask` or `while_on`; `grace`
-    does not apply when the robot enters the region `in`."""
+    is enabled. For the same time, the robot may already accelerate before it leaves such cells. Only with `mask` or
+    `while_on`; `grace` does not apply when the robot enters the region `in`."""
 
     @model_validator(mode="after")
     def _check_keys(self) -> Speed:
@@ -69,10 +70,10 @@ class Speed(Spec, Criterion):
             raise ValueError("expected max, max_turn_rate or mask")
         if self.while_on and (self.in_ is None or self.mask is not None):
             raise ValueError("while_on only applies to the zone of a region: give `in` and no mask")
-        percent = self.mask is not None and self.mask.type == "percent"
-        if percent and self.full_speed is None:
+        is_percent = self.mask is not None and self.mask.type == "percent"
+        if is_percent and self.full_speed is None:
             raise ValueError("expected full_speed, to which the percentages of the mask refer (or `type: absolute`)")
-        if not percent and self.full_speed is not None:
+        if not is_percent and self.full_speed is not None:
             raise ValueError("full_speed only applies to a mask of percentages")
         if self.mask is None and "tolerance" in self.model_fields_set:
             raise ValueError("tolerance only applies to a mask")
@@ -83,9 +84,9 @@ class Speed(Spec, Criterion):
     @property
     def evidence(self) -> frozenset[Evidence]:
         """Evidence in the log that the criterion needs."""
-        place = POSITION_EVIDENCE if self.in_ is not None or self.mask is not None else set()
-        switched = {Evidence.DISTURBANCES} if self.while_on else set()
-        return frozenset({Evidence.TRUTH, Evidence.VELOCITY, *place, *switched})
+        position = POSITION_EVIDENCE if self.in_ is not None or self.mask is not None else set()
+        disturbances = {Evidence.DISTURBANCES} if self.while_on else set()
+        return frozenset({Evidence.TRUTH, Evidence.VELOCITY, *position, *disturbances})
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding for each given bound."""
@@ -101,18 +102,18 @@ class Speed(Spec, Criterion):
         signal = ground_truth.speed(trace) if name == "speed" else ground_truth.turn_rate(trace)
         if not len(signal):
             return undecided(what, "no velocity was recorded", limit_text)
-        inside = self._inside(trace, case, signal)
-        if inside is None:
+        is_inside = self._is_inside(trace, case, signal)
+        if is_inside is None:
             return undecided(what, f"the world has no region `{self.in_}`", limit_text)
         if self.while_on:
             spans = enabled_spans(trace, "speed", self.in_, self.grace)
             if not spans:
                 return undecided(what, NEVER_ENABLED, limit_text)
-            inside &= np.any([(first <= signal.ticks) & (signal.ticks <= last) for first, last in spans], axis=0)
-        if not inside.any():
-            because = f"the robot was never in `{self.in_}`{' while it was on' * self.while_on}"
+            is_inside &= np.any([(first <= signal.ticks) & (signal.ticks <= last) for first, last in spans], axis=0)
+        if not is_inside.any():
+            because = f"the robot was never in `{self.in_}`{' while the zone was on' * self.while_on}"
             return undecided(what, because, limit_text)
-        k = int(np.flatnonzero(inside)[np.argmax(signal.values[inside, 0])])
+        k = int(np.flatnonzero(is_inside)[np.argmax(signal.values[is_inside, 0])])
         context = "" if self.in_ is None else f"in {self.in_}"
         return at_most(what, float(signal.values[k, 0]), limit, unit, at=(trace, int(signal.ticks[k])), context=context)
 
@@ -123,24 +124,24 @@ class Speed(Spec, Criterion):
             return undecided("speed", "no velocity was recorded", limit_text)
         if mask.file not in case.masks:
             return undecided("speed", f"the log has no mask `{mask.file}`", limit_text)
-        inside = self._inside(trace, case, signal)
-        if inside is None:
+        is_inside = self._is_inside(trace, case, signal)
+        if is_inside is None:
             return undecided("speed", f"the world has no region `{self.in_}`", limit_text)
         limits = mask.speed_limits(case.masks[mask.file].grid)
         local_limits = limits.at_points(ground_truth.truth(trace).at(signal.ticks)[:, :2], self.full_speed or 0.0)
         highest = _sliding_maximum(local_limits, signal.ticks, round(self.grace * trace.tick_rate))
-        limited = inside & np.isfinite(highest)
-        if not limited.any():
+        is_limited = is_inside & np.isfinite(highest)
+        if not is_limited.any():
             because = f"the robot was never in a limited part of the mask for longer than {2 * self.grace:g} s"
             return undecided("speed", because, limit_text)
-        excess = np.where(limited, signal.values[:, 0] - highest, -np.inf)
+        excess = np.where(is_limited, signal.values[:, 0] - highest, -np.inf)
         k = int(np.argmax(excess))
         value, limit = float(signal.values[k, 0]), float(highest[k]) + self.tolerance
         context = f"by {mask.file} (tolerance {self.tolerance:g} m/s)"
         return at_most("speed", value, limit, "m/s", at=(trace, int(signal.ticks[k])), context=context)
 
-    def _inside(self, trace: Trace, case: Case, signal: Samples) -> ground_truth.Flags | None:
-        """Return for each sample whether the robot's center was in the region `in`; always True without `in`.
+    def _is_inside(self, trace: Trace, case: Case, signal: Samples) -> ground_truth.Flags | None:
+        """Return for each sample of `signal` whether the robot's center was in the region `in`; True without `in`.
 
         Return None if the world has no such region.
         """

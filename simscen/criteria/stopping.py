@@ -66,16 +66,16 @@ class StoppedWithin(Spec, Criterion):
         """
         if not len(trace.velocity):
             raise MissingEvidence("the robot's true velocity was not recorded")
-        happened = spans(trace, self.after)
-        if not happened:
+        active_spans = spans(trace, self.after)
+        if not active_spans:
             because, detail = never_started(trace, self.after)
             return [undecided("stopped_within", because, self._limit_text, detail)]
         is_slow = speed(trace).values[:, 0] <= self.speed
         is_standing = is_slow & (turn_rate(trace).values[:, 0] <= self.turn_rate)
-        if all(_stood_before(trace, is_standing, span.start) for span in happened):
+        if all(_stood_before(trace, is_standing, span.start) for span in active_spans):
             because = f"the robot was not moving when `{self.after}` started, so nothing had to stop"
             return [undecided("stopped_within", because, self._limit_text)]
-        return [finding for span in happened for finding in self._judge_span(trace, span, is_standing)]
+        return [finding for span in active_spans for finding in self._judge_span(trace, span, is_standing)]
 
     @property
     def _limit_text(self) -> str:
@@ -87,29 +87,31 @@ class StoppedWithin(Spec, Criterion):
         hold = round(self.hold * trace.tick_rate)
         stop, lasted = first_sustained(trace.velocity.ticks[first:], is_standing[first:], hold, trace.end)
         stop = None if stop is None or stop > span.end else max(stop, span.start)
-        until = span.end if stop is None else stop
-        elapsed = trace.seconds(until - span.start)
+        end = span.end if stop is None else stop
+        elapsed = trace.seconds(end - span.start)
         if elapsed <= self.time and not (stop is not None and lasted):
-            over = f"`{self.after}`" if span.has_end_event and stop is None else f"the run ({end_reason(trace)})"
-            state = "still moving" if stop is None else "at rest too briefly"
-            because = f"{over} was over {elapsed:.2f} s after it started, with the robot {state}"
+            ended = f"`{self.after}`" if span.has_end_event and stop is None else f"the run ({end_reason(trace)})"
+            if stop is None:
+                because = f"{ended} ended {elapsed:.2f} s after the start of `{self.after}`, while the robot moved"
+            else:
+                because = f"{ended} ended before the robot had stood for {self.hold:.2f} s"
             return [undecided("stopped_within", because, self._limit_text)]
-        detail = _describe_motion(trace, span.start, until) + ([] if stop is not None else ["it never came to rest"])
+        detail = _describe_motion(trace, span.start, end) + ([] if stop is not None else ["it never came to rest"])
         context = f"after {self.after}"
-        found = at_most("stopped_within", elapsed, self.time, "s", at=(trace, until), context=context, detail=detail)
-        return [found, self._judge_stay(trace, span, until, is_standing)] if self.stay and stop is not None else [found]
+        finding = at_most("stopped_within", elapsed, self.time, "s", at=(trace, end), context=context, detail=detail)
+        stay = [self._judge_stay(trace, span, end, is_standing)] if self.stay and stop is not None else []
+        return [finding, *stay]
 
     def _judge_stay(self, trace: Trace, span: Span, stop: int, is_standing: Flags) -> Finding:
         """Return the finding that the robot stood from the tick `stop` to the end of the interval."""
         ticks = trace.velocity.ticks
-        again = ticks[~is_standing & (ticks > stop) & (ticks < span.end)]
+        moving_ticks = ticks[~is_standing & (ticks > stop) & (ticks < span.end)]
         expected = f"standing until {self.after} ends"
-        if not len(again):
+        if not len(moving_ticks):
             return held("stayed", "stood still", expected)
-        late = trace.seconds(int(again[0]) - span.start)
-        return missed(
-            "stayed", f"moved again {late:.2f} s after {self.after} started", expected, (trace, int(again[0]))
-        )
+        first = int(moving_ticks[0])
+        elapsed = trace.seconds(first - span.start)
+        return missed("stayed", f"moved again {elapsed:.2f} s after {self.after} started", expected, (trace, first))
 
 
 def _stood_before(trace: Trace, is_standing: Flags, tick: int) -> bool:
@@ -152,9 +154,9 @@ class Stuck(Spec, Criterion):
         """Return the finding for the longest standstill over all goals."""
         poses = truth(trace)
         drives = [
-            (outcome.accepted, trace.end if outcome.end is None else outcome.end.tick)
+            (outcome.accepted_tick, trace.end if outcome.end is None else outcome.end.tick)
             for outcome in goal_outcomes(trace, case)
-            if outcome.accepted is not None
+            if outcome.accepted_tick is not None
         ]
         standstills = [
             standstill for start, end in drives for standstill in _standstills(poses, start, end, self.radius)
@@ -167,18 +169,18 @@ class Stuck(Spec, Criterion):
 
 
 def _standstills(poses: Samples, start: int, end: int, radius: float) -> list[tuple[int, int]]:
-    """Divide a drive from tick `start` to `end` into periods, and return the duration and the end of each in ticks.
+    """Divide a drive from tick `start` to `end` into periods. Return (duration, end) of each period in ticks.
 
     As in Nav2's progress checker, a period ends when the robot is more than `radius` m away from its position at the
-    start of the period. The list is empty without samples.
+    start of the period. The list is empty if there is no sample between `start` and `end`.
     """
     first, last = np.searchsorted(poses.ticks, (start, end + 1), side="left").tolist()
     if first == last:
         return []
     xs, ys, ticks = poses.values[:, 0].tolist(), poses.values[:, 1].tolist(), poses.ticks.tolist()
-    found, base, since = [], first, start
+    periods, first_of_period, period_start = [], first, start
     for k in range(first, last):
-        if math.hypot(xs[k] - xs[base], ys[k] - ys[base]) > radius:
-            found.append((ticks[k] - since, ticks[k]))
-            base, since = k, ticks[k]
-    return [*found, (end - since, end)]
+        if math.hypot(xs[k] - xs[first_of_period], ys[k] - ys[first_of_period]) > radius:
+            periods.append((ticks[k] - period_start, ticks[k]))
+            first_of_period, period_start = k, ticks[k]
+    return [*periods, (end - period_start, end)]

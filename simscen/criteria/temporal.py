@@ -8,18 +8,19 @@ from __future__ import annotations
 
 from pydantic import BaseModel
 
-from simscen.criteria.stl.condition import Condition, Release, Whenever, Windowed
+from simscen.criteria.stl.condition import Condition, UntilOperands, Whenever, WindowedCondition
 from simscen.criteria.stl.criterion import TemporalCriterion
 from simscen.spec.base import Spec
 
 
-class Always(Windowed, TemporalCriterion):
+class Always(WindowedCondition, TemporalCriterion):
     """A condition is true at all times of the run, or of a part of it (a window).
 
     What is measured: the distance of each signal from its bound, at each sample of the truth. The margin is the
         smallest distance in the window.
     When it fails: the condition was false at a sample.
-    Why this: the other criteria cover the most frequent requirements. This one covers all that signals can express.
+    Why this: the other criteria cover the most frequent requirements. This criterion covers all requirements that
+        signals can express.
     Source: signal temporal logic with the robust semantics of Donzé and Maler 2010, over samples.
 
     Inconclusive if the run ended before the end of the window, and the condition was never false until then.
@@ -33,7 +34,7 @@ class Always(Windowed, TemporalCriterion):
         return Condition.model_construct(always=self)
 
 
-class Eventually(Windowed, TemporalCriterion):
+class Eventually(WindowedCondition, TemporalCriterion):
     """A condition is true at least once in the run, or in a part of it (a window).
 
     What is measured: the distance of each signal from its bound, at each sample of the truth. The margin is the largest
@@ -54,11 +55,11 @@ class Eventually(Windowed, TemporalCriterion):
         return Condition.model_construct(eventually=self)
 
 
-class Until(Release, TemporalCriterion):
+class Until(UntilOperands, TemporalCriterion):
     """The condition `hold` is true until the condition `release` becomes true, which must happen within the window.
 
-    What is measured: the distance of each signal from its bound, at each sample of the truth. For each
-        sample, take the smallest of the distance of `release` at this sample and the distances of `hold` before it. The
+    What is measured: the distance of each signal from its bound, at each sample of the truth. For each sample in the
+        window, take the smallest of the distance of `release` at this sample and the distances of `hold` before it. The
         margin is the largest of these minima.
     When it fails: `release` was not true in the window, or `hold` was false before `release` became true.
     Why this: only this criterion can require an order, for example that a robot does not move before it is localized.
@@ -76,7 +77,7 @@ class Until(Release, TemporalCriterion):
 
 
 class Response(Spec, TemporalCriterion):
-    """The criterion `whenever … then`, made of two keys of a scenario: the premise and the response."""
+    """The criterion `whenever … then`, which has two keys in a scenario: `whenever` is `premise`, `then` `response`."""
 
     premise: Whenever
     response: Condition

@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 
 START_KINDS = (EventKind.FAULT_STARTED, EventKind.EVENT_STARTED, EventKind.MARK)
 """Kinds of recorded events that start a fault, an event of the scenario, or a mark."""
-_ENDS = (EventKind.FAULT_ENDED, EventKind.EVENT_ENDED)
+_END_KINDS = (EventKind.FAULT_ENDED, EventKind.EVENT_ENDED)
 NEVER_ENABLED = "no event enabled the zone for longer than `grace`: leave `while_on` out to judge the whole run"
 """Reason of inconclusive findings with `while_on` if there is no interval in which the zone was enabled."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """Interval from `start` to `end` in ticks.
+    """Interval from tick `start` to tick `end` in which a fault, event, or mark was active.
 
-    `has_end_event` is True if an event of the trace ended the interval, and False if it lasts to the end of the run.
+    `has_end_event` is False if the interval lasts to the end of the run, because no recorded event ended it.
     """
 
     start: int
@@ -37,11 +37,13 @@ class Span:
 def spans(trace: Trace, label: str) -> list[Span]:
     """Return the intervals in which faults, events, or marks (of the action `mark`) with this label were active.
 
-    They are sorted by start. An interval without an end, or with an end at its start, lasts to the end of the run.
+    The intervals are sorted by start. If the end was not recorded, or was recorded at the tick of the start, the
+    interval lasts to the end of the run.
     """
     starts = [event for event in trace.of_kind(*START_KINDS) if event.name == label]
-    ends = [event for event in trace.of_kind(*_ENDS) if event.name == label]
+    ends = [event for event in trace.of_kind(*_END_KINDS) if event.name == label]
     found = []
+    # Several faults or events can have the same label. `entry` is the index of one of them in the scenario.
     for entry in dict.fromkeys(start.data.get("entry") for start in starts):
         start_ticks = [start.tick for start in starts if start.data.get("entry") == entry]
         end_ticks = [end.tick for end in ends if end.data.get("entry") == entry]
@@ -60,7 +62,7 @@ def never_started(trace: Trace, label: str) -> tuple[str, list[str]]:
 
 
 def end_reason(trace: Trace) -> str:
-    """Return as text why the run ended; for a truncated log, that the log stops."""
+    """Return the reason why the run ended; "the log stops there" for a truncated log."""
     ends = trace.of_kind(EventKind.RUN_ENDED)
     return ends[-1].name if ends else "the log stops there"
 
@@ -70,13 +72,15 @@ def has_ended(trace: Trace) -> bool:
     return bool(trace.of_kind(EventKind.RUN_ENDED))
 
 
-def enabled_spans(trace: Trace, what: Filter, region: str | None, grace: float) -> list[tuple[int, int]]:
-    """Return the intervals (first tick, last tick) in which a zone of the costmap filter `what` was enabled.
+def enabled_spans(trace: Trace, costmap_filter: Filter, region: str | None, grace: float) -> list[tuple[int, int]]:
+    """Return the intervals (first tick, last tick) in which a zone of a costmap filter was enabled.
 
     `region` is the region of the zone; None for the mask of the filter. Intervals begin `grace` seconds after an
-    event enabled the zone, or at tick 0 if the first event disabled it. The list is empty if no event switched it.
+    event enabled the zone, or at tick 0 if the first event disabled the zone. The list is empty if no event switched
+    the zone.
     """
-    switches = [e for e in trace.of_kind(EventKind.ZONE_SWITCHED) if (e.name, e.data["filter"]) == (region or "", what)]
+    zone = (region or "", costmap_filter)
+    switches = [e for e in trace.of_kind(EventKind.ZONE_SWITCHED) if (e.name, e.data["filter"]) == zone]
     if not switches:
         return []
     begin: int | None = None if switches[0].data["enabled"] else 0
@@ -92,9 +96,10 @@ def enabled_spans(trace: Trace, what: Filter, region: str | None, grace: float) 
 
 
 def clip_samples(samples: Samples, first: int, last: int) -> Samples:
-    """Return the samples from tick `first` to `last`, with samples at these two ticks.
+    """Return the samples from tick `first` to tick `last`, including samples at exactly these two ticks.
 
-    Added samples repeat the sample before. None is added before the first or after the last of `samples`.
+    A sample that is added at one of the two ticks repeats the sample before it. No sample is added before the first or
+    after the last of `samples`.
     """
     inner = samples.ticks[(samples.ticks > first) & (samples.ticks < last)]
     ticks = np.unique(np.concatenate(([first], inner, [last])))
@@ -106,7 +111,7 @@ def first_sustained(ticks: Ticks, is_true: Flags, hold: int, end: int) -> tuple[
     """Return (tick, True) for the first tick from which a state is true for at least `hold` ticks.
 
     `is_true` contains the state at each of the `ticks`; the last state lasts until the tick `end`. If the state is
-    never true that long, return (start, False) for a shorter period that lasts until `end`, or else (None, False).
+    never true for so long, return (tick, False) if it is true from `tick` until `end`, and otherwise (None, False).
     """
     begins = np.flatnonzero(is_true & ~np.concatenate(([False], is_true[:-1])))
     breaks = np.flatnonzero(~is_true & np.concatenate(([False], is_true[:-1])))

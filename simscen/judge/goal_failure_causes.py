@@ -43,7 +43,7 @@ def _current_goal(trace: Trace, case: Case, tick: int) -> GoalOutcome | None:
     started = [outcome for outcome in goal_outcomes(trace, case) if outcome_start(outcome) <= tick]
     if not started:
         return None
-    reached, end = started[-1].reached, started[-1].end
+    reached, end = started[-1].reached_tick, started[-1].end
     is_reached = reached is not None and reached <= tick
     is_canceled = end is not None and end.kind == EventKind.GOAL_CANCELED and end.tick < tick
     return None if is_reached or is_canceled else started[-1]

@@ -57,17 +57,17 @@ class Condition(Spec):
     """True while at least one condition of this list is true."""
     not_: Condition | None = Field(default=None, alias="not")
     """True while the given condition is false."""
-    always: Windowed | None = None
+    always: WindowedCondition | None = None
     """True if the given condition is true at all times of its window."""
-    eventually: Windowed | None = None
+    eventually: WindowedCondition | None = None
     """True if the given condition is true at least once in its window."""
-    until: Release | None = None
+    until: UntilOperands | None = None
     """True if `release` becomes true in its window, and `hold` is true until then."""
     whenever: Condition | None = None
-    """True if the condition `then` is true each time that the given condition is true until the end of the run.
+    """True if the condition `then` is true at all times at which the given condition is true, until the end of the run.
     Undecided if the given condition is never true."""
     then: Condition | None = None
-    """Condition that must be true each time that the condition of `whenever` is true."""
+    """Condition that must be true at all times at which the condition of `whenever` is true."""
 
     @field_validator("op", mode="before")
     @classmethod
@@ -84,7 +84,7 @@ class Condition(Spec):
         return Quantity(dimension).parse(value) if dimension in UNITS else value
 
     @model_validator(mode="after")
-    def _check_shape(self) -> Condition:
+    def _check_keys(self) -> Condition:
         given = [name.rstrip("_") for name in OPERATORS if getattr(self, name) is not None]
         if not given:
             raise ValueError(f"expected one of: {', '.join(name.rstrip('_') for name in OPERATORS)}")
@@ -102,7 +102,7 @@ class Condition(Spec):
 
     @property
     def definition(self) -> Signal:
-        """Definition of the compared signal. Raises AssertionError if the condition is no comparison."""
+        """Definition of the compared signal. Raises AssertionError if the condition is not a comparison."""
         assert self.signal is not None
         return SIGNALS[self.signal]
 
@@ -126,13 +126,17 @@ class Condition(Spec):
 
 
 class Window(Spec):
-    """Interval of time after the evaluation of its condition. Without any key, it is the rest of the run."""
+    """Interval of time in which a condition is evaluated. Without any key, the window lasts to the end of the run.
+
+    The times of a window count from the start of the run or, in a nested condition, from the time at which the
+    condition around it is evaluated.
+    """
 
     within: PositiveDuration | None = None
-    """Length of the window. It begins at the start of the run; in a nested condition, at its evaluation."""
+    """Length of the window, which begins at the start of the run (in a nested condition: at its evaluation)."""
     after: PositiveDuration | None = None
-    """Time from the start of the run (in a nested condition: from its evaluation) to the start of the window, which
-    lasts until the end of the run."""
+    """Time from the start of the run (in a nested condition: from its evaluation) to the start of the window. Such a
+    window lasts until the end of the run."""
     between: Annotated[list[Duration], Field(min_length=2, max_length=2)] | None = None
     """Times from the start of the run (in a nested condition: from its evaluation) to the start and to the end of the
     window."""
@@ -154,32 +158,33 @@ class Window(Spec):
         return self.after or 0.0, self.within
 
 
-class Windowed(Window, Condition):
+class WindowedCondition(Window, Condition):
     """Condition, and the window in which it is evaluated."""
 
 
-class Whenever(Windowed):
+class Whenever(WindowedCondition):
     """Whenever one condition (the premise) is true, another condition (the response, `then`) is true as well.
 
     For a response within some seconds, write `then: {eventually: {…, within: 2 s}}`.
 
-    What is measured: the distance of each signal from its bound, at each sample of the truth. The margin is the
-        smallest value over all samples of the larger margin of the response and of the negated premise.
+    What is measured: the distance of each signal from its bound, at each sample of the truth. At each sample, the larger
+        of two margins counts: the margin of the response and the margin of the negated premise. The margin of the
+        criterion is the smallest of these values.
     When it fails: at a sample, the premise was true and the response was false.
     Why this: a robot that is lost, blind, or too close to something must react in time, and each time.
     Source: the bounded response pattern of Dwyer, Avrunin and Corbett 1999; robust semantics of Donzé and Maler 2010.
 
-    Inconclusive if the run ended before the time for a response was over. Also inconclusive if the premise was never
-    true, because nothing was tested; `required: false` lets such a run pass.
+    Inconclusive if the run ended while a response was still due. Also inconclusive if the premise was never true,
+    because nothing was tested; with `required: false`, such a run passes.
 
     Example: `{whenever: {signal: scan_age, op: ">", value: 0.3 s}, then: {eventually: {signal: speed, op: "<", value: 1 cm/s, within: 1 s}}}`
     """  # noqa: E501 (an example is on one line)
 
     required: bool = True
-    """Whether the premise must be true at least once. With `false`, a run in which it was never true passes."""
+    """Whether the premise must be true at least once. With `false`, a run passes if the premise was never true."""
 
 
-class Release(Window):
+class UntilOperands(Window):
     """Operands of `until`: `hold` must be true until `release` becomes true, which must happen in the window."""
 
     hold: Condition
@@ -225,15 +230,15 @@ def _check_decidable(op: Op, value: float, name: str, signal: Signal) -> None:
         raise ValueError(f"`{name}` is never {where}, so `{op} {value:g}{unit}` is {frequency} true")
 
 
-for _model in (Condition, Windowed, Whenever, Release):
-    _model.model_rebuild()  # they refer to each other, and criteria in other modules derive from them
+for _model in (Condition, WindowedCondition, Whenever, UntilOperands):
+    _model.model_rebuild()  # the models refer to each other, and criteria in other modules derive from them
 
 
 def decision_horizon(condition: Condition, holds: bool = True) -> float:
-    """Return the earliest time in s after its evaluation at which a condition can be known to be true.
+    """Return the earliest time at which a condition can be known to be true, in s after the start of its evaluation.
 
-    If `holds` is False, return the earliest time at which it can be known to be false. A window that lasts to the end
-    of the run counts only with its start.
+    If `holds` is False, return the earliest time at which the condition can be known to be false. A window that lasts
+    to the end of the run counts only with its start.
     """
     if condition.all is not None or condition.any is not None:
         needs_all = (condition.all is not None) == holds

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class TemporalCriterion(Criterion):
-    """Criterion that a condition is true at the start of the run. Temporal operators in it cover later times."""
+    """Criterion that a condition is true at the start of the run. Its temporal operators cover later times."""
 
     @property
     @abstractmethod
@@ -40,16 +40,17 @@ class TemporalCriterion(Criterion):
 
     @property
     def clearance_range(self) -> float:
-        """Distance in m around the robot up to which clearance must be measured; 0 without a comparison of it."""
-        compared = [one for one in self.condition.comparisons() if one.signal == "clearance"]
-        return max((one.value + SEARCH_MARGIN_M for one in compared if one.value is not None), default=0.0)
+        """Distance in m around the robot up to which clearance must be measured; 0 if clearance is not compared."""
+        bounds = [each.value for each in self.condition.comparisons() if each.signal == "clearance"]
+        return max((bound + SEARCH_MARGIN_M for bound in bounds if bound is not None), default=0.0)
 
     @property
     def evidence(self) -> frozenset[Evidence]:
         """Evidence that the log must contain for the compared signals."""
-        compared = list(self.condition.comparisons())
-        objects = {Evidence.OBJECTS} if any(one.object is not None for one in compared) else set()
-        return frozenset(objects).union(*(signal_evidence(one.signal) for one in compared if one.signal is not None))
+        comparisons = list(self.condition.comparisons())
+        objects = {Evidence.OBJECTS} if any(each.object is not None for each in comparisons) else set()
+        signals = [each.signal for each in comparisons if each.signal is not None]
+        return frozenset(objects).union(*map(signal_evidence, signals))
 
     def judge(self, trace: Trace, case: Case) -> list[Finding]:
         """Return one finding, with the value of the signal at the sample that decides the condition."""
@@ -74,8 +75,8 @@ class TemporalCriterion(Criterion):
     def _decisive_finding(self, trace: Trace, result: Robustness, bound: Bound, value: float) -> Finding:
         """Return the finding of a decided condition. `value` is its robustness: `bound` of `result` at the start."""
         witness = result.witness(0, bound)
-        times = [(what, trace.seconds(int(trace.truth.ticks[sample]))) for what, sample in witness.notes]
-        notes = [f"{what} at t = {seconds:.2f} s" for what, seconds in times]
+        times = [(text, trace.seconds(int(trace.truth.ticks[sample]))) for text, sample in witness.notes]
+        notes = [f"{text} at t = {seconds:.2f} s" for text, seconds in times]
         tick = int(trace.truth.ticks[witness.sample])
         signal, unit, margin = witness.comparison.definition, _margin_unit(list(self.condition.comparisons())), None
         if unit is None or math.isinf(value):
@@ -98,11 +99,11 @@ class TemporalCriterion(Criterion):
 
 def _unknown_signals(trace: Trace, result: Robustness) -> Iterator[str]:
     """Yield a line for each comparison with a signal that is unknown at the beginning of the run."""
-    for one in result.comparisons():
-        unknown = np.flatnonzero(np.isnan(one.values))
+    for part in result.comparisons():
+        unknown = np.flatnonzero(np.isnan(part.values))
         if len(unknown):
-            until = trace.seconds(int(trace.truth.ticks[unknown[-1]]))
-            yield f"{describe_signal(one.comparison)} is unknown up to t = {until:.2f} s: there was no belief yet"
+            end = trace.seconds(int(trace.truth.ticks[unknown[-1]]))
+            yield f"{describe_signal(part.comparison)} is unknown up to t = {end:.2f} s: there was no belief yet"
 
 
 def _untested_finding(response: ResponseRobustness, formula: str, with_hint: bool) -> Finding:
@@ -118,10 +119,10 @@ def _untested_finding(response: ResponseRobustness, formula: str, with_hint: boo
     return undecided("", because, formula, ["`required: false` lets such a run pass"] if with_hint else [])
 
 
-def _margin_unit(compared: list[Condition]) -> str | None:
+def _margin_unit(comparisons: list[Condition]) -> str | None:
     """Return the unit of all compared numeric signals; "" if all have a `scale`, None without a common unit."""
-    measured = [one for one in compared if not one.definition.is_boolean]
-    if measured and all(one.scale is not None for one in measured):
+    numeric = [each for each in comparisons if not each.definition.is_boolean]
+    if numeric and all(each.scale is not None for each in numeric):
         return ""
-    units = {one.definition.unit for one in measured}
-    return units.pop() if len(units) == 1 and all(one.scale is None for one in measured) else None
+    units = {each.definition.unit for each in numeric}
+    return units.pop() if len(units) == 1 and all(each.scale is None for each in numeric) else None

@@ -1,4 +1,4 @@
-"""Text for reports: conditions, and the measured values that decide them."""
+"""Descriptions of conditions, and of the measured values that decide them, as text for reports."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ def describe(condition: Condition) -> str:
     if condition.signal is not None:
         return f"{describe_signal(condition)} {_limit(condition)}".rstrip()
     if condition.all is not None:
-        return " and ".join(_grouped(part) for part in condition.all)
+        return " and ".join(_in_parentheses(part) for part in condition.all)
     if condition.any is not None:
-        return " or ".join(_grouped(part) for part in condition.any)
+        return " or ".join(_in_parentheses(part) for part in condition.any)
     if condition.not_ is not None:
-        return f"not {_grouped(condition.not_)}"
+        return f"not {_in_parentheses(condition.not_)}"
     if condition.always is not None:
-        return f"always {_window_text(condition.always)}{_grouped(condition.always)}"
+        return f"always {_window_text(condition.always)}{_in_parentheses(condition.always)}"
     if condition.eventually is not None:
-        return f"eventually {_window_text(condition.eventually)}{_grouped(condition.eventually)}"
+        return f"eventually {_window_text(condition.eventually)}{_in_parentheses(condition.eventually)}"
     if condition.until is not None:
         until = condition.until
-        return f"{_grouped(until.hold)} until {_window_text(until)}{_grouped(until.release)}"
+        return f"{_in_parentheses(until.hold)} until {_window_text(until)}{_in_parentheses(until.release)}"
     assert condition.whenever is not None and condition.then is not None
     return f"whenever {describe(condition.whenever)}, then {describe(condition.then)}"
 
@@ -69,13 +69,13 @@ def describe_value(witness: Witness) -> str:
 
 
 def describe_limit(witness: Witness) -> str:
-    """Return the limit of the comparison of a witness, e.g. "≥ 0.50 m"; the negated limit below a `not`."""
+    """Return the limit of the comparison of a witness, e.g. "≥ 0.50 m". Below a `not`, return the negated limit."""
     comparison = witness.comparison
     signal = comparison.definition
     if signal.is_boolean:
-        return "no" if witness.negated else "yes"
+        return "no" if witness.is_negated else "yes"
     assert comparison.value is not None and comparison.op is not None
-    op = _OPPOSITE[comparison.op] if witness.negated else comparison.op
+    op = _OPPOSITE[comparison.op] if witness.is_negated else comparison.op
     digits = decimals(witness.value, comparison.value)
     return f"{_SIGNS[op]} {format_quantity(comparison.value, signal.unit, digits)}"
 
@@ -89,6 +89,6 @@ def _limit(condition: Condition) -> str:
     return f"{_SIGNS[condition.op]} {condition.value:g} {signal.unit}".rstrip()
 
 
-def _grouped(condition: Condition) -> str:
+def _in_parentheses(condition: Condition) -> str:
     """Return a condition as text, in parentheses unless it is a single comparison."""
     return describe(condition) if condition.signal is not None else f"({describe(condition)})"

@@ -13,7 +13,7 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.stl import operators
-from simscen.criteria.stl.condition import Condition, Release, Whenever, Window, Windowed
+from simscen.criteria.stl.condition import Condition, UntilOperands, Whenever, Window, WindowedCondition
 from simscen.criteria.stl.operators import Continuation, SampleWindows
 from simscen.criteria.stl.robustness import (
     TIE_MARGIN,
@@ -34,14 +34,14 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Trace
 
 WindowOperator = Callable[[Array, SampleWindows, Continuation], Array]
-"""Function `always` or `eventually` of the module operators."""
+"""Function `always` or `eventually` of the module `operators`."""
 
 
 @dataclass(frozen=True, eq=False)
 class EvaluationContext:
     """Run on which conditions are evaluated, at each sample of the ground truth.
 
-    `run_ended` is False for a truncated log.
+    `run_ended` is True if the trace contains the end of the run, and False for a truncated log.
     """
 
     trace: Trace
@@ -94,17 +94,19 @@ def robustness(condition: Condition, context: EvaluationContext, begin: int = 0)
     return _response(condition.whenever, condition.then, context, begin)
 
 
-def _windowed(operator: WindowOperator, condition: Windowed, context: EvaluationContext, begin: int) -> Robustness:
+def _windowed(
+    operator: WindowOperator, condition: WindowedCondition, context: EvaluationContext, begin: int
+) -> Robustness:
     """Return the robustness of `always` or `eventually`. For `begin`, see `robustness`."""
     windows = context.sample_windows(condition)
-    return _apply_windows(operator, robustness(condition, context, _start(windows, begin)), windows, context)
+    return _apply_windows(operator, robustness(condition, context, _first_sample(windows, begin)), windows, context)
 
 
-def _until(condition: Release, context: EvaluationContext, begin: int) -> Robustness:
+def _until(condition: UntilOperands, context: EvaluationContext, begin: int) -> Robustness:
     """Return the robustness of `until`: `hold` is true until `release` is true. For `begin`, see `robustness`."""
     windows = context.sample_windows(condition)
     holds = robustness(condition.hold, context, begin)
-    releases = robustness(condition.release, context, _start(windows, begin))
+    releases = robustness(condition.release, context, _first_sample(windows, begin))
     low, high = (
         operators.until(holds.bound(bound), releases.bound(bound), windows, continuation)
         for bound, continuation in _continuations(context)
@@ -115,12 +117,12 @@ def _until(condition: Release, context: EvaluationContext, begin: int) -> Robust
 def _response(premise: Condition, response: Condition, context: EvaluationContext, begin: int) -> ResponseRobustness:
     """Return the robustness of "whenever `premise`, then `response`". For `begin`, see `robustness`.
 
-    The premise of a criterion (`Whenever`) has its own window. Otherwise, the window is the rest of the run. If the
-    premise is required, but was never certainly true, `low` is -inf.
+    The premise of a criterion (`Whenever`) has a window. For a nested `whenever`, the window is the rest of the run.
+    `low` is -inf if the premise is required, but was never certainly true.
     """
     windows = context.sample_windows(premise if isinstance(premise, Whenever) else Window())
-    required = premise.required if isinstance(premise, Whenever) else True
-    start = _start(windows, begin)
+    is_required = premise.required if isinstance(premise, Whenever) else True
+    start = _first_sample(windows, begin)
     premise_part, response_part = robustness(premise, context, start), robustness(response, context, start)
     negated = NegationRobustness(-premise_part.high, -premise_part.low, [premise_part])
     implication = _combine([negated, response_part], "any")
@@ -134,9 +136,9 @@ def _response(premise: Condition, response: Condition, context: EvaluationContex
         windows,
         premise,
         slice(start, end),
-        required,
+        is_required,
     )
-    return replace(found, low=np.full_like(found.low, -math.inf)) if required and not found.was_tested else found
+    return replace(found, low=np.full_like(found.low, -math.inf)) if is_required and not found.was_tested else found
 
 
 def _apply_windows(
@@ -147,13 +149,13 @@ def _apply_windows(
     return WindowRobustness(low, high, [part], windows)
 
 
-def _start(windows: SampleWindows, begin: int) -> int:
+def _first_sample(windows: SampleWindows, begin: int) -> int:
     """Return the index of the first sample in the window of sample `begin`; the number of samples if there is none."""
     return int(windows.first[begin]) if begin < len(windows.first) else len(windows.first)
 
 
 def _continuations(context: EvaluationContext) -> list[tuple[Bound, Continuation]]:
-    """Return each bound with its assumption about the time after the last sample."""
+    """Return each bound of the robustness with the assumption about the time after the last sample that leads to it."""
     return [("low", Continuation(-math.inf, context.run_ended)), ("high", Continuation(math.inf, context.run_ended))]
 
 
@@ -165,15 +167,15 @@ def _combine(parts: Sequence[Robustness], operator: Literal["all", "any"]) -> Ro
 
 
 def _compare(condition: Condition, context: EvaluationContext) -> Robustness:
-    """Return the robustness of the comparison of a signal with a value. Unknown values have an unlimited range."""
+    """Return the robustness of the comparison of a signal with a value; -inf to inf where the signal is unknown."""
     assert condition.signal is not None
     values = read_signal(condition.signal, context.trace, context.case, condition.arguments)
     if condition.definition.is_boolean:
-        certain = np.where(values, math.inf, -math.inf)
-        return ComparisonRobustness(certain, certain, (), condition, values)
+        exact = np.where(values, math.inf, -math.inf)
+        return ComparisonRobustness(exact, exact, (), condition, values)
     distances = _distances(condition, values)
     if condition.signal == "clearance":
-        # Clearance is measured up to a maximum range; beyond it, the true distance may have any larger value.
+        # Clearance is measured up to a maximum range. A value at this range stands for any larger distance.
         farther = _distances(condition, np.where(values >= context.case.clearance_range, math.inf, values))
         low, high = np.minimum(distances, farther), np.maximum(distances, farther)
     else:
@@ -183,10 +185,10 @@ def _compare(condition: Condition, context: EvaluationContext) -> Robustness:
 
 
 def _distances(condition: Condition, values: Array) -> Array:
-    """Return the signed distances of a signal from its limit, divided by `condition.scale`."""
+    """Return the distances of a signal from its limit, divided by `condition.scale`; negative if it is violated."""
     assert condition.value is not None
-    above = condition.op in (">=", ">")
-    distances = (values - condition.value if above else condition.value - values) / (condition.scale or 1.0)
+    is_minimum = condition.op in (">=", ">")
+    distances = (values - condition.value if is_minimum else condition.value - values) / (condition.scale or 1.0)
     tie = TIE_MARGIN if condition.op in (">=", "<=") else -TIE_MARGIN
     signed: Array = np.where(values == condition.value, tie, distances)
     return signed

@@ -42,20 +42,20 @@ class Continuation(NamedTuple):
 class SampleWindows:
     """Window of each of n samples: the index `first` and the index `last` of a sample (n,), both inclusive.
 
-    `first` is n if the window begins after the last sample. `past_end` (n,) is True if the window extends beyond the
-    last sample. If `unbounded`, all windows last to the end of the run.
+    `first` is n if the window begins after the last sample. `extends_past_end` (n,) is True if the window extends
+    beyond the last sample. If `is_unbounded`, all windows last to the end of the run.
     """
 
     first: Indices
     last: Indices
-    past_end: Flags
-    unbounded: bool
+    extends_past_end: Flags
+    is_unbounded: bool
 
     @classmethod
     def of_samples(cls, ticks: Ticks, period: int, begin: int, end: int | None) -> SampleWindows:
         """Return the windows from `begin` to `end` ticks after each sample. An end of None is the end of the run.
 
-        `period` is the usual spacing of samples in ticks. A window without a sample contains the newest sample before.
+        `period` is the usual spacing of samples in ticks. A window between two samples contains the earlier sample.
         """
         count = len(ticks)
         first = np.searchsorted(ticks, ticks + begin, side="left")
@@ -63,9 +63,9 @@ class SampleWindows:
             return cls(first, np.full(count, count - 1), np.zeros(count, dtype=bool), True)
         last = np.searchsorted(ticks, ticks + end, side="right") - 1
         # The next sample would come one period after the last one.
-        past_end = ticks + end >= ticks[-1:] + period
-        is_held = (last < first) & (first < count)
-        return cls(np.where(is_held, last, first), last, past_end, False)
+        extends_past_end = ticks + end >= ticks[-1:] + period
+        is_between_samples = (last < first) & (first < count)
+        return cls(np.where(is_between_samples, last, first), last, extends_past_end, False)
 
 
 def always(values: Array, windows: SampleWindows, continuation: Continuation) -> Array:
@@ -76,9 +76,10 @@ def always(values: Array, windows: SampleWindows, continuation: Continuation) ->
 def eventually(values: Array, windows: SampleWindows, continuation: Continuation) -> Array:
     """Return the largest of the values (n,) in the window of each sample."""
     largest = _range_maximum(values, windows.first, windows.last)
-    open_end = windows.past_end | (windows.unbounded and not continuation.run_ended) | (windows.first >= len(values))
-    values_in_window: Array = np.where(open_end, np.maximum(largest, continuation.value_after_end), largest)
-    return values_in_window
+    may_grow = windows.is_unbounded and not continuation.run_ended
+    has_open_end = windows.extends_past_end | may_grow | (windows.first >= len(values))
+    result: Array = np.where(has_open_end, np.maximum(largest, continuation.value_after_end), largest)
+    return result
 
 
 def until(hold: Array, release: Array, windows: SampleWindows, continuation: Continuation) -> Array:
@@ -92,12 +93,12 @@ def until(hold: Array, release: Array, windows: SampleWindows, continuation: Con
     from_window = np.append(_unbounded_until(hold, release, windows, continuation), continuation.value_after_end)
     before = -_range_maximum(-hold, np.arange(count), np.minimum(windows.first, count) - 1)
     robustness: Array = np.minimum(from_window[np.minimum(windows.first, count)], before)
-    return robustness if windows.unbounded else np.minimum(robustness, eventually(release, windows, continuation))
+    return robustness if windows.is_unbounded else np.minimum(robustness, eventually(release, windows, continuation))
 
 
 def _unbounded_until(hold: Array, release: Array, windows: SampleWindows, continuation: Continuation) -> Array:
-    """Return the robustness (n,) of `until` if `release` may become true at any later sample."""
-    later = -math.inf if windows.unbounded and continuation.run_ended else continuation.value_after_end
+    """Return the robustness (n,) of `until` from each sample on, if `release` may become true at any later time."""
+    later = -math.inf if windows.is_unbounded and continuation.run_ended else continuation.value_after_end
     results = []
     for holds, releases in np.column_stack((hold, release))[::-1].tolist():
         later = max(releases, min(holds, later))
@@ -108,7 +109,7 @@ def _unbounded_until(hold: Array, release: Array, windows: SampleWindows, contin
 def _range_maximum(values: Array, first: Indices, last: Indices) -> Array:
     """Return the maximum of values[first[k]] … values[last[k]] for each k; -inf for an empty range.
 
-    The method is a sparse table: level j contains the maximum of the 2^j values from each index on.
+    The method is a sparse table: level j contains, for each index, the maximum of the 2^j values that begin there.
     """
     widths = last - first + 1
     found = np.full(len(first), -np.inf)

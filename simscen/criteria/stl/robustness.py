@@ -31,28 +31,28 @@ Bound = Literal["low", "high"]
 class Witness:
     """Comparison that decides the robustness of a condition.
 
-    `sample` is the index of the decisive sample. `value` is the value of the signal at this sample. `negated` is True
-    if the comparison is below a `not`. `notes` contains texts about other samples, with their indices.
+    `sample` is the index of the decisive sample. `value` is the value of the signal at this sample. `is_negated` is
+    True below a `not` (False below two). `notes` are pairs of a text and the index of the sample that it describes.
     """
 
     comparison: Condition
     sample: int
     value: float
-    negated: bool = False
+    is_negated: bool = False
     notes: tuple[tuple[str, int], ...] = ()
 
-    def with_note(self, what: str, sample: int) -> Witness:
-        """Return a copy with the note `what` about a sample in front of the other notes."""
-        return replace(self, notes=((what, sample), *self.notes))
+    def with_note(self, text: str, sample: int) -> Witness:
+        """Return a copy with a note about a sample in front of the other notes."""
+        return replace(self, notes=((text, sample), *self.notes))
 
 
 @dataclass(frozen=True, eq=False)
 class Robustness:
     """Lower and upper bound (n,) of the robustness of a condition at each sample.
 
-    The bounds differ where something is unknown, such as the time after the last sample. A condition is decided at a
-    sample if both bounds have the same sign, and certainly true if both are positive. `parts` are the robustness of the
-    operands. Each operator has a subclass.
+    The bounds `low` and `high` differ where something is unknown, such as the time after the last sample. A condition
+    is decided at a sample if `low` and `high` have the same sign, and certainly true if `low` is positive. `parts`
+    contains the robustness of each operand. Each operator has a subclass.
     """
 
     low: Array
@@ -68,7 +68,7 @@ class Robustness:
         raise NotImplementedError
 
     def untested_responses(self) -> Iterator[ResponseRobustness]:
-        """Yield each `whenever` in the condition if its premise is required, but was never certainly true."""
+        """Yield each `whenever` in the condition whose premise is required, but was never certainly true."""
         for part in self.parts:
             yield from part.untested_responses()
 
@@ -101,7 +101,7 @@ class NegationRobustness(Robustness):
     def witness(self, sample: int, bound: Bound) -> Witness:
         """Return the witness of the operand for the other bound, negated."""
         found = self.parts[0].witness(sample, "high" if bound == "low" else "low")
-        return replace(found, negated=not found.negated)
+        return replace(found, is_negated=not found.is_negated)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,12 +128,12 @@ class WindowRobustness(Robustness):
 
 @dataclass(frozen=True, eq=False)
 class UntilRobustness(Robustness):
-    """Robustness of `until`. `parts` are those of `hold` and `release`."""
+    """Robustness of `until`. `parts` contains the robustness of `hold` and of `release`."""
 
     windows: SampleWindows
 
     def witness(self, sample: int, bound: Bound) -> Witness:
-        """Return the witness of `release` at its best sample, or of `hold` if a sample before has lower robustness."""
+        """Return the witness of `release` at the best sample, or of `hold` if `hold` was less robust before it."""
         hold_part, release_part = self.parts
         end = int(self.windows.last[sample]) + 1
         first = int(self.windows.first[sample]) - sample
@@ -157,9 +157,9 @@ class UntilRobustness(Robustness):
 class ResponseRobustness(Robustness):
     """Robustness of `whenever … then`: at all samples of a window, the premise is false or the response is true.
 
-    `parts` are those of the premise and the response. `implication` is the robustness of "the premise is false or the
-    response is true". `premise_samples` are the samples at which the premise is checked. If `required`, the condition
-    cannot pass unless the premise was certainly true at one of these samples.
+    `parts` contains the robustness of the premise and of the response. `implication` is the robustness of "the premise
+    is false or the response is true". `premise_samples` is the range of samples at which the premise is checked. If
+    `required`, the condition can pass only if the premise was certainly true at one of these samples.
     """
 
     implication: Robustness
@@ -175,16 +175,16 @@ class ResponseRobustness(Robustness):
 
     @property
     def may_be_tested(self) -> bool:
-        """Whether the premise was true at a sample, or may have been true if the run had continued."""
+        """Whether the premise was true at a sample, or could have become true if the run had continued."""
         return bool((self.parts[0].high[self.premise_samples] > 0).any())
 
     def witness(self, sample: int, bound: Bound) -> Witness:
-        """Return the witness of the worst response, with a note on the sample at which its premise was true."""
+        """Return the witness of the worst response, with a note on the sample at which this response was due."""
         at = _first_equal(self.implication.bound(bound), self.bound(bound)[sample], sample, self.windows)
         return self.implication.witness(at, bound).with_note(RESPONSE_DUE, at)
 
     def untested_responses(self) -> Iterator[ResponseRobustness]:
-        """Yield this `whenever`, and each nested one, if its premise is required, but was never certainly true."""
+        """Yield each `whenever`, including this one, whose premise is required, but was never certainly true."""
         if self.required and not self.was_tested:
             yield self
         yield from super().untested_responses()

@@ -44,7 +44,7 @@ class Signal:
         read: Function that returns the values (n,) of a run in SI units.
         evidence: Kinds of information that a log must contain for this signal, besides the truth.
         minimum: Smallest possible value.
-        maximum: Greatest possible value.
+        maximum: Largest possible value.
         alternative_arguments: Keys of arguments of which exactly one must be given; empty if none is needed.
         optional_arguments: Keys of arguments that may be given.
     """
@@ -94,14 +94,14 @@ SIGNALS: dict[SignalName, Signal] = {
         minimum=-math.inf,
     ),
     "acceleration": Signal(
-        "Change of the true speed over ground since the sample before, divided by the time; negative while braking.",
+        "Change of the true speed over ground since the previous sample, divided by the time; negative while braking.",
         "acceleration",
         readers.acceleration,
         {Evidence.VELOCITY},
         minimum=-math.inf,
     ),
     "angular_acceleration": Signal(
-        "Change of the true yaw rate since the sample before, divided by the time.",
+        "Change of the true yaw rate since the previous sample, divided by the time.",
         "angular acceleration",
         readers.angular_acceleration,
         {Evidence.VELOCITY},
@@ -116,7 +116,7 @@ SIGNALS: dict[SignalName, Signal] = {
     "travelled": Signal("True distance driven so far, in moves of at least 1 cm.", "length", readers.travelled),
     "time": Signal("Simulated time since the start.", "duration", readers.time),
     "goal_distance": Signal(
-        "True straight-line distance to the goal accepted last; before any acceptance, to the goal accepted first.",
+        "True straight-line distance to the goal accepted last; before the first acceptance, to this first goal.",
         "length",
         readers.goal_distance,
         {Evidence.ALIGNMENT, Evidence.NAVIGATION},
@@ -156,7 +156,7 @@ SIGNALS: dict[SignalName, Signal] = {
     ),
     "localization_error": Signal(
         "Distance of the newest estimated position from the true position at the time of the estimate, or from the "
-        "current one if the belief is over 1 s old. Not aligned.",
+        "current true position if the belief is over 1 s old. The trajectories are not aligned.",
         "length",
         readers.localization_error,
         {Evidence.ALIGNMENT, Evidence.BELIEF},
@@ -169,7 +169,7 @@ SIGNALS: dict[SignalName, Signal] = {
         maximum=math.pi,
     ),
     "position_std": Signal(
-        "Standard deviation of the estimated position along its worst direction.",
+        "Standard deviation of the estimated position in the direction with the largest variance.",
         "length",
         readers.position_std,
         {Evidence.BELIEF, Evidence.COVARIANCE},
@@ -229,7 +229,7 @@ SIGNALS: dict[SignalName, Signal] = {
         maximum=1.0,
     ),
     "in_region": Signal(
-        "The robot's center is truly in a region of the world.",
+        "The true position of the robot's center is in the region.",
         YES_OR_NO,
         readers.in_region,
         {Evidence.ALIGNMENT},
@@ -237,7 +237,7 @@ SIGNALS: dict[SignalName, Signal] = {
         alternative_arguments=("region",),
     ),
     "in_collision": Signal(
-        "The robot touches something, or the named object.",
+        "The robot touches something; with `with`, the robot touches this object.",
         YES_OR_NO,
         event_readers.in_collision,
         {Evidence.CONTACTS},
@@ -245,7 +245,7 @@ SIGNALS: dict[SignalName, Signal] = {
         optional_arguments=("with",),
     ),
     "goal_active": Signal(
-        "The robot drives to a goal, or to the named one.",
+        "The robot drives to a goal; with `goal`, to this goal.",
         YES_OR_NO,
         event_readers.goal_active,
         {Evidence.NAVIGATION},
@@ -253,7 +253,7 @@ SIGNALS: dict[SignalName, Signal] = {
         optional_arguments=("goal",),
     ),
     "recovery_active": Signal(
-        "A recovery is running, or the named one.",
+        "A recovery behavior is running; with `recovery`, this behavior.",
         YES_OR_NO,
         event_readers.recovery_active,
         {Evidence.RECOVERIES},

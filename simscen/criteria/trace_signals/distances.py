@@ -63,7 +63,7 @@ def object_positions(trace: Trace, name: str) -> Array:
         and isinstance(x := event.data.get("x"), int | float)
         and isinstance(y := event.data.get("y"), int | float)
     ]
-    if name in trace.objects:  # its first sample is of the object that was spawned first
+    if name in trace.objects:  # its first sample replaces the position in the event of the first spawning
         parts[:1] = [trace.objects[name]]
     if not parts:
         raise MissingEvidence(f"`{name}` never existed, or does not move")
@@ -130,7 +130,7 @@ def _newest_plans(trace: Trace, ticks: Ticks) -> list[tuple[int, int, Array]]:
 
 
 def _project_on_path(points: Array, path: Array) -> tuple[Array, Array]:
-    """Return the distance (n,) of points (n, 2) from a path (m, 2), and the length (n,) of the rest of the path."""
+    """Return the distance (n,) in m of points (n, 2) from a path (m, 2), and the length (n,) of the path after them."""
     if len(path) == 1:
         path = np.vstack((path, path))
     steps = np.diff(path, axis=0)
@@ -173,9 +173,9 @@ def pedestrian_radii(trace: Trace) -> dict[str, float]:
 
 
 def pedestrian_gap(trace: Trace, case: Case) -> Array:
-    """Return the distance between the robot's footprint and the nearest pedestrian's body; inf while there is none.
+    """Return the distance between the robot's footprint and the nearest pedestrian's body; inf without pedestrians.
 
-    Raises MissingEvidence if the run has no pedestrians.
+    Raises MissingEvidence if the whole run has no pedestrians.
     """
     radii = pedestrian_radii(trace)
     if not radii:

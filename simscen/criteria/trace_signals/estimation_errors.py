@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from simscen.core.records.trace import Samples, Ticks, Trace
 
 BELIEF_TIMEOUT_S = 1.0
-"""Age up to which a belief is valid, as transform_tolerance of nav2_amcl."""
+"""Maximum age of a valid belief, like transform_tolerance of nav2_amcl."""
 NO_BELIEF = "the robot never reported an estimated pose"
 """Reason of inconclusive findings and undefined metrics if the trace has no belief."""
 
@@ -43,8 +43,8 @@ def pose_error(trace: Trace) -> Samples:
 def error_weights(trace: Trace, error: Samples) -> Array:
     """Return the weights (n,) of the samples of `pose_error` in statistics.
 
-    Each published belief has the weight 1, as in evo. While the newest belief is old, the samples of the truth together
-    have the weight that beliefs at their usual rate would have.
+    Each published belief has the weight 1, as in evo. The samples of the truth during which the newest belief is old
+    together have the weight that beliefs at the usual rate would have in this time.
     """
     published, timeout = trace.belief.ticks, BELIEF_TIMEOUT_S * trace.tick_rate
     belief_period = min(usual_period(published), timeout) if len(published) > 1 else timeout

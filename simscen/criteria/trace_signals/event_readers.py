@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def in_collision(query: SignalQuery) -> Array:
-    """Return whether the robot touches something, or the object of the query.
+    """Return whether the robot touches the object of the query; without an object, whether it touches anything.
 
     Raises MissingEvidence if there is no such object.
     """
@@ -35,13 +35,13 @@ def in_collision(query: SignalQuery) -> Array:
 
 
 def require_object(case: Case, name: str) -> None:
-    """Raise MissingEvidence if neither the log nor the criteria file has an object with this name."""
+    """Raise MissingEvidence if `case.objects` is known and does not contain an object with this name."""
     if case.objects is not None and name not in case.objects:
         raise MissingEvidence(f"neither the log nor the world of the criteria file has an object `{name}`")
 
 
 def goal_active(query: SignalQuery) -> Array:
-    """Return whether the goal of the query, or any goal, is active: accepted, and not yet ended.
+    """Return whether the goal of the query (without one: any goal) is active: accepted, and not yet ended.
 
     Raises MissingEvidence if the scenario has no such goal, or if the stack accepted none of the scenario's goals.
     """
@@ -57,9 +57,9 @@ def goal_active(query: SignalQuery) -> Array:
 
 
 def recovery_active(query: SignalQuery) -> Array:
-    """Return whether the recovery behavior of the query, or any recovery behavior, is active.
+    """Return whether the recovery behavior of the query (without one: any recovery behavior) is active.
 
-    Raises MissingEvidence as `recoveries` does.
+    Raises MissingEvidence under the same conditions as `recoveries`.
     """
     recoveries(query.trace, query.case)
     start, end = EventKind.RECOVERY_STARTED, EventKind.RECOVERY_ENDED
@@ -67,7 +67,10 @@ def recovery_active(query: SignalQuery) -> Array:
 
 
 def is_active(query: SignalQuery) -> Array:
-    """Return whether the fault or event of the query is active. Raises MissingEvidence if there is no such one."""
+    """Return whether the fault or event of the query is active.
+
+    Raises MissingEvidence if the scenario has no such fault or event.
+    """
     active = spans(query.trace, _label(query))
     return _active_in_intervals(query.trace, [(span.start, span.end + (not span.has_end_event)) for span in active])
 
@@ -75,7 +78,7 @@ def is_active(query: SignalQuery) -> Array:
 def has_just_started(query: SignalQuery) -> Array:
     """Return whether the fault or event of the query has started since the previous sample.
 
-    Raises MissingEvidence if there is no such fault or event.
+    Raises MissingEvidence if the scenario has no such fault or event.
     """
     starts = [(span.start, span.start) for span in spans(query.trace, _label(query))]
     return _active_in_intervals(query.trace, starts)
@@ -94,8 +97,8 @@ def replan_count(query: SignalQuery) -> Array:
 def replans(trace: Trace) -> list[Event]:
     """Return the events of plans that were made for another reason than a new goal.
 
-    Raises MissingEvidence if the trace has plans, but the stack did not report why it made them, or if it reported a
-    reached goal without any plan.
+    Raises MissingEvidence if the stack did not report the reason of a plan, or if it reported a reached goal without
+    any plan.
     """
     plans = trace.of_kind(EventKind.PLAN_MADE)
     if (trace.plans and not plans) or any("reason" not in plan.data for plan in plans):
@@ -122,7 +125,10 @@ def recoveries(trace: Trace, case: Case) -> list[Event]:
 
 
 def _label(query: SignalQuery) -> str:
-    """Return the name of the fault or event in the arguments. Raises MissingEvidence if the scenario has none."""
+    """Return the name of the fault or event in the arguments.
+
+    Raises MissingEvidence if the scenario has no such fault or event.
+    """
     kind = "fault" if query.arguments.get("fault") else "event"
     label = str(query.arguments[kind])
     if query.case.labels is not None and label not in query.case.labels:
@@ -130,22 +136,24 @@ def _label(query: SignalQuery) -> str:
     return label
 
 
-def _active_between_events(trace: Trace, start: EventKind, ends: tuple[EventKind, ...], name: object) -> Array:
-    """Return 1 (n,) for the samples between each event of the kind `start` and its end, and 0 for the others.
+def _active_between_events(
+    trace: Trace, start_kind: EventKind, end_kinds: tuple[EventKind, ...], name: object
+) -> Array:
+    """Return 1 (n,) for the samples between each start event and the event that ends it, and 0 for the others.
 
-    `ends` are the kinds of events that can end it. `name` is the name of the start events; None for any name.
+    `name` is the name of the start events; None for any name.
     """
     intervals: list[tuple[int, float]] = []
-    active: list[Event] = []
-    for event in trace.of_kind(start, *ends):
-        if event.kind in ends:
-            intervals += [(begun.tick, event.tick) for begun in active if _ends(event, begun)]
-            active = [begun for begun in active if not _ends(event, begun)]
-        is_goal = start is EventKind.GOAL_ACCEPTED
-        is_named = name in (None, event.name) or (is_goal and matches_goal_name(event.name, str(name)))
-        if event.kind == start and is_named:
+    active: list[Event] = []  # start events that have not ended
+    for event in trace.of_kind(start_kind, *end_kinds):
+        if event.kind in end_kinds:
+            intervals += [(start.tick, event.tick) for start in active if _ends(event, start)]
+            active = [start for start in active if not _ends(event, start)]
+        is_goal = start_kind is EventKind.GOAL_ACCEPTED
+        has_name = name in (None, event.name) or (is_goal and matches_goal_name(event.name, str(name)))
+        if event.kind == start_kind and has_name:
             active.append(event)
-    return _active_in_intervals(trace, [*intervals, *((begun.tick, np.inf) for begun in active)])
+    return _active_in_intervals(trace, [*intervals, *((start.tick, np.inf) for start in active)])
 
 
 def _ends(event: Event, start: Event) -> bool:
@@ -156,9 +164,9 @@ def _ends(event: Event, start: Event) -> bool:
 
 
 def _active_in_intervals(trace: Trace, intervals: Iterable[tuple[int, float]]) -> Array:
-    """Return 1 (n,) for the samples in intervals from `start` to before `end`, both in ticks, and 0 for the others.
+    """Return 1 (n,) for the samples in the intervals, and 0 for the others.
 
-    An interval without a sample selects the next sample.
+    An interval is a pair (start, end) in ticks, without its end. If it contains no sample, the next sample gets 1.
     """
     clock = sample_ticks(trace)
     active = np.zeros(len(clock))

@@ -58,8 +58,8 @@ def true_pose(trace: Trace, tick: int) -> Pose2:
 def clearance(trace: Trace) -> Samples:
     """Return the recorded distance (n, 1) in m from the robot to the nearest surface.
 
-    It is negative by the depth of an overlap. Larger distances than `Case.clearance_range` are recorded as this range
-    by simscen, and possibly as inf in other logs. Raises InvalidTrace if a value is nan or -inf.
+    During an overlap, the distance is negative by the depth of the overlap. simscen records larger distances than
+    `Case.clearance_range` as this range; other logs may contain inf. Raises InvalidTrace if a value is nan or -inf.
     """
     distances = trace.clearance.values[:, 0]
     is_invalid = np.isnan(distances) | np.isneginf(distances)

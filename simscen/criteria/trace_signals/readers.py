@@ -3,8 +3,10 @@
 A reader is a function that computes the values (n,) of a signal at the n samples of the truth.
 
 The value of a yes-or-no signal is 0 or 1. Readers raise MissingEvidence if the trace lacks the data of the signal,
-and InvalidTrace if the data are not finite. A belief is an estimated pose with its covariance. Signals of the belief
-are nan (unknown) up to BELIEF_TIMEOUT_S before the first belief; from then on, the first belief counts.
+and InvalidTrace if the data are not finite.
+
+A belief is an estimated pose with its covariance. Signals of the belief are nan (unknown) until BELIEF_TIMEOUT_S before
+the first belief. During this last period, they already have the value of the first belief.
 """
 
 from __future__ import annotations
@@ -120,7 +122,7 @@ def localized(query: SignalQuery) -> Array:
 
 
 def goal_distance(query: SignalQuery) -> Array:
-    """Return the true distance in m to the newest accepted goal; before it, to the first accepted goal."""
+    """Return the true distance in m to the goal accepted last; before the first acceptance, to this first goal."""
     goals, poses = _current_goals(query.trace, query.case), true_poses(query.trace)
     return np.hypot(poses[:, 0] - goals[:, 0], poses[:, 1] - goals[:, 1])
 
@@ -181,7 +183,7 @@ def _covariance(trace: Trace) -> Array:
 
 
 def sample_and_hold_belief(trace: Trace, samples: Samples, what: str) -> Array:
-    """Return the newest values (n, k) of `samples`, which begin with the first belief; nan where they are unknown.
+    """Return the newest values (n, k) of `samples`, whose first sample is at the first belief; nan where unknown.
 
     Raises MissingEvidence if `samples` are empty; `what` is the name of the data in the message.
     """
@@ -233,19 +235,19 @@ def _age(trace: Trace, received: Ticks) -> Array:
 
 
 def _current_goals(trace: Trace, case: Case) -> Array:
-    """Return x, y, yaw (n, 3) of the newest accepted goal; before the first acceptance, of the first accepted goal.
+    """Return x, y, yaw (n, 3) of the goal accepted last; before the first acceptance, of the goal accepted first.
 
-    If no goal was accepted, return those of the scenario's first goal (1, 3).
+    If no goal was accepted, return x, y, yaw (1, 3) of the scenario's first goal.
     """
     clock = sample_ticks(trace)
     pose_by_name = {goal.name: goal.pose for goal in reversed(case.every_goal)}
     ticks, poses = [], []
     for event in trace.of_kind(EventKind.GOAL_ACCEPTED):
         pose = tuple(event.data.get(key) for key in ("x", "y", "yaw"))
-        known = all(isinstance(part, int | float) for part in pose)
-        if known or event.name in pose_by_name:
+        has_pose = all(isinstance(coordinate, int | float) for coordinate in pose)
+        if has_pose or event.name in pose_by_name:
             ticks.append(event.tick)
-            poses.append(pose if known else pose_by_name[event.name])
+            poses.append(pose if has_pose else pose_by_name[event.name])
     if not poses and not case.goals:
         raise MissingEvidence("there was no goal")
     if not poses:

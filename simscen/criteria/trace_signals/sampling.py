@@ -1,4 +1,4 @@
-"""Sampling of signals: each signal has one value for each sample of the truth (the true state of the robot)."""
+"""Sampling of signals: each signal has one value for each sample of the truth (the recorded true poses)."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def evenly_spaced(samples: Samples, tick_rate: int) -> Samples:
     if steps[longest] > MAX_INTERPOLATED_GAP_S * tick_rate:
         begin, end = ticks[longest] / tick_rate, ticks[longest + 1] / tick_rate
         raise MissingEvidence(
-            f"the truth has no sample from t = {begin:.2f} s to {end:.2f} s; differences over time need one every "
+            f"the truth has no sample from t = {begin:.2f} s to {end:.2f} s; differences over time need a sample every "
             f"{MAX_INTERPOLATED_GAP_S:g} s"
         )
     grid = np.arange(ticks[0], ticks[-1] + 1, usual_period(ticks))

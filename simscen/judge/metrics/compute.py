@@ -144,7 +144,7 @@ def _success(trace: Trace, case: Case) -> bool:
 
 def _time_to_goal(trace: Trace, case: Case) -> float | str:
     outcomes = goal_outcomes(trace, case)
-    ends = [outcome.reached for outcome in outcomes if outcome.must_be_reached]
+    ends = [outcome.reached_tick for outcome in outcomes if outcome.must_be_reached]
     if not ends or ends[-1] is None:
         return "the last goal was not reached"
     start = first_acceptance(outcomes)

@@ -53,8 +53,8 @@ def _goal_mark(outcome: GoalOutcome, scene: Scene) -> GoalMark:
     A goal that the stack reported as reached counts as failed if the criterion goals_reached found the robot elsewhere.
     """
     if outcome.end is None:
-        word = "not tried" if outcome.accepted is None else "not reached"
-        return GoalMark(word, palette.GRAY if outcome.accepted is None else palette.AMBER, word)
+        word = "not tried" if outcome.accepted_tick is None else "not reached"
+        return GoalMark(word, palette.GRAY if outcome.accepted_tick is None else palette.AMBER, word)
     match outcome.end.kind:
         case EventKind.GOAL_FAILED:
             expected = "as expected" if outcome.failed_as_expected else ""

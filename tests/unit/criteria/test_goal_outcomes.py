@@ -20,7 +20,7 @@ def test_kth_goal_of_a_name_has_the_kth_report_of_that_name():
     events = [[t, kind, "dock"] for t in (1, 3, 5) for kind in ("goal.accepted", "goal.reached")]
     events = [[t + (0.5 if kind == "goal.reached" else 0), kind, name] for t, kind, name in events]
     trace, found = outcomes([goal("dock", 1.0), goal("dock", 2.0), goal("dock", 3.0)], events)
-    assert [(each.goal.pose.x, trace.seconds(each.reached)) for each in found] == [(1, 1.5), (2, 3.5), (3, 5.5)]
+    assert [(each.goal.pose.x, trace.seconds(each.reached_tick)) for each in found] == [(1, 1.5), (2, 3.5), (3, 5.5)]
 
 
 def test_via_pose_without_reports_has_the_outcome_of_the_next_stop():

@@ -115,7 +115,7 @@ def test_a_window_without_a_later_sample_is_refused():
 
 def test_single_sample_has_a_spacing_of_one_tick():
     window = EvaluationContext(run([1.0], [0.0]), CASE, run_ended=True).sample_windows(Window(within=1 / 240))
-    assert (window.first.tolist(), window.last.tolist(), window.past_end.tolist()) == ([0], [0], [True])
+    assert (window.first.tolist(), window.last.tolist(), window.extends_past_end.tolist()) == ([0], [0], [True])
 
 
 def test_nested_response_is_required_from_the_first_sample():

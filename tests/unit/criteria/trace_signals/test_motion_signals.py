@@ -109,7 +109,7 @@ def test_differences_of_uneven_samples_are_those_of_the_interpolated_signal():
 def test_differences_are_not_known_across_a_long_gap():
     steady = uneven([0, 12, 24, 36, 97, 108], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert read_signal("speed", steady, synthetic_case({}), {}).tolist() == [0.0] * 6
-    with pytest.raises(MissingEvidence, match=r"no sample from t = 0.15 s to 0.40 s; .* need one every 0.25 s"):
+    with pytest.raises(MissingEvidence, match=r"no sample from t = 0.15 s to 0.40 s; .* need a sample every 0.25 s"):
         read_signal("acceleration", steady, synthetic_case({}), {})
     bridged = uneven([0, 12, 24, 36, 96, 108], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert read_signal("acceleration", bridged, synthetic_case({}), {}).tolist() == [0.0] * 6
