@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from simscen.actions.base import Action, WorldAction
 from simscen.core.environment.costmap_filters import ZoneSwitch
-from simscen.core.environment.world_model import Patch, disc_outline
+from simscen.core.environment.world_model import FloorPatch, disc_outline
 from simscen.core.stage import Effect, Stage
 from simscen.spec.base import Spec
 from simscen.spec.places import PlaceName, PlaceOrPoint, RegionName
@@ -57,7 +57,7 @@ class FrictionPatch(Spec, WorldAction):
             x, y = self.at
             name, outline, where = self.name, disc_outline((x, y), self.radius), f"around ({x:g}, {y:g})"
         until = math.inf if self.for_ is None else stage.tick + stage.clock.ticks(self.for_)
-        stage.add_friction_patch(name, Patch(outline, self.value, until))
+        stage.add_friction_patch(name, FloorPatch(outline, self.value, until))
         return Effect(True, f"made the friction of the floor {where} {self.value:g}")
 
 

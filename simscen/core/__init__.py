@@ -1,1 +1,1 @@
-"""Data types and pure functions that all packages use. Needs neither pydantic nor a simulation library."""
+"""Data types and functions that all other packages use. Imports neither pydantic nor a simulation library."""

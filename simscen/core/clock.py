@@ -12,15 +12,15 @@ Stamp = tuple[int, int]
 class Clock:
     """Converts ticks to other units of time and back, and rates to periods.
 
-    `rate` is the number of physics ticks per second; 240 is the default of PyBullet. Raises ValueError unless it is in
-    1 … 999,999,999.
+    `rate` is the number of physics ticks per second; 240 is the default of PyBullet. Raises ValueError unless `rate` is
+    in 1 … 999,999,999.
     """
 
     rate: int = 240
 
     def __post_init__(self) -> None:
         if not 1 <= self.rate < NS_PER_SECOND:
-            raise ValueError(f"a clock rate of {self.rate} Hz cannot be expressed in nanoseconds")
+            raise ValueError(f"the clock rate must be in 1 … {NS_PER_SECOND - 1:,} Hz, got {self.rate}")
 
     def seconds(self, tick: int) -> float:
         """Return the simulated time of a tick in s."""
@@ -43,11 +43,11 @@ class Clock:
         return -(-nanoseconds * self.rate // NS_PER_SECOND)
 
     def period(self, hertz: float) -> int:
-        """Return the period of the rate `hertz` in ticks. Raises ValueError if it is not a whole number of ticks."""
+        """Return the period of the rate `hertz` in ticks. Raises ValueError unless it is a whole number of ticks."""
         period = self.rate / hertz if hertz > 0 else 0.0
         if period < 1 or abs(period - round(period)) > 1e-9:
-            fitting = self.nearest_rate(hertz)
-            raise ValueError(f"{hertz:g} Hz does not divide {self.rate} Hz; the nearest that does is {fitting:g} Hz")
+            nearest = self.nearest_rate(hertz)
+            raise ValueError(f"{hertz:g} Hz does not divide {self.rate} Hz; the nearest that does is {nearest:g} Hz")
         return round(period)
 
     def nearest_rate(self, hertz: float) -> float:

@@ -14,21 +14,21 @@ _Class = TypeVar("_Class")
 def fast_dataclass(*, eq: bool = True) -> Callable[[type[_Class]], type[_Class]]:
     """Return a decorator like `dataclass(frozen=True, slots=True, eq=eq)`, but with a constructor twice as fast."""
 
-    def decorate(plain: type[_Class]) -> type[_Class]:
-        slotted = dataclass(frozen=True, slots=True, eq=eq)(plain)
-        setattr(slotted, "__init__", _init_function(slotted))  # noqa: B010 - mypy rejects the assignment
-        return slotted
+    def decorate(cls: type[_Class]) -> type[_Class]:
+        slots_class = dataclass(frozen=True, slots=True, eq=eq)(cls)
+        setattr(slots_class, "__init__", _init_function(slots_class))  # noqa: B010 - mypy rejects the assignment
+        return slots_class
 
     return decorate
 
 
-def _init_function(slotted: type) -> Any:
+def _init_function(slots_class: type) -> Any:
     """Return a generated `__init__` that sets the slots directly, without the name lookup of `object.__setattr__`."""
     namespace: dict[str, Any] = {"MISSING": MISSING}
     arguments, lines = ["self"], ["pass"]
-    for field in fields(slotted):
+    for field in fields(slots_class):
         name, value = field.name, field.name
-        namespace[f"set_{name}"] = getattr(slotted, name).__set__
+        namespace[f"set_{name}"] = getattr(slots_class, name).__set__
         if field.default_factory is not MISSING:
             namespace[f"default_{name}"] = field.default_factory
             arguments.append(f"{name}=MISSING")

@@ -9,8 +9,8 @@ class Exit(IntEnum):
     """Exit codes of the command line.
 
     FAILED: a run failed. USAGE: the command line or an input file is invalid. INCOMPLETE: a run could not be completed.
-    INTERNAL: a defect of simscen. UNDECIDED: too few runs to decide on the pass rate that a study requires, or on the
-    failure rate of a search.
+    INTERNAL: a defect of simscen. NOTHING_SELECTED: no scenario matched the selection. UNDECIDED: too few runs to
+    decide on the pass rate that a study requires, or on the failure rate of a search.
     HUNG_UP, INTERRUPTED, TERMINATED: a signal ended the command. The code is 128 plus the number of the signal.
     """
 
@@ -108,11 +108,13 @@ class Problem:
 def exception_place(error: BaseException, component: str = "") -> str:
     """Return "file:line" of the innermost entry of the traceback of an exception.
 
-    `component` is the name of a module or class, such as "package.module:Class". If there are entries in its package,
-    the innermost of these is returned.
+    If the traceback has entries in the top-level package of `component`, the innermost of these entries is used.
+    `component` is the name of a module or class, such as "package.module:Class".
     """
     package = component.partition(":")[0].partition(".")[0]
-    frames = list(traceback.walk_tb(error.__traceback__))
-    own = [entry for entry in frames if str(entry[0].f_globals.get("__name__", "")).partition(".")[0] == package]
-    frame, line = (own or frames)[-1]
+    entries = list(traceback.walk_tb(error.__traceback__))
+    package_entries = [
+        entry for entry in entries if str(entry[0].f_globals.get("__name__", "")).partition(".")[0] == package
+    ]
+    frame, line = (package_entries or entries)[-1]
     return f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"

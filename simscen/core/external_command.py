@@ -20,8 +20,8 @@ class ExternalCommand:
         cwd: Working folder.
         start_limit: Maximum wall time in s until the program has started and subscribed to its topics.
         answer_limit: Maximum wall time in s of each later answer.
-        digest: Hash of the arguments, of the files that they name, and of the environment variables that the user
-            configuration sets.
+        digest: Hash of the arguments, of the files named in the arguments, and of the environment variables that the
+            user configuration sets.
     """
 
     argv: tuple[str, ...]
@@ -35,7 +35,7 @@ class ExternalCommand:
 def split_command(command: str) -> tuple[str, ...]:
     """Split a command line with shell quoting into words.
 
-    Raises ValueError if a quote is not closed, or if no program is named.
+    Raises ValueError if a quote is not closed, or if the first word, the program, is missing or empty.
     """
     try:
         words = tuple(shlex.split(command))

@@ -24,7 +24,7 @@ def require_regular_file(path: Path) -> None:
 
 
 def probe_writable(path: Path) -> None:
-    """Raise OSError unless a regular file can be written at `path`. Leaves no new file."""
+    """Raise OSError unless a regular file can be written at `path`. Deletes the file if it did not exist before."""
     require_regular_file(path)
     existed = path.exists()
     with path.open("ab"):
@@ -35,8 +35,8 @@ def probe_writable(path: Path) -> None:
 
 def require_not_input(path: Path, inputs: Iterable[Path]) -> None:
     """Raise OSError if the output file `path` is one of the `inputs`."""
-    real = os.path.realpath(path)
-    if any(os.path.realpath(each) == real for each in inputs):
+    real_path = os.path.realpath(path)
+    if any(os.path.realpath(file) == real_path for file in inputs):
         raise OSError(errno.EINVAL, "it is one of the input files")
 
 
@@ -48,7 +48,7 @@ def expand_home(path: str | Path) -> Path:
         return Path(path)
 
 
-_READ: ContextVar[set[Path] | None] = ContextVar("files_read", default=None)
+_READ_FILES: ContextVar[set[Path] | None] = ContextVar("files_read", default=None)
 """Set to which `record_read_file` adds files; None outside of a `with` block of `collect_read_files`."""
 
 
@@ -56,11 +56,11 @@ _READ: ContextVar[set[Path] | None] = ContextVar("files_read", default=None)
 def collect_read_files() -> Iterator[set[Path]]:
     """Collect the files that are read during the `with` block: yield a set to which `record_read_file` adds them."""
     read: set[Path] = set()
-    token = _READ.set(read)
+    token = _READ_FILES.set(read)
     try:
         yield read
     finally:
-        _READ.reset(token)
+        _READ_FILES.reset(token)
 
 
 def record_read_file(file: Path) -> None:
@@ -68,6 +68,6 @@ def record_read_file(file: Path) -> None:
 
     Call this for every file to which another input file refers.
     """
-    read = _READ.get()
+    read = _READ_FILES.get()
     if read is not None:
         read.add(file)

@@ -15,8 +15,8 @@ MAX_SEED = 2**32 - 1
 class Streams:
     """Source of the random generators of a run, which are derived from its `seed`.
 
-    `robot` is the name of the robot that uses them; "" for a single robot. Raises ValueError unless `seed` is in
-    1 … MAX_SEED.
+    `robot` is the name of the robot that uses the generators; "" for a single robot. Raises ValueError unless `seed` is
+    in 1 … MAX_SEED.
     """
 
     seed: int

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from simscen.core.clock import Clock
 from simscen.core.environment.costmap_filters import ZoneSwitch
-from simscen.core.environment.world_model import Patch, WalkingPedestrian
+from simscen.core.environment.world_model import FloorPatch, WalkingPedestrian
 from simscen.core.geometry import Polygon, Pose2
 from simscen.core.geometry.kinematics import Twist
 from simscen.core.geometry.shapes import Body, MotionPath
@@ -26,9 +26,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Effect:
-    """Result of an action: `what` describes the change, or the reason why the requested change has not `happened`.
+    """Result of an action.
 
-    If an action was possible only in part, `happened` is False.
+    `happened` states whether the action made the requested change completely; False if only a part was possible.
+    `what` is a text: the change, or the reason why the action did not make the change.
     """
 
     happened: bool
@@ -40,7 +41,7 @@ class Situation(Protocol):
 
     @property
     def tick(self) -> int:
-        """Simulated time in ticks."""
+        """Current simulated time in ticks."""
 
     @property
     def clock(self) -> Clock:
@@ -92,7 +93,7 @@ class Situation(Protocol):
         """Names of all robots in order; empty for a single robot."""
 
     def of(self, robot: str) -> Situation:
-        """Return the same interface for the robot with this name."""
+        """Return the situation of the robot with this name."""
 
     def region(self, name: str) -> Polygon:
         """Return the polygon of a named region of the world."""
@@ -102,10 +103,10 @@ class Situation(Protocol):
 
 
 class Stage(Situation, Protocol):
-    """Interface with which actions change the run, its world, and one robot."""
+    """Interface through which actions change the world, one robot, and the goals and zones of its stack."""
 
     def of(self, robot: str) -> Stage:
-        """Return the same interface for the robot with this name."""
+        """Return the stage of the robot with this name."""
 
     def spawn(self, body: Body) -> None:
         """Add a body to the world from the next tick on. Replaces a body of the same name."""
@@ -131,7 +132,7 @@ class Stage(Situation, Protocol):
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
         """Return the path of a moving object, and the time in s since the path started; None if it follows no path.
 
-        The path of a pedestrian stays at its current pose.
+        For a pedestrian, the path has no motion: all of its poses are the current pose of the pedestrian.
         """
 
     def mass(self, name: str) -> float:
@@ -141,10 +142,10 @@ class Stage(Situation, Protocol):
         """Move an object along a path that starts now."""
 
     def place(self, name: str, pose: Pose2) -> None:
-        """Move an object to `pose` at once, and end its motion along a path. It is then at rest."""
+        """Move an object to `pose` at once, and end its motion along a path. The object is then at rest."""
 
     def place_robot(self, pose: Pose2) -> None:
-        """Move the robot to `pose` at once, without informing the stack. It is then at rest."""
+        """Move the robot to `pose` at once, without informing the stack. The robot is then at rest."""
 
     def push(self, impulse: tuple[float, float], name: str | None = None, seconds: float = 0.0) -> None:
         """Apply an impulse (x, y) in N s at the center of an object with a mass, or of the robot if `name` is None.
@@ -152,17 +153,17 @@ class Stage(Situation, Protocol):
         The impulse is spread evenly over `seconds`, or over one physics tick if `seconds` is 0.
         """
 
-    def add_friction_patch(self, name: str, patch: Patch) -> None:
+    def add_friction_patch(self, name: str, patch: FloorPatch) -> None:
         """Change the friction of a part of the floor; replaces a patch of the same name."""
 
     def send_goal(self, name: str) -> None:
-        """Send the goal with this name to the stack. It preempts the current goal."""
+        """Send the goal with this name to the stack. The new goal preempts the current goal."""
 
     def cancel_goal(self) -> None:
         """Cancel the current goal and all later goals, as an action client would."""
 
     def switch_zone(self, order: ZoneSwitch) -> str:
-        """Send a command to the costmap filters of the stack. Return the reason if it has no effect, otherwise ""."""
+        """Send `order` to the costmap filters of the stack. Return the reason if it has no effect, otherwise ""."""
 
     def record_world_event(self, event: Event) -> None:
         """Record an event for all robots. A tick of 0 is replaced by the current tick."""

@@ -12,7 +12,7 @@ MIN_PAIRS = 5
 RESAMPLES = 10_000
 """Number of bootstrap resamples, unless MAX_DRAWS requires fewer."""
 MAX_DRAWS = 20_000_000
-"""Number of drawn values above which a bootstrap uses fewer resamples, but at least a tenth of RESAMPLES."""
+"""Maximum number of values that a bootstrap draws. For many pairs, it uses fewer resamples: at least RESAMPLES / 10."""
 CONFIDENCE = 0.95
 """Confidence level of the bootstrap interval."""
 _DRAWS_PER_BATCH = 1 << 20
@@ -71,7 +71,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 Z_95 = 1.959963984540054
-"""Two-sided 95 % quantile of the normal distribution."""
+"""Number of standard deviations around the mean that contain 95 % of a normal distribution."""
 
 
 def wilson_interval(successes: float, runs: int) -> tuple[float, float]:
@@ -80,7 +80,7 @@ def wilson_interval(successes: float, runs: int) -> tuple[float, float]:
     `successes` may be fractional. Raises ValueError unless 0 <= successes <= runs and runs >= 1.
     """
     if runs < 1 or not 0 <= successes <= runs:
-        raise ValueError(f"{successes} successes of {runs} runs")
+        raise ValueError(f"{successes} successes of {runs} runs are impossible")
     rate, square = successes / runs, Z_95 * Z_95
     middle = (rate + square / (2 * runs)) / (1 + square / runs)
     half = Z_95 / (1 + square / runs) * math.sqrt(rate * (1 - rate) / runs + square / (4 * runs * runs))

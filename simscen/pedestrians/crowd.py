@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from simscen.core.environment.world_model import PedestrianAction, WalkingPedestrian
+from simscen.core.environment.world_model import PedestrianEvent, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2
 from simscen.pedestrians import forces
 from simscen.pedestrians.forces import RELAXATION_TIME_S, Indices
@@ -68,15 +68,15 @@ class Crowd:
         spec = self._people[name].spec
         return max(forces.MAX_SPEED_RATIO * spec.speed, THREATENING_SPEED_M_S)
 
-    def step(self, surroundings: Surroundings, seconds: float) -> list[PedestrianAction]:
+    def step(self, surroundings: Surroundings, seconds: float) -> list[PedestrianEvent]:
         """Move all pedestrians by one step of `seconds`.
 
-        Returns the actions of this step: a pedestrian began or ended a reaction, or reached a goal.
+        Returns the events of this step: a pedestrian began or ended a reaction, or reached a goal.
         """
         people = list(self._people.values())
         if not people:
             return []
-        target_robots, actions = self._update_reactions(people, surroundings, seconds)
+        target_robots, events = self._update_reactions(people, surroundings, seconds)
         for number, person in enumerate(people):
             self._update_path(person, number)
         intents = [person.intent(robot) for person, robot in zip(people, target_robots, strict=True)]
@@ -90,27 +90,27 @@ class Crowd:
         new_velocities[is_clipped] = clipped_moves[is_clipped] / seconds
         for person, move, velocity, intent in zip(people, clipped_moves, new_velocities, intents, strict=True):
             person.move(move, velocity, intent.looks_at, seconds)
-            actions += person.update_goal()
+            events += person.update_goal()
         self._steps += 1
-        return actions
+        return events
 
     def _update_reactions(
         self, people: list[Pedestrian], surroundings: Surroundings, seconds: float
-    ) -> tuple[list[ObservedRobot | None], list[PedestrianAction]]:
+    ) -> tuple[list[ObservedRobot | None], list[PedestrianEvent]]:
         """Begin and end reactions to robots in a step of `seconds`.
 
-        Returns for each pedestrian the robot that the pedestrian reacts to, or None; and one action for each reaction
+        Returns for each pedestrian the robot that the pedestrian reacts to, or None; and one event for each reaction
         that began or ended.
         """
         target_robots: list[ObservedRobot | None] = []
-        actions: list[PedestrianAction] = []
+        events: list[PedestrianEvent] = []
         for person in people:
             visible: dict[str, ObservedRobot] = {}
             if person.spec.reacts_within and "robots" not in person.spec.blind_to:
                 visible = {r.name: r for r in surroundings.robots if self._sees(person, r.pose[:2])}
-                actions += person.update_reaction(visible, seconds)
+                events += person.update_reaction(visible, seconds)
             target_robots.append(None if person.reacts_to is None else visible.get(person.reacts_to))
-        return target_robots, actions
+        return target_robots, events
 
     def _sees(self, person: Pedestrian, point: Point) -> bool:
         """Return whether no wall hides a point from a pedestrian, regardless of the field of view."""

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
-from simscen.core.environment.world_model import PedestrianAction, WalkingPedestrian
+from simscen.core.environment.world_model import PedestrianEvent, WalkingPedestrian
 from simscen.core.geometry import Array, Pose2, wrap
 from simscen.pedestrians.forces import MAX_SPEED_RATIO, RELAXATION_TIME_S
 from simscen.pedestrians.surroundings import ObservedRobot
@@ -90,18 +90,18 @@ class Pedestrian:
 
     # Goals
 
-    def update_goal(self) -> list[PedestrianAction]:
+    def update_goal(self) -> list[PedestrianEvent]:
         """Remove passed corners from the path, and set the next goal if the goal is reached.
 
-        Returns one action if the goal is reached.
+        Returns one event if the goal is reached.
         """
         while len(self.path) > 1 and math.dist(self.position, self.path[0]) <= CORNER_RADIUS_M:
             self.path.pop(0)
         if self.has_arrived or math.dist(self.position, self.destination) > GOAL_RADIUS_M:
             return []
-        action = PedestrianAction(self.spec.name, "reached", str(self.goal_index + 1))
+        event = PedestrianEvent(self.spec.name, "reached", str(self.goal_index + 1))
         self._advance_goal()
-        return [action]
+        return [event]
 
     def _advance_goal(self) -> None:
         """Set the next goal, according to `spec.repeat`."""
@@ -127,8 +127,8 @@ class Pedestrian:
         bearing = math.atan2(robot.pose.y - self.pose.y, robot.pose.x - self.pose.x)
         return abs(wrap(bearing - self.pose.yaw)) <= HALF_FIELD_OF_VIEW_RAD
 
-    def update_reaction(self, visible: dict[str, ObservedRobot], seconds: float) -> list[PedestrianAction]:
-        """Begin, continue, or end a reaction in a step of `seconds`. Return one action if a reaction began or ended.
+    def update_reaction(self, visible: dict[str, ObservedRobot], seconds: float) -> list[PedestrianEvent]:
+        """Begin, continue, or end a reaction in a step of `seconds`. Return one event if a reaction began or ended.
 
         `visible` are the robots that no wall hides, by name.
         """
@@ -143,7 +143,7 @@ class Pedestrian:
                 return []
             self.has_lost_interest = is_time_over
             robot_name, self.reacts_to = self.reacts_to, None
-            return [PedestrianAction(self.spec.name, "calmed", robot_name)]
+            return [PedestrianEvent(self.spec.name, "calmed", robot_name)]
         if self.has_lost_interest and self.spec.behavior != "scared":
             return []
         near = sorted((math.dist(self.position, robot.pose[:2]), name) for name, robot in visible.items()
@@ -151,7 +151,7 @@ class Pedestrian:
         if not near:
             return []
         self.reacts_to = near[0][1]
-        return [PedestrianAction(self.spec.name, "reacted", self.reacts_to)]
+        return [PedestrianEvent(self.spec.name, "reacted", self.reacts_to)]
 
     def intent(self, robot: ObservedRobot | None) -> Intent:
         """Return the intended motion. `robot` is the robot that the pedestrian reacts to; None without a reaction."""

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from simscen.core.clock import Clock
-from simscen.core.environment.world_model import Patch
+from simscen.core.environment.world_model import FloorPatch
 from simscen.core.messages.navigation import Belief
 from simscen.core.messages.sensor_data import Odometry, Reading
 from simscen.core.random_streams import Streams
@@ -61,7 +61,7 @@ def assemble(prepared: PreparedScenario, seed: int, stack_log: Path | None = Non
         ),
     )
     for region, friction in world.friction.items():
-        simulation.add_friction_patch(region, Patch(world.regions[region], friction))
+        simulation.add_friction_patch(region, FloorPatch(world.regions[region], friction))
     scene, stages = RayScene(prepared.built.mesh), dict[str, LiveStage]()
     pedestrians = PedestrianSimulation(prepared.built, simulation, clock)
     robots = {

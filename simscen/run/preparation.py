@@ -11,7 +11,7 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.shapes import TriangleMesh
 from simscen.core.messages.goals import Goal
 from simscen.core.messages.navigation import Estimate
-from simscen.core.records.case import CLEARANCE_RANGE_M, ROBOT_NAME, Case
+from simscen.core.records.case import CLEARANCE_RANGE_M, SINGLE_ROBOT_NAME, Case
 from simscen.criteria.base import Criterion
 from simscen.loading.builders import (
     load_criterion_masks,
@@ -73,7 +73,7 @@ class PreparedScenario:
     @property
     def by_robot(self) -> Mapping[str, "PreparedScenario"]:
         """Prepared scenario of each robot by name. The name of a single robot is ""."""
-        return self.robots or {ROBOT_NAME: self}
+        return self.robots or {SINGLE_ROBOT_NAME: self}
 
     @property
     def spec(self) -> ScenarioSpec:

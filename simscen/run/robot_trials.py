@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from simscen.core.geometry import Pose2, Pose3, wrap
 from simscen.core.geometry.kinematics import STOP, Twist
-from simscen.core.records.case import ROBOT_NAME
+from simscen.core.records.case import SINGLE_ROBOT_NAME
 from simscen.run.robot_interface import robot_model
 from simscen.sensors.odometry import integrate_arc, kinematics_of
 from simscen.sim.body.robot_body import RobotBody
@@ -82,7 +82,9 @@ def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
 
     Raises RunError if the simulation becomes unstable.
     """
-    simulation = Simulation(merge_solids([]), [], {ROBOT_NAME: RobotPlacement(body, Pose2(0.0, 0.0, 0.0))}, triangulate)
+    simulation = Simulation(
+        merge_solids([]), [], {SINGLE_ROBOT_NAME: RobotPlacement(body, Pose2(0.0, 0.0, 0.0))}, triangulate
+    )
     try:
         rest = _measure_rest(simulation)
         return rest, tuple(_run_trial(simulation, body, name, legs) for name, legs in _legs_by_trial(body).items())
@@ -103,7 +105,7 @@ def _legs_by_trial(body: RobotBody) -> dict[str, list[_TrialLeg]]:
 
 
 def _measure_rest(simulation: Simulation) -> RestingState:
-    robot = simulation.robots[ROBOT_NAME]
+    robot = simulation.robots[SINGLE_ROBOT_NAME]
     begin = robot.base_pose()
     simulation.step(REST_TICKS)
     end = robot.base_pose()
@@ -111,8 +113,8 @@ def _measure_rest(simulation: Simulation) -> RestingState:
 
 
 def _run_trial(simulation: Simulation, body: RobotBody, name: str, legs: list[_TrialLeg]) -> Trial:
-    robot = simulation.robots[ROBOT_NAME]
-    simulation.place_robot(ROBOT_NAME, Pose2(0.0, 0.0, 0.0))
+    robot = simulation.robots[SINGLE_ROBOT_NAME]
+    simulation.place_robot(SINGLE_ROBOT_NAME, Pose2(0.0, 0.0, 0.0))
     simulation.step(SETTLING_TICKS)
     motion, level = kinematics_of(body.drive), robot.base_pose()
     encoders, start, max_tilt = robot.encoders(), level.plane, 0.0

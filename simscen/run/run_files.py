@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from simscen.core.records.case import ROBOT_NAME, Run
+from simscen.core.records.case import SINGLE_ROBOT_NAME, Run
 from simscen.judge.result_json import to_json
 from simscen.record.moment_buffer import MomentSink
 from simscen.run.external.build import robot_file
@@ -37,7 +37,7 @@ def execute_run(
     (folder / "scenario.yaml").write_text(log_header(prepared, seed).scenario, encoding="utf-8")
     run = simulate(prepared, seed, log=log, attach=lambda *_: logs, stack_log=folder / "stack.log")
     (folder / "result.json").write_text(to_json(run.result), encoding="utf-8")
-    for name, one in (run.robots or {ROBOT_NAME: run}).items():
+    for name, one in (run.robots or {SINGLE_ROBOT_NAME: run}).items():
         if one.stack:
             file = robot_file(folder / "stack.json", name)
             file.write_text(json.dumps(one.stack, indent=1) + "\n", encoding="utf-8")

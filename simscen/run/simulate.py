@@ -8,7 +8,7 @@ from pathlib import Path
 
 from simscen.core.clock import Clock
 from simscen.core.errors import InvalidInput, RunError
-from simscen.core.records.case import ROBOT_NAME, Run
+from simscen.core.records.case import SINGLE_ROBOT_NAME, Run
 from simscen.core.records.trace import Trace
 from simscen.judge.result_json import to_json
 from simscen.judge.run_result import judge_run
@@ -104,7 +104,7 @@ def _run_and_judge(
             recorder.close(end.tick, to_json(run.result), facts)
     descriptions = {name: stack.description for name, stack in externals.items()}
     robots = {name: replace(one, stack=descriptions.get(name, {})) for name, one in run.robots.items()}
-    return replace(run, robots=robots, stack=descriptions.get(next(iter(robots), ROBOT_NAME), {}))
+    return replace(run, robots=robots, stack=descriptions.get(next(iter(robots), SINGLE_ROBOT_NAME), {}))
 
 
 def _close(stacks: Collection[ExternalStack]) -> None:

@@ -1,7 +1,7 @@
 """Inertial measurement unit (IMU): gyroscope and accelerometer with noise and bias."""
 
 from simscen.core.environment.world_model import GRAVITY_M_S2
-from simscen.core.geometry import Pose3, Vector, rotated
+from simscen.core.geometry import Pose3, Vector, rotate_vector
 from simscen.core.messages.sensor_data import Imu
 from simscen.model.sensors import InertialUnit
 from simscen.sensors.sensor import NormalStream, SensorSetting
@@ -34,8 +34,8 @@ class ImuSensor:
             self._placements, (old_vx, old_vy, old_vz) = placements, linear
         self._velocity = vx, vy, vz = linear
         seconds, sensor_from_world = self._seconds, (-i, -j, -k, w)
-        wx, wy, wz = rotated(sensor_from_world, angular)
-        ax, ay, az = rotated(
+        wx, wy, wz = rotate_vector(sensor_from_world, angular)
+        ax, ay, az = rotate_vector(
             sensor_from_world,
             ((vx - old_vx) / seconds, (vy - old_vy) / seconds, (vz - old_vz) / seconds + GRAVITY_M_S2),
         )
@@ -59,7 +59,7 @@ class ImuSensor:
         pose, (linear, angular) = self._view.base_pose(), self._view.base_velocity()
         if self._is_at_base:
             return pose.quaternion, linear, angular
-        x, y, z = rotated(pose.quaternion, self._mount.position)
+        x, y, z = rotate_vector(pose.quaternion, self._mount.position)
         (vx, vy, vz), (wx, wy, wz) = linear, angular
         velocity_at_mount = vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x
         return pose.compose(self._mount).quaternion, velocity_at_mount, angular

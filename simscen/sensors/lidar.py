@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from simscen.core.geometry import Array, Pose2, Pose3, rotated
+from simscen.core.geometry import Array, Pose2, Pose3, rotate_vector
 from simscen.core.geometry.ray_fans import Float32Array, RayFan
 from simscen.core.messages.sensor_data import Scan
 from simscen.model.sensors import Lidar
@@ -50,7 +50,7 @@ class LidarSensor:
             limits = self._first, self._increment, spec.min_range, spec.max_range
             return Scan(self.name, tick, ranges, *limits, self._mount, self._tilted_mount)
         px, py, pz, i, j, k, w = pose
-        x, y, z = rotated((i, j, k, w), self._origin)
+        x, y, z = rotate_vector((i, j, k, w), self._origin)
         origin = Pose3(px + x, py + y, pz + z, i, j, k, w)
         distances: Array | Float32Array = self._rays.sweep(self._fan, origin, self._cast_range)
         slopes = 2 * (i * k - j * w), 2 * (j * k + i * w)  # z components of the x and y axes of the base

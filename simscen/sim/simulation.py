@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simscen.core.environment.world_model import Patch
+from simscen.core.environment.world_model import FloorPatch
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.shapes import Body, MotionPath, TriangleMesh
 from simscen.core.records.case import CLEARANCE_RANGE_M
@@ -98,7 +98,7 @@ class Simulation:
 
     # Changing the world
 
-    def add_friction_patch(self, name: str, patch: Patch) -> None:
+    def add_friction_patch(self, name: str, patch: FloorPatch) -> None:
         """Change the friction of an area of the floor; replaces a patch of the same name."""
         self._scene.floor.add(name, patch)
 

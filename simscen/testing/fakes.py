@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from simscen.core.clock import Clock
 from simscen.core.environment.costmap_filters import ZoneSwitch
-from simscen.core.environment.world_model import Patch, WalkingPedestrian
+from simscen.core.environment.world_model import FloorPatch, WalkingPedestrian
 from simscen.core.geometry import Array, Polygon, Pose2, Pose3
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.geometry.ray_fans import RayCaster
@@ -114,7 +114,7 @@ class FakeStage:
         """Record the call."""
         self.calls.append(("push", impulse, name, seconds))
 
-    def add_friction_patch(self, name: str, patch: Patch) -> None:
+    def add_friction_patch(self, name: str, patch: FloorPatch) -> None:
         """Record the call."""
         self.calls.append(("add_friction_patch", name, patch))
 

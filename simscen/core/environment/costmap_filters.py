@@ -1,4 +1,4 @@
-"""Masks (grids) and zones (polygons) of Nav2's costmap filters: keepout areas and speed limits."""
+"""Masks (grids) and zones (polygons) of Nav2's costmap filters KeepoutFilter and SpeedFilter."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class FilterMasks:
-    """Filter masks that a stack receives; None for a mask that it does not receive."""
+    """Filter masks that a stack receives; None for a mask that the stack does not receive."""
 
     keepout: OccupancyGrid | None = None
     speed: SpeedLimits | None = None
@@ -27,8 +27,8 @@ class FilterMasks:
 class SpeedLimits:
     """Mask of speed limits.
 
-    A cell of value v limits the speed to `base + multiplier * v`: in percent of full speed if `percent`, otherwise in
-    m/s.
+    A cell of `grid` with the value v limits the speed to `base + multiplier * v`: in percent of full speed if
+    `percent`, otherwise in m/s.
     """
 
     grid: OccupancyGrid
@@ -95,8 +95,8 @@ class MaskBlocks:
         width = max((column + width for column, _, width, _, _ in self.blocks), default=0)
         height = max((row + height for _, row, _, height, _ in self.blocks), default=0)
         cells = np.full((height, width), FREE, dtype=np.int8)
-        for column, row, wide, high, value in self.blocks:
-            cells[row : row + high, column : column + wide] = value
+        for column, row, block_width, block_height, value in self.blocks:
+            cells[row : row + block_height, column : column + block_width] = value
         return OccupancyGrid(cells, self.resolution, self.origin)
 
     @property
@@ -132,10 +132,10 @@ def mask_blocks(grid: OccupancyGrid) -> MaskBlocks:
     return MaskBlocks(float(grid.resolution), grid.origin, tuple(blocks))
 
 
-def _strips(cells: npt.NDArray[np.int8]) -> list[tuple[int, int, int]]:
-    """Return first column, width, and value of each strip of equal cells above 0 in a row."""
-    edges = np.concatenate(([0], np.flatnonzero(np.diff(cells)) + 1, [len(cells)])).tolist()
-    return [(a, b - a, int(cells[a])) for a, b in pairwise(edges) if b > a and cells[a] > FREE]
+def _strips(row: npt.NDArray[np.int8]) -> list[tuple[int, int, int]]:
+    """Return first column, width, and value of each strip of equal cells above 0 in a row (columns,) of a mask."""
+    edges = np.concatenate(([0], np.flatnonzero(np.diff(row)) + 1, [len(row)])).tolist()
+    return [(a, b - a, int(row[a])) for a, b in pairwise(edges) if b > a and row[a] > FREE]
 
 
 Filter = Literal["keepout", "speed"]
@@ -144,7 +144,10 @@ Filter = Literal["keepout", "speed"]
 
 @dataclass(frozen=True, eq=False)
 class Zones:
-    """Enabled zones and masks, in the map frame. `speed` contains pairs of a polygon and its limit in m/s."""
+    """Enabled zones and masks of the costmap filters, in the map frame.
+
+    `keepout` contains the polygons of keepout zones. `speed` contains pairs of a polygon and its speed limit in m/s.
+    """
 
     keepout: tuple[Polygon, ...] = ()
     speed: tuple[tuple[Polygon, float], ...] = ()

@@ -46,9 +46,9 @@ class OccupancyGrid:
         return [self.origin.compose(Pose2(x, y))[:2] for x, y in local]
 
     def refined(self, max_cell_size: float) -> OccupancyGrid:
-        """Split the cells so that they are at most `max_cell_size` m wide, or as small as MAX_CELLS allows.
+        """Return the map with each cell split into equal parts, which have the value of the cell.
 
-        Return a map in which the parts of a cell have the value of the cell.
+        The parts are at most `max_cell_size` m wide, or as small as MAX_CELLS allows.
         """
         rows, columns = self.shape
         max_parts = math.isqrt(MAX_CELLS // max(1, rows * columns))

@@ -18,8 +18,8 @@ from simscen.core.geometry import Polygon, Pose2
 class MovableObject:
     """Movable object at its start pose.
 
-    `outlines` are the outlines of its parts, seen from above, in the frame of the object. `closed` and `opened` are the
-    poses of a door panel; None for other objects. `mass` is in kg; 0 if the object cannot be pushed.
+    `outlines` are the outlines of the object's parts, seen from above, in the frame of the object. `closed` and
+    `opened` are the poses of a door panel; None for other objects. `mass` is in kg; 0 if the object cannot be pushed.
     """
 
     name: str
@@ -72,8 +72,8 @@ class FilterZone:
 class CompressedGrid:
     """Occupancy grid with compressed cells, which can be written as JSON.
 
-    `width` and `height` are in cells, and `resolution` is in m per cell. `data` contains the int8 cells row by row,
-    compressed by zlib and encoded in base64.
+    `width` and `height` are in cells, and `resolution` is in m per cell. `origin` is the pose of the corner of cell
+    (0, 0) in the map frame. `data` contains the int8 cells row by row, compressed by zlib and encoded in base64.
     """
 
     width: int
@@ -105,7 +105,7 @@ class Scenery:
 
     `places` are named poses, and `things` are movable objects. `ground` contains ramps and other drivable surfaces,
     `floors` the regions with changed friction, and `zones` the zones and masks of costmap filters. `map` is the map of
-    the world; None if all robots receive it.
+    the world; None if every robot receives this map.
     """
 
     places: Mapping[str, Pose2] = field(default_factory=dict)

@@ -17,7 +17,7 @@ GRAVITY_M_S2 = 9.81
 
 @dataclass(frozen=True)
 class World:
-    """Contents of a world, without robots and without pedestrians and objects that events add.
+    """Contents of a world, without the robots, and without the pedestrians and objects that events add.
 
     Attributes:
         solids: Parts that never move.
@@ -62,7 +62,7 @@ DISC_CORNERS = 32
 
 
 @dataclass(frozen=True)
-class Patch:
+class FloorPatch:
     """Part of the floor with changed friction.
 
     `friction` is the coefficient for rubber wheels. `until` is the tick at which the change ends; inf if it never ends.
@@ -84,7 +84,7 @@ Behavior = Literal["regular", "impassive", "surprised", "scared", "curious", "th
 Ignorable = Literal["robots", "people", "objects"]
 """Obstacles that a pedestrian can ignore; "people" are other pedestrians."""
 Repeat = Literal["once", "loop", "back_and_forth"]
-"""Whether a pedestrian stops at its last goal, returns to the first one, or reverses the order."""
+"""Behavior of a pedestrian after its last goal: stay, walk to the first goal again, or walk back through the goals."""
 
 PEDESTRIAN_HEIGHT_M = 1.7
 """Default height of the upright cylinder that represents a pedestrian."""
@@ -96,8 +96,8 @@ class WalkingPedestrian:
 
     `speed` is the preferred speed in m/s. `radius` and `height` of the body are in m. Pedestrians of the same `group`
     stay together. `blind_to` contains the obstacles that the pedestrian ignores. A `behavior` other than regular and
-    impassive is a reaction: it begins within `reacts_within` m of a robot. Except for scared pedestrians, all reactions
-    together last for `reacts_for` s.
+    impassive is a reaction. A reaction begins if a robot is within `reacts_within` m. All reactions together last for
+    `reacts_for` s, but the reactions of a scared pedestrian are not limited.
     """
 
     name: str
@@ -115,12 +115,12 @@ class WalkingPedestrian:
 
 
 @dataclass(frozen=True)
-class PedestrianAction:
-    """Action of the pedestrian `name`: it reached a goal, began to react to a robot, or ended its reaction (calmed).
+class PedestrianEvent:
+    """Event of the pedestrian `name`: it reached a goal, began to react to a robot, or ended its reaction (calmed).
 
-    `about` is the number of the goal, counted from 1, or the name of the robot.
+    `goal_or_robot` is the number of the goal, counted from 1, as text, or the name of the robot.
     """
 
     name: str
-    what: Literal["reached", "reacted", "calmed"]
-    about: str
+    kind: Literal["reached", "reacted", "calmed"]
+    goal_or_robot: str

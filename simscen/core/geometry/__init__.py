@@ -10,9 +10,9 @@ from simscen.core.geometry.poses import (
     Pose3,
     Vector,
     forward_and_left,
-    rotated,
+    rotate_vector,
     wrap,
     wrap_array,
 )
 
-__all__ = ["Array", "Polygon", "Pose2", "Pose3", "Vector", "forward_and_left", "rotated", "wrap", "wrap_array"]
+__all__ = ["Array", "Polygon", "Pose2", "Pose3", "Vector", "forward_and_left", "rotate_vector", "wrap", "wrap_array"]

@@ -29,17 +29,17 @@ MAX_CONVEX_FACES = 400
 _YZX, _ZXY = (1, 2, 0), (2, 0, 1)
 """Orders of the coordinates in the two products of a cross product."""
 CONVEX_TOLERANCE_M = 1e-6
-"""Distance in m by which a vertex of a convex mesh may lie outside the plane of a face."""
+"""Maximum distance by which a vertex of a convex mesh may lie outside the plane of a face."""
 
 
 def submesh(vertices: Array, faces: Faces) -> Mesh:
     """Return a mesh of these faces, without unused vertices."""
     if faces.size < len(vertices) // 8:  # faster for few faces
-        used, indices = np.unique(faces, return_inverse=True)
-        return Mesh(vertices[used], indices.reshape(-1, 3).astype(np.int32))
-    needed = np.zeros(len(vertices), dtype=np.bool_)
-    needed[faces] = True
-    return Mesh(vertices[needed], (np.cumsum(needed, dtype=np.int32) - np.int32(1))[faces])
+        used_indices, indices = np.unique(faces, return_inverse=True)
+        return Mesh(vertices[used_indices], indices.reshape(-1, 3).astype(np.int32))
+    is_used = np.zeros(len(vertices), dtype=np.bool_)
+    is_used[faces] = True
+    return Mesh(vertices[is_used], (np.cumsum(is_used, dtype=np.int32) - np.int32(1))[faces])
 
 
 def concatenate_meshes(meshes: Sequence[Mesh]) -> Mesh:
@@ -50,7 +50,7 @@ def concatenate_meshes(meshes: Sequence[Mesh]) -> Mesh:
 
 
 def submesh_between_heights(vertices: Array, faces: Faces, heights: tuple[float, float]) -> Mesh:
-    """Return a mesh of the faces with a part between two `heights`, the minimum and maximum z in m."""
+    """Return a mesh of the faces that are not entirely below or above `heights`: minimum and maximum z in m."""
     low, high = heights
     below, above = (outside[faces] for outside in (vertices[:, 2] < low, vertices[:, 2] > high))
     outside_range = (below[:, 0] & below[:, 1] & below[:, 2]) | (above[:, 0] & above[:, 1] & above[:, 2])
@@ -89,18 +89,18 @@ class FaceTiles:
         """Return the faces of a tile."""
         return self.faces[self.starts[index] : self.starts[index + 1]]
 
-    def near(self, x: float, y: float, within: float) -> npt.NDArray[np.bool_]:
-        """Return a mask of the tiles whose bounding box is within `within` m of the point (x, y)."""
+    def near(self, x: float, y: float, distance: float) -> npt.NDArray[np.bool_]:
+        """Return a mask of the tiles whose bounding box is at most `distance` m away from the point (x, y)."""
         point = (x, y)
         outside = np.maximum(np.maximum(self.low - point, point - self.high), 0.0)
-        found: npt.NDArray[np.bool_] = (outside * outside).sum(axis=1) <= within * within
+        found: npt.NDArray[np.bool_] = (outside * outside).sum(axis=1) <= distance * distance
         return found
 
 
-def tile_faces(vertices: Array, faces: Faces, edge: float) -> FaceTiles:
-    """Group faces by square tiles with edges of `edge` m. The center of a face determines its tile."""
+def tile_faces(vertices: Array, faces: Faces, tile_size: float) -> FaceTiles:
+    """Group faces by square tiles of `tile_size` m. The center of a face determines its tile."""
     corners = vertices[faces, :2]
-    squares = np.floor(corners.mean(axis=1) / edge)
+    squares = np.floor(corners.mean(axis=1) / tile_size)
     order = np.lexsort((squares[:, 1], squares[:, 0]))
     starts = np.flatnonzero(np.diff(squares[order], axis=0, prepend=np.nan).any(axis=1))
     if not len(starts):
@@ -111,7 +111,7 @@ def tile_faces(vertices: Array, faces: Faces, edge: float) -> FaceTiles:
 
 
 FLOOR_HEIGHT_M = 0.005
-"""Height up to which faces belong to the floor."""
+"""Faces of which no point is higher than this belong to the floor."""
 MAX_SLOPE_RAD = math.radians(50)
 """Maximum slope of faces on which wheels can roll. Steeper faces are walls."""
 SOLIDS_PER_BATCH = 64
@@ -131,7 +131,7 @@ def face_normals(mesh: TriangleMesh) -> Array:
 
 
 def upward_faces(mesh: TriangleMesh) -> Mask:
-    """Return a mask of the faces above the floor that point upwards and are at most MAX_SLOPE_RAD steep."""
+    """Return a mask of the upward faces that are at most MAX_SLOPE_RAD steep and do not belong to the floor."""
     top = mesh.vertices[mesh.faces, 2].max(axis=1, initial=-math.inf)
     found: Mask = (face_normals(mesh)[:, 2] >= math.cos(MAX_SLOPE_RAD)) & (top > FLOOR_HEIGHT_M)
     return found

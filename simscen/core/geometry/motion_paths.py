@@ -1,4 +1,4 @@
-"""Poses of bodies on scripted paths, and upper bounds on their speed and on their displacement per tick.
+"""Poses of bodies on scripted paths, and upper bounds on the speed and the displacement of the bodies.
 
 Segment k of a path leads from pose k to pose k + 1.
 """
@@ -17,7 +17,7 @@ SMOOTH_PEAK_SPEED_RATIO = 1.5
 MAX_STEP_M = 0.1
 """Maximum distance that a point of a scripted body may move per tick. A faster body could pass through a robot."""
 XYYaw = tuple[float, float, float]
-"""Displacement (x, y, yaw) in m and rad, or velocity (x, y, yaw) in m/s and rad/s."""
+"""Displacement (x, y, yaw) in m and rad, or velocity (x, y, yaw) in m/s and rad/s, in the frame of the path."""
 _new_pose = tuple.__new__  # faster than the constructor of the class
 
 
@@ -48,19 +48,19 @@ class PathSampler:
     def __init__(self, path: MotionPath, z: float) -> None:
         self._path, self._z = path, z
         self._first, self._last = path.times[0], path.times[-1]
-        self._even = len(path.times) > 1 and path.ease == "linear"
-        self._once = path.mode == "once"
+        self._is_linear = len(path.times) > 1 and path.ease == "linear"
+        self._repeats = path.mode != "once"
         self._begin, self._end = math.inf, -math.inf
         self._segment: PathSegment
 
     def at(self, seconds: float) -> Pose3:
         """Return the pose in space, `seconds` after the start of the path. x, y, and yaw are as in `pose_at`."""
         path, z = self._path, self._z
-        if not self._even:
+        if not self._is_linear:
             return Pose3.planar(pose_at(path, seconds), z)
         running = seconds - path.start
         local = path.phase + running if running > 0 else path.phase
-        if not self._once:
+        if self._repeats:
             local = _fold_repetitions(path, local)
         if local < self._first:
             local = self._first
@@ -146,7 +146,10 @@ def too_fast_message(name: str, step: float) -> str:
 
 
 class SweptSegment(NamedTuple):
-    """Straight line between the ends of a segment, which deviates from the line by at most `deviation`; in m."""
+    """Straight line from (x, y) to (to_x, to_y), the ends of a path segment.
+
+    The distance of the path segment from the line is at most `deviation`. All values are in m.
+    """
 
     x: float
     y: float
@@ -156,10 +159,10 @@ class SweptSegment(NamedTuple):
 
 
 def swept_segments(path: MotionPath) -> list[SweptSegment]:
-    """Return the straight line between the ends of each segment."""
+    """Return the straight line between the ends of each segment; a line without length for a path with one pose."""
     (x, y, _), *_ = poses = path.poses
-    legs = range(len(path.times) - 1)
-    return [SweptSegment(*poses[k][:2], *poses[k + 1][:2], _deviation(path, k)) for k in legs] or [
+    segments = range(len(path.times) - 1)
+    return [SweptSegment(*poses[k][:2], *poses[k + 1][:2], _deviation(path, k)) for k in segments] or [
         SweptSegment(x, y, x, y)
     ]
 
@@ -227,12 +230,12 @@ def _max_distance(step: XYYaw, reach: float) -> float:
 
 
 def _fold_repetitions(path: MotionPath, seconds: float) -> float:
-    """Convert a path time to the time of the same pose before the path repeats."""
+    """Return the time in the first pass of the path at which the body has the same pose as at a path time in s."""
     first, duration = path.times[0], path.times[-1] - path.times[0]
-    since = seconds - first
-    if duration <= 0 or since <= 0 or path.mode == "once":
+    elapsed = seconds - first
+    if duration <= 0 or elapsed <= 0 or path.mode == "once":
         return seconds
     if path.mode == "loop":
-        return first + math.fmod(since, duration)
-    phase = math.fmod(since, 2 * duration)
+        return first + math.fmod(elapsed, duration)
+    phase = math.fmod(elapsed, 2 * duration)
     return first + (phase if phase <= duration else 2 * duration - phase)

@@ -71,19 +71,19 @@ def _merge_triangles(triangles: Sequence[Piece]) -> list[Piece]:
     pieces = dict(enumerate(triangles))
     owner = {edge: number for number, piece in pieces.items() for edge in polygon_edges(piece)}
     for a, b in list(owner):
-        one, other = owner.get((a, b)), owner.get((b, a))
-        if one is None or other is None or one == other:
+        first, second = owner.get((a, b)), owner.get((b, a))
+        if first is None or second is None or first == second:
             continue
-        joined = (*_rotated_to(pieces[one], b)[:-1], *_rotated_to(pieces[other], a)[:-1])
+        joined = (*_starting_with(pieces[first], b)[:-1], *_starting_with(pieces[second], a)[:-1])
         if _is_convex(joined):
-            pieces[one] = joined
-            owner |= dict.fromkeys(polygon_edges(pieces.pop(other)), one)
+            pieces[first] = joined
+            owner |= dict.fromkeys(polygon_edges(pieces.pop(second)), first)
             del owner[a, b], owner[b, a]
     return list(pieces.values())
 
 
-def _rotated_to(piece: Piece, corner: Corner) -> Piece:
-    """Return the same polygon, starting with `corner`."""
+def _starting_with(piece: Piece, corner: Corner) -> Piece:
+    """Return the corners of the same polygon, starting with `corner`."""
     k = piece.index(corner)
     return (*piece[k:], *piece[:k])
 
@@ -107,7 +107,7 @@ MAX_BATCH_POSES = 1024
 def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) -> Array:
     """Return the signed distance (n,) in m of the polygon `moving`, placed at `poses` (n, 3), from the polygon `fixed`.
 
-    If the polygons overlap, the distance is negative: minus the length of the shortest translation that separates them.
+    The distance of overlapping polygons is the negative length of the shortest translation that separates them.
     For concave polygons, this length is only a lower bound. `moving` may be a single point. Raises ValueError for a
     polygon that intersects itself.
     """
@@ -119,8 +119,8 @@ def separation(poses: Array, moving: Sequence[Corner], fixed: Sequence[Corner]) 
         near = np.flatnonzero(np.hypot(*(poses[:, :2] - middle).T) - reach < found)
         for batch in np.array_split(near, 1 + len(near) // MAX_BATCH_POSES):
             placed = _transformed_corners(poses[batch], piece)
-            still = np.broadcast_to(other, (len(batch), *other.shape))
-            found[batch] = np.minimum(found[batch], _convex_separation(placed, still))
+            repeated = np.broadcast_to(other, (len(batch), *other.shape))
+            found[batch] = np.minimum(found[batch], _convex_separation(placed, repeated))
     return found
 
 
@@ -131,8 +131,8 @@ POSES_PER_BATCH = 64
 def separation_from_boxes(poses: Array, moving: Sequence[Corner], boxes: Array) -> Array:
     """Return the signed distance (n,) in m of the polygon `moving`, placed at `poses` (n, 3), from the nearest box.
 
-    The sign is that of `separation`. `boxes` (m, 4) are rectangles as min x, min y, max x, max y in m. The result is
-    inf without boxes.
+    The distance is negative for overlaps, as in `separation`. `boxes` (m, 4) are rectangles as min x, min y, max x,
+    max y in m. The result is inf without boxes.
     """
     pieces = _piece_arrays(moving)
     reach = max(float(np.hypot(*piece.T).max()) for piece in pieces)
@@ -174,20 +174,20 @@ def _transformed_corners(poses: Array, corners: Array) -> Array:
     return placed
 
 
-def _convex_separation(moving: Array, still: Array) -> Array:
+def _convex_separation(first: Array, second: Array) -> Array:
     """Return the signed distances (n,) of n pairs of convex counterclockwise polygons, (n, h, 2) and (n, r, 2).
 
     By the separating axis theorem, convex polygons overlap if they overlap along all edge normals. The smallest of
-    these overlaps is the length of the shortest translation that separates them.
+    these overlaps is the length of the shortest translation that separates the polygons.
     """
-    along = np.maximum(_separation_along_normals(still, moving), _separation_along_normals(moving, still))
-    apart = np.minimum(_distance_to_border(moving, still), _distance_to_border(still, moving))
-    signed: Array = np.where(along > 0, apart, along)
+    gap = np.maximum(_separation_along_normals(second, first), _separation_along_normals(first, second))
+    distance = np.minimum(_distance_to_border(first, second), _distance_to_border(second, first))
+    signed: Array = np.where(gap > 0, distance, gap)
     return signed
 
 
 def _separation_along_normals(polygon: Array, points: Array) -> Array:
-    """Return the largest gap (n,) in m between polygons (n, m, 2) and points (n, k, 2) along an edge normal.
+    """Return the largest gap (n,) in m, over all edges, between polygons (n, m, 2) and points (n, k, 2).
 
     The gap at an edge is the smallest signed distance of the points from the line of the edge; negative inside.
     """

@@ -1,4 +1,4 @@
-"""Polygons in the plane: points inside of them, distances of points, transforms, and validity.
+"""Polygons in the plane: transforms, tests of points, distances, and validity.
 
 A polygon is a sequence of corners (x, y) in m. The last corner is connected to the first one.
 """
@@ -57,17 +57,17 @@ def points_in_polygon(corners: Sequence[Corner], points: Array) -> npt.NDArray[n
 
 
 def distance_to_polygon(point: Pose2, corners: Sequence[Corner]) -> float:
-    """Return the distance in m from the position of a pose to a polygon; 0 inside the polygon."""
+    """Return the distance in m from the position of the pose `point` to a polygon; 0 inside the polygon."""
     return 0.0 if polygon_contains(corners, (point.x, point.y)) else _distance_to_border(point, corners)
 
 
 def depth_inside_polygon(pose: Pose2, corners: Sequence[Corner]) -> float:
-    """Return how far in m the position of a pose is inside a polygon: its distance to the border; -1 if outside."""
+    """Return the distance in m from the position of a pose inside a polygon to the border; -1 outside the polygon."""
     return _distance_to_border(pose, corners) if polygon_contains(corners, (pose.x, pose.y)) else -1.0
 
 
-def _distance_to_border(point: Pose2, corners: Sequence[Corner]) -> float:
-    return min(distance_to_segment(point.x, point.y, a, b) for a, b in polygon_edges(corners))
+def _distance_to_border(pose: Pose2, corners: Sequence[Corner]) -> float:
+    return min(distance_to_segment(pose.x, pose.y, a, b) for a, b in polygon_edges(corners))
 
 
 def distance_to_segment(x: float, y: float, a: Corner, b: Corner) -> float:
@@ -119,7 +119,7 @@ def polygon_defect(ring: Sequence[Corner]) -> str | None:
 
 
 def without_repeated_corners(ring: Sequence[Corner]) -> tuple[Corner, ...]:
-    """Return the corners without repetitions of the previous corner."""
+    """Remove each corner that equals the previous corner. The last corner counts as the previous one of the first."""
     return tuple(corner for k, corner in enumerate(ring) if corner != ring[k - 1])
 
 

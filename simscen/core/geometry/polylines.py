@@ -20,7 +20,7 @@ def resample_polyline(points: Array, spacing: float, min_segments: int = 1) -> A
 
 
 def path_corners(path: Array, tolerance: float) -> list[int]:
-    """Simplify a path (n, 2) to straight lines. Return the indices of the corners between them.
+    """Simplify a path (n, 2) to straight lines. Return the indices of the corners between the lines, without the ends.
 
     The path deviates from the lines by at most `tolerance` m. Source: Douglas and Peucker, Algorithms for the reduction
     of the number of points (1973).

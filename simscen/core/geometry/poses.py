@@ -17,29 +17,28 @@ else:
 
 _PI, _TURN = math.pi, 2 * math.pi
 _cos, _sin, _remainder, _isfinite = math.cos, math.sin, math.remainder, math.isfinite
-# Faster than the constructor of the class: about 50 000 poses are created per minute.
-_new_pose = tuple.__new__
+_new_pose = tuple.__new__  # faster than the constructor of the class
 
 
 def wrap(angle: float) -> float:
-    """Return the same angle in (-π, π]."""
+    """Return the equivalent angle in (-π, π]."""
     wrapped = _remainder(angle, _TURN)
     return wrapped if wrapped != -_PI else _PI
 
 
 def wrap_array(angles: Array) -> Array:
-    """Return the same angles in [-π, π)."""
+    """Return the equivalent angles in [-π, π)."""
     return (angles + np.pi) % (2 * np.pi) - np.pi
 
 
 Vector = tuple[float, float, float]
 """(x, y, z)."""
 Polygon = tuple[tuple[float, float], ...]
-"""Corners (x, y) in m, in order; the last one is connected to the first one."""
+"""Corners (x, y) in m, in order; the last corner is connected to the first one."""
 
 
-def rotated(quaternion: tuple[float, float, float, float], vector: Vector) -> Vector:
-    """Return a vector rotated by a unit quaternion (x, y, z, w)."""
+def rotate_vector(quaternion: tuple[float, float, float, float], vector: Vector) -> Vector:
+    """Return `vector`, rotated by a unit quaternion (x, y, z, w)."""
     x, y, z, w = quaternion
     a, b, c = vector
     p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)

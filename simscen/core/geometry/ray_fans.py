@@ -31,13 +31,13 @@ _PACKET_ALIGNMENT, _VALUE_BYTES = 64, 4
 _ALL_BITS = 0xFFFFFFFF
 """Mask of a ray that hits all geometries, and id of the hit geometry if nothing was hit."""
 MIN_DIRECTION_COMPONENT = 2e-18
-"""Components of directions with a smaller magnitude are set to 0, because Embree misses hits with such tiny values."""
+"""Smaller components of directions are set to 0, because Embree misses hits of rays with such tiny components."""
 
 
 class RayPackets:
     """Buffer of `count` rays for Embree: `starts` and `directions` (packets, 3, 16), and `lengths` (packets, 16).
 
-    `lengths` are the maximum lengths of the rays in m. Embree replaces them with the distances of hits.
+    `lengths` are the maximum lengths of the rays in m. Embree replaces the maximum length with the distance of the hit.
     """
 
     def __init__(self, count: int) -> None:
@@ -68,7 +68,7 @@ class RayPackets:
         self.lengths[:] = padded.reshape(-1, PACKET_SIZE)
 
     def distances(self) -> Float32Array:
-        """Return the distance (n,) of the hit of each ray in m, or its maximum length without a hit.
+        """Return the distance (n,) in m of the hit of each ray; the maximum length of the ray if it hits nothing.
 
         Call this after Embree has cast the rays.
         """
@@ -88,7 +88,7 @@ class RayFan:
         """Buffer of the rays. Copies of the last ray fill the last packet."""
         angles = first + increment * np.minimum(np.arange(PACKET_SIZE * len(self.rays.lengths)), count - 1)
         self._first, self._increment, self._count = first, increment, count
-        self._full = 2 * math.pi / increment
+        self._turn = 2 * math.pi / increment  # a full turn in increments
         self._flat = np.array((np.cos(angles), np.sin(angles)))
 
     def __len__(self) -> int:
@@ -127,14 +127,14 @@ class RayFan:
         far = math.hypot(x, y)
         if min_dot > far:
             return []
-        count, full = self._count, self._full
+        count, turn = self._count, self._turn
         half = math.acos(max(-1.0, min_dot / far)) / self._increment if far > 0 else math.inf
-        if 2 * half >= full:
+        if 2 * half >= turn:
             return [slice(0, count)]
         middle = (math.atan2(y, x) - self._first) % (2 * math.pi) / self._increment
         return [
             slice(max(0, math.floor(around - half)), math.ceil(around + half) + 1)
-            for around in (middle - full, middle, middle + full)
+            for around in (middle - turn, middle, middle + turn)
             if around + half > -1 and around - half < count
         ]
 

@@ -83,7 +83,7 @@ Shape = Box | Cylinder | Sphere | Capsule | Ellipsoid | Cone | Extrusion | Mesh
 
 @dataclass(frozen=True)
 class Solid:
-    """Shape at a pose. `pose` is in the frame of its body, or in the world frame for a solid that never moves."""
+    """Shape at a pose: in the frame of the body, or in the world frame for a solid that belongs to no body."""
 
     shape: Shape
     pose: Pose3 = Pose3()
@@ -129,7 +129,7 @@ class MotionPath:
     phase: float = 0.0
 
     def elapsed(self, seconds: float) -> float:
-        """Return the path time, `seconds` after the start of the path. It keeps increasing when the path repeats."""
+        """Return the path time, `seconds` after the start of the path. The path time also increases in repetitions."""
         return self.phase + max(0.0, seconds - self.start)
 
     def has_ended(self, seconds: float) -> bool:
@@ -143,7 +143,7 @@ class TriangleMesh:
 
     `owners` (m,) contains the index of the solid of each face. `names`, `frictions`, and `hulls` have one element per
     solid. `frictions` is empty if all are 1. `hulls` contains the range of vertices of a convex solid, and None for a
-    concave one; it is empty if convexity was not tested.
+    concave solid; `hulls` is empty if convexity was not tested.
     """
 
     vertices: Array
@@ -155,7 +155,7 @@ class TriangleMesh:
 
 
 MAX_SAGITTA_M = 0.0005
-"""Default of the maximum depth by which a facet cuts into a circle."""
+"""Default maximum depth to which a facet cuts into a circle."""
 FACET_COUNT_RANGE = (12, 192)
 """Minimum and maximum number of facets of a circle."""
 

@@ -1,4 +1,4 @@
-"""Goals of navigation: pose and tolerances, the navigation action that they belong to, and names of repeated goals."""
+"""Navigation goals, Nav2 actions that receive goals, and names of goals that are repeated in a loop."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from simscen.core.decorators import fast_dataclass
 from simscen.core.geometry import Pose2
 
 Mode = Literal["navigate_to_pose", "navigate_through_poses", "follow_waypoints"]
-"""Navigation action of Nav2: one goal at a time, all goals without a stop, or a list of waypoints with stops."""
+"""Nav2 action that receives the goals: one goal at a time, all goals without stops, or all goals with stops."""
 FAILED = "failed"
-"""Value of the YAML key `expect` for a goal that must fail, with any error code."""
+"""Value of the YAML key `expect`: the goal must fail, with any error code."""
 
 
 @fast_dataclass()
@@ -41,13 +41,13 @@ def loop_goal_name(name: str, loop: int) -> str:
     return name if loop == 1 else f"{name}#{loop}"
 
 
-LOOP_GOAL_NAME = re.compile(r"(.+)#[0-9]+")
+LOOP_GOAL_PATTERN = re.compile(r"(.+)#[0-9]+")
 """Pattern of the names that `loop_goal_name` returns for loops after the first."""
 
 
 def goal_without_loop(name: str) -> str:
     """Return the name of a goal without the number of its loop: `shelf` for `shelf` and for `shelf#2`."""
-    loop = LOOP_GOAL_NAME.fullmatch(name)
+    loop = LOOP_GOAL_PATTERN.fullmatch(name)
     return name if loop is None else loop[1]
 
 

@@ -19,7 +19,7 @@ ReplanReason = Literal["blocked", "missed", "tight", "better", "window", "recove
 
 - `blocked`, `tight`: An obstacle is on the old plan, or too close to it.
 - `missed`: The robot has left the old plan, or has passed its end without reaching all goals.
-- `better`: A better plan exists.
+- `better`: The planner has found a better plan.
 - `window`: The rolling window of the global costmap has moved.
 - `recovery`, `rate`: A recovery has ended, or the planning period has passed.
 - `moving`: A predicted obstacle will be on the old plan (advanced stack).
@@ -82,7 +82,7 @@ class TaskResult(str, Enum):
 
 @fast_dataclass(eq=False)
 class Path:
-    """Planned path: `points` (n, 3) are x, y, yaw in the map frame; `tick` is the tick at which it was planned."""
+    """Planned path: `points` (n, 3) are x, y, yaw in the map frame, and `tick` is the time of planning."""
 
     points: Array = field(default_factory=lambda: np.empty((0, 3)))
     tick: int = 0

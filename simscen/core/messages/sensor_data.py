@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simscen.core.decorators import fast_dataclass
-from simscen.core.geometry import Array, Pose2, Pose3, rotated
+from simscen.core.geometry import Array, Pose2, Pose3, rotate_vector
 from simscen.core.geometry.kinematics import Twist
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 PoseCovariance = tuple[float, float, float, float, float, float, float, float, float]
 """Covariance of x, y (m) and yaw (rad), row by row."""
 UNKNOWN_POSE_COVARIANCE: PoseCovariance = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-"""Zeros mean unknown, as in ROS."""
+"""Covariance of an unknown pose: all zeros, as in ROS."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Scan:
         return self.angle_min + self.angle_increment * np.arange(len(self.ranges), dtype=np.float64)
 
     def points(self) -> Array:
-        """Return the x and y of the hits (m, 2) in the base frame of the robot."""
+        """Return x and y of the valid hits (m, 2) in the base frame. Ranges outside of the limits are left out."""
         hit = np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
         angles, ranges = self.angles()[hit], self.ranges[hit]
         flat = np.column_stack((ranges * np.cos(angles), ranges * np.sin(angles)))
@@ -126,17 +126,17 @@ Readings = tuple[Reading, ...]
 
 
 MIN_HEIGHT_M = 0.05
-"""Minimum height of hits that `level_scan` uses; half the height of the lidar if that is lower."""
+"""Minimum height above the ground of hits that `level_scan` uses, or half the height of the lidar if it is lower."""
 MAX_HEIGHT_M = 2.0
-"""Maximum height of hits that `level_scan` uses: `max_obstacle_height` of Nav2's costmap."""
+"""Maximum height above the ground of hits that `level_scan` uses: `max_obstacle_height` of Nav2's costmap."""
 
 
 def level_scan(scan: Scan) -> Scan:
     """Convert the scan of a tilted lidar to the scan of a level lidar at the same position.
 
     As in pointcloud_to_laserscan, each level beam gets the nearest hit in its direction. Hits below MIN_HEIGHT_M, above
-    MAX_HEIGHT_M, or outside the angles of the level scan are ignored. The range is inf if nothing was hit, and nan in
-    directions without a usable beam.
+    MAX_HEIGHT_M, or outside the angles of the level scan are ignored. The range is inf in directions in which
+    nothing was hit, and nan in directions without a measurement, or in which all hits are ignored.
     A scan without `tilted_mount` is returned unchanged.
     """
     if scan.tilted_mount is None:
@@ -158,15 +158,15 @@ def level_scan(scan: Scan) -> Scan:
 
 
 def imu_in_base_frame(imu: Imu) -> Imu:
-    """Rotate a reading to the axes of the base frame. It still applies to the position of the sensor."""
+    """Rotate a reading to the axes of the base frame. The acceleration remains that of the sensor's position."""
     at_base = Pose3()
     if imu.mount == at_base:
         return imu
     quaternion = imu.mount.quaternion
     return replace(
         imu,
-        angular_velocity=rotated(quaternion, imu.angular_velocity),
-        linear_acceleration=rotated(quaternion, imu.linear_acceleration),
+        angular_velocity=rotate_vector(quaternion, imu.angular_velocity),
+        linear_acceleration=rotate_vector(quaternion, imu.linear_acceleration),
         mount=at_base,
     )
 

@@ -21,8 +21,8 @@ Point = tuple[float, float]
 class Passage:
     """Narrow passage on the shortest path to a goal: a gap between two static solids.
 
-    `goal` is the name of the goal. `ends` are the two sides of the gap, in m in the world frame. `between` contains the
-    names of the solids; "" for a solid without a name.
+    `goal` is the name of the goal. `ends` are the points (x, y) on the two sides of the gap, in m in the world frame.
+    `between` contains the names of the solids; "" for a solid without a name.
     """
 
     goal: str
@@ -43,39 +43,39 @@ class Passage:
     @property
     def description(self) -> str:
         """Description such as "the passage of 0.90 m between `wall 3` and `wall 4` at (9.00, 5.75)"."""
-        one, other = self.between
-        between = f" between `{one}` and `{other}`" if one and other and one != other else ""
+        first, second = self.between
+        between = f" between `{first}` and `{second}`" if first and second and first != second else ""
         return f"the passage of {self.width:.2f} m{between} at ({self.middle[0]:.2f}, {self.middle[1]:.2f})"
 
 
-ROBOT_NAME = ""
-"""Name of the robot in a scenario with only one robot."""
+SINGLE_ROBOT_NAME = ""
+"""Name of the robot in a scenario with a single robot."""
 CLEARANCE_RANGE_M = 2.0
 """Default of `Case.clearance_range`."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """Parts of a scenario that criteria need to judge its runs. They are also written to the log of each run.
+    """Parts of a scenario that criteria need to judge runs. The log of each run contains these parts, too.
 
     Attributes:
         start: Start pose of the robot.
         goals: Goals of the scenario, in order.
-        shortest: Length in m of the shortest path to each goal from the previous goal that is not in `expected`, or
-            from the start, by goal name; inf if there is no path. It is the path of a disc of radius
-            `inscribed_radius` in the static world.
+        shortest: Length in m of the shortest path to each goal, by goal name; inf if there is no path. The path starts
+            at the previous goal that is not in `expected`, or at the start pose. It is planned for a disc with the
+            radius `inscribed_radius` in the static world.
         regions: Regions of the world by name.
         footprint: Footprint of the robot in the base frame; empty if unknown.
         inscribed_radius: Radius in m of the largest circle around the base that fits in the footprint.
         time_limit: Maximum simulated time of the run in s.
         clearance_range: Measuring range of the clearance in m. Larger clearances are recorded as this value.
-        disturbances: The events of the scenario, each followed by the steps of its sequence (`then`), and its faults.
+        disturbances: The events of the scenario, each followed by the steps of its sequence (`then`), and the faults.
         sent: Goals that events can send during the run.
         passages: Narrow passages on the shortest paths, in driving direction.
         masks: Filter masks that criteria refer to, by the path in the scenario.
         expected: Expected failure of goals, by goal name: "failed" for any failure, or the name of an error code.
-        labels: Names of all events, faults, and marks; None if the criteria were checked together with the scenario, so
-            that they name no others. Not written to logs.
+        labels: Names of all events, faults, and marks, for criteria of a criteria file; None for criteria of the
+            scenario, whose names were checked before the run. Not written to logs.
         objects: Names of all objects, other robots, and pedestrians; None as for `labels`. Not written to logs.
     """
 
@@ -111,8 +111,8 @@ class Run:
         case: Parts of the scenario that the criteria used.
         log: MCAP file of the run; None if none was requested.
         stack: Facts that an external stack sent, such as its version; empty for the reference stack.
-        robots: One run for each robot by name, if there are several robots. `trace`, `case`, and `stack` of the run
-            itself then belong to the first robot.
+        robots: One run for each robot by name, if there are several robots; `trace`, `case`, and `stack` of the whole
+            run then belong to the first robot.
     """
 
     result: RunResult
@@ -129,7 +129,7 @@ class Run:
             f"{name} {finding.measured} ({finding.limit})" for name, finding in unsatisfied if finding is not None
         ]
         summary = f"<Run of {self.result.key.test}, seed {self.result.key.seed}: {self.result.outcome.value}"
-        return f"{summary}{''.join(f'; {each}' for each in reasons)}>"
+        return f"{summary}{''.join(f'; {reason}' for reason in reasons)}>"
 
     @property
     def passed(self) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class OutcomeCounts:
-    """Number of runs by outcome, as if no failure were expected."""
+    """Number of runs by outcome. A run that failed as expected counts as failed."""
 
     passed: int = 0
     failed: int = 0
@@ -66,7 +66,7 @@ class ScenarioChange:
 
     `scenario` is the id of a scenario or "all scenarios". `what` is "pass rate" or the name of a metric. `baseline` and
     `value` are the means for the baseline and for the other stack or session. `p` is the p-value with Holm's adjustment
-    for multiple tests. `is_worse` is None for a metric without a better direction.
+    for multiple tests. `is_worse` is None for a metric of which neither higher nor lower values are better.
     """
 
     scenario: str
@@ -87,7 +87,7 @@ class BaselineComparison:
         stack: Name of the stack or session.
         pairs: Number of pairs in which both runs were completed.
         error_pairs: Number of pairs in which a run could not be completed.
-        unpaired_runs: Number of runs without a partner.
+        unpaired_runs: Number of runs whose counterpart of the other stack or session is missing.
         pairs_with_different_arrivals: Number of completed pairs in which a robot reached its last goal in only one of
             the two runs. Only `collisions` is compared for these pairs.
         flips: Pairs in which only one run passed.

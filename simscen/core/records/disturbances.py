@@ -10,8 +10,8 @@ class Disturbance:
 
     `when` is the trigger as text from the scenario; "" for a fault that is active from the start, and for a step of
     `then` that follows at once. If `required`, the run fails unless the disturbance takes place. `line` is the line in
-    the scenario file; 0 if unknown. `after` is the index of the previous event in a sequence (`then`); None for other
-    disturbances.
+    the scenario file; 0 if unknown. `after` is the index of the previous step in a sequence (`then`); None for the
+    first step and for all other disturbances.
     """
 
     name: str
@@ -46,12 +46,12 @@ class DisturbanceOutcome:
 
     @property
     def missing(self) -> bool:
-        """Whether the disturbance was required but did not take place."""
+        """Whether the disturbance is required but did not take place."""
         return self.disturbance.required and not self.happened
 
 
 READING_KINDS = ("Scan", "Odometry", "Imu", "Bump", "Image")
-"""Kinds of fault targets that are sensors: names of the classes of their readings in core.messages.sensor_data."""
+"""Kinds of fault targets that are sensors: class names of the sensors' readings in core.messages.sensor_data."""
 COMMAND = "Command"
 """Kind of the fault target `cmd_vel`: velocity commands from the stack to the base."""
 WHEELS = "Wheels"
@@ -63,4 +63,4 @@ MAP = "Map"
 KIND_BY_TARGET_NAME = {"cmd_vel": COMMAND, "wheels": WHEELS, "localizer": BELIEF, "map": MAP}
 """Kinds of fault targets by name in a scenario. A sensor of the same name takes precedence."""
 FAULT_TARGET_KINDS = (*READING_KINDS, *KIND_BY_TARGET_NAME.values())
-"""All kinds of fault targets. The attribute `affects` of a fault contains some of them."""
+"""All kinds of fault targets. The attribute `affects` of a fault contains the kinds that the fault can affect."""

@@ -1,4 +1,4 @@
-"""Polygons and poses in the data of events. Stacks of packages can report events with any data."""
+"""Polygons and poses in the data of events. Data can be invalid, because plug-in stacks can report any data."""
 
 import math
 
@@ -26,7 +26,7 @@ def spawn_pose(event: Event) -> Pose2:
 
 def _lists(value: Value) -> list[list[Value]]:
     """Return the lists in a list; [] for any other value."""
-    return [each for each in value if isinstance(each, list)] if isinstance(value, list) else []
+    return [item for item in value if isinstance(item, list)] if isinstance(value, list) else []
 
 
 def _number(value: Value) -> float:

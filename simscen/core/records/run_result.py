@@ -68,7 +68,7 @@ class RunKey:
 
     @property
     def is_proposal(self) -> bool:
-        """Whether `simscen falsify` proposed the values of the run, so that `simscen run` cannot select it."""
+        """Whether `simscen falsify` proposed the values of the run. `simscen run` cannot select such a run."""
         return self.variation.startswith(PROPOSAL_PREFIX) and self.variation.removeprefix(PROPOSAL_PREFIX).isdecimal()
 
     @property
@@ -163,7 +163,7 @@ class RunResult:
 
     @property
     def is_unfinished(self) -> bool:
-        """Whether the session ended before the run was finished or started, so that the run says nothing."""
+        """Whether the session ended before the run was started or finished."""
         return self.error is not None and self.error.kind in (INTERRUPTED, NOT_RUN)
 
     @property
@@ -171,9 +171,9 @@ class RunResult:
         """Command that repeats the run if it is executed in the root; "" if no command does."""
         if self.key.is_proposal:
             return ""
-        varied = ["--variation", self.key.variation] if self.key.variation else []
-        chosen = ["--stack", self.stack] if self.stack else []
-        return shlex.join(["simscen", "run", self.path, "--seed", str(self.key.seed), *varied, *chosen])
+        variation = ["--variation", self.key.variation] if self.key.variation else []
+        stack = ["--stack", self.stack] if self.stack else []
+        return shlex.join(["simscen", "run", self.path, "--seed", str(self.key.seed), *variation, *stack])
 
 
 def skipped_result(key: RunKey, path: str, reason: str, stack: str = "") -> RunResult:

@@ -10,22 +10,24 @@ from simscen.core.records.run_result import RunKey
 from simscen.core.records.session_events import RunFinished
 
 MAX_UNCOMPRESSED = 2000
-"""Number of results, from the first one on, that a store keeps uncompressed."""
+"""Maximum number of results that a store keeps uncompressed."""
 
 
 class RunStore(Sequence[RunFinished]):
-    """List of results. Results after the first MAX_UNCOMPRESSED are compressed, and decompressed at each access."""
+    """List of results. Results after the first MAX_UNCOMPRESSED are compressed, and restored at each access."""
 
     def __init__(self, runs: Iterable[RunFinished] = ()) -> None:
         self._entries: list[RunFinished | bytes] = []
-        self._order: list[tuple[str, str, str, int, str]] = []
-        self._sample = b""
+        self._sort_keys: list[tuple[str, str, str, int, str]] = []
+        """File, scenario, variation, seed, and stack of each result."""
+        self._dictionary = b""
+        """Dictionary of the compression: the first pickled result, with which other results share most words."""
         self.extend(runs)
 
     def append(self, run: RunFinished) -> None:
         """Add a result at the end."""
         key = run.key
-        self._order.append(
+        self._sort_keys.append(
             (sys.intern(run.result.path), sys.intern(key.scenario), key.variation, key.seed, sys.intern(key.stack_name))
         )
         self._entries.append(run if len(self._entries) < MAX_UNCOMPRESSED else self._compress(run))
@@ -37,16 +39,16 @@ class RunStore(Sequence[RunFinished]):
 
     def in_order(self) -> "RunStore":
         """Return a store with the same results, sorted by file, scenario, variation, seed, and stack."""
-        return self.select(sorted(range(len(self)), key=self._order.__getitem__))
+        return self.select(sorted(range(len(self)), key=self._sort_keys.__getitem__))
 
     def select(self, indices: Iterable[int]) -> "RunStore":
         """Return a store with the results at these indices."""
-        found = RunStore()
-        found._sample = self._sample
+        selected = RunStore()
+        selected._dictionary = self._dictionary
         for index in indices:
-            found._entries.append(self._entries[index])
-            found._order.append(self._order[index])
-        return found
+            selected._entries.append(self._entries[index])
+            selected._sort_keys.append(self._sort_keys[index])
+        return selected
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -67,20 +69,20 @@ class RunStore(Sequence[RunFinished]):
 
     def _compress(self, run: RunFinished) -> bytes:
         data = pickle.dumps(run, pickle.HIGHEST_PROTOCOL)
-        self._sample = self._sample or data
-        compressor = zlib.compressobj(1, zdict=self._sample)  # other results share most of their words with the sample
+        self._dictionary = self._dictionary or data
+        compressor = zlib.compressobj(1, zdict=self._dictionary)
         return compressor.compress(data) + compressor.flush()
 
     def _restore(self, entry: RunFinished | bytes) -> RunFinished:
         if isinstance(entry, RunFinished):
             return entry
-        run = pickle.loads(zlib.decompressobj(zdict=self._sample).decompress(entry))
+        run = pickle.loads(zlib.decompressobj(zdict=self._dictionary).decompress(entry))
         assert isinstance(run, RunFinished)
         return run
 
 
 class FinishedRuns(Mapping[RunKey, RunFinished]):
-    """Newest result of each run by key. `store` contains all results, in the order in which they were added."""
+    """Newest result of each run by key. `store` contains all results, in the order of the calls of `add`."""
 
     def __init__(self) -> None:
         self._index: dict[RunKey, int] = {}

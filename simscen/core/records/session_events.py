@@ -33,7 +33,7 @@ class SessionStarted:
         folder: Path of the output folder.
         ids: Titles of the scenarios and variations.
         stacks: Values of --stack.
-        twice: Whether each run is repeated to check that both have the same result.
+        twice: Whether each run is repeated to check that both runs have the same log.
         seeds: Largest number of different seeds of a scenario or variation.
     """
 
@@ -51,7 +51,10 @@ class SessionStarted:
 def session_started(
     version: str, runs: Sequence[RunKey], workers: int, folder: Path, stacks: tuple[str, ...]
 ) -> SessionStarted:
-    """Return the first event of a session with these runs. `folder` is the output folder."""
+    """Return the first event of a session with these runs, and with one stack or the compared `stacks`.
+
+    `workers` is the number of worker processes. `folder` is the output folder.
+    """
     tests = Counter(test for test, _ in {(key.test, key.seed) for key in runs})
     scenarios = len({key.scenario for key in runs})
     twice = any(key.is_repetition for key in runs)
@@ -154,7 +157,7 @@ def broadcast(*listeners: Listener) -> Listener:
     """Return a listener that passes each event to all `listeners` in order."""
 
     def listen(event: SessionEvent) -> None:
-        for each in listeners:
-            each(event)
+        for listener in listeners:
+            listener(event)
 
     return listen

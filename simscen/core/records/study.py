@@ -33,10 +33,11 @@ class ClaimResult:
         passed: Number of runs that passed, out of `runs`.
         runs: Number of runs that decide the claim.
         errors: Number of runs that could not be completed.
-        limits: Lower and upper confidence limit of the pass rate. Each limit holds with the probability `confidence`;
-            for the method `anytime`, both hold together. None for `sprt`, and before the first run.
+        limits: Lower and upper confidence limit of the pass rate. Each limit alone holds with the probability
+            `confidence`; for the method `anytime`, both limits together do. None for `sprt`, and before the first run.
         target: Pass rate of a robot that `sprt` should accept; None for other methods.
-        power: Minimum probability that `sprt` does not reject a robot with this rate; None for other methods.
+        power: Minimum probability that `sprt` does not reject a robot with the pass rate `target`; None for other
+            methods.
     """
 
     method: str

@@ -31,8 +31,8 @@ else:
 class Truth(NamedTuple):
     """Sample of the ground truth: `pose` of the robot's base in the world frame, `twist` in the base frame.
 
-    `clearance` is the distance in m from the robot to the nearest obstacle, up to the measuring range; negative if they
-    overlap. `objects` contains the poses of movable objects in the world frame, by name.
+    `clearance` is the distance in m from the robot to the nearest obstacle, up to the measuring range; negative if the
+    robot overlaps the obstacle. `objects` contains the poses of movable objects in the world frame, by name.
     """
 
     pose: Pose3
@@ -166,10 +166,10 @@ class Samples:
     def at(self, ticks: Ticks) -> Array:
         """Return the values (m, k) of the newest sample at each of the `ticks` (m,).
 
-        The first sample is used for ticks before it.
+        Ticks before the first sample get the values of the first sample.
         """
         return self.values[np.maximum(np.searchsorted(self.ticks, ticks, side="right") - 1, 0)]
 
-    def select(self, chosen: npt.NDArray[Any] | slice) -> Samples:
-        """Return the samples that an index array, a mask, or a slice selects."""
-        return Samples(self.ticks[chosen], self.values[chosen])
+    def select(self, selection: npt.NDArray[Any] | slice) -> Samples:
+        """Return the samples of a selection: an index array, a mask, or a slice."""
+        return Samples(self.ticks[selection], self.values[selection])

@@ -112,9 +112,9 @@ POSITION_EVIDENCE = frozenset({Evidence.TRUTH, Evidence.ALIGNMENT})
 
 @dataclass(frozen=True)
 class LogCoverage:
-    """Coverage of a log: the evidence that it lacks, with the reason for each.
+    """Coverage of a log: the evidence that the log lacks, each with the reason.
 
-    `missing` evidence is not in the log. `partial` evidence covers only a part of the time. Logs of other recorders
+    `missing` evidence is not in the log. `partial` evidence covers only a part of the run. Logs of other recorders
     (`recorded_by_simscen` is False) can contain irregular signals and values that are not finite.
     """
 
@@ -131,10 +131,10 @@ COMPLETE_COVERAGE = LogCoverage()
 """Coverage of a log that lacks nothing."""
 
 
-def unique_name(name: str, used: set[str], separator: str = "#") -> str:
-    """Return `name`, with the first free number from 2 if it is in `used`, and add the result to `used`."""
+def unique_name(name: str, used_names: set[str], separator: str = "#") -> str:
+    """Return `name`, with the first free number from 2 if `name` is used already; add the result to `used_names`."""
     candidate, number = name, 2
-    while candidate in used:
+    while candidate in used_names:
         candidate, number = f"{name}{separator}{number}", number + 1
-    used.add(candidate)
+    used_names.add(candidate)
     return candidate

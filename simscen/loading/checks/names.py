@@ -4,7 +4,7 @@ from collections.abc import Container, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from simscen.core.messages.goals import LOOP_GOAL_NAME
+from simscen.core.messages.goals import LOOP_GOAL_PATTERN
 from simscen.criteria.registry import verdict_names
 from simscen.loading.checks.registry import NAMES, ROBOT_NAMES, CheckProblem, NameScope
 from simscen.loading.known_names import KIND_NAMES, event_names, known_names, listed_goal_names, world_object_names
@@ -119,7 +119,7 @@ def duplicate_marks_and_new_goals(scope: NameScope) -> Iterator[CheckProblem]:
 def reserved_goal_names(scope: NameScope) -> Iterator[CheckProblem]:
     """Find goals with names such as `shelf#2`, which are reserved for goals in the second and later loops."""
     for index, goal in enumerate(scope.loaded.spec.goals):
-        if goal.name is not None and LOOP_GOAL_NAME.fullmatch(goal.name):
+        if goal.name is not None and LOOP_GOAL_PATTERN.fullmatch(goal.name):
             message = f"{quoted(goal.name)} is reserved for the goals of the second and later loops"
             yield CheckProblem(("goals", index, "name"), message, "choose a name that does not end in # and a number")
 

@@ -108,7 +108,7 @@ EVENT_KINDS = {
     "reacted": EventKind.PEDESTRIAN_REACTED,
     "calmed": EventKind.PEDESTRIAN_CALMED,
 }
-"""Kind of event by the field `what` of a PedestrianAction."""
+"""Kind of the recorded event by `PedestrianEvent.kind`."""
 
 
 class PedestrianSimulation:
@@ -170,17 +170,17 @@ class PedestrianSimulation:
     def _step(self) -> None:
         crowd, step_s = self._crowd, self._step_s
         before = crowd.poses()
-        actions = crowd.step(self._surroundings(), step_s)
+        events = crowd.step(self._surroundings(), step_s)
         for name, pose in crowd.poses().items():
             path = MotionPath((0.0, step_s), (before[name], pose))
             self._simulation.follow(name, path, crowd.top_speed(name))
-        for action in actions:
-            data: dict[str, Value] = {"behavior": self._behaviors[action.name], "robot": action.about}
-            if action.what == "reached":
-                data = {"goal": int(action.about)}
-            event = Event(self._simulation.tick, EVENT_KINDS[action.what], action.name, data)
+        for event in events:
+            data: dict[str, Value] = {"behavior": self._behaviors[event.name], "robot": event.goal_or_robot}
+            if event.kind == "reached":
+                data = {"goal": int(event.goal_or_robot)}
+            recorded = Event(self._simulation.tick, EVENT_KINDS[event.kind], event.name, data)
             for listener in self.listeners:
-                listener(event)
+                listener(recorded)
 
     # Perception of the pedestrians
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from simscen.core.clock import Clock
 from simscen.core.environment.costmap_filters import Filter, ZoneSwitch
-from simscen.core.environment.world_model import Patch, WalkingPedestrian, World
+from simscen.core.environment.world_model import FloorPatch, WalkingPedestrian, World
 from simscen.core.geometry import Polygon, Pose2
 from simscen.core.geometry.shapes import Body, MotionPath
 from simscen.core.messages.goals import Goal
@@ -214,7 +214,7 @@ class LiveStage:
         kind = EventKind.ROBOT_PUSHED if name is None else EventKind.OBJECT_PUSHED
         (self.record_event if name is None else self.record_world_event)(Event(0, kind, name or "", data))
 
-    def add_friction_patch(self, name: str, patch: Patch) -> None:
+    def add_friction_patch(self, name: str, patch: FloorPatch) -> None:
         self._simulation.add_friction_patch(name, patch)
         outline: list[Value] = [[round(x, 3), round(y, 3)] for x, y in patch.outline]
         data: dict[str, Value] = {"outline": outline, "friction": patch.friction}

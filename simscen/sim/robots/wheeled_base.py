@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simscen.core.geometry import Pose2, Pose3, Vector, rotated
+from simscen.core.geometry import Pose2, Pose3, Vector, rotate_vector
 from simscen.core.geometry.shapes import Solid, Sphere
 from simscen.sim.body.robot_body import RobotBody
 from simscen.sim.body.undercarriage import Wheel, caster_gap, casters_for_uneven_ground
@@ -101,11 +101,11 @@ class WheeledBase:
         (px, py, pz), quaternion = pybullet.getBasePositionAndOrientation(self.id, self._client)
         (vx, vy, vz), angular = pybullet.getBaseVelocity(self.id, self._client)
         if self._is_aligned:
-            x, y, z = rotated(quaternion, self._center)
+            x, y, z = rotate_vector(quaternion, self._center)
             pose = _new(Pose3, (px - x, py - y, pz - z, *quaternion))
         else:
             pose = Pose3(px, py, pz, *quaternion).compose(self._center_from_base)
-            x, y, z = rotated(pose.quaternion, self._center)
+            x, y, z = rotate_vector(pose.quaternion, self._center)
         wx, wy, wz = angular
         linear = (vx - (wy * z - wz * y), vy - (wz * x - wx * z), vz - (wx * y - wy * x))
         return _new(RobotState, (pose, linear, angular))
@@ -114,7 +114,7 @@ class WheeledBase:
         """Set the friction of each wheel to the value that `friction` returns at the wheel's (x, y)."""
         base = self.state().pose
         for link, position in self._wheels.items():
-            x, y, _ = rotated(base.quaternion, position)
+            x, y, _ = rotate_vector(base.quaternion, position)
             value = friction(base.x + x, base.y + y)
             if value != self._frictions[link]:
                 self._frictions[link] = value

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from simscen.core.environment.world_model import Patch
+from simscen.core.environment.world_model import FloorPatch
 from simscen.core.geometry import Array, Pose2, Pose3
 from simscen.core.geometry.meshes import drivable_solids, is_convex, submesh
 from simscen.core.geometry.polygons import polygon_contains
@@ -104,7 +104,7 @@ class FloorFriction:
     """
 
     def __init__(self) -> None:
-        self._patches: dict[str, tuple[Patch, tuple[float, float, float, float]]] = {}
+        self._patches: dict[str, tuple[FloorPatch, tuple[float, float, float, float]]] = {}
         """Patches with their bounding boxes (min x, min y, max x, max y) in m, by name, oldest first."""
         self._has_expired = False
 
@@ -112,7 +112,7 @@ class FloorFriction:
         """Whether a patch exists or has existed, so that the friction of wheels must be updated."""
         return bool(self._patches) or self._has_expired
 
-    def add(self, name: str, patch: Patch) -> None:
+    def add(self, name: str, patch: FloorPatch) -> None:
         """Add a patch; replaces a patch of the same name."""
         xs, ys = zip(*patch.outline, strict=True)
         self._patches.pop(name, None)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from embreex import rtcore_scene
 
 from simscen.core.decorators import cached_on_instance
-from simscen.core.geometry import Array, Pose3, Vector, rotated
+from simscen.core.geometry import Array, Pose3, Vector, rotate_vector
 from simscen.core.geometry.ray_fans import ALL_PACKETS, PACKET_SIZE, Float32Array, RayFan, RayPackets
 from simscen.core.geometry.shapes import Mesh, TriangleMesh
 
@@ -168,7 +168,7 @@ class MovingMesh:
     def center(self) -> Vector:
         """Center of the scene in the world frame."""
         x, y, z, i, j, k, w = self.pose
-        p, q, r = rotated((i, j, k, w), self.scene.center)
+        p, q, r = rotate_vector((i, j, k, w), self.scene.center)
         return x + p, y + q, z + r
 
     @cached_property
@@ -193,8 +193,8 @@ class MovingMesh:
         (px, py, pz, *_), (ahead, left), (x, y, z, i, j, k, w) = pose, axes, self.pose
         inverse = -i, -j, -k, w
         for packets in packets_towards_sphere(fan, pose, self.center, self.scene.radius):
-            fan.set_directions(rotated(inverse, ahead), rotated(inverse, left), packets)
-            self.scene.sweep(fan, rotated(inverse, (px - x, py - y, pz - z)), packets)
+            fan.set_directions(rotate_vector(inverse, ahead), rotate_vector(inverse, left), packets)
+            self.scene.sweep(fan, rotate_vector(inverse, (px - x, py - y, pz - z)), packets)
 
 
 def packets_towards_sphere(fan: RayFan, pose: Pose3, center: Vector, radius: float) -> list[slice]:
@@ -202,7 +202,7 @@ def packets_towards_sphere(fan: RayFan, pose: Pose3, center: Vector, radius: flo
     (x, y, z), (px, py, pz, i, j, k, w) = center, pose
     offset = x - px, y - py, z - pz
     distance = math.hypot(*offset)
-    ahead, left, _ = rotated((-i, -j, -k, w), offset)
+    ahead, left, _ = rotate_vector((-i, -j, -k, w), offset)
     tangent_length = math.sqrt(distance * distance - radius * radius) if distance > radius else -math.inf
     cone = fan.rays_towards(ahead, left, tangent_length)
     ends = fan.rays.lengths

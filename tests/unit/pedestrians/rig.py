@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from simscen.core.environment.world_model import PedestrianAction, WalkingPedestrian
+from simscen.core.environment.world_model import PedestrianEvent, WalkingPedestrian
 from simscen.core.geometry import Pose2
 from simscen.pedestrians.crowd import Crowd
 from simscen.pedestrians.surroundings import ObservedRobot, Surroundings, WallMap
@@ -42,16 +42,16 @@ def robot(
     return ObservedRobot(name, Pose2(x, y, yaw), velocity, radius, SQUARE * radius / 0.2)
 
 
-def walk(crowd: Crowd, seconds: float, *robots: ObservedRobot) -> tuple[dict[str, np.ndarray], list[PedestrianAction]]:
+def walk(crowd: Crowd, seconds: float, *robots: ObservedRobot) -> tuple[dict[str, np.ndarray], list[PedestrianEvent]]:
     """Everybody's x, y, yaw at each step, the first before it; and what they did. Robots drive on as they do."""
     tracks = {name: [pose] for name, pose in crowd.poses().items()}
-    deeds: list[PedestrianAction] = []
+    events: list[PedestrianEvent] = []
     for number in range(round(seconds / STEP)):
         now = tuple(_driven(one, number * STEP) for one in robots)
-        deeds += crowd.step(Surroundings(now), STEP)
+        events += crowd.step(Surroundings(now), STEP)
         for name, pose in crowd.poses().items():
             tracks[name].append(pose)
-    return {name: np.array(track) for name, track in tracks.items()}, deeds
+    return {name: np.array(track) for name, track in tracks.items()}, events
 
 
 def _driven(one: ObservedRobot, seconds: float) -> ObservedRobot:

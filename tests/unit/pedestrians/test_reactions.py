@@ -35,8 +35,12 @@ def test_impassive_pedestrians_treat_the_robot_as_an_object():
 
 def test_surprised_pedestrians_stop_and_look_for_a_limited_time():
     crowd = people(walker("anna", 8.0, 1.0, (-9.0, 1.0), **SURPRISED))
-    tracks, deeds = walk(crowd, 45.0, robot(0.0, 0.0))
-    assert [(deed.what, deed.about) for deed in deeds] == [("reacted", ""), ("calmed", ""), ("reached", "1")]
+    tracks, events = walk(crowd, 45.0, robot(0.0, 0.0))
+    assert [(event.kind, event.goal_or_robot) for event in events] == [
+        ("reacted", ""),
+        ("calmed", ""),
+        ("reached", "1"),
+    ]
     anna = tracks["anna"]
     begun = int(np.argmax(gaps(anna) <= 4.0))
     standing = slice(begun + 80, begun + int(29.0 / STEP))
@@ -48,8 +52,8 @@ def test_surprised_pedestrians_stop_and_look_for_a_limited_time():
 
 def test_curious_pedestrians_approach_and_leave():
     crowd = people(walker("anna", 7.0, 3.0, (7.0, -9.0), yaw=math.pi, **CURIOUS))
-    tracks, deeds = walk(crowd, 45.0, robot(0.0, 0.0))
-    assert [deed.what for deed in deeds] == ["reacted", "calmed", "reached"]
+    tracks, events = walk(crowd, 45.0, robot(0.0, 0.0))
+    assert [event.kind for event in events] == ["reacted", "calmed", "reached"]
     near = gaps(tracks["anna"])
     assert 1.1 < near.min() <= 1.5
     assert near[600] < 1.6 and gaps(tracks["anna"], 7.0, -9.0)[-1] < 0.4
@@ -58,8 +62,8 @@ def test_curious_pedestrians_approach_and_leave():
 def test_scared_pedestrians_keep_away_from_a_standing_robot():
     """Their goal is behind the robot; the tolerance is their stopping distance."""
     crowd = people(walker("anna", 9.0, 0.0, (-9.0, 0.0), **SCARED))
-    tracks, deeds = walk(crowd, 60.0, robot(0.0, 0.0))
-    assert deeds[0].what == "reacted" and gaps(tracks["anna"]).min() > 2.2
+    tracks, events = walk(crowd, 60.0, robot(0.0, 0.0))
+    assert events[0].kind == "reacted" and gaps(tracks["anna"]).min() > 2.2
 
 
 def test_scared_pedestrians_flee_from_a_slow_robot():
@@ -71,10 +75,10 @@ def test_scared_pedestrians_flee_from_a_slow_robot():
 
 def test_threatening_pedestrians_block_the_robot():
     crowd = people(walker("anna", 1.0, 3.0, (1.0, -9.0), **THREATENING))
-    tracks, deeds = walk(crowd, 20.0, robot(0.0, 0.0, 0.0, 0.2))
+    tracks, events = walk(crowd, 20.0, robot(0.0, 0.0, 0.0, 0.2))
     ahead = tracks["anna"][:, 0] - np.arange(len(tracks["anna"])) * STEP * 0.2
     blocking = slice(100, 400)
-    assert deeds[0].what == "reacted"
+    assert events[0].kind == "reacted"
     assert ahead[blocking] == pytest.approx(1.1, abs=0.25)
     assert np.abs(tracks["anna"][blocking, 1]).max() < 0.1
 
@@ -103,8 +107,8 @@ def test_pedestrians_do_not_walk_into_a_visible_robot():
 
 def test_pedestrians_avoid_all_robots_and_react_to_the_nearest():
     crowd = people(walker("anna", 0.0, 0.0, (0.0, 0.0), **SURPRISED))
-    _, deeds = walk(crowd, 1.0, robot(3.0, 0.5, name="far"), robot(2.0, 0.5, name="near"))
-    assert [deed.about for deed in deeds if deed.what == "reacted"] == ["near"]
+    _, events = walk(crowd, 1.0, robot(3.0, 0.5, name="far"), robot(2.0, 0.5, name="near"))
+    assert [event.goal_or_robot for event in events if event.kind == "reacted"] == ["near"]
 
 
 def test_pedestrians_walk_around_objects():

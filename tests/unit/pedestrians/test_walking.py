@@ -131,7 +131,7 @@ def test_pedestrians_do_not_walk_through_walls_or_each_other():
 def test_goals_are_visited_once_in_a_loop_or_back_and_forth():
     def reached(repeat: str) -> list[str]:
         crowd = people(walker("anna", 0.0, 0.0, (2.0, 0.0), (2.0, 2.0), (0.0, 2.0), repeat=repeat))
-        return [deed.about for deed in walk(crowd, 20.0)[1]]
+        return [event.goal_or_robot for event in walk(crowd, 20.0)[1]]
 
     assert reached("once") == ["1", "2", "3"]
     assert reached("loop")[:7] == ["1", "2", "3", "1", "2", "3", "1"]
@@ -139,8 +139,8 @@ def test_goals_are_visited_once_in_a_loop_or_back_and_forth():
 
 
 def test_pedestrian_stays_at_the_last_goal():
-    tracks, deeds = walk(people(walker("anna", 0.0, 0.0, (3.0, 0.0))), 12.0)
-    assert [deed.what for deed in deeds] == ["reached"]
+    tracks, events = walk(people(walker("anna", 0.0, 0.0, (3.0, 0.0))), 12.0)
+    assert [event.kind for event in events] == ["reached"]
     assert tracks["anna"][-1, :2] == pytest.approx([3.0, 0.0], abs=0.06)
     assert tracks["anna"][-1, 0] == tracks["anna"][-20, 0]
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from simulation_helpers import box, robot_spec
 
-from simscen.core.environment.world_model import Patch, disc_outline
+from simscen.core.environment.world_model import FloorPatch, disc_outline
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.sim.body.from_spec import build_robot_body
@@ -25,7 +25,7 @@ WHOLE_FLOOR = square(-50, -50, 50, 50)
 def test_four_braked_wheels_slide_for_v_squared_over_2_mu_g(simulate, friction):
     simulation = simulate("jackal", drive=(1.0, 0.0, 0.0))
     simulation.step(3 * TICKS)
-    simulation.add_friction_patch("ice", Patch(WHOLE_FLOOR, friction))
+    simulation.add_friction_patch("ice", FloorPatch(WHOLE_FLOOR, friction))
     start, speed = simulation.truth().pose.x, simulation.truth().twist.vx
     rolled = simulation.encoders()[0]
     simulation.drive(STOP)
@@ -39,7 +39,7 @@ def test_four_braked_wheels_slide_for_v_squared_over_2_mu_g(simulate, friction):
 
 def test_spinning_wheels_accelerate_by_mu_g_and_odometry_counts_the_spin(simulate):
     simulation = simulate("jackal")
-    simulation.add_friction_patch("ice", Patch(WHOLE_FLOOR, 0.05))
+    simulation.add_friction_patch("ice", FloorPatch(WHOLE_FLOOR, 0.05))
     simulation.drive(Twist(2.0, 0.0, 0.0))
     simulation.step(2 * TICKS)
     assert simulation.truth().pose.x == pytest.approx(0.05 * GRAVITY_M_S2 * 2**2 / 2, rel=0.05)
@@ -49,7 +49,7 @@ def test_spinning_wheels_accelerate_by_mu_g_and_odometry_counts_the_spin(simulat
 def test_braking_with_one_side_on_oil_turns_the_robot(simulate):
     simulation = simulate("jackal", drive=(1.5, 0.0, 0.0))
     simulation.step(2 * TICKS)
-    simulation.add_friction_patch("oil", Patch(square(-50, 0, 50, 50), 0.05))
+    simulation.add_friction_patch("oil", FloorPatch(square(-50, 0, 50, 50), 0.05))
     simulation.drive(STOP)
     simulation.step(TICKS)
     assert simulation.truth().pose.yaw < -math.radians(5)  # towards the side with grip
@@ -57,13 +57,13 @@ def test_braking_with_one_side_on_oil_turns_the_robot(simulate):
 
 def test_newer_friction_patch_covers_older_ones_and_ends(simulate):
     simulation = simulate("turtlebot")
-    simulation.add_friction_patch("wet", Patch(WHOLE_FLOOR, 0.3))
-    simulation.add_friction_patch("oil", Patch(disc_outline((0.0, 0.0), 1.0), 0.1, until=24))
+    simulation.add_friction_patch("wet", FloorPatch(WHOLE_FLOOR, 0.3))
+    simulation.add_friction_patch("oil", FloorPatch(disc_outline((0.0, 0.0), 1.0), 0.1, until=24))
     floor = simulation._scene.floor
     assert (floor.friction(0.5, 0.0), floor.friction(2.0, 0.0), floor.friction(99.0, 0.0)) == (0.1, 0.3, 1.0)
     simulation.step(25)
     assert floor.friction(0.5, 0.0) == 0.3
-    simulation.add_friction_patch("wet", Patch(WHOLE_FLOOR, 1.0))
+    simulation.add_friction_patch("wet", FloorPatch(WHOLE_FLOOR, 1.0))
     simulation.step(1)
     assert floor.friction(0.5, 0.0) == 1.0
 
@@ -71,7 +71,7 @@ def test_newer_friction_patch_covers_older_ones_and_ends(simulate):
 @pytest.mark.parametrize("robot", ["turtlebot", "jackal", "car", "omni"])
 def test_distant_friction_patch_does_not_change_the_motion(simulate, robot):
     poses = []
-    for patches in ([], [Patch(square(20, 20, 21, 21), 0.1)]):
+    for patches in ([], [FloorPatch(square(20, 20, 21, 21), 0.1)]):
         simulation = simulate(robot, drive=(0.4, 0.0, 0.3), pose=Pose2(0.1, 0.2, 0.3))
         for patch in patches:
             simulation.add_friction_patch("oil", patch)
@@ -87,7 +87,7 @@ def test_hull_slides_along_wall_by_coulombs_law(simulate, share):
     reach = max(x for x, _ in body.footprint)
     wall = box("wall", 1.0, 0.0, 1.0, 20.0)
     simulation = simulate(body, solids=[wall], pose=Pose2(0.5 - reach - 0.001, 0.0, 0.0))
-    simulation.add_friction_patch("ice", Patch(WHOLE_FLOOR, 0.0))
+    simulation.add_friction_patch("ice", FloorPatch(WHOLE_FLOOR, 0.0))
     pressing = 0.5 * body.mass * GRAVITY_M_S2
     along = share * body.hull_friction * pressing
 
@@ -117,7 +117,7 @@ def test_motors_of_planar_base_overcome_friction_of_hull_below_one(simulate, fri
 def test_planar_base_at_rest_on_ice_is_pushed_away(simulate):
     simulation = simulate("omni")
     simulation.step(TICKS)
-    simulation.add_friction_patch("ice", Patch(WHOLE_FLOOR, 0.0))
+    simulation.add_friction_patch("ice", FloorPatch(WHOLE_FLOOR, 0.0))
     simulation.step(1)
     simulation.push_robot((20.0, 0.0))
     simulation.step(TICKS)
@@ -128,7 +128,7 @@ def test_casters_glide_without_friction(simulate):
     """A robot with its wheels on ice keeps its speed, although its hull has friction."""
     simulation = simulate("turtlebot", drive=(0.4, 0.0, 0.0))
     simulation.step(2 * TICKS)
-    simulation.add_friction_patch("ice", Patch(WHOLE_FLOOR, 0.0))
+    simulation.add_friction_patch("ice", FloorPatch(WHOLE_FLOOR, 0.0))
     simulation.drive(STOP)
     simulation.step(2 * TICKS)
     assert simulation.truth().twist.vx == pytest.approx(0.4, abs=0.005)
