@@ -27,7 +27,7 @@ class Action(ABC):
 
     @property
     def is_robot_specific(self) -> bool:
-        """Whether a scenario with several robots must name the robot of this action (key `robot`)."""
+        """Whether this action concerns one robot: with several robots, the scenario must name it (key `robot`)."""
         return True
 
     @abstractmethod
@@ -70,7 +70,7 @@ class AnyAction(Choice):
     mark: Annotated[Action | None, LazySpec("simscen.actions.mark", "Mark")] = None
 
     robot: RobotName | None = None
-    """The robot that the action is for, if there are several; default: the only one."""
+    """The robot that the action concerns, if there are several robots; default: the only robot."""
 
     def may_do(self, *kinds: str) -> bool:
         """Return whether the action has one of the YAML keys `kinds`, or is from a plug-in, whose effect is unknown."""
@@ -101,28 +101,29 @@ def _perform_plugin_action(action: Action, stage: Stage, origin: str) -> Effect:
     effect: object = action.perform(cast(Stage, observed))
     if not isinstance(effect, Effect) or not isinstance(effect.happened, bool) or not isinstance(effect.what, str):
         raise RunError(BROKEN_COMPONENT, f"an action returned {effect!r}, which is not an Effect{origin}")
-    if effect.happened and not observed.changed:
+    if effect.happened and not observed.was_changed:
         raise RunError(BROKEN_COMPONENT, f"an action returned the effect `{effect.what}`, but changed nothing{origin}")
     return effect
 
 
 class _ObservedStage:
-    """Wrapper of a stage, and of the stages of other robots that it returns.
+    """Wrapper of a stage that records whether an action changes anything through it.
 
-    `changed` becomes true when a member of any of them is used that is not read-only.
+    The stages of other robots, which `of` returns, are wrapped as well.
     """
 
     def __init__(self, stage: Stage) -> None:
-        self._stage, self._others, self._used = stage, list[_ObservedStage](), False
+        self._stage, self._others, self._was_changed = stage, list[_ObservedStage](), False
 
     @property
-    def changed(self) -> bool:
-        return self._used or any(other.changed for other in self._others)
+    def was_changed(self) -> bool:
+        """Whether a member that is not in _READ_ONLY_MEMBERS was used, of this stage or a stage of another robot."""
+        return self._was_changed or any(other.was_changed for other in self._others)
 
     def of(self, robot: str) -> Stage:
         self._others.append(_ObservedStage(self._stage.of(robot)))
         return cast(Stage, self._others[-1])
 
     def __getattr__(self, name: str) -> Any:
-        self._used = self._used or name not in _READ_ONLY_MEMBERS
+        self._was_changed = self._was_changed or name not in _READ_ONLY_MEMBERS
         return getattr(self._stage, name)

@@ -17,7 +17,7 @@ from simscen.spec.quantities import PositiveDuration, Ratio
 SWING_SEGMENTS = 16
 """Number of straight segments that approximate the arc of a swinging door."""
 TRAVEL_TOLERANCE = 1e-6
-"""Remaining fraction of a door's full travel below which the door counts as at its target."""
+"""Remaining fraction of a door's full travel below which the door has reached its target."""
 
 
 class OpenDoor(Spec, WorldAction):
@@ -92,6 +92,6 @@ def _travel_fraction(start: Pose2, end: Pose2, closed: Pose2, opened: Pose2) -> 
 
 
 def _interpolate(start: Pose2, end: Pose2, fraction: float) -> Pose2:
-    """Return the pose at `fraction` (0 to 1) of the straight way from `start` to `end`, with the shorter rotation."""
+    """Return the pose after `fraction` (0 to 1) of a straight motion from `start` to `end`, by the shorter rotation."""
     x, y = start.x + fraction * (end.x - start.x), start.y + fraction * (end.y - start.y)
     return Pose2(x, y, wrap(start.yaw + fraction * wrap(end.yaw - start.yaw)))

@@ -72,9 +72,9 @@ class Spawn(ShapedObject, Action):
 
 
 def pose_on_plan(plan: Path, robot: Pose2, distance: float) -> Pose2:
-    """Return the pose that is `distance` m ahead along `plan`, counted from the point of its line nearest to the robot.
+    """Return the pose on `plan` that is `distance` m beyond the point of the plan nearest to the robot.
 
-    The heading is the direction of the plan. If the plan is shorter, the pose is at its end.
+    The heading is the direction of the plan. If the plan ends before, the pose is at the end of the plan.
     """
     points = plan.points[:, :2]
     steps = np.hypot(*np.diff(points, axis=0).T)
@@ -103,7 +103,7 @@ class Remove(Spec, WorldAction):
     """The object to remove."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Remove the object; has no effect if it does not exist."""
+        """Remove the object. Has no effect if the object does not exist."""
         if stage.object(self.name) is None:
             return Effect(False, f"there is nothing called {self.name}")
         stage.remove(self.name)
@@ -123,12 +123,12 @@ class Move(Motion, WorldAction):
     """The object to move."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Start the motion. Has no effect if the object does not exist, or if it rests at all its waypoints."""
+        """Start the motion. Has no effect if the object does not exist, or is at rest and already at all waypoints."""
         pose = stage.object(self.name)
         if pose is None:
             return Effect(False, f"there is nothing called {self.name}")
         path = self.path(pose)
-        if stage.motion(self.name) is None and all(is_same_pose(pose, each) for each in path.poses):
+        if stage.motion(self.name) is None and all(is_same_pose(pose, waypoint) for waypoint in path.poses):
             return Effect(False, f"{self.name} is already at its waypoint")
         stage.move(self.name, path)
         return Effect(True, f"moved {self.name}")
@@ -149,7 +149,7 @@ class Teleport(Spec, WorldAction):
     """New pose in the world frame, or a place by name."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Move the object. Has no effect if it does not exist, or if it is already there and no script moves it."""
+        """Move the object. Has no effect if the object does not exist, or is at rest and already at the new pose."""
         current, target = stage.object(self.name), self.pose.pose
         if current is None:
             return Effect(False, f"there is nothing called {self.name}")
@@ -163,8 +163,8 @@ class Teleport(Spec, WorldAction):
 class Stop(Spec, WorldAction):
     """Stop a moving object, pedestrian, or door. With `for`, an object or door continues its motion after this time.
 
-    Use it for a person who stops in front of the robot, a cart that waits, or a door that jams. A pedestrian can only
-    be stopped for good, without `for`.
+    Use this action for a person who stops in front of the robot, a cart that waits, or a door that jams. A pedestrian
+    can only be stopped for good, without `for`.
 
     Example: `do: {stop: {name: cart, for: 3 s}}`
     """
@@ -175,7 +175,7 @@ class Stop(Spec, WorldAction):
     """Duration of the stop; default: until another action moves the object."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Stop the object; has no effect if it does not exist, if no script moves it, or if it stands longer anyway."""
+        """Stop the object. Has no effect if it does not exist, if no script moves it, or if it already stops longer."""
         pose, motion = stage.object(self.name), stage.motion(self.name)
         if pose is None:
             return Effect(False, f"there is nothing called {self.name}")

@@ -25,7 +25,7 @@ MEAN_SPEED_M_S, SPEED_STD_M_S = 1.29, 0.19
 """Mean and standard deviation of preferred walking speeds (Moussaïd et al. 2009)."""
 MAX_SPEED_STDS = 2.0
 """Maximum deviation of a preferred speed from the mean, in standard deviations."""
-REACTIONS: dict[str, tuple[float, float]] = {
+REACTION_DEFAULTS: dict[str, tuple[float, float]] = {
     "surprised": (4.0, 30.0),
     "curious": (10.0, 30.0),
     "scared": (3.0, 40.0),
@@ -33,7 +33,7 @@ REACTIONS: dict[str, tuple[float, float]] = {
 }
 """Defaults of `reacts_within` (m) and `reacts_for` (s) by `behavior`, as in the behavior trees of HuNavSim."""
 MAX_DRAWS = 200
-"""Maximum number of random points to try in a region. If none is free, the region counts as full."""
+"""Maximum number of random points to try in a region. If none of the points is free, the region counts as full."""
 GROUP_HALF_WIDTH_M = 1.0
 """Maximum initial distance from the first member of a group to another member, along x and along y."""
 INITIAL_CLEARANCE_M = 0.1
@@ -68,11 +68,11 @@ class _WalkSettings(Spec):
     @model_validator(mode="after")
     def _check_reaction(self) -> _WalkSettings:
         given = [name for name in ("reacts_within", "reacts_for") if getattr(self, name) is not None]
-        if given and self.behavior not in REACTIONS:
+        if given and self.behavior not in REACTION_DEFAULTS:
             raise ValueError(f"`{given[0]}` has no effect with `behavior: {self.behavior}`, which does not react")
         if self.behavior == "scared" and self.reacts_for is not None:
             raise ValueError("`reacts_for` has no effect with `behavior: scared`, which does not end")
-        if self.behavior in REACTIONS and "robots" in self.blind_to:
+        if self.behavior in REACTION_DEFAULTS and "robots" in self.blind_to:
             raise ValueError(f"`behavior: {self.behavior}` contradicts `blind_to: [robots]`")
         return self
 
@@ -80,7 +80,7 @@ class _WalkSettings(Spec):
         self, stage: Stage, name: str, pose: Pose2, goals: tuple[Point, ...], group: str | None
     ) -> WalkingPedestrian:
         """Return a pedestrian with these settings. Members of a `group` (None: no group) have the same random speed."""
-        reaction_distance, reaction_time = REACTIONS.get(self.behavior, (0.0, 0.0))
+        reaction_distance, reaction_time = REACTION_DEFAULTS.get(self.behavior, (0.0, 0.0))
         return WalkingPedestrian(
             name=name,
             pose=pose,
@@ -141,7 +141,7 @@ class Crowd(_WalkSettings, WorldAction):
     """
 
     name: Name
-    """Common name, to which a number from 1 is appended."""
+    """Common name of the people. A number from 1 is appended for each person."""
     count: Annotated[int, Field(ge=1, le=500)]
     """Number of people."""
     start: RegionName
@@ -163,14 +163,17 @@ class Crowd(_WalkSettings, WorldAction):
                 group_start = None
             rng = stage.rng(f"person {self.names[index]}, start")
             start = _draw_point(stage, rng, stage.region(self.start), self.radius, near=group_start)
-            full_region = self.start if start is None else self._add(stage, index, start)
+            full_region = self.start if start is None else self._add_person(stage, index, start)
             if full_region is not None:
                 return Effect(False, f"added only {index} of {self.count} people: no more free space in {full_region}")
             group_start = group_start or start
         return Effect(True, f"added {self.count} people in {self.start}")
 
-    def _add(self, stage: Stage, index: int, start: Point) -> str | None:
-        """Add the person with this index at `start`; or return the name of a goal region that has no free space."""
+    def _add_person(self, stage: Stage, index: int, start: Point) -> str | None:
+        """Add the person with this index at `start`, and return None.
+
+        If a goal region has no free space, add nobody, and return the name of this region.
+        """
         name, group = self.names[index], None
         if self.group_size > 1:
             group = f"{self.name} group {index // self.group_size + 1}"
@@ -199,7 +202,7 @@ def _draw_point(
     """Return a random point inside the polygon `corners` with room for a pedestrian; None if none was found.
 
     radius:      radius of the pedestrian in m
-    near:        point from which it is at most GROUP_HALF_WIDTH_M away along x and along y; default: anywhere
+    near:        center of a square with sides of 2 GROUP_HALF_WIDTH_M that limits the result; None: no limit
     walls_only:  whether only walls count as obstacles
     """
     if near is None:
@@ -217,5 +220,6 @@ def _draw_point(
 
 
 def _draw_speed(rng: np.random.Generator) -> float:
+    """Return a random preferred speed in m/s."""
     draw = float(rng.standard_normal())
     return MEAN_SPEED_M_S + SPEED_STD_M_S * max(-MAX_SPEED_STDS, min(MAX_SPEED_STDS, draw))

@@ -33,7 +33,8 @@ class FrictionPatch(Spec, WorldAction):
     radius: PositiveLength | None = None
     """Radius of the disc."""
     name: PlaceName = "patch"
-    """Name of the disc. It replaces an earlier disc of this name, so discs that exist together need different names."""
+    """Name of the disc. A disc replaces an earlier disc of the same name, so discs that exist together need different
+    names."""
     value: Friction
     """Coefficient of friction between the floor and rubber wheels; 1 is dry concrete."""
     for_: PositiveDuration | None = Field(default=None, alias="for")
@@ -58,7 +59,7 @@ class FrictionPatch(Spec, WorldAction):
             name, outline, where = self.name, disc_outline((x, y), self.radius), f"around ({x:g}, {y:g})"
         until = math.inf if self.for_ is None else stage.tick + stage.clock.ticks(self.for_)
         stage.add_friction_patch(name, FloorPatch(outline, self.value, until))
-        return Effect(True, f"made the friction of the floor {where} {self.value:g}")
+        return Effect(True, f"set the friction of the floor {where} to {self.value:g}")
 
 
 class SwitchKeepout(Spec, Action):

@@ -17,7 +17,7 @@ from simscen.spec.quantities import Force, Impulse, PositiveAngle, PositiveDurat
 class Kidnap(Spec, Action):
     """Move the robot to another pose, at rest, without informing its stack. For objects, use `teleport`.
 
-    Use it for a robot that is carried away and for testing relocalization.
+    Use this action for a robot that somebody carries away, and to test relocalization.
 
     Example: `do: {kidnap: {pose: {x: 2, y: 3, yaw: 90 deg}}}`
     """
@@ -26,7 +26,7 @@ class Kidnap(Spec, Action):
     """New pose in the world frame, or a place by name."""
 
     def perform(self, stage: Stage) -> Effect:
-        """Move the robot; has no effect if it is already there."""
+        """Move the robot. Has no effect if the robot is already at the new pose."""
         current, target = stage.robot, self.pose.pose
         if is_same_pose(current, target):
             return Effect(False, "the robot was already there")
@@ -38,8 +38,8 @@ class Kidnap(Spec, Action):
 class Push(Spec, Action):
     """Push the robot, or an object with a mass, at its center: with an impulse, or with a force for a duration.
 
-    Use an `impulse` for a person who bumps into the robot. Use a `force` for a person who leans on it, a slope, or a
-    gust of wind.
+    Use an `impulse` for a person who bumps into the robot. Use a `force` for a person who leans on the robot, for a
+    slope, or for a gust of wind.
 
     Example: `do: {push: {force: [0, 20], for: 1.5 s}}`
     """
@@ -91,7 +91,7 @@ class NewGoal(Spec, Action):
     """
 
     name: Name
-    """Name of the goal, which no other goal may have."""
+    """Name of the goal. It must differ from the names of all other goals."""
     pose: PlaceOrPose
     """Pose in the map frame, or a place by name."""
     timeout: PositiveDuration | None = None
