@@ -24,7 +24,9 @@ MAX_STACK_NAME_COLUMNS = 16
 
 
 Links = Mapping[tuple[str, str, int], str]
-"""Path of the replay or log of each failed run, or command to repeat it, by stack or session, scenario ID, and seed."""
+"""Path of the replay or log of each failed run, or the command that repeats the run, by (stack, scenario ID, seed).
+
+If sessions are compared, the name of the session takes the place of the stack."""
 NO_LINKS: Links = {}
 
 
@@ -36,9 +38,9 @@ def comparison_lines(comparison: Comparison, prefix: str = "", columns: int | No
     """
     yield ()
     yield from _outcome_table(comparison, prefix, columns)
-    for against in comparison.against:
+    for baseline_comparison in comparison.baseline_comparisons:
         yield ()
-        yield from _comparison_section(comparison.baseline, against, prefix)
+        yield from _comparison_section(comparison.baseline, baseline_comparison, prefix)
     yield ()
 
 
@@ -47,35 +49,41 @@ def session_comparison_lines(comparison: Comparison, links: Links, is_worse: boo
 
     `is_worse` states whether the session is significantly worse than the baseline.
     """
-    (against,) = comparison.against
-    yield from _comparison_section(comparison.baseline, with_changed_metrics(against), "", links)
+    (baseline_comparison,) = comparison.baseline_comparisons
+    yield from _comparison_section(comparison.baseline, with_changed_metrics(baseline_comparison), "", links)
     yield from _outcome_table(comparison, "", None, changed_only=True)
     yield (StyledText(""),)
-    newly_fails = any(flip.failed == against.stack for flip in against.flips)
-    is_doubtful = newly_fails or against.error_pairs or not against.pairs
+    newly_fails = any(flip.failed == baseline_comparison.stack for flip in baseline_comparison.flips)
+    is_doubtful = newly_fails or baseline_comparison.error_pairs or not baseline_comparison.pairs
     yield (
-        StyledText(session_conclusion(against, is_worse), "bad" if is_worse else "warning" if is_doubtful else "good"),
+        StyledText(
+            session_conclusion(baseline_comparison, is_worse),
+            "bad" if is_worse else "warning" if is_doubtful else "good",
+        ),
     )
 
 
-def with_changed_metrics(against: BaselineComparison) -> BaselineComparison:
+def with_changed_metrics(baseline_comparison: BaselineComparison) -> BaselineComparison:
     """Return the comparison without metrics that are equal in all pairs of runs."""
     return replace(
-        against,
-        differences=tuple(difference for difference in against.differences if difference.equal < difference.pairs),
+        baseline_comparison,
+        differences=tuple(
+            difference for difference in baseline_comparison.differences if difference.equal < difference.pairs
+        ),
     )
 
 
-def session_conclusion(against: BaselineComparison, is_worse: bool) -> str:
-    """Return whether a session is significantly worse than the baseline, and otherwise how many runs newly fail."""
-    if not against.pairs:
-        return f"nothing was compared: {', '.join(_exclusions(against)) or 'there are no runs'}"
-    newly_failed = sum(flip.failed == against.stack for flip in against.flips)
+def session_conclusion(baseline_comparison: BaselineComparison, is_worse: bool) -> str:
+    """Return a sentence on whether a session is significantly worse than the baseline; if not, on newly failed runs."""
+    if not baseline_comparison.pairs:
+        return f"nothing was compared: {', '.join(_exclusions(baseline_comparison)) or 'there are no runs'}"
+    newly_failed = sum(flip.failed == baseline_comparison.stack for flip in baseline_comparison.flips)
     if is_worse:
-        return f"{against.stack} is significantly worse"
+        return f"{baseline_comparison.stack} is significantly worse"
     runs = "1 run fails that passed" if newly_failed == 1 else f"{newly_failed} runs fail that passed"
     more = f"; {runs} before, which may be chance" if newly_failed else ""
-    return f"{against.stack} is not significantly worse in {number_with_noun(against.pairs, 'pair')}{more}"
+    pairs = number_with_noun(baseline_comparison.pairs, "pair")
+    return f"{baseline_comparison.stack} is not significantly worse in {pairs}{more}"
 
 
 def outcome_text(outcomes: OutcomeCounts) -> str:
@@ -84,37 +92,36 @@ def outcome_text(outcomes: OutcomeCounts) -> str:
     return f"{outcomes.passed}/{outcomes.decided}{errors}"
 
 
-def exclusion_notes(against: BaselineComparison) -> list[str]:
-    """Return notes on pairs with different arrivals, on pairs with an error, and on runs without a partner."""
+def exclusion_notes(baseline_comparison: BaselineComparison) -> list[str]:
+    """Return notes on pairs in which only one run arrived, pairs with an error, and runs without a partner."""
     notes = []
-    if against.pairs_with_different_arrivals:
-        pairs = number_with_noun(against.pairs_with_different_arrivals, "pair")
-        notes.append(f"the arrivals differ in {pairs}, so only their collisions are compared")
-    excluded = _exclusions(against)
+    if baseline_comparison.pairs_with_different_arrivals:
+        pairs = number_with_noun(baseline_comparison.pairs_with_different_arrivals, "pair")
+        notes.append(f"only collisions are compared in {pairs}: only one run reached the last goal")
+    excluded = _exclusions(baseline_comparison)
     return [*notes, f"left out: {', '.join(excluded)}"] if excluded else notes
 
 
-def _exclusions(against: BaselineComparison) -> list[str]:
+def _exclusions(baseline_comparison: BaselineComparison) -> list[str]:
     excluded = []
-    if against.error_pairs:
-        excluded.append(f"{number_with_noun(against.error_pairs, 'pair')} with an error")
-    if against.unpaired_runs:
-        excluded.append(f"{number_with_noun(against.unpaired_runs, 'run')} without a partner")
+    if baseline_comparison.error_pairs:
+        excluded.append(f"{number_with_noun(baseline_comparison.error_pairs, 'pair')} with an error")
+    if baseline_comparison.unpaired_runs:
+        excluded.append(f"{number_with_noun(baseline_comparison.unpaired_runs, 'run')} without a partner")
     return excluded
 
 
-def comparison_headline(baseline: str, against: BaselineComparison) -> str:
+def comparison_headline(baseline: str, baseline_comparison: BaselineComparison) -> str:
     """Return the result of the comparison in one line: pairs, better and worse outcomes, p-value."""
-    better = sum(flip.passed == against.stack for flip in against.flips)
-    worse = len(against.flips) - better
-    text = (
-        f"{against.stack} against {baseline}: {number_with_noun(against.pairs, 'pair')} of the same scenario and seed"
-    )
-    if not against.pairs:
-        return f"{against.stack} against {baseline}: nothing to compare"
-    if not against.flips:
-        return f"{text}, all with equal outcomes"
-    return f"{text}, {better} better, {worse} worse (p = {against.p:.2g})"
+    better = sum(flip.passed == baseline_comparison.stack for flip in baseline_comparison.flips)
+    worse = len(baseline_comparison.flips) - better
+    names = f"{baseline_comparison.stack} against {baseline}"
+    if not baseline_comparison.pairs:
+        return f"{names}: nothing to compare"
+    pairs = f"{number_with_noun(baseline_comparison.pairs, 'pair')} of the same scenario and seed"
+    if not baseline_comparison.flips:
+        return f"{names}: {pairs}, all with equal outcomes"
+    return f"{names}: {pairs}, {better} better, {worse} worse (p = {baseline_comparison.p:.2g})"
 
 
 def change_text(change: ScenarioChange, prefix: str = "") -> str:
@@ -137,8 +144,8 @@ def change_direction(change: ScenarioChange) -> str:
 def difference_cells(metric: MetricDifference) -> tuple[str, str, str, str, str, str]:
     """Return the cells of a row of the table of metrics as text.
 
-    They are: name and unit, mean of the baseline, mean of the other stack, difference, its 95 % interval ("" if
-    unknown), and the numbers of pairs with a lower, equal, and higher value.
+    The cells are: name and unit, mean of the baseline, mean of the other stack, difference, 95 % interval of the
+    difference ("" if unknown), and the numbers of pairs with a lower, equal, and higher value.
     """
     digits = 3 if metric.unit and max(abs(metric.baseline), abs(metric.value)) < 1 else 2
     return (
@@ -167,72 +174,77 @@ def _outcome_table(
     if len(comparison.outcomes) > 1 or not rows:
         rows.append(("all", [outcome_text(comparison.total(name)) for name in comparison.stacks]))
     headings = [shorten(name) for name in comparison.stacks]
-    widths = [max([len(head), *(len(cells[number]) for _, cells in rows)]) + 3 for number, head in enumerate(headings)]
+    widths = [
+        max([len(heading), *(len(cells[column]) for _, cells in rows)]) + 3 for column, heading in enumerate(headings)
+    ]
     available = None if columns is None else max(MIN_NAME_COLUMNS, columns - 2 - sum(widths))
     names = [shorten(name, available) if available else name for name, _ in rows]
     longest = max(len(name) for name in ("passed", *names))
 
-    def row(name: str, cells: Sequence[str]) -> str:
+    def format_row(name: str, cells: Sequence[str]) -> str:
         return f"  {name:{longest}}" + "".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
 
-    yield (StyledText(row("passed", headings), "quiet"),)
+    yield (StyledText(format_row("passed", headings), "quiet"),)
     for name, (_, cells) in zip(names, rows, strict=True):
-        yield (StyledText(row(name, cells)),)
+        yield (StyledText(format_row(name, cells)),)
     if any(row[name].errors for row in comparison.outcomes.values() for name in row):
         yield (StyledText("  ! = runs with errors, which are not counted", "quiet"),)
 
 
 def _comparison_section(
-    baseline: str, against: BaselineComparison, prefix: str, links: Links = NO_LINKS
+    baseline: str, baseline_comparison: BaselineComparison, prefix: str, links: Links = NO_LINKS
 ) -> Iterator[StyledLine]:
-    yield (StyledText(f"  {comparison_headline(baseline, against)}", "name"),)
-    for flip in against.flips[:MAX_FLIPS]:
-        better = flip.passed == against.stack
+    yield (StyledText(f"  {comparison_headline(baseline, baseline_comparison)}", "name"),)
+    for flip in baseline_comparison.flips[:MAX_FLIPS]:
+        is_better = flip.passed == baseline_comparison.stack
         yield (
             StyledText("    "),
-            StyledText("better" if better else "worse ", "good" if better else "bad"),
+            StyledText("better" if is_better else "worse ", "good" if is_better else "bad"),
             StyledText(f" {one_line(flip.scenario.removeprefix(prefix))}, seed {flip.seed}: "),
             StyledText(one_line(f"passed with {flip.passed}, failed with {flip.failed}: {flip.why}"), "quiet"),
         )
         if link := links.get((flip.failed, flip.scenario, flip.seed)):
             yield (StyledText(f"           {link}"),)
-    if len(against.flips) > MAX_FLIPS:
-        yield (StyledText(f"    and {len(against.flips) - MAX_FLIPS} more, in the JSON results", "quiet"),)
-    yield from _metric_table(baseline, against)
-    yield from _change_lines(against, prefix)
-    for note in exclusion_notes(against):
+    if len(baseline_comparison.flips) > MAX_FLIPS:
+        yield (StyledText(f"    and {len(baseline_comparison.flips) - MAX_FLIPS} more, in the JSON results", "quiet"),)
+    yield from _metric_table(baseline, baseline_comparison)
+    yield from _change_lines(baseline_comparison, prefix)
+    for note in exclusion_notes(baseline_comparison):
         yield (StyledText(f"    {note}", "quiet"),)
 
 
-def _change_lines(against: BaselineComparison, prefix: str) -> Iterator[StyledLine]:
-    if not against.changes:
+def _change_lines(baseline_comparison: BaselineComparison, prefix: str) -> Iterator[StyledLine]:
+    if not baseline_comparison.changes:
         return
     yield (StyledText("    significant changes", "quiet"),)
     roles: dict[str, Role] = {"worse": "bad", "better": "good", "other": "plain"}
-    for change in against.changes[:MAX_CHANGES]:
+    for change in baseline_comparison.changes[:MAX_CHANGES]:
         direction = change_direction(change)
         yield (
             StyledText("    "),
             StyledText(f"{direction:6}", roles[direction]),
             StyledText(f" {one_line(change_text(change, prefix))}"),
         )
-    if len(against.changes) > MAX_CHANGES:
-        yield (StyledText(f"    and {len(against.changes) - MAX_CHANGES} more, in the JSON results", "quiet"),)
-
-
-def _metric_table(baseline: str, against: BaselineComparison) -> Iterator[StyledLine]:
-    if not against.differences:
-        return
-    stacks = shorten(baseline), shorten(against.stack)
-    head = ("mean over pairs", *stacks, "difference", "95 % interval", "-/=/+")
-    rows = [difference_cells(difference) for difference in against.differences]
-    columns = list(zip(head, *rows, strict=True))
-    widths = [max(map(len, column)) for column in columns]
-    for number, row in enumerate((head, *rows)):
-        first, *cells = (
-            f"{cell:{'>' if place else ''}{width}}" for place, (cell, width) in enumerate(zip(row, widths, strict=True))
+    if len(baseline_comparison.changes) > MAX_CHANGES:
+        yield (
+            StyledText(f"    and {len(baseline_comparison.changes) - MAX_CHANGES} more, in the JSON results", "quiet"),
         )
-        yield (StyledText(f"    {'  '.join((first, *cells))}".rstrip(), "plain" if number else "quiet"),)
+
+
+def _metric_table(baseline: str, baseline_comparison: BaselineComparison) -> Iterator[StyledLine]:
+    if not baseline_comparison.differences:
+        return
+    stacks = shorten(baseline), shorten(baseline_comparison.stack)
+    headings = ("mean over pairs", *stacks, "difference", "95 % interval", "-/=/+")
+    rows = [difference_cells(difference) for difference in baseline_comparison.differences]
+    columns = list(zip(headings, *rows, strict=True))
+    widths = [max(map(len, column)) for column in columns]
+    for number, row in enumerate((headings, *rows)):
+        cells = (
+            f"{cell:{'>' if column else ''}{width}}"
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        yield (StyledText(f"    {'  '.join(cells)}".rstrip(), "plain" if number else "quiet"),)
 
 
 def shorten(text: str, max_length: int = MAX_STACK_NAME_COLUMNS) -> str:

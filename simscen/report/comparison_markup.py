@@ -45,10 +45,11 @@ def comparison_html(comparison: Comparison) -> str:
     )
     total = "".join(_outcome_cell(comparison.total(name)) for name in comparison.stacks)
     total_row = f"<tr><td><b>all</b></td>{total}</tr>" if len(comparison.outcomes) > 1 else ""
+    sections = (_comparison_section_html(comparison.baseline, each) for each in comparison.baseline_comparisons)
     return (
         f'<section class="in"><h2>{html_text(" and ".join(comparison.stacks))}</h2><p class="quiet">{EXPLANATION}</p>'
         f"<table><tr><th>passed</th>{names}</tr>{rows}{total_row}</table>"
-        f"{''.join(_comparison_section_html(comparison.baseline, against) for against in comparison.against)}</section>"
+        f"{''.join(sections)}</section>"
     )
 
 
@@ -57,10 +58,10 @@ def session_comparison_markdown(comparison: Comparison, links: Links, is_worse: 
 
     `is_worse` states whether the session is significantly worse than the baseline.
     """
-    (against,) = comparison.against
-    reduced = replace(comparison, against=(with_changed_metrics(against),))
+    (baseline_comparison,) = comparison.baseline_comparisons
+    reduced = replace(comparison, baseline_comparisons=(with_changed_metrics(baseline_comparison),))
     return [
-        f"### simscen: {session_conclusion(against, is_worse)}",
+        f"### simscen: {session_conclusion(baseline_comparison, is_worse)}",
         *comparison_markdown(reduced, links, changed_only=True),
     ]
 
@@ -78,26 +79,27 @@ def comparison_markdown(comparison: Comparison, links: Links = NO_LINKS, changed
         ("all", {name: comparison.total(name) for name in comparison.stacks}),
     ]
     lines += [f"| {cell(name)} | {' | '.join(outcome_text(row[stack]) for stack in row)} |" for name, row in rows]
-    for against in comparison.against:
-        lines += ["", f"**{cell(comparison_headline(comparison.baseline, against))}**", ""]
+    for baseline_comparison in comparison.baseline_comparisons:
+        lines += ["", f"**{cell(comparison_headline(comparison.baseline, baseline_comparison))}**", ""]
         lines += [
             f"- {cell(flip.scenario)}, seed {flip.seed}: passed with {cell(flip.passed)}, failed with "
             f"{cell(flip.failed)}: {cell(flip.why)}{_link_markdown(flip, links)}"
-            for flip in against.flips[:MAX_FLIPS]
+            for flip in baseline_comparison.flips[:MAX_FLIPS]
         ]
-        more = len(against.flips) - MAX_FLIPS
+        more = len(baseline_comparison.flips) - MAX_FLIPS
         lines += [f"- and {more} more, in the JSON results"] if more > 0 else []
-        if against.differences:
-            heads = [cell(head.format(comparison.baseline, against.stack)) for head in _HEADINGS]
+        if baseline_comparison.differences:
+            heads = [cell(head.format(comparison.baseline, baseline_comparison.stack)) for head in _HEADINGS]
             lines += ["", f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
-        lines += [f"| {' | '.join(_metric_cells(difference))} |" for difference in against.differences]
-        lines += ["", "Significant changes:", ""] if against.changes else []
+        lines += [f"| {' | '.join(_metric_cells(difference))} |" for difference in baseline_comparison.differences]
+        lines += ["", "Significant changes:", ""] if baseline_comparison.changes else []
         lines += [
-            f"- {change_direction(change)}: {cell(change_text(change))}" for change in against.changes[:MAX_CHANGES]
+            f"- {change_direction(change)}: {cell(change_text(change))}"
+            for change in baseline_comparison.changes[:MAX_CHANGES]
         ]
-        more = len(against.changes) - MAX_CHANGES
+        more = len(baseline_comparison.changes) - MAX_CHANGES
         lines += [f"- and {more} more significant changes, in the JSON results"] if more > 0 else []
-        lines += [f"\n{cell(note)}" for note in exclusion_notes(against)]
+        lines += [f"\n{cell(note)}" for note in exclusion_notes(baseline_comparison)]
     return [*lines, "", EXPLANATION]
 
 
@@ -120,26 +122,26 @@ def _outcome_cell(outcomes: OutcomeCounts) -> str:
     return f'<td class="count {css_class}">{outcome_text(outcomes)}</td>'
 
 
-def _comparison_section_html(baseline: str, against: BaselineComparison) -> str:
+def _comparison_section_html(baseline: str, baseline_comparison: BaselineComparison) -> str:
     flips = "".join(
-        f'<tr class="{"" if flip.passed == against.stack else "bad"}">'
-        f"<td>{'better' if flip.passed == against.stack else 'worse'}</td><td>{html_text(flip.scenario)}</td>"
-        f"<td>seed {flip.seed}</td>"
+        f'<tr class="{"" if flip.passed == baseline_comparison.stack else "bad"}">'
+        f"<td>{'better' if flip.passed == baseline_comparison.stack else 'worse'}</td>"
+        f"<td>{html_text(flip.scenario)}</td><td>seed {flip.seed}</td>"
         f"<td>passed with {html_text(flip.passed)}, failed with {html_text(flip.failed)}</td>"
         f"<td>{html_text(flip.why)}</td></tr>"
-        for flip in against.flips
+        for flip in baseline_comparison.flips
     )
-    _, *headings = (html_text(head.format(baseline, against.stack)) for head in _HEADINGS)
+    _, *headings = (html_text(head.format(baseline, baseline_comparison.stack)) for head in _HEADINGS)
     heads = "<th></th>" + "".join(f'<th class="margin">{head}</th>' for head in headings)
-    rows = "".join(_metric_row_html(difference) for difference in against.differences)
+    rows = "".join(_metric_row_html(difference) for difference in baseline_comparison.differences)
     changes = "".join(
         f'<tr class="{"bad" if change.is_worse else ""}"><td>{change_direction(change)}</td>'
         f"<td>{html_text(change_text(change))}</td></tr>"
-        for change in against.changes
+        for change in baseline_comparison.changes
     )
-    notes = "".join(f'<p class="quiet">{html_text(note)}</p>' for note in exclusion_notes(against))
+    notes = "".join(f'<p class="quiet">{html_text(note)}</p>' for note in exclusion_notes(baseline_comparison))
     return (
-        f"<h3>{html_text(comparison_headline(baseline, against))}</h3>"
+        f"<h3>{html_text(comparison_headline(baseline, baseline_comparison))}</h3>"
         + (f"<table>{flips}</table>" if flips else "")
         + (f"<table><tr>{heads}</tr>{rows}</table>" if rows else "")
         + (f"<table><tr><th colspan='2'>significant changes</th></tr>{changes}</table>" if changes else "")

@@ -164,8 +164,8 @@ def wrap_line(line: StyledLine, columns: int | None) -> list[StyledLine]:
 def _continuation_indent(line: StyledLine) -> int:
     """Return the indentation of the second and further lines of a wrapped line.
 
-    If the first part is a label that ends with a space, such as "      again ", this is the width of the label.
-    Otherwise, it is two columns more than the indentation of the first line.
+    If the first part is a label that ends with a space, such as "      again ", return the width of the label.
+    Otherwise, return the indentation of the first line plus two columns.
     """
     first = line[0].text
     if first.strip() and first.endswith(" "):
@@ -192,19 +192,19 @@ class _LineWrapper:
         return self._lines
 
     def _add_part(self, part: StyledText, reserved: int) -> None:
-        """Add a part to the current line or the next one. Keep `reserved` columns free for punctuation behind it."""
+        """Add a part to the current line or the next one. Keep `reserved` columns free after it for punctuation."""
         text = part.text
         if self._used_columns + display_width(text.rstrip()) + reserved <= self._columns:
             self._append(part, text)
         elif text.startswith("  ") and self._indent + display_width(text.strip()) + reserved <= self._columns:
             self._start_line(part, text.strip())
         else:
-            for blank, word, last in _words(part):
-                tail = reserved if last else len(_LINE_CONTINUATION) if part.is_shell else 0
-                if self._used_columns + display_width(blank + word) + tail <= self._columns or not self._used_columns:
+            for blank, word, is_last in _words(part):
+                free = reserved if is_last else len(_LINE_CONTINUATION) if part.is_shell else 0
+                if self._used_columns + display_width(blank + word) + free <= self._columns or not self._used_columns:
                     self._append(part, blank + word)
                 else:
-                    self._start_line(part, word, tail)
+                    self._start_line(part, word, free)
 
     def _append(self, part: StyledText, text: str) -> None:
         """Append `text` in the style of `part` to the current line."""
@@ -212,7 +212,7 @@ class _LineWrapper:
         self._used_columns += display_width(text)
 
     def _start_line(self, part: StyledText, text: str, reserved: int = 0) -> None:
-        """Start the next line with `text` in the style of `part`. Keep `reserved` columns free behind it.
+        """Start the next line with `text` in the style of `part`. Keep `reserved` columns free after the text.
 
         If the text does not fit, the indentation is reduced.
         """
@@ -230,10 +230,10 @@ class _LineWrapper:
 
 
 def _words(part: StyledText) -> Iterator[tuple[str, str, bool]]:
-    """Yield for each word of a part: the spaces before the word, the word, and whether the word is the last one."""
-    found = (_SHELL_WORD if part.is_shell else _WORD).findall(part.text)
-    for number, (blank, word) in enumerate(found, start=1):
-        yield blank, word, number == len(found)
+    """Yield (spaces before the word, word, True if it is the last word) for each word of a part."""
+    words = (_SHELL_WORD if part.is_shell else _WORD).findall(part.text)
+    for number, (blank, word) in enumerate(words, start=1):
+        yield blank, word, number == len(words)
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,9 @@ from simscen.report.violations import (
 MAX_PICTURES = 10
 """Maximum number of pictures in the summary."""
 MAX_ROWS, MAX_TABLE_BYTES = 1000, 2**19
-"""Maximum number of runs in the summary, and maximum size of their rows; GitHub refuses a summary of over 1 MiB."""
+"""Maximum number of runs in the summary, and maximum size of all rows together.
+
+GitHub refuses a summary of more than 1 MiB."""
 
 
 class GitHubReporter(Reporter):
@@ -62,14 +64,18 @@ def annotations(run: RunFinished) -> list[str]:
     A run has one annotation per violation, and one for its error. A skipped run or an expected failure has one notice.
     """
     name = short_run_name(run.key)
-    if excuse := reason_without_failure(run):
-        line = next((each.line for each in failed_violations(run)), 0)
-        return [_workflow_command("notice", run, line, name, excuse)]
+    if reason := reason_without_failure(run):
+        line = next((violation.line for violation in failed_violations(run)), 0)
+        return [_workflow_command("notice", run, line, name, reason)]
     lines = [
         _workflow_command(
-            "warning" if each.is_warning else "error", run, each.line, name, "\n".join((each.message, *each.detail))
+            "warning" if violation.is_warning else "error",
+            run,
+            violation.line,
+            name,
+            "\n".join((violation.message, *violation.detail)),
         )
-        for each in reported_violations(run)
+        for violation in reported_violations(run)
     ]
     if run.outcome is Outcome.ERROR:
         lines.append(_workflow_command("error", run, 0, name, error_summary(run)))
@@ -124,8 +130,8 @@ def _reason_cell(run: RunFinished) -> str:
     """Return a table cell: the error, violated criteria, why a failure does not count, or the tightest margin."""
     if run.outcome is Outcome.ERROR:
         return markdown_cell(error_summary(run))
-    if excuse := reason_without_failure(run):
-        return markdown_cell(excuse)
+    if reason := reason_without_failure(run):
+        return markdown_cell(reason)
     messages = [markdown_cell(violation.message) for violation in reported_violations(run)]
     tightest = tightest_margin(run.result.verdicts)
     return "<br>".join(messages) if messages or not tightest else f"tightest: {markdown_cell(tightest)}"

@@ -27,14 +27,15 @@ from simscen.report.journal_reader import (
 )
 
 BLOCK_BYTES = 1 << 20
-"""Size of the blocks in which the last line break of a journal is searched."""
+"""Size of the blocks in which a journal is read backward to find its last line break."""
 
 
 class Journal:
     """Writes the events of a session to events.jsonl in `folder`, and locks this folder until `close`.
 
-    With `resume`, lines are appended to an existing journal. With `sync`, each line is flushed to the disk, so that it
-    survives a crash of the machine. If a line cannot be written, for example because the disk is full, `error` is set.
+    With `resume`, lines are appended to an existing journal. With `sync`, each line is flushed to the disk, so that the
+    line survives a crash of the machine. If a line cannot be written, for example because the disk is full, `error` is
+    the exception; otherwise None.
 
     Raises UsageError if another process has locked the folder, or if a journal exists and `resume` is false. Raises
     OSError if the file cannot be opened.
@@ -82,9 +83,9 @@ class Journal:
         self._write({"event": "planned", **facts, "runs": [planned_run_to_data(run) for run in runs]})
 
     def add(self, runs: Sequence[PlannedRun], version: str, workers: int, study: StudyPlan) -> None:
-        """Write a line with the next runs of a study: the line of `plan` for the first runs, later a shorter line.
+        """Write a line with the next runs of a study. The first call writes the line of `plan`.
 
-        `study` is the plan of the study with these runs. The other parameters are those of `plan`.
+        `study` is the plan of the study, including these runs. The other parameters are as in `plan`.
         """
         first = len(self._numbers)
         if not first:
@@ -125,7 +126,7 @@ class Journal:
         size = os.fstat(self._file).st_size
         try:
             unwritten = memoryview(data)
-            while unwritten:  # if the disk is full, a part is written first, and the next call raises the error
+            while unwritten:  # on a full disk, os.write first writes only a part, and the next call raises the error
                 unwritten = unwritten[os.write(self._file, unwritten) :]
             if self._sync:
                 os.fdatasync(self._file)
@@ -137,7 +138,7 @@ class Journal:
 
 
 def _truncate_to_complete_lines(file: int) -> int:
-    """Remove an incomplete last line, which a killed process left, and return the remaining size in bytes."""
+    """Remove an incomplete last line, as a killed process leaves it, and return the remaining size in bytes."""
     full_size = size = os.fstat(file).st_size
     while size:
         start = max(0, size - BLOCK_BYTES)

@@ -18,7 +18,7 @@ from simscen.report.display_text import relative_path, relative_to_cwd
 
 JOURNAL_FILE = "events.jsonl"
 JOURNAL_FORMAT = 2
-"""Version of the format. Journals with other versions are refused."""
+"""Version of the format of the journal. Journals with other versions are refused."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +97,7 @@ def finished_run_from_data(data: dict[str, Any], folder: Path) -> RunFinished:
 
 
 AnyRun = TypeVar("AnyRun", PlannedRun, RunFinished)
+"""A run that has the path `file` of its scenario."""
 
 
 @dataclass(frozen=True)
@@ -109,8 +110,8 @@ class JournaledSession:
         shard: (i, n): the session ran part i of n of the selected scenarios; (1, 1) for all of them.
         planned: All runs of the session in order.
         finished: Finished runs by key.
-        started: Keys of runs that started, whether or not they finished.
-        wall: Wall time in s from the start of the session to its end, or to the last line if it did not end.
+        started: Keys of all runs that started, finished or not.
+        wall: Wall time in s from the start of the session to its end; to the last line if the session did not end.
         interrupted: Whether the session was interrupted, or has runs that are not finished.
         study: Plan of the study, for a session of `simscen study`; None for other sessions.
     """
@@ -153,7 +154,7 @@ class JournaledSession:
 def read_journal(folder: Path) -> JournaledSession:
     """Read the last session of the journal in `folder`. Raises InvalidInput if there is no valid journal."""
     if not (folder / JOURNAL_FILE).is_file():
-        hint = "name the folder that `simscen run` wrote, e.g. simscen-out/latest"
+        hint = "use the output folder of `simscen run`, such as simscen-out/latest"
         message = f"the folder has no {JOURNAL_FILE}" if folder.is_dir() else "no such folder"
         raise _invalid_journal(folder, message, hint)
     try:
@@ -176,7 +177,7 @@ def _last_session_lines(folder: Path) -> Iterator[dict[str, Any]]:
     with (folder / JOURNAL_FILE).open("rb") as file:
         start, position = None, 0
         for line in file:
-            # The text may also be part of a name, so only the parsed line decides.
+            # The text "planned" can also be part of a name, so the line must be parsed.
             if b'"planned"' in line and line.endswith(b"\n") and json.loads(line)["event"] == "planned":
                 start = position
             position += len(line)
@@ -197,11 +198,16 @@ def session_process(folder: Path) -> int | None:
 
 
 class _SessionReader:
-    """Reads the lines of one session. `first` is the first line with the planned runs, `folder` the output folder."""
+    """Reads the lines of one session.
+
+    `first` is the first line of the session, which has the planned runs. `folder` is the output folder. Raises
+    InvalidInput if the journal has another format.
+    """
 
     def __init__(self, first: dict[str, Any], folder: Path) -> None:
         if first["format"] != JOURNAL_FORMAT:
-            raise ValueError(f"it has format {first['format']}; this version reads {JOURNAL_FORMAT}")
+            message = f"the journal has format {first['format']}; this version of simscen reads format {JOURNAL_FORMAT}"
+            raise _invalid_journal(folder / JOURNAL_FILE, message)
         self._first, self._last, self._folder = {**first, "runs": None}, first, folder
         self._cwd = first.get("cwd", "")
         self._study = first.get("study")
@@ -243,7 +249,7 @@ class _SessionReader:
 
 
 def _relocate(run: AnyRun, cwd: str) -> AnyRun:
-    """Return the run with its path `file` relative to the current working folder instead of the folder `cwd`."""
+    """Return the run with the path `file` relative to the current working folder instead of the folder `cwd`."""
     return replace(run, file=intern(relative_to_cwd(run.file, cwd)))
 
 

@@ -27,11 +27,11 @@ def short_log_line(run: RunFinished, name: str) -> StyledLine:
     """Return a line with the outcome of a log, its length in s, and its error, first violation, or tightest margin."""
     if run.outcome is Outcome.ERROR:
         return (*_outcome_and_length(run.result, name), StyledText(f"   {error_summary(run)}", "warning"))
-    if excuse := reason_without_failure(run):
-        return (*_outcome_and_length(run.result, name), StyledText(f"   {excuse}", "quiet"))
+    if reason := reason_without_failure(run):
+        return (*_outcome_and_length(run.result, name), StyledText(f"   {reason}", "quiet"))
     tightest = one_line(tightest_margin(run.result.verdicts))
-    reason = first_violation(run) or (f"tightest: {tightest}" if tightest else "")
-    return (*_outcome_and_length(run.result, name), StyledText(f"   {reason}".rstrip(), "quiet"))
+    note = first_violation(run) or (f"tightest: {tightest}" if tightest else "")
+    return (*_outcome_and_length(run.result, name), StyledText(f"   {note}".rstrip(), "quiet"))
 
 
 def margin_table(runs: Sequence[tuple[str, RunFinished]]) -> Iterator[StyledLine]:
@@ -93,7 +93,7 @@ def _margin_cell(result: RunResult, verdict_id: str) -> str:
 
 
 def _margin_text(margin: float, unit: str) -> str:
-    """Format a margin with its sign. Counts become integers; other margins are shown as zero only if they are zero."""
+    """Format a margin with its sign. Counts become integers. A small margin is never rounded to zero."""
     if not unit and margin == round(margin):
         return f"{margin:+.0f}"
     return f"{margin:+.2f} {unit}".rstrip() if margin == 0 or abs(margin) >= 0.005 else f"{margin:+.1g} {unit}".rstrip()

@@ -38,8 +38,8 @@ def xml_parts(
 ) -> Iterator[bytes]:
     """Yield the document in UTF-8 in consecutive parts, to save memory. Runs are sorted by file and key.
 
-    `name` is the name of `testsuites`. For a `study` with a claim (a minimum pass rate to show), the document has one
-    testcase for the claim, and one for each run that could not be completed.
+    `name` is the attribute `name` of the root element. For a `study` with a claim (a minimum pass rate to show), the
+    document has one testcase for the claim, and one for each run that could not be completed.
     """
     root = Element("testsuites", {"name": escape_control(name)})
     ordered = in_order(runs)
@@ -82,7 +82,10 @@ def _add_counts(counts: dict[str, float], run: RunFinished) -> None:
 
 
 def _set_sums(element: Element, counts: Collection[dict[str, float]]) -> None:
-    """Set the attributes of an element to sums, except `skipped`, which the root element must not have."""
+    """Set the attributes of an element to the sums of `counts`, except `skipped`, which the root element must not have.
+
+    `counts` are the values of _COUNTS of several testsuites.
+    """
     for name in ("tests", "failures", "errors"):
         element.set(name, str(sum(each[name] for each in counts)))
     element.set("time", f"{sum(each['time'] for each in counts):.3f}")
@@ -120,8 +123,8 @@ def _claim_xml(root: Element, study: Study, claim: ClaimResult, runs: Sequence[R
     for run in incomplete:
         _add_case(suite, run, unique_name(_case_name(run), used_names, " #"), family)
     is_refuted = claim.status is ClaimStatus.REFUTED
-    is_open = claim.status in (ClaimStatus.UNDECIDED, ClaimStatus.BLOCKED)
-    counts = {"tests": 1 + len(incomplete), "failures": int(is_refuted), "errors": is_open + len(incomplete)}
+    is_error = claim.status in (ClaimStatus.UNDECIDED, ClaimStatus.BLOCKED)
+    counts = {"tests": 1 + len(incomplete), "failures": int(is_refuted), "errors": is_error + len(incomplete)}
     for element in (root, suite):
         _set_sums(element, [{**counts, "time": sum(run.wall for run in runs)}])
     suite.set("skipped", "0")
@@ -200,7 +203,7 @@ def _details(run: RunFinished) -> str:
 
 
 def _system_out(run: RunFinished) -> str:
-    """Return a line for each warning, disturbance, and artifact. Jenkins and GitLab attach the artifacts."""
+    """Return a line for each warning, disturbance, and artifact. Jenkins and GitLab attach the artifacts to the run."""
     warnings = [violation for violation in reported_violations(run) if violation.is_warning]
     lines = [f"{source_location(run, warning.line)}: warning: {warning.message}" for warning in warnings]
     files = (run.artifacts.picture, run.artifacts.replay, run.artifacts.mcap, run.artifacts.result)

@@ -59,8 +59,8 @@ class ProgressEstimate:
         if self._total < 2:
             return ""
         seconds = self.remaining_s
-        rest = "" if seconds is None else f", about {_round_duration(seconds)} left"
-        return f"{self._finished} of {self._total}{rest}"
+        estimate = "" if seconds is None else f", about {_round_duration(seconds)} left"
+        return f"{self._finished} of {self._total}{estimate}"
 
     @property
     def remaining_s(self) -> float | None:
@@ -100,7 +100,7 @@ class ColorReporter(PlainReporter):
 
 
 class LiveReporter(Reporter):
-    """Prints lines in color, and below them a line for each current run, which is updated in place.
+    """Prints lines in color. Below these lines, one line for each current run is updated in place.
 
     `slow` is the number of slowest runs to list at the end (0: all runs, None: no list).
     """
@@ -110,7 +110,7 @@ class LiveReporter(Reporter):
         self._live = Live(console=self._console, refresh_per_second=8, transient=True)
         self._formatter = SessionFormatter(slow, lambda: style.columns)
         self._estimate = ProgressEstimate(monotonic)
-        self._running: dict[RunKey, tuple[RunStarted, float]] = {}
+        self._running: dict[RunKey, tuple[RunStarted, float]] = {}  # start event and simulated time in s
 
     def __enter__(self) -> "LiveReporter":
         self._live.start()

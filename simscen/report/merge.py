@@ -28,7 +28,7 @@ def read_shards(folders: Sequence[Path], allow_missing: bool) -> dict[Path, Jour
     first = next(iter(sessions.values()))
     for folder, session in sessions.items():
         if session.version != first.version:
-            message = f"it was written by simscen {session.version}, the first shard by {first.version}"
+            message = f"this shard was written by simscen {session.version}, but the first shard by {first.version}"
             problems.append(_shard_problem(folder, message))
         for run in session.planned:
             if folders_by_key.setdefault(run.key, folder) != folder:

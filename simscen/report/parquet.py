@@ -30,8 +30,8 @@ def write_parquet(folder: Path, runs: Sequence[RunFinished], values: Mapping[Run
     folder.mkdir(parents=True, exist_ok=True)
     ordered = in_order(runs)
     metrics = sorted({name for run in ordered for name in run.result.metrics})
-    paths = sorted({path for own in values.values() for path in own})
-    numeric = {path for path in paths if all(_is_number(own[path]) for own in values.values() if path in own)}
+    paths = sorted({path for run_values in values.values() for path in run_values})
+    numeric = {path for path in paths if all(_is_number(each[path]) for each in values.values() if path in each)}
     tables = {
         RUNS_FILE: pa.schema([
             *_fields(pa, "run:int64 scenario:string variation:string seed:int64 stack:string outcome:string"),

@@ -48,7 +48,7 @@ def _json_text(data: dict[str, Any]) -> str:
     return json.dumps(data, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False)
 
 
-def as_document(runs: Sequence[RunFinished]) -> dict[str, Any]:
+def results_document(runs: Sequence[RunFinished]) -> dict[str, Any]:
     """Return the document of `json_parts` as data instead of text, without a comparison or a study."""
     ordered = in_order(runs)
     return {**_document(ordered, None, None), "runs": [_run_data(run, "") for run in ordered]}
@@ -88,11 +88,11 @@ def summaries_by_stack(runs: Iterable[RunFinished]) -> dict[str, SessionSummary]
 
     The second runs of --check-determinism do not count.
     """
-    figures_by_stack: dict[str, SessionSummaryBuilder] = {}
+    builders: dict[str, SessionSummaryBuilder] = {}
     for run in runs:
         if not run.key.is_repetition:
-            figures_by_stack.setdefault(run.key.stack_name, SessionSummaryBuilder()).add(run.result)
-    return {stack: figures.summary() for stack, figures in figures_by_stack.items()}
+            builders.setdefault(run.key.stack_name, SessionSummaryBuilder()).add(run.result)
+    return {stack: builder.summary() for stack, builder in builders.items()}
 
 
 def in_order(runs: Sequence[RunFinished]) -> RunStore:

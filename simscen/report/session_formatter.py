@@ -40,7 +40,7 @@ class SessionFormatter:
         self.naming = RunNaming()
         self._slow, self._columns = slow, columns
         self._runs = RunStore()
-        self._warned: set[str] = set()
+        self._printed_warnings: set[str] = set()
 
     def __call__(self, event: SessionEvent) -> list[StyledLine]:
         """Return the lines for an event, wrapped to the width of the terminal."""
@@ -55,9 +55,9 @@ class SessionFormatter:
                 self._runs.append(event)
                 if _error_kind(event) not in (INTERRUPTED, NOT_RUN):  # these runs are only counted at the end
                     yield from run_lines(event, self.naming)
-                    for text in event.warnings:  # of the external stack; each is printed once per session
-                        if text not in self._warned:
-                            self._warned.add(text)
+                    for text in event.warnings:  # the external stack can repeat a warning in each run
+                        if text not in self._printed_warnings:
+                            self._printed_warnings.add(text)
                             yield (StyledText(f"      warning: {one_line(text)}", "warning"),)
             case SessionFinished():
                 yield from self._final_lines(event)
@@ -101,7 +101,7 @@ NameOfRun = Callable[[RunKey], str]
 def failure_lines(runs: Sequence[RunFinished], name: NameOfRun) -> Iterator[StyledLine]:
     """Yield each run that did not pass, with its first violation or error, artifacts, and repeat command.
 
-    Yield nothing for a session with a single run. A run that --check-determinism repeated is listed once.
+    Yield nothing for a session with a single run. A run and its repetition by --check-determinism are listed once.
     """
     failed = {run.key for run in runs if not run.outcome.is_good}
     failures = [
@@ -131,7 +131,10 @@ def slowest_run_lines(runs: Sequence[RunFinished], max_count: int, name: NameOfR
 
 
 def determinism_lines(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
-    """Yield a statement whether the logs of runs that --check-determinism repeated are equal; nothing without logs."""
+    """Yield lines that state whether runs and their repetitions by --check-determinism have equal logs.
+
+    Yield nothing without repetitions or without logs.
+    """
     if not any(run.key.is_repetition for run in runs):
         return
     first_runs = {run.key: run for run in runs if not run.key.is_repetition}
@@ -151,14 +154,14 @@ def determinism_lines(runs: Sequence[RunFinished]) -> Iterator[StyledLine]:
 
 
 def _difference_text(pairs: Sequence[tuple[RunFinished, RunFinished]]) -> str:
-    """Return how much the runs of a pair differ over all pairs: verdicts, time to the goal, and path length."""
+    """Return how many pairs have equal verdicts, and the largest differences of time to the goal and path length."""
     equal = sum(_statuses(first) == _statuses(second) for first, second in pairs)
     parts = [f"verdicts equal in {equal} of {len(pairs)}"]
     for metric, name, unit in (("time_to_goal", "time to goal", "s"), ("path_length", "path length", "m")):
-        both = [(first.result.metrics.get(metric), second.result.metrics.get(metric)) for first, second in pairs]
-        gaps = [abs(a - b) for a, b in both if a is not None and b is not None]
-        if gaps:
-            parts.append(f"{name} differs by up to {max(gaps):.2f} {unit}")
+        values = [(first.result.metrics.get(metric), second.result.metrics.get(metric)) for first, second in pairs]
+        differences = [abs(a - b) for a, b in values if a is not None and b is not None]
+        if differences:
+            parts.append(f"{name} differs by up to {max(differences):.2f} {unit}")
     return ", ".join(parts)
 
 

@@ -75,23 +75,25 @@ def past_outcomes(run: RunFinished, past: Sequence[PastSession]) -> list[PastOut
 
 
 def outcome_change(run: RunFinished, past: Sequence[PastSession]) -> str:
-    """Return a text such as "failed before" if the run's outcome changed from good to bad or from bad to good.
+    """Return a text such as "failed before" if the outcome of the run changed from good to bad or from bad to good.
 
     Return "" if the outcome has not changed, or if no earlier session contains the run.
     """
-    before = changed_outcome(run, past_outcomes(run, past))
-    return "" if before is None else f"{before.value.replace('-', ' ')} before"
+    previous = changed_outcome(run, past_outcomes(run, past))
+    return "" if previous is None else f"{previous.value.replace('-', ' ')} before"
 
 
 def changed_outcome(run: RunFinished, past: Sequence[PastOutcome | None]) -> Outcome | None:
-    """Return the latest of the `past` outcomes, oldest first, if it was good and is now bad, or vice versa; else None.
+    """Return the previous outcome if the run was good and is now bad, or was bad and is now good; otherwise None.
 
-    Sessions that skipped the run are ignored. A run that is now skipped has not changed.
+    `past` are the outcomes in earlier sessions, oldest first, with None for a session without the run. Sessions that
+    skipped the run are ignored. A run that is now skipped has not changed.
     """
-    outcomes = (one.outcome for one in reversed(past) if one is not None)
-    before = next((outcome for outcome in outcomes if outcome is not Outcome.SKIPPED), None)
-    has_changed = before is not None and run.outcome is not Outcome.SKIPPED and before.is_good != run.outcome.is_good
-    return before if has_changed else None
+    outcomes = (earlier.outcome for earlier in reversed(past) if earlier is not None)
+    previous = next((outcome for outcome in outcomes if outcome is not Outcome.SKIPPED), None)
+    if previous is None or run.outcome is Outcome.SKIPPED:
+        return None
+    return previous if previous.is_good != run.outcome.is_good else None
 
 
 MAX_SEARCHED_SESSIONS = 50
@@ -128,19 +130,19 @@ def last_failed(folder: Path) -> frozenset[RunKey] | None:
     sessions = sessions_in(folder)
     if not sessions:
         return None
-    known: dict[RunKey, bool] = {}
+    latest: dict[RunKey, bool] = {}
     for session in islice(sessions, MAX_SEARCHED_SESSIONS):
         outcomes: dict[RunKey, bool] = {}
-        for key, good in _outcomes(session):
-            outcomes[key.original] = outcomes.get(key.original, True) and good
-        known = {**outcomes, **known}
-    return frozenset(key for key, good in known.items() if not good)
+        for key, is_good in _outcomes(session):
+            outcomes[key.original] = outcomes.get(key.original, True) and is_good
+        latest = {**outcomes, **latest}
+    return frozenset(key for key, is_good in latest.items() if not is_good)
 
 
 def _outcomes(session: Path) -> Iterator[tuple[RunKey, bool]]:
-    """Yield the key of each finished run and whether its outcome is good. Yield nothing for an invalid journal.
+    """Yield (key, True if the outcome is good) of each finished run. Yield nothing for an invalid journal.
 
-    For a run that was skipped or not finished, `last_failed` uses the outcome in an earlier session.
+    Runs that were skipped or not finished are omitted, so that `last_failed` uses their outcome in an earlier session.
     """
     try:
         runs = read_journal(session).runs

@@ -38,7 +38,12 @@ SYMBOLS: dict[Outcome, tuple[str, Role]] = {
 
 @dataclass(frozen=True)
 class RunNaming:
-    """Rule for short unique names of runs: with the seed if `has_seeds`, without the `prefix`, padded to `width`."""
+    """Rule for short unique names of runs.
+
+    has_seeds:  whether names contain the seed
+    prefix:     folder that is removed from the scenario ID
+    width:      number of characters to which names are padded
+    """
 
     has_seeds: bool = False
     prefix: str = ""
@@ -46,7 +51,7 @@ class RunNaming:
 
     @classmethod
     def for_session(cls, session: SessionStarted, columns: int | None = None) -> "RunNaming":
-        """Return the rule for a session. Names contain seeds if there are several.
+        """Return the rule for a session. Names contain the seed if the session has several seeds.
 
         `columns` is the width of the terminal; None for no limit.
         """
@@ -72,8 +77,8 @@ def _common_folder(ids: Sequence[str]) -> str:
     if len(ids) < 2:
         return ""
     first, last = min(ids), max(ids)
-    same = next((k for k, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), len(first))
-    return first[: first.rfind("/", 0, same) + 1]
+    common_length = next((k for k, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), len(first))
+    return first[: first.rfind("/", 0, common_length) + 1]
 
 
 def session_header(started: SessionStarted) -> StyledLine:
@@ -131,7 +136,7 @@ def session_footer(session: SessionFinished, unfinished: Mapping[str, int]) -> I
 
 
 def interruption_lines(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledLine]:
-    """Yield the last two lines of an interrupted session: outcomes, then report.html and --resume, if possible.
+    """Yield the last two lines of an interrupted session: outcomes, then the path of report.html and how to resume.
 
     `unfinished` is as in `outcome_counts`.
     """
@@ -148,8 +153,8 @@ def _page_link(session: SessionFinished) -> StyledLine:
 def outcome_counts(session: SessionFinished, unfinished: Mapping[str, int]) -> Iterator[StyledText]:
     """Yield the numbers of outcomes, for example "13 passed, 1 failed, 2 errors, 3 not run".
 
-    `unfinished` maps a description such as "not run" to the number of these runs. They are also part of
-    `session.errors`, but are not counted as errors here.
+    `unfinished` maps a description such as "not run" to the number of these runs. `session.errors` includes these runs,
+    but the yielded number of errors does not.
     """
     counts: list[tuple[int, str, Role]] = [
         (session.passed, "passed", "good"),
@@ -176,9 +181,9 @@ def _timing_and_junit(session: SessionFinished) -> Iterator[StyledText]:
 
 
 def _times_and_reason(run: RunFinished) -> tuple[StyledText, ...]:
-    """Return the times of a run, with the tightest margin if it passed, or the reason if it failed as expected.
+    """Return the times of a run, and the tightest margin of a passed run or the reason of an expected failure.
 
-    A skipped run has only a reason. An error before the simulation has its kind and the wall time.
+    For a skipped run, return only the reason. For an error before the simulation, return the kind and the wall time.
     """
     if run.outcome is Outcome.SKIPPED:
         return (StyledText(reason_without_failure(run), "quiet"),)
@@ -211,7 +216,7 @@ def _disturbance_lines(run: RunFinished) -> Iterator[StyledLine]:
 
 
 def artifact_lines(run: RunFinished) -> Iterator[StyledLine]:
-    """Yield the paths of replay and picture (without a picture, only of the log), and the command to repeat the run."""
+    """Yield the paths of replay and picture, and the command to repeat the run. Without a picture, yield the log."""
     files = run.artifacts
     paths = [("replay", files.replay), ("picture", files.picture)] if files.picture else [("log", files.mcap)]
     for name, path in paths:

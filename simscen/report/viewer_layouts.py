@@ -38,11 +38,11 @@ def _read_shipped(name: str) -> str:
 def _show_robots(panels: dict[str, Any], scans: Mapping[str, Sequence[str]]) -> None:
     """Change `panels` (settings by panel name) to show all robots.
 
-    `scans` are the lidar topics without namespace by robot name, which is "" for a single robot.
+    `scans` are the lidar topics without namespace, by name of the robot ("" for a single robot).
     """
-    first = next(iter(scans))
+    first_robot = next(iter(scans))
     scene = panels["3D!scene"]
-    scene["followTf"] = RobotFrames(first).log_frame(frame_names.TRUTH)
+    scene["followTf"] = RobotFrames(first_robot).log_frame(frame_names.TRUTH)
     defaults, robot = scene["topics"], scene["layers"].pop(_ROBOT_LAYER)
     scene["topics"] = {}
     for number, (name, lidars) in enumerate(scans.items()):
@@ -58,7 +58,7 @@ def _show_robots(panels: dict[str, Any], scans: Mapping[str, Sequence[str]]) -> 
         panel["paths"] = [_plot_path(path, name) for name in scans for path in paths]
         for key in ("topicToRender", "topicPath"):
             if key in panel:
-                panel[key] = _with_namespace(first, panel[key])
+                panel[key] = _with_namespace(first_robot, panel[key])
         if not paths:
             del panel["paths"]
 

@@ -36,13 +36,13 @@ def reported_violations(run: RunFinished) -> list[Violation]:
 
     The texts are safe for terminals.
     """
-    found = []
+    reported = []
     for verdict, line in run.result.verdicts_with_lines:
-        unchecked = Finding(Status.ERROR, verdict.criterion, "it returned no findings", "")
-        for finding in violations(verdict) if verdict.findings else [unchecked]:
+        no_findings = Finding(Status.ERROR, verdict.criterion, "it returned no findings", "")
+        for finding in violations(verdict) if verdict.findings else [no_findings]:
             message = one_line(sentence(verdict, finding, run.result.tick_rate))
-            found.append(Violation(verdict, line, message, tuple(one_line(text) for text in finding.detail)))
-    return found
+            reported.append(Violation(verdict, line, message, tuple(one_line(text) for text in finding.detail)))
+    return reported
 
 
 def failed_violations(run: RunFinished) -> list[Violation]:
@@ -72,7 +72,7 @@ def scenario_file(run: RunFinished) -> str:
 
 
 def error_details(run: RunFinished) -> tuple[str, str, str]:
-    """Return the kind and message of the error of a run, and the end of the worker's output.
+    """Return (kind of the error of a run, message, end of the output of the worker process).
 
     For a completed run that could not be judged, the kind is "invalid", and the message lists the errors of criteria.
     """
@@ -92,7 +92,7 @@ def error_summary(run: RunFinished) -> str:
 def first_violation(run: RunFinished, more: str = " (and {} more)") -> str:
     """Return the message of the first violation that is not a warning; "" if there is none.
 
-    If there are further violations, `more` follows, with their number in place of {}.
+    If there are further violations, `more` is appended, with the number of further violations in place of {}.
     """
     messages = [violation.message for violation in failed_violations(run)]
     return messages[0] + (more.format(len(messages) - 1) if len(messages) > 1 else "") if messages else ""

@@ -78,11 +78,11 @@ def command(
         {name: str(folder) for name, folder in folders.items()},
         Significance(alpha, min_effect),
     )
-    (against,) = comparison.against
-    if not against.pairs + against.error_pairs:
+    (baseline_comparison,) = comparison.baseline_comparisons
+    if not baseline_comparison.pairs + baseline_comparison.error_pairs:
         hint = "run the same scenarios with the same seeds in both"
         raise InvalidInput([Problem(str(candidate), 0, 0, "SC811", f"no run has a counterpart in {baseline}", hint)])
-    is_worse = any(change.is_worse for change in against.changes)
+    is_worse = any(change.is_worse for change in baseline_comparison.changes)
     links = _links(sessions)
     if format_ is ComparisonFormat.JSON:
         print_json(json.dumps({"worse": is_worse, **comparison_data(comparison)}, indent=2, ensure_ascii=False))
@@ -90,8 +90,8 @@ def command(
         print_text("\n".join(session_comparison_markdown(comparison, links, is_worse)))
     else:
         print_lines(session_comparison_lines(comparison, links, is_worse), sys.stdout)
-    is_incomplete = not against.pairs or any(row[CANDIDATE].errors for row in comparison.outcomes.values())
-    has_flipped = any(flip.failed == CANDIDATE for flip in against.flips)
+    is_incomplete = not baseline_comparison.pairs or any(row[CANDIDATE].errors for row in comparison.outcomes.values())
+    has_flipped = any(flip.failed == CANDIDATE for flip in baseline_comparison.flips)
     has_failed = {Gate.WORSE: is_worse, Gate.FLIP: has_flipped, Gate.NEVER: False}[fail_on]
     sys.exit(Exit.FAILED if has_failed else Exit.INCOMPLETE if is_incomplete else Exit.PASSED)
 

@@ -30,7 +30,7 @@ from simscen.judge.result_json import result_data
 from simscen.record.foreign.options import ForeignLogOptions
 from simscen.report.display_text import StyledLine, escape_ci_commands, plain_text
 from simscen.report.judged_logs import full_log_lines, margin_table, short_log_line, summary_line
-from simscen.report.results_json import as_document, in_order
+from simscen.report.results_json import in_order, results_document
 
 
 def command(
@@ -96,7 +96,7 @@ def _document(runs: list[RunFinished], options: list[str]) -> str:
 
     The value of `again` is the command that evaluates the log again; `options` are its options.
     """
-    document = {**result_data(runs[0].result)} if len(runs) == 1 else as_document(runs)
+    document = {**result_data(runs[0].result)} if len(runs) == 1 else results_document(runs)
     logs = [run.artifacts.mcap for run in in_order(runs)]
     for log, data in zip(logs, document.get("runs", [document]), strict=True):
         if log:

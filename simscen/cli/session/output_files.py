@@ -80,9 +80,9 @@ class Reports:
         self._missing = frozenset(path for path, data in documents.items() if not _write(path, data))
         return not self._missing
 
-    def write_live(self, finished_runs: Sequence[RunFinished], live: RunningSession) -> bool:
+    def write_live(self, finished_runs: Sequence[RunFinished], progress: RunningSession) -> bool:
         """Write the HTML report of a session that is still running, and return whether it was written."""
-        page = to_html(SessionReport(finished_runs, self._past, folder=str(self.folder), live=live))
+        page = to_html(SessionReport(finished_runs, self._past, folder=str(self.folder), progress=progress))
         return _write(self.page, page.encode())
 
     @cached_property

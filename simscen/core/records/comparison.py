@@ -112,13 +112,13 @@ class Comparison:
     """Comparison of stacks or sessions. The first one is the baseline.
 
     `stacks` contains the value of --stack for each stack by name, or the output folder of each session by name.
-    `outcomes` contains the outcomes by scenario, and then by stack or session. `against` contains one comparison with
-    the baseline for each further stack or session.
+    `outcomes` contains the outcomes by scenario, and then by stack or session. `baseline_comparisons` contains one
+    comparison with the baseline for each further stack or session.
     """
 
     stacks: Mapping[str, str]
     outcomes: Mapping[str, Mapping[str, OutcomeCounts]]
-    against: tuple[BaselineComparison, ...]
+    baseline_comparisons: tuple[BaselineComparison, ...]
 
     @property
     def baseline(self) -> str:

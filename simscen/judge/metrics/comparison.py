@@ -253,21 +253,21 @@ def comparison_data(comparison: Comparison) -> dict[str, Any]:
             {"scenario": scenario, "stacks": {name: asdict(one) for name, one in row.items()}}
             for scenario, row in comparison.outcomes.items()
         ],
-        "against": [_baseline_data(one) for one in comparison.against],
+        "against": [_baseline_data(one) for one in comparison.baseline_comparisons],
     }
 
 
-def _baseline_data(against: BaselineComparison) -> dict[str, Any]:
+def _baseline_data(comparison: BaselineComparison) -> dict[str, Any]:
     return {
-        "stack": against.stack,
-        "pairs": against.pairs,
-        "left_out": {"broken_pairs": against.error_pairs, "runs_without_partner": against.unpaired_runs},
-        "pairs_of_which_one_arrived": against.pairs_with_different_arrivals,
-        "flips": [asdict(flip) for flip in against.flips],
-        "flips_p": against.p,
+        "stack": comparison.stack,
+        "pairs": comparison.pairs,
+        "left_out": {"broken_pairs": comparison.error_pairs, "runs_without_partner": comparison.unpaired_runs},
+        "pairs_of_which_one_arrived": comparison.pairs_with_different_arrivals,
+        "flips": [asdict(flip) for flip in comparison.flips],
+        "flips_p": comparison.p,
         "differences": [
             {**asdict(one), "interval": None if one.interval is None else list(one.interval)}
-            for one in against.differences
+            for one in comparison.differences
         ],
-        "changes": [asdict(one) for one in against.changes],
+        "changes": [asdict(one) for one in comparison.changes],
     }

@@ -28,14 +28,14 @@ LABEL_CELL_PX = 4
 """Side of a label cell. In a grid of these cells, the canvas tracks which areas labels should not cover."""
 
 HATCH_SPACING_PX = 11.0
-"""Distance of the lines with which `hatch` fills a polygon."""
+"""Distance between the lines with which `hatch` fills a polygon."""
 MAX_ELLIPSE_RADIUS_PX, _SIDES_OF_LARGE_DISC = 4000.0, 2000
 """Maximum radius of a disc that is drawn as an ellipse, and number of sides of the polygon for a larger disc."""
 
 
 @lru_cache(maxsize=16)
 def font(size: int) -> Font:
-    """Return the built-in font of Pillow, which is the same on every machine."""
+    """Return the built-in font of Pillow in `size` pixels. This font is the same on every machine."""
     return ImageFont.load_default(size)
 
 
@@ -67,10 +67,11 @@ class Canvas:
     """Image of the rectangle `bounds` of the world, with `scale` pixels per meter; y points up.
 
     Points of shapes are in m, widths and radii in pixels. Labels avoid symbols, and shapes with `blocks_labels`.
+    `finish` draws `texts` on top of all shapes. `parts` is the list of drawn parts.
     """
 
     def __init__(self, bounds: Bounds, scale: float, background: Color | None) -> None:
-        """Create an image with a `background` color. If it is None, call `set_image` before drawing."""
+        """Create an image with a `background` color. With None, the caller must call `set_image` before drawing."""
         self.bounds, self.scale = bounds, scale
         x0, y0, x1, y1 = bounds
         self.width, self.height = max(1, math.ceil((x1 - x0) * scale)), max(1, math.ceil((y1 - y0) * scale))
@@ -78,11 +79,11 @@ class Canvas:
             self.set_image(Image.new("RGB", self.supersampled_size, background))
         self._blocked = Image.new("L", (-(-self.width // LABEL_CELL_PX), -(-self.height // LABEL_CELL_PX)), 0)
         self._block_pen = ImageDraw.Draw(self._blocked)
-        self.texts: list[TextItem] = []  # `finish` draws them on top of all shapes
+        self.texts: list[TextItem] = []
         self.parts: list[DrawnPart] = []
 
     def set_image(self, image: Image.Image) -> None:
-        """Draw on this image, without a copy. Its size must be `supersampled_size`."""
+        """Draw on this image, without a copy. The size of the image must be `supersampled_size`."""
         self._image, self._draw = image, ImageDraw.Draw(image, "RGBA")
 
     @property
@@ -96,7 +97,7 @@ class Canvas:
         return np.asarray(self._blocked, dtype=np.float64) / 255
 
     def pixel(self, x: float, y: float) -> tuple[float, float]:
-        """Return the pixel (column, row) of a point in m. It can be outside of the image."""
+        """Return the pixel (column, row) of a point in m. The pixel can be outside of the image."""
         return (x - self.bounds[0]) * self.scale, (self.bounds[3] - y) * self.scale
 
     def shows(self, x: float, y: float) -> bool:

@@ -1,6 +1,7 @@
 """Goals, faults, events, marks, collisions, violations, and places on the picture of a run.
 
-Each function `draw_…` draws one layer on the canvas, and yields its labels.
+Each function `draw_…` draws one layer on the canvas, and yields its labels. A layer without labels ends with
+`yield from ()`, so that the function is a generator.
 """
 
 import math
@@ -30,8 +31,8 @@ MAX_VIOLATION_CHARACTERS = 60
 class GoalMark:
     """Color and text that show the outcome of a goal on the picture.
 
-    `word` is reached, failed, canceled, "not reached", or "not tried". `text` is the label behind the name of the goal;
-    "" for a goal that was reached.
+    `word` is reached, failed, canceled, "not reached", or "not tried". In the label, `text` follows the name of the
+    goal; "" for a goal that was reached.
     """
 
     word: str
@@ -63,8 +64,8 @@ def _goal_mark(outcome: GoalOutcome, scene: Scene) -> GoalMark:
         case EventKind.GOAL_CANCELED:
             return GoalMark("canceled", palette.GRAY, "canceled")
         case _:
-            own = f"{scene.robot_name}/" if scene.robot_name else ""
-            verdicts = [v for v in scene.result.verdicts if v.criterion == "goals_reached" and v.id.startswith(own)]
+            prefix = f"{scene.robot_name}/" if scene.robot_name else ""
+            verdicts = [v for v in scene.result.verdicts if v.criterion == "goals_reached" and v.id.startswith(prefix)]
             findings = [finding for verdict in verdicts for finding in verdict.findings]
             if any(f.status is Status.FAIL and f.what == f"goal {outcome.goal.name}" for f in findings):
                 return GoalMark(
@@ -78,15 +79,15 @@ def draw_goals(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
     Goals at the same position have one label. Goals of actions `new_goal` that did not take place are omitted.
     """
-    sent = {event.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED)}
-    goals = [goal for goal in scene.case.every_goal if goal.name in sent or goal not in scene.case.sent]
+    accepted_names = {event.name for event in scene.trace.of_kind(EventKind.GOAL_ACCEPTED)}
+    goals = [goal for goal in scene.case.every_goal if goal.name in accepted_names or goal not in scene.case.sent]
     outcomes = {outcome.goal.name: outcome for outcome in goal_outcomes(scene.trace, scene.case)}
     marks = [(goal, _goal_mark(outcomes[goal.name], scene)) for goal in goals]
     names: dict[tuple[float, float], list[str]] = {}
     for goal, mark in marks:
         entries = names.setdefault((goal.pose.x, goal.pose.y), [])
-        known = any(matches_goal_name(goal.name, other.partition(":")[0]) for other in entries)
-        if not known or mark.text:  # goals of a second loop have the same position
+        is_listed = any(matches_goal_name(goal.name, other.partition(":")[0]) for other in entries)
+        if not is_listed or mark.text:  # goals of a second loop have the same position
             entries.append(f"{goal.name}: {mark.text}" if mark.text else goal.name)
     for goal, mark in marks:
         x, y, yaw = goal.pose
@@ -119,22 +120,22 @@ DIAMOND, SMALL_DIAMOND = ([(0, -r), (r, 0), (0, r), (-r, 0)] for r in (6, 4))
 
 def draw_fault_bands(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """Draw a wide band along the part of the path on which a fault was active."""
-    pieces = driven_segments(scene)
-    for start, ended, name in _faults(scene):
-        for piece in pieces:
-            is_active = (piece.ticks >= start) & (piece.ticks <= ended)
-            canvas.line(piece.values[is_active, :2], palette.FAULTY, 11.0)
+    segments = driven_segments(scene)
+    for start, end, name in _faults(scene):
+        for segment in segments:
+            is_active = (segment.ticks >= start) & (segment.ticks <= end)
+            canvas.line(segment.values[is_active, :2], palette.FAULTY, 11.0)
             if is_active.any():
-                canvas.add_part(f"fault {scene.label(name)}", piece.values[is_active][[0, -1], :2])
+                canvas.add_part(f"fault {scene.label(name)}", segment.values[is_active][[0, -1], :2])
     yield from ()
 
 
 def draw_faults(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """Draw an amber bolt where the robot was when a fault started, and a gray one where it was when the fault ended."""
     trace = scene.trace
-    for start, ended, name in _faults(scene):
-        ends = [(start, f"{name} from", palette.AMBER), (ended, f"{name} over,", palette.FAINT_INK)]
-        for tick, text, color in ends if ended < trace.end else ends[:1]:
+    for start, end, name in _faults(scene):
+        bolts = [(start, f"{name} from", palette.AMBER), (end, f"{name} over,", palette.FAINT_INK)]
+        for tick, text, color in bolts if end < trace.end else bolts[:1]:
             x, y = trace.place(tick)
             canvas.disc(x, y, 11, (255, 255, 255, 225), color, 1.4, blocks_labels=True)
             canvas.symbol(x, y, _BOLT, color)
@@ -143,7 +144,7 @@ def draw_faults(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def _faults(scene: Scene) -> list[tuple[int, int, str]]:
-    """Return the start tick, end tick, and name of each fault. A fault that does not end has the last tick."""
+    """Return (start tick, end tick, name) of each fault. A fault that is active to the end has the last tick as end."""
     names = dict.fromkeys(event.name for event in scene.trace.of_kind(EventKind.FAULT_STARTED))
     faults = [(span.start, span.end, name) for name in names for span in spans(scene.trace, name)]
     return sorted(faults, key=lambda fault: fault[0])
@@ -153,8 +154,8 @@ def draw_events(canvas: Canvas, scene: Scene) -> Iterator[Label]:
     """Draw a diamond where the robot was when a named event of the scenario started or a new goal arrived."""
     trace = scene.trace
     events = [(event.tick, event.name) for event in trace.of_kind(EventKind.EVENT_STARTED) if event.name]
-    sent = {goal.name for goal in scene.case.sent}
-    events += [(e.tick, f"new goal {e.name}") for e in trace.of_kind(EventKind.GOAL_ACCEPTED) if e.name in sent]
+    new_goals = {goal.name for goal in scene.case.sent}
+    events += [(e.tick, f"new goal {e.name}") for e in trace.of_kind(EventKind.GOAL_ACCEPTED) if e.name in new_goals]
     for tick, name in events:
         x, y = trace.place(tick)
         canvas.symbol(x, y, DIAMOND, palette.INK)

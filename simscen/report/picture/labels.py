@@ -11,11 +11,11 @@ from simscen.report.picture.canvas import LABEL_CELL_PX, Canvas, TextItem, text_
 from simscen.report.picture.palette import Color
 
 _DISTANCES_PX = (4.0, 12.0, 22.0, 36.0, 54.0, 76.0, 104.0, 140.0)
-"""Distances between the rim of a part and its label, in the order in which they are tried."""
+"""Distances between the rim of a part and its label, in the order of the trials."""
 _ANGLES_RAD = tuple(math.radians(degrees) for degrees in (0, 180, 90, 270, 30, 150, 330, 210, 60, 120, 300, 240))
-"""Directions from a part to its label, in the order in which they are tried."""
+"""Directions from a part to its label, in the order of the trials."""
 _LEADER_DISTANCE_PX = 16.0
-"""Distance between a label and the rim of its part above which a line connects them."""
+"""Distance between a label and the rim of its part above which a line connects label and part."""
 _WALL_COST, _LABEL_COST, _COST_PER_PX = 0.25, 3.0, 0.0015
 """Costs of a label on walls, on another label, and per pixel of distance. The cost on a blocked label cell is 1."""
 _MAX_OPTIONAL_COST = 0.2
@@ -75,7 +75,7 @@ Box = tuple[float, float, float, float]
 
 
 def _best_box(canvas: Canvas, label: Label, occupied: Array) -> tuple[float, Box]:
-    """Return the lowest cost of the tried boxes of a label, and this box. `occupied` is the cost of each label cell."""
+    """Return (cost, box) of the best position of a label. `occupied` is the cost of each label cell."""
     sums = np.zeros((occupied.shape[0] + 1, occupied.shape[1] + 1))
     sums[1:, 1:] = occupied.cumsum(axis=0).cumsum(axis=1)
     width, height = text_size(label.text, label.size)

@@ -40,12 +40,12 @@ def map_scale(bounds: Bounds) -> float:
 
 def draw_map(canvas: Canvas, grid: OccupancyGrid) -> None:
     """Draw the map as the image of the canvas, below everything else."""
-    per_pixel = 1 / (canvas.scale * SUPERSAMPLING)
-    merge = max(1, int(per_pixel / grid.resolution))
-    cells = _downsample(grid.cells, merge) if merge > 1 else grid.cells
-    image, resolution = Image.fromarray(_colors()[cells.view(np.uint8)]), grid.resolution * merge
+    pixel_size = 1 / (canvas.scale * SUPERSAMPLING)
+    factor = max(1, int(pixel_size / grid.resolution))
+    cells = _downsample(grid.cells, factor) if factor > 1 else grid.cells
+    image, resolution = Image.fromarray(_colors()[cells.view(np.uint8)]), grid.resolution * factor
     x0, _, _, y1 = canvas.bounds
-    corners = np.array([[x0, y1], [x0 + per_pixel, y1], [x0, y1 - per_pixel]])
+    corners = np.array([[x0, y1], [x0 + pixel_size, y1], [x0, y1 - pixel_size]])
     origin, right, down = grid.origin.inverse().apply(corners) / resolution
     affine = (
         *(right[0] - origin[0], down[0] - origin[0], origin[0]),
@@ -81,11 +81,14 @@ def _downsample(cells: npt.NDArray[np.int8], factor: int) -> npt.NDArray[np.int8
 LEFT_MARGIN_PX, BOTTOM_MARGIN_PX = 40, 26
 """Space for the coordinates to the left of the map and below it."""
 _MIN_GRID_SPACING_PX = 55
-"""Minimum distance of two grid lines."""
+"""Minimum distance between two grid lines."""
 
 
 def grid_spacing(canvas: Canvas) -> float:
-    """Return the distance of grid lines in m: 1, 2, or 5 times a power of ten, and at least _MIN_GRID_SPACING_PX."""
+    """Return the distance between grid lines in m.
+
+    The distance is 1, 2, or 5 times a power of ten, and at least _MIN_GRID_SPACING_PX on the canvas.
+    """
     min_spacing = _MIN_GRID_SPACING_PX / canvas.scale
     power = 10.0 ** math.floor(math.log10(min_spacing))
     return next(power * factor for factor in (1, 2, 5, 10) if power * factor >= min_spacing)

@@ -28,7 +28,7 @@ from simscen.report.picture.sidebar import WIDTH_PX, draw_sidebar
 
 HEADER_HEIGHT_PX = 66
 _MARGIN_PX = 14
-"""Margin above the map and to its right."""
+"""Margin above the map and to the right of the map."""
 
 DrawLayer = Callable[[Canvas, Scene], Iterator[Label]]
 """Function that draws one layer on the canvas, and yields its labels."""
@@ -56,14 +56,14 @@ _LAYERS_ABOVE_ROBOT: tuple[DrawLayer, ...] = (
 def draw_map_picture(scene: Scene) -> Image.Image:
     """Draw the picture of a run: header, map with events, and sidebar with criteria and legend."""
     canvas = draw_map_canvas(scene)
-    map_ = canvas.finish()
-    width = LEFT_MARGIN_PX + map_.width + _MARGIN_PX
-    height = _MARGIN_PX + map_.height + BOTTOM_MARGIN_PX
-    side = draw_sidebar(scene, [part.name for part in canvas.parts], height)
-    image = Image.new("RGB", (width + WIDTH_PX, HEADER_HEIGHT_PX + max(height, side.height)), palette.PAGE)
+    map_image = canvas.finish()
+    width = LEFT_MARGIN_PX + map_image.width + _MARGIN_PX
+    height = _MARGIN_PX + map_image.height + BOTTOM_MARGIN_PX
+    sidebar = draw_sidebar(scene, [part.name for part in canvas.parts], height)
+    image = Image.new("RGB", (width + WIDTH_PX, HEADER_HEIGHT_PX + max(height, sidebar.height)), palette.PAGE)
     left, top = LEFT_MARGIN_PX, HEADER_HEIGHT_PX + _MARGIN_PX
-    image.paste(map_, (left, top))
-    image.paste(side, (width, HEADER_HEIGHT_PX))
+    image.paste(map_image, (left, top))
+    image.paste(sidebar, (width, HEADER_HEIGHT_PX))
     pen = ImageDraw.Draw(image, "RGBA")
     write_coordinates(pen, canvas, left, top)
     _draw_header(image, scene)
@@ -133,7 +133,7 @@ def _facts_text(scene: Scene) -> str:
 
 
 def end_reason(scene: Scene) -> str:
-    """Return the error of the run, or why the run ended and the results of robots whose navigation did not succeed."""
+    """Return the error of the run; without an error, why the run ended, and the result of each failed navigation."""
     if scene.result.outcome is Outcome.ERROR and scene.result.error is not None:
         return f"{scene.result.error.kind}: {scene.result.error.message}"
     reasons = [scene.result.ended]

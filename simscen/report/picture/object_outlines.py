@@ -20,7 +20,7 @@ _UNKNOWN_SHAPE: Outlines = (
 
 def object_outlines(trace: Trace, world_objects: Sequence[MovableObject]) -> dict[str, Outlines]:
     """Return the outlines of `world_objects` and of all spawned objects by name; a circle for an unknown shape."""
-    outlines = {thing.name: tuple(map(np.array, thing.outlines)) for thing in world_objects if thing.outlines}
+    outlines = {each.name: tuple(map(np.array, each.outlines)) for each in world_objects if each.outlines}
     outlines.update({event.name: outlines_of_event(event) for event in trace.of_kind(EventKind.OBJECT_SPAWNED)})
     for name in trace.objects:
         outlines.setdefault(name, _UNKNOWN_SHAPE)

@@ -1,6 +1,7 @@
 """Paths on the picture of a run: true path, belief, plans, and the robot at the start and the end.
 
-Each function `draw_…` draws one layer on the canvas, and yields its labels.
+Each function `draw_…` draws one layer on the canvas, and yields its labels. A layer without labels ends with
+`yield from ()`, so that the function is a generator.
 """
 
 import math
@@ -30,9 +31,9 @@ _SET_DOWN_SYMBOL = [(x, -y) for x, y in _LIFTED_SYMBOL]
 
 
 def split_at_jumps(samples: Samples, tick_rate: int, placement_ticks: tuple[int, ...] = ()) -> list[Samples]:
-    """Split poses at jumps, and at `placement_ticks`, the ticks at which the robot was placed elsewhere.
+    """Split poses at jumps, and at `placement_ticks`.
 
-    `tick_rate` is in ticks per second.
+    `tick_rate` is in ticks per second. `placement_ticks` are the ticks at which an event placed the robot elsewhere.
     """
     if len(samples) < 2:
         return [samples] if len(samples) else []

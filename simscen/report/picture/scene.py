@@ -14,8 +14,8 @@ from simscen.core.records.trace import Trace
 class Scene:
     """Finished run to draw: the world and the data of one robot.
 
-    With several robots, there is a scene for each robot and a common scene. All of them contain the scenes of all
-    robots in `robots`. `trace` and `case` of the common scene are those of the first robot.
+    With several robots, there is one scene for each robot, and a common scene. Each of these scenes contains the scenes
+    of all robots in `robots`. The common scene has `trace` and `case` of the first robot.
 
     Attributes:
         trace: Recorded run of the robot.

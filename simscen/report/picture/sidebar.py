@@ -32,9 +32,10 @@ CriterionRow = tuple[Status, Color, list[str]]
 def draw_sidebar(scene: Scene, parts: Sequence[str], min_height: int) -> Image.Image:
     """Return the sidebar, which is at least `min_height` pixels high.
 
-    `parts` are the names of the drawn parts of the map. The legend explains path and plans, and these parts.
+    `parts` are the names of the drawn parts of the map. The legend explains these parts, and always the true path and
+    the plans.
     """
-    reasons, rows = _reasons(scene), _criteria(scene)
+    reasons, rows = _reason_lines(scene), _criterion_rows(scene)
     legend = [entry[1:] for entry in _legend(round_time_step(scene.result.simulated)) if _is_drawn(parts, entry[0])]
     text_height = (
         len(reasons) * _LINE_HEIGHT_PX
@@ -59,7 +60,7 @@ def _is_drawn(parts: Sequence[str], word: str) -> bool:
     return any(part.startswith(word) or part.endswith(f" {word}") for part in parts)
 
 
-def _reasons(scene: Scene) -> list[str]:
+def _reason_lines(scene: Scene) -> list[str]:
     """Return the error of a run, or the reason of a skipped run or expected failure, as lines; otherwise []."""
     result = scene.result
     if result.error is not None:
@@ -69,7 +70,7 @@ def _reasons(scene: Scene) -> list[str]:
     return []
 
 
-def _criteria(scene: Scene) -> list[CriterionRow]:
+def _criterion_rows(scene: Scene) -> list[CriterionRow]:
     """Return a row for each criterion, in the order of _STATUS_ORDER."""
     rows: list[CriterionRow] = []
     for verdict in sorted(scene.result.verdicts, key=lambda verdict: _STATUS_ORDER.index(verdict.status)):
@@ -79,10 +80,10 @@ def _criteria(scene: Scene) -> list[CriterionRow]:
         if finding is None:
             rows.append((verdict.status, color, _wrap(f"{printable(verdict.id)}: no findings")))
             continue
-        failed = verdict.status is not Status.PASS
-        where = time_and_place(finding, scene.result.tick_rate) if failed else ""
+        has_passed = verdict.status is Status.PASS
+        where = "" if has_passed else time_and_place(finding, scene.result.tick_rate)
         text = ", ".join(part for part in (f"{subject(verdict, finding)}: {comparison(finding)}", where) if part)
-        texts = [f"warning: {text}" if is_warning else text, *(finding.detail if failed else ())]
+        texts = [f"warning: {text}" if is_warning else text, *(() if has_passed else finding.detail)]
         rows.append((verdict.status, color, [line for text in texts for line in _wrap(printable(text))]))
     return rows
 
@@ -148,7 +149,7 @@ def _draw_shapes(draw: Pen, x: float, y: float, shapes: Iterable[Shape]) -> None
 
 
 def _legend(step: float) -> list[tuple[str, str, list[Shape]]]:
-    """Return the entries of the legend: word for `_is_drawn` ("": always shown), text, and symbol.
+    """Return the entries of the legend as (word for `_is_drawn`, text, symbol). Entries with the word "" always appear.
 
     `step` is the time between two dots on the true path in s.
     """

@@ -1,6 +1,7 @@
 """World on the picture of a run: ramps, floors, zones of costmap filters, objects, doors, and pedestrians.
 
-Each function `draw_…` draws one layer on the canvas, and yields its labels.
+Each function `draw_…` draws one layer on the canvas, and yields its labels. A layer without labels ends with
+`yield from ()`, so that the function is a generator.
 """
 
 import math
@@ -22,7 +23,7 @@ from simscen.report.picture.path_layer import split_at_jumps
 from simscen.report.picture.scene import Scene
 
 LABEL_RANK = 6
-"""Rank of the labels of ramps and floors, which are placed after the labels of robots, goals, and objects."""
+"""Rank of the labels of ramps and floors. These labels are placed after the labels of robots, goals, and objects."""
 
 
 def draw_ground(canvas: Canvas, scene: Scene) -> Iterator[Label]:
@@ -55,7 +56,7 @@ def _draw_chevrons(canvas: Canvas, ground: DrivableSurface, outline: Array) -> N
 
 
 def draw_floors(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw floors with another friction than dry concrete. Labels show the times of changes during the run."""
+    """Draw floors whose friction differs from dry concrete. Labels show when the friction changed during the run."""
     for floor in scene.scenery.floors:
         yield from _draw_floor(canvas, floor.region, np.array(floor.outline), f"friction {floor.friction:g}")
     for event in scene.per_robot[0].trace.of_kind(EventKind.FLOOR_CHANGED):
@@ -93,7 +94,7 @@ def draw_zones(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def _active_zones(scene: Scene) -> Iterator[tuple[FilterZone, str]]:
-    """Yield the zones of the robot that were enabled at any time, and the text of the label for each zone."""
+    """Yield (zone, text of the label) for each zone of the robot that was enabled at any time."""
     initial = {(str(zone.filter), zone.region): zone for zone in scene.scenery.zones if zone.robot == scene.robot_name}
     switched: dict[tuple[str, str], list[Event]] = {}
     for event in scene.trace.of_kind(EventKind.ZONE_SWITCHED):
@@ -152,12 +153,12 @@ def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
             removed[event.name] = event.tick
         else:  # an object that replaces another one is spawned at the tick of the removal
             removed.pop(event.name, None)
-    doors = {thing.name: thing for thing in scene.scenery.things if thing.closed and thing.opened}
+    doors = {each.name: each for each in scene.scenery.things if each.closed and each.opened}
     for name in sorted(set(shapes) - set(scene.robots)):
         samples, spawn = trace.objects.get(name), spawned.get(name)
-        person = spawn is not None and spawn.data.get("person") is True
-        kind = "person" if person else "door" if name in doors else "object"
-        color = palette.PEDESTRIAN if person else palette.OBJECT
+        is_person = spawn is not None and spawn.data.get("person") is True
+        kind = "person" if is_person else "door" if name in doors else "object"
+        color = palette.PEDESTRIAN if is_person else palette.OBJECT
         if samples is not None:
             _draw_object_path(canvas, scene, samples, shapes[name])
         if name in doors:
@@ -174,7 +175,7 @@ def draw_objects(canvas: Canvas, scene: Scene) -> Iterator[Label]:
             fill, width = (None, 1.0) if is_removed else ((*color, 150), 1.5)
             canvas.polygon(outline, fill, color, width, blocks_labels=not is_removed)
             canvas.add_part(f"{kind} {name}{' removed' if is_removed else ''}", outline)
-        if person:
+        if is_person:
             radius = float(np.hypot(*(outlines[0] - (last.x, last.y)).T).max())
             canvas.line(last.apply(np.array([(0.0, 0.0), (1.5 * radius, 0.0)])), palette.PEDESTRIAN, 2.0)
         corners = np.concatenate(outlines)
@@ -203,7 +204,10 @@ def _draw_door_positions(canvas: Canvas, door: MovableObject, shape: Outlines) -
 
 
 def _earlier_poses(samples: Samples) -> list[int]:
-    """Return the indices of samples at equal distances along an object's path, except its end; [] without motion."""
+    """Return the indices of samples at equal distances along the path of an object, without the end of the path.
+
+    Return [] for an object that did not move.
+    """
     steps = np.diff(samples.values[:, :3], axis=0)
     distances = np.hypot(steps[:, 0], steps[:, 1]) + 0.3 * np.abs(np.angle(np.exp(1j * steps[:, 2])))
     lengths = np.concatenate(([0.0], np.cumsum(distances)))

@@ -18,7 +18,7 @@ Column = list[float]
 
 
 class PackedColumns:
-    """Collects encoded arrays. `reductions` are notes about data that the page contains only in part."""
+    """Collects encoded arrays. `reductions` are notes on data that the page contains only in part."""
 
     def __init__(self) -> None:
         self.reductions: list[str] = []

@@ -72,12 +72,14 @@ def page_html(title: str, data: bytes, numbers: bytes) -> str:
 def joined_script() -> str:
     """Return all JavaScript modules as one script."""
     texts = {path.stem: path.read_text(encoding="utf-8") for path in sorted(PAGE_FOLDER.glob("*.js"))}
-    modules = [re.sub(r"^export ", "", _IMPORT.sub("", texts[name]), flags=re.MULTILINE) for name in _in_order(texts)]
+    modules = [
+        re.sub(r"^export ", "", _IMPORT.sub("", texts[name]), flags=re.MULTILINE) for name in _sorted_modules(texts)
+    ]
     return "\n".join(modules)
 
 
-def _in_order(texts: Mapping[str, str]) -> list[str]:
-    """Return the names of the modules, each after the modules that it imports. `texts` are the sources by name."""
+def _sorted_modules(texts: Mapping[str, str]) -> list[str]:
+    """Return the names of the modules. Imported modules precede the importing one. `texts` are the sources by name."""
     ordered: list[str] = []
 
     def visit(name: str) -> None:
@@ -96,7 +98,7 @@ def _title(run: Mapping[str, Any]) -> str:
 
 
 MAX_MASK_BLOCKS = 2000
-"""Maximum number of blocks of a filter mask. The largest blocks are used."""
+"""Maximum number of blocks of a filter mask. If there are more, the page shows the largest blocks."""
 
 
 def scenery_data(log: Log, columns: PackedColumns) -> dict[str, Any]:
@@ -178,7 +180,9 @@ def run_data(log: Log, result: RunResult, columns: PackedColumns) -> dict[str, A
         "regions": {one_line(name): corners_data(polygon) for name, polygon in log.header.case.regions.items()},
         "scenery": scenery_data(log, columns),
         "spawned": [
-            _spawned(event) for event in log.trace.of_kind(EventKind.OBJECT_SPAWNED) if event.name not in robots
+            _spawned_object_data(event)
+            for event in log.trace.of_kind(EventKind.OBJECT_SPAWNED)
+            if event.name not in robots
         ],
         "gone": [[one_line(event.name), event.tick] for event in log.trace.of_kind(EventKind.OBJECT_REMOVED)],
         "things": moving_objects(log.trace, columns, robots),
@@ -189,7 +193,7 @@ def run_data(log: Log, result: RunResult, columns: PackedColumns) -> dict[str, A
     }
 
 
-def _spawned(event: Event) -> dict[str, Any]:
+def _spawned_object_data(event: Event) -> dict[str, Any]:
     """Return the JSON data of a spawned object: tick, pose, and outlines in the frame of the object."""
     return {
         "name": one_line(event.name),

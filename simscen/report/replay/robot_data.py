@@ -152,7 +152,7 @@ def _costmap(
 def map_from_odom(trace: Trace, tick: int) -> Pose2:
     """Return the pose of the odom frame in the map frame, from the newest belief at `tick`.
 
-    Without belief or odometry, or if one is garbage such as nan, return the identity.
+    Without belief or odometry, or if one of the two poses is not finite, return the identity.
     """
     if not len(trace.belief) or not len(trace.odometry):
         return Pose2(0.0, 0.0)
@@ -212,7 +212,7 @@ def robot_data(
 
 
 def _goals(case: Case, lines: SourceLines) -> list[dict[str, Any]]:
-    """Return each goal once, also if the robot drives to it in several loops."""
+    """Return each goal once, even if the robot drives to the goal in several loops."""
     goals: dict[tuple[str, float, float], dict[str, Any]] = {}
     for goal in case.every_goal:
         base = goal_without_loop(goal.name)

@@ -35,9 +35,9 @@ _SIGNAL_OF_CRITERION = {
     ("recoveries", ""): "recovery_count",
     ("collisions", ""): "collision_count",
 }
-"""Signal that a criterion limits, by criterion and by unit of the finding (checked bound)."""
-_OTHER_QUANTITIES = frozenset({"localization_error rmse", "localization_error final"})
-"""Measured quantities of these criteria that do not limit the signal at all times."""
+"""Signal that a criterion limits, by (criterion, unit of the finding)."""
+_STATISTICS = frozenset({"localization_error rmse", "localization_error final"})
+"""`Finding.what` for limits of a statistic. Such a limit is not a limit of the signal at each time."""
 
 
 def signal_plots(trace: Trace, case: Case, spec: ScenarioSpec | None, columns: PackedColumns) -> list[dict[str, Any]]:
@@ -50,10 +50,10 @@ def signal_plots(trace: Trace, case: Case, spec: ScenarioSpec | None, columns: P
     }
     criteria = () if spec is None else (entry.chosen for entry in spec.pass_)
     conditions = (criterion.condition for criterion in criteria if isinstance(criterion, TemporalCriterion))
-    for one in (one for condition in conditions for one in condition.comparisons()):
-        if one.signal is not None:
-            words = (str(getattr(value, "name", value)) for value in one.arguments.values())
-            plots[one_line(" ".join((one.signal, *words)))] = one.signal, one.arguments
+    for comparison in (comparison for condition in conditions for comparison in condition.comparisons()):
+        if comparison.signal is not None:
+            words = (str(getattr(value, "name", value)) for value in comparison.arguments.values())
+            plots[one_line(" ".join((comparison.signal, *words)))] = comparison.signal, comparison.arguments
     data = (
         _plot_data(title, signal, arguments, trace, case, columns)
         for title, (signal, arguments) in plots.items()
@@ -108,7 +108,7 @@ def _limit(verdict: Verdict, finding: Finding) -> dict[str, Any] | None:
     relation = finding.limit[:1]
     if finding.margin is None or finding.value is None or relation not in ("≤", "≥", "<", ">"):
         return None
-    if finding.what in _OTHER_QUANTITIES:
+    if finding.what in _STATISTICS:
         return None
     is_minimum = relation in ("≥", ">")
     name = _SIGNAL_OF_CRITERION.get((verdict.criterion, finding.unit)) or finding.what.partition(" ")[0]

@@ -22,9 +22,9 @@ class SourceLines:
 
 
 def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, ScenarioSpec | None]:
-    """Return the line numbers for a robot ("" for a single robot) and the specification of a scenario, from its text.
+    """Return (line numbers for a robot, specification) of the scenario in `text`.
 
-    Return no line numbers and None if the scenario is missing or invalid.
+    `robot` is "" for a single robot. Return no line numbers and None if the text is empty or the scenario is invalid.
     """
     if not text:
         return SourceLines(), None
@@ -33,28 +33,28 @@ def read_source_lines(text: str, robot: str = "") -> tuple[SourceLines, Scenario
     except InvalidInput:
         return SourceLines(), None
     names = verdict_names(spec.pass_)
-    sent = {
-        one.spec.name: _source_line(tree, *one.keys[:-1])
+    new_goals = {
+        action.spec.name: _source_line(tree, *action.keys[:-1])
         for step in spec.steps
-        for one in step.actions
-        if one.kind == "new_goal"
+        for action in step.actions
+        if action.kind == "new_goal"
     }
     return SourceLines(
         criteria={name: _source_line(tree, "pass", index) for index, name in enumerate(names)},
-        goals=sent | {name: _source_line(tree, "goals", index) for index, name in enumerate(_goal_names(spec))},
+        goals=new_goals | {name: _source_line(tree, "goals", index) for index, name in enumerate(_goal_names(spec))},
         events={number: _source_line(tree, *step.keys) for number, step in enumerate(spec.steps)},
         faults={index: _source_line(tree, "faults", index) for index in range(len(spec.faults))},
     ), spec
 
 
 def _goal_names(spec: ScenarioSpec) -> list[str]:
-    """Return the names of all goals. Unlike ScenarioSpec.goal_names, accept names of places as poses."""
+    """Return the names of all goals. Unlike in ScenarioSpec.goal_names, a pose can be the name of a place."""
     used_names, names = {goal.name for goal in spec.goals}, list[str]()
     for number, goal in enumerate(spec.goals, start=1):
         pose: Any = goal.pose
         default = pose if isinstance(pose, str) else f"goal-{number}"
-        others = (name for number in count(2) if (name := f"{default}-{number}") not in used_names)
-        names.append(goal.name or (default if default not in used_names else next(others)))
+        numbered = (name for suffix in count(2) if (name := f"{default}-{suffix}") not in used_names)
+        names.append(goal.name or (default if default not in used_names else next(numbered)))
         used_names.add(names[-1])
     return names
 

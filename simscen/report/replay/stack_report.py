@@ -14,7 +14,8 @@ from simscen.report.replay.packed_columns import PackedColumns
 MAX_TREE_CHANGES = 20_000
 """Maximum number of changes of a behavior tree.
 
-If there are more, nodes that are never RUNNING (conditions) are omitted, and, if necessary, the first changes.
+If there are more, nodes that are never RUNNING (conditions) are omitted. If there are still too many, the first changes
+are omitted as well.
 """
 _RUNNING = "RUNNING"
 MAX_LINES, MAX_LINE_CHARACTERS = 1000, 400
@@ -71,10 +72,10 @@ def behavior_tree_data(log: Log, columns: PackedColumns) -> dict[str, Any] | Non
 
 
 def _tree_changes(log: Log) -> Iterator[tuple[int, str, str, str]]:
-    """Yield tick, node, previous status, and new status of each change of the behavior tree."""
+    """Yield (tick, node, previous status, new status) of each change of the behavior tree."""
     for tick, line in log.sensors.stack_lines():
-        if found := _tree_change(line):
-            yield tick, found[1], found[2], found[3]
+        if match := _tree_change(line):
+            yield tick, match[1], match[2], match[3]
 
 
 def log_lines_data(log: Log, columns: PackedColumns) -> list[list[Any]]:
@@ -94,6 +95,7 @@ def log_lines_data(log: Log, columns: PackedColumns) -> list[list[Any]]:
 
 
 def _tree_change(line: LogLine) -> re.Match[str] | None:
+    """Return the match of _TREE_CHANGE if the line is a change of the behavior tree; otherwise None."""
     return _TREE_CHANGE.fullmatch(line.text) if line.name == BEHAVIOR_TREE_LOGGER else None
 
 

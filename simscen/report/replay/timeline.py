@@ -45,10 +45,11 @@ _OPTIONAL_KEYS = {"until", "ended", "bad", "line", "place", "about", "robot"}
 
 
 def timeline_data(trace: Trace, lines: SourceLines, robot: str, with_world: bool) -> list[dict[str, Any]]:
-    """Return the JSON data of the events of a robot in order; if `with_world`, also of the events of the world.
+    """Return the JSON data of the events of a robot in order; with `with_world`, also of the events of the world.
 
-    `robot` is "" in a run with a single robot. `lane` is the row of an entry. An interval ends at the tick `until` with
-    an event of the kind `ended`, or with the run. `about` is the data of an event that switches a zone on or off.
+    `robot` is "" in a run with a single robot. In the data, `lane` is the row of an entry. An interval ends at the tick
+    `until`, with an event of the kind `ended` or with the run. `about` is the data of an event that switches a zone on
+    or off.
     """
     entries: list[dict[str, Any]] = []
     open_intervals: dict[tuple[EventKind, str, Any], dict[str, Any]] = {}
@@ -66,7 +67,7 @@ def timeline_data(trace: Trace, lines: SourceLines, robot: str, with_world: bool
             open_intervals[event.kind, event.name, entry] = entries[-1]
     for interval in open_intervals.values():
         interval["until"] = trace.end
-    return [{key: value for key, value in one.items() if value or key not in _OPTIONAL_KEYS} for one in entries]
+    return [{key: value for key, value in data.items() if value or key not in _OPTIONAL_KEYS} for data in entries]
 
 
 def _entry(event: Event, lines: SourceLines, robot: str) -> dict[str, Any]:
@@ -88,6 +89,7 @@ def _entry(event: Event, lines: SourceLines, robot: str) -> dict[str, Any]:
 
 
 def _details(event: Event) -> Iterator[str]:
+    """Yield the effects and the other data of an event as texts."""
     effects = event.data.get("effects")
     if isinstance(effects, list):
         yield from (str(one["what"]) for one in effects if isinstance(one, dict) and one.get("what"))
@@ -116,21 +118,22 @@ def disturbance_data(result: RunResult, lines: dict[str, SourceLines]) -> list[d
     """Return the JSON data of the events and faults of the scenario. `lines` are the line numbers by robot."""
     data, numbers = [], {"event": 0, "fault": 0}
     first = next(iter(lines.values()))
-    for one in result.disturbances:
-        number = numbers[one.disturbance.kind]
-        numbers[one.disturbance.kind] += 1
-        line_numbers = first.events if one.disturbance.kind == "event" else first.faults
+    for outcome in result.disturbances:
+        disturbance = outcome.disturbance
+        number = numbers[disturbance.kind]
+        numbers[disturbance.kind] += 1
+        line_numbers = first.events if disturbance.kind == "event" else first.faults
         data.append(
             {
-                "kind": one.disturbance.kind,
-                "name": one_line(one.disturbance.name),
-                "ordered": one_line(one.disturbance.trigger),
-                "when": one_line(disturbance_times(one, result.tick_rate)),
-                "fired": list(one.fired),
-                "happened": one.happened,
-                "missing": one.missing,
-                "effect": one_line(one.effect),
-                "line": line_numbers.get(number, one.disturbance.line) if len(lines) == 1 else one.disturbance.line,
+                "kind": disturbance.kind,
+                "name": one_line(disturbance.name),
+                "ordered": one_line(disturbance.trigger),
+                "when": one_line(disturbance_times(outcome, result.tick_rate)),
+                "fired": list(outcome.fired),
+                "happened": outcome.happened,
+                "missing": outcome.missing,
+                "effect": one_line(outcome.effect),
+                "line": line_numbers.get(number, disturbance.line) if len(lines) == 1 else disturbance.line,
             }
         )
     return data
@@ -153,11 +156,11 @@ def verdict_data(verdict: Verdict, result: RunResult, lines: dict[str, SourceLin
 
 
 def _disturbance_line(verdict: Verdict, name: str, result: RunResult) -> int:
-    """Return the line of the disturbance if a verdict states that it did not take place; 0 for other verdicts."""
+    """Return the line of the disturbance that did not take place according to a verdict; 0 for other verdicts."""
     if verdict.criterion != DISTURBANCE:
         return 0
-    ordered = [one.disturbance for one in result.disturbances]
-    return next((one.line for one in ordered if one.name in (name, name.rpartition("#")[0])), 0)
+    disturbances = [outcome.disturbance for outcome in result.disturbances]
+    return next((each.line for each in disturbances if each.name in (name, name.rpartition("#")[0])), 0)
 
 
 def _finding(verdict: Verdict, finding: Finding) -> dict[str, Any]:

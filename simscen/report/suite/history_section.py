@@ -18,7 +18,8 @@ _GOOD_OUTCOMES = tuple(outcome for outcome in Outcome if outcome.is_good)
 def history_html(runs: Sequence[RunFinished], past: Sequence[PastSession], good_share: float) -> str:
     """Return the section; "" if `past`, the earlier sessions (newest first), is empty.
 
-    `runs` are the listed runs of this session. `good_share` is the fraction of good outcomes of all its runs.
+    `runs` are the runs of this session that the page lists. `good_share` is the fraction of good outcomes of all runs
+    of this session.
     """
     if not past:
         return ""

@@ -24,7 +24,7 @@ from simscen.report.suite.study_section import study_html
 ORDER = (Outcome.ERROR, Outcome.FAILED, Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED, Outcome.PASSED)
 """Outcomes in the order in which the page lists the runs."""
 MAX_SYMBOLS = 200
-"""Number of runs of a scenario above which its heading does not show their outcomes as symbols."""
+"""Maximum number of runs of a scenario whose outcomes are shown as symbols in the heading of the scenario."""
 MAX_LISTED_RUNS = 2000
 """Maximum number of runs that the page lists."""
 _LINKED_FILES = ("junit.xml", "results.json", "run.json", "console.txt")
@@ -33,7 +33,7 @@ _LINKED_FILES = ("junit.xml", "results.json", "run.json", "console.txt")
 
 @dataclass(frozen=True)
 class RunningSession:
-    """Progress of a running session: total number of runs, and keys of the runs that are simulated now."""
+    """Progress of a running session: total number of runs, and keys of the runs in progress."""
 
     total: int
     current: tuple[RunKey, ...] = ()
@@ -49,7 +49,7 @@ class SessionReport:
         comparison: Comparison of several stacks; None for one stack.
         folder: Output folder of the session, for links; "" for a page without links.
         files: Names of other reports in the folder, for links.
-        live: Progress of a running session; None for one that has ended.
+        progress: Progress of a running session; None for a session that has ended.
         study: Result of `simscen study`; None for other sessions.
         title: Title of the page.
     """
@@ -59,7 +59,7 @@ class SessionReport:
     comparison: Comparison | None = None
     folder: str = ""
     files: Sequence[str] = ()
-    live: RunningSession | None = None
+    progress: RunningSession | None = None
     study: Study | None = None
     title: str = "simscen"
 
@@ -81,11 +81,11 @@ def to_html(report: SessionReport) -> str:
     if report.study is not None:
         comparison += study_html(report.study, listed, report.folder)
     return (
-        f'<!doctype html>\n<html lang="en"{" data-live" if report.live else ""}>\n<head>\n<meta charset="utf-8">\n'
+        f'<!doctype html>\n<html lang="en"{" data-live" if report.progress else ""}>\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
         f"style-src '{csp_hash(style)}'; script-src '{csp_hash(script)}'; base-uri 'none'; form-action 'none'\">\n"
-        f"{'<noscript><meta http-equiv=refresh content=3></noscript>' if report.live else ''}"
+        f"{'<noscript><meta http-equiv=refresh content=3></noscript>' if report.progress else ''}"
         f"<title>{html_text(report.title)}: {counts}</title>\n<style>{style}</style>\n</head>\n<body>\n"
         f"<header>{_headline(report, totals, counts, len(listed))}</header>\n<main>\n"
         f"{history_html(listed, report.past, totals.good.total() / max(1, len(report.runs)))}{comparison}\n"
@@ -119,7 +119,7 @@ class Totals:
 
 
 def listed_runs(runs: Sequence[RunFinished]) -> Sequence[RunFinished]:
-    """Return at most MAX_LISTED_RUNS runs. If some are omitted, the failures and errors come first."""
+    """Return at most MAX_LISTED_RUNS runs. If there are more, failures and errors have priority and come first."""
     if len(runs) <= MAX_LISTED_RUNS:
         return runs
     bad, good = list[int](), list[int]()
@@ -143,12 +143,12 @@ def _headline(report: SessionReport, totals: Totals, counts: str, listed: int) -
     return (
         f"<h1>{counts}</h1>"
         f'{_outcome_bar(totals)}<p class="quiet">{" · ".join(facts)}</p>'
-        f"{_progress(report.live, len(report.runs)) if report.live else ''}"
+        f"{_progress_bar(report.progress, len(report.runs)) if report.progress else ''}"
     )
 
 
 def _outcome_bar(totals: Totals) -> str:
-    """Return a bar with one colored segment per outcome. The length of a segment is its number of runs."""
+    """Return a bar with one colored segment per outcome. The length of a segment is the number of runs."""
     parts, start = "", 0
     for outcome in reversed(ORDER):
         number = totals.outcomes[outcome]
@@ -158,12 +158,13 @@ def _outcome_bar(totals: Totals) -> str:
     return f'<svg class="bar" {view} aria-hidden="true">{parts}</svg>'
 
 
-def _progress(live: RunningSession, done: int) -> str:
+def _progress_bar(progress: RunningSession, done: int) -> str:
     """Return a progress bar and the names of the current runs. `done` is the number of finished runs."""
-    names = ", ".join(html_text(full_run_name(key)) for key in live.current)
+    names = ", ".join(html_text(full_run_name(key)) for key in progress.current)
     return (
-        f'<p id="live" role="status"><progress max="{live.total}" value="{done}" aria-label="runs done"></progress> '
-        f"{done} of {number_with_noun(live.total, 'run')} done{f', running: {names}' if names else ''} "
+        f'<p id="live" role="status"><progress max="{progress.total}" value="{done}" aria-label="runs done">'
+        "</progress> "
+        f"{done} of {number_with_noun(progress.total, 'run')} done{f', running: {names}' if names else ''} "
         '<button type="button" id="pause" aria-pressed="false">pause</button></p>'
     )
 
@@ -249,7 +250,7 @@ def filter_form(runs: Sequence[RunFinished], past: Sequence[PastSession]) -> str
 
 
 def _filter_select(name: str, counts: Counter[str]) -> str:
-    """Return a filter for a property of runs; "" if it has only one value. `counts` is the number of runs by value."""
+    """Return a filter for a property; "" if all runs have the same value. `counts` is the number of runs by value."""
     named = sorted(value for value in counts if value)
     if not named or len(counts) < 2:
         return ""

@@ -44,11 +44,11 @@ def run_element(
 
     `folder` is the output folder of the session. `picture` is the HTML of the picture of the run; "" for none. `past`
     are the outcomes of the run in earlier sessions, oldest first, with None for a session without the run.
-    `is_one_of_many` omits the scenario from the name of the run.
+    `is_one_of_many` states that the scenario has several runs; the name of the run then omits the scenario.
     """
     extra = ", ".join(part for part in (f"seed {run.key.seed}", run.key.stack_name) if part)
     name = (run.key.variation or extra) if is_one_of_many else run.key.test
-    outcomes = [None if one is None else one.outcome for one in past]
+    outcomes = [None if earlier is None else earlier.outcome for earlier in past]
     marks = outcome_symbols([*outcomes, run.outcome], "earlier sessions and this one") if any(outcomes) else ""
     return (
         f'<details class="run" id="{anchor(run.key)}"{"" if run.outcome.is_good else " open"} '
@@ -125,11 +125,11 @@ def _criteria_table(run: RunFinished) -> str:
 
 
 def _criterion_row(run: RunFinished, verdict: Verdict, finding: Finding, line: int) -> str:
-    failed, warning = finding.status is not Status.PASS, verdict.severity == "warn"
-    css_class = "" if not failed else "bad" if finding.status is Status.FAIL and not warning else "odd"
-    word = "warning" if failed and warning else finding.status.value
+    has_passed, is_warning = finding.status is Status.PASS, verdict.severity == "warn"
+    css_class = "" if has_passed else "bad" if finding.status is Status.FAIL and not is_warning else "odd"
+    word = "warning" if is_warning and not has_passed else finding.status.value
     margin = "" if finding.margin is None else f"{finding.margin:+.3g} {finding.unit}".rstrip()
-    where = time_and_place(finding, run.result.tick_rate) if failed else ""
+    where = "" if has_passed else time_and_place(finding, run.result.tick_rate)
     measured = f"{comparison(finding)}, {where}" if where else comparison(finding)
     reasons = "".join(f"<li>{html_text(reason)}</li>" for reason in finding.detail)
     return (
@@ -154,7 +154,7 @@ def _disturbance_table(run: RunFinished) -> str:
 
 
 def _table(headings: Sequence[str], rows: str) -> str:
-    """Return a table, in narrow windows without its heading. `rows` is HTML; "" for no table."""
+    """Return a table with these headings and rows; "" without rows. `rows` is HTML."""
     head = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
     return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>' if rows else ""
 
@@ -162,11 +162,11 @@ def _table(headings: Sequence[str], rows: str) -> str:
 def _links(run: RunFinished, folder: str) -> str:
     """Return links to the files of a run in the output folder of the session; "" without any."""
     files = run.artifacts
-    named = [(files.replay, "replay"), (files.mcap, "log"), (files.picture, "picture"), (files.result, "result")]
+    labeled = [(files.replay, "replay"), (files.mcap, "log"), (files.picture, "picture"), (files.result, "result")]
     if files.folder:
         others = [(str(Path(files.folder, name)), label) for name, label in _OTHER_FILES]
-        named += [(path, label) for path, label in others if _has_content(path)]
-    links = " · ".join(html for path, label in named if (html := link(path, folder, label)))
+        labeled += [(path, label) for path, label in others if _has_content(path)]
+    links = " · ".join(html for path, label in labeled if (html := link(path, folder, label)))
     return f"<p>{links}</p>" if links else ""
 
 
@@ -201,9 +201,9 @@ def _collapsible(title: str, inside: str) -> str:
 
 def _duration_sparkline(run: RunFinished, past: Sequence[PastOutcome | None]) -> str:
     """Return a line chart of the simulated times in the last sessions; "" for fewer than three values."""
-    known = [one.simulated for one in past if one is not None] + [run.result.simulated]
-    if len(known) < 3:
+    times = [earlier.simulated for earlier in past if earlier is not None] + [run.result.simulated]
+    if len(times) < 3:
         return ""
-    values = ", ".join(f"{value:.1f}" for value in known)
-    line = sparkline(known, f"simulated seconds, oldest first: {values}", min(known), max(known))
-    return f'<p class="quiet">simulated time in the last sessions: {line} {known[-2]:.1f} s, now {known[-1]:.1f} s</p>'
+    values = ", ".join(f"{value:.1f}" for value in times)
+    line = sparkline(times, f"simulated seconds, oldest first: {values}", min(times), max(times))
+    return f'<p class="quiet">simulated time in the last sessions: {line} {times[-2]:.1f} s, now {times[-1]:.1f} s</p>'

@@ -22,7 +22,7 @@ from simscen.report.suite.elements import address
 from simscen.spec.quantities import si_number
 
 MAX_PLOTS = 8
-"""Maximum number of parameters with a plot. Parameters with the strongest effects come first."""
+"""Maximum number of parameters with a plot. Parameters with the most significant effects come first."""
 MAX_POINTS = 2000
 """Maximum number of runs in a plot. Errors and failures have priority."""
 WIDTH, HEIGHT, LABEL_SPACE = 420, 220, 44
@@ -75,10 +75,13 @@ def _effect_table(study: Study) -> str:
 
 
 def _plots(study: Study, runs: Sequence[RunFinished], folder: str) -> str:
-    """Return a plot for each of at most MAX_PLOTS numeric parameters: the margin that depends most on the parameter."""
-    criterion_of = {effect.path: effect.criterion for effect in reversed(study.effects) if effect.is_ordered}
-    order = [path for path in dict.fromkeys(effect.path for effect in study.effects) if path in criterion_of]
-    plots = "".join(_plot(path, criterion_of[path], study, runs, folder) for path in order[:MAX_PLOTS])
+    """Return a plot for each of at most MAX_PLOTS numeric parameters.
+
+    A plot shows the margin on which the parameter has the most significant effect.
+    """
+    criteria = {effect.path: effect.criterion for effect in reversed(study.effects) if effect.is_ordered}
+    paths = [path for path in dict.fromkeys(effect.path for effect in study.effects) if path in criteria]
+    plots = "".join(_plot(path, criteria[path], study, runs, folder) for path in paths[:MAX_PLOTS])
     return f'<h3>Margins</h3><div class="plots">{plots}</div>' if plots else ""
 
 
@@ -137,4 +140,5 @@ def _range(values: Sequence[float]) -> tuple[float, float]:
 
 
 def _scale(value: float, limits: tuple[float, float], start: float, end: float) -> float:
+    """Map `value` linearly from the range `limits` to the range from `start` to `end`."""
     return start + (value - limits[0]) / (limits[1] - limits[0]) * (end - start)

@@ -11,7 +11,7 @@ from simscen.core.records.run_store import FinishedRuns, RunStore
 from simscen.core.records.session_events import RunFinished, SessionFinished
 from simscen.report import github
 from simscen.report.junit import xml_parts
-from simscen.report.results_json import as_document, json_parts
+from simscen.report.results_json import json_parts, results_document
 from simscen.report.suite import SessionReport, page, to_html
 
 
@@ -72,7 +72,7 @@ def test_last_result_of_a_run_replaces_earlier_ones(store: RunStore) -> None:
 @pytest.mark.parametrize("number", [0, 1, 8])
 def test_results_json_is_one_sorted_and_indented_document(number: int) -> None:
     runs = RUNS[:number]
-    expected = json.dumps(as_document(runs), sort_keys=True, indent=2, ensure_ascii=False) + "\n"
+    expected = json.dumps(results_document(runs), sort_keys=True, indent=2, ensure_ascii=False) + "\n"
     assert "".join(json_parts(runs)) == expected
 
 

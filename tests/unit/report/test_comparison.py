@@ -32,7 +32,7 @@ EXPECTED = """\
     mean over pairs    ref   mine  difference  95 % interval  -/=/+
     time_to_goal, s  25.34  28.23       +2.89  +0.78 … +4.95  1/0/7
     replans           3.00   3.00       +0.00                 0/2/0
-    the arrivals differ in 2 pairs, so only their collisions are compared
+    only collisions are compared in 2 pairs: only one run reached the last goal
     left out: 1 pair with an error, 1 run without a partner
 
 """  # noqa: E501 - as it is printed
@@ -62,7 +62,7 @@ def test_console_output_snapshot(comparison) -> None:
 def test_tables_fit_into_the_columns_of_a_terminal_and_use_a_wider_one(comparison) -> None:
     long = {"a" * 90 + "/one": comparison.outcomes["navigation/goal"]}
     for columns in (80, 200):
-        text = lines(Comparison(comparison.stacks, long, comparison.against), columns)
+        text = lines(Comparison(comparison.stacks, long, comparison.baseline_comparisons), columns)
         tables = [line for line in text if "worse " not in line]
         assert max(map(len, tables)) <= columns
         assert (next(iter(long)) in "\n".join(text)) == (columns == 200)

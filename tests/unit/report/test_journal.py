@@ -153,7 +153,7 @@ def test_lines_that_are_written_in_several_parts_are_complete(tmp_path, runs, mo
         (None, "the folder has no events.jsonl"),
         (b"", "ended before it listed its runs"),
         (b"junk\n", "the journal is damaged"),
-        (b'{"event": "planned", "format": 99, "runs": []}\n', "it has format 99"),
+        (b'{"event": "planned", "format": 99, "runs": []}\n', "the journal has format 99"),
         (b'{"event": "planned", "format": 2, "runs": [{}], "version": "", "workers": 1, "at": 0}\n', "damaged"),
         (b'{"event": "planned", "format": 2, "runs": ["a"], "version": "", "workers": 1, "at": 0}\n', "damaged"),
     ],

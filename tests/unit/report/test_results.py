@@ -2,7 +2,7 @@ import json
 from dataclasses import replace
 
 from simscen.judge.result_json import from_data
-from simscen.report.results_json import as_document, json_parts
+from simscen.report.results_json import json_parts, results_document
 
 
 def test_results_contain_each_run_once(passed, failed, crashed):
@@ -18,7 +18,7 @@ def test_results_contain_each_run_once(passed, failed, crashed):
 
 def test_results_contain_the_figures_of_the_session(passed, failed, crashed):
     measured = replace(passed, result=replace(passed.result, metrics={"collisions": 2.0, "path_length": 500.0}))
-    figures = as_document([measured, failed, crashed])["suite"]
+    figures = results_document([measured, failed, crashed])["suite"]
     assert (figures["runs"], figures["measured_runs"], figures["collisions_per_km"]) == (3, 1, 4.0)
 
 
@@ -33,13 +33,13 @@ def test_results_do_not_depend_on_wall_time_or_order(passed, failed):
 
 def test_determinism_runs_do_not_count_as_evidence(passed, failed):
     again = [replace(run, result=replace(run.result, key=run.key.repetition)) for run in (passed, failed)]
-    assert as_document([passed, failed, *again])["suite"] == as_document([passed, failed])["suite"]
+    assert results_document([passed, failed, *again])["suite"] == results_document([passed, failed])["suite"]
 
 
 def test_stacks_are_not_pooled(passed, failed):
     def by(run, stack):
         return replace(run, result=replace(run.result, key=replace(run.key, stack_name=stack)))
 
-    document = as_document([by(passed, "a"), by(passed, "a.again"), by(failed, "b")])
+    document = results_document([by(passed, "a"), by(passed, "a.again"), by(failed, "b")])
     assert "suite" not in document
-    assert document["suites"] == {"a": as_document([passed])["suite"], "b": as_document([failed])["suite"]}
+    assert document["suites"] == {"a": results_document([passed])["suite"], "b": results_document([failed])["suite"]}

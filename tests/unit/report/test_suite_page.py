@@ -251,14 +251,14 @@ def test_sessions_with_missing_or_damaged_results_are_ignored(sessions, tmp_path
 
 
 def test_page_of_a_running_session_shows_progress_and_reloads(passed, failed):
-    html = to_html(SessionReport([passed], live=RunningSession(3, (failed.key,))))
+    html = to_html(SessionReport([passed], progress=RunningSession(3, (failed.key,))))
     assert "1 of 3 runs done, running: faults/lidar_off, seed 7" in html
     assert "<noscript><meta http-equiv=refresh" in html
     assert "refresh" not in to_html(SessionReport([passed])).replace("refreshing", "").partition("<script>")[0]
 
 
 def test_session_without_runs_has_a_page():
-    assert "<h1>✓ 0 passed</h1>" in to_html(SessionReport([], live=RunningSession(5)))
+    assert "<h1>✓ 0 passed</h1>" in to_html(SessionReport([], progress=RunningSession(5)))
 
 
 def test_every_outcome_has_a_symbol_and_a_color(passed):

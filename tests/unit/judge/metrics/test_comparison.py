@@ -45,7 +45,7 @@ def run(stack: str, seed: int = 1, scenario: str = "a", outcome: Outcome = Outco
 def against(*runs: RunResult):
     comparison = compare_stacks(runs, STACKS)
     assert comparison is not None
-    (one,) = comparison.against
+    (one,) = comparison.baseline_comparisons
     return one
 
 
@@ -117,8 +117,8 @@ def test_comparison_is_with_the_first_stack_in_any_order_of_runs() -> None:
     assert compare_stacks(runs, stacks) == compare_stacks(runs[::-1], stacks)
     comparison = compare_stacks(runs, stacks)
     assert comparison is not None
-    assert [one.stack for one in comparison.against] == ["mine", "other"]
-    found = of(comparison.against[1], "time_to_goal")
+    assert [one.stack for one in comparison.baseline_comparisons] == ["mine", "other"]
+    found = of(comparison.baseline_comparisons[1], "time_to_goal")
     assert found.interval is not None
     assert found.interval[0] < found.difference < found.interval[1]
     assert found.difference == pytest.approx(0.2 * 4.5)
@@ -220,7 +220,7 @@ def sessions(worse: dict[str, float], seeds: int = 12, failing: int = 0, scenari
         for seed in range(seeds)
     ]
     comparison = compare_sessions({"before": before, "now": now}, {"before": "b", "now": "n"}, Significance())
-    (one,) = comparison.against
+    (one,) = comparison.baseline_comparisons
     return one
 
 
@@ -236,7 +236,7 @@ def test_metric_of_a_package_has_no_worse_direction() -> None:
     before = [run("", seed, added=1.0, another=1.0) for seed in range(8)]
     now = [run("", seed, added=2.0, another=2.0) for seed in range(8)]
     comparison = compare_sessions({"before": before, "now": now}, {"before": "b", "now": "n"}, Significance())
-    (one,) = comparison.against
+    (one,) = comparison.baseline_comparisons
     assert [(change.what, change.is_worse) for change in one.changes] == [("added", None), ("another", None)]
     assert [found.metric for found in one.differences][-2:] == ["added", "another"]
 
@@ -280,7 +280,7 @@ def test_differences_are_counted_by_direction_and_written_with_their_interval(pa
     runs = [run(name, seed, headway=2.0 + 0.5 * k) for seed in range(pairs) for k, name in enumerate(("ref", "mine"))]
     comparison = compare_stacks(runs, STACKS)
     assert comparison is not None
-    found = of(comparison.against[0], "headway")
+    found = of(comparison.baseline_comparisons[0], "headway")
     assert (found.lower, found.equal, found.higher) == (0, 0, pairs)
     data = next(one for one in comparison_data(comparison)["against"][0]["differences"] if one["metric"] == "headway")
     assert data["interval"] == ([0.5, 0.5] if has_interval else None)
