@@ -53,7 +53,9 @@ def _robot_data(loaded: LoadedScenario, checks: TextChecks) -> dict[str, Any]:
     # Without immovable bodies, the tuple stays the same: the cache of shortest paths compares identities.
     immovable = scene.immovable_bodies
     solids = (*scene.world.solids, *immovable) if immovable else scene.world.solids
-    paths = checks.cache.shortest_paths(solids, extend_bounds(world.bounds, stops), size.inscribed, scene.z_range)
+    paths = checks.cache.shortest_paths(
+        solids, extend_bounds(world.bounds, stops), size.inscribed_radius, scene.z_range
+    )
     legs = [_leg(paths, *ends) for ends in list(pairwise(stops))[:MAX_LEGS]]
     return {
         "footprint": [[round(x, 4), round(y, 4)] for x, y in size.footprint],

@@ -65,7 +65,7 @@ def _stops(loaded: LoadedScenario) -> Iterator[Pose2]:
     for goal in (*scenario_goals(spec), *event_goals(loaded).values()):
         if not expects_failure(spec, goal.name):
             yield goal.pose
-    yield from (one.spec.pose.pose for one in loaded.actions if one.kind == "kidnap")
+    yield from (action.spec.pose.pose for action in loaded.actions if action.kind == "kidnap")
 
 
 def extend_bounds(bounds: Bounds, poses: list[Pose2]) -> Bounds:

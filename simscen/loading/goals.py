@@ -37,7 +37,11 @@ def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
 
 def event_goals(loaded: LoadedScenario) -> dict[Keys, Goal]:
     """Return the goals that events send, by the keys of their `new_goal` actions in the scenario."""
-    return {one.keys: _goal(one.spec.name, one.spec, loaded.spec) for one in loaded.actions if one.kind == "new_goal"}
+    return {
+        action.keys: _goal(action.spec.name, action.spec, loaded.spec)
+        for action in loaded.actions
+        if action.kind == "new_goal"
+    }
 
 
 def _goal(name: str, entry: "GoalEntry | NewGoal", spec: ScenarioSpec) -> Goal:

@@ -20,13 +20,13 @@ KIND_NAMES = {
     "disturbance": "event, fault or mark",
     "verdict": "criterion, event or fault",
 }
-"""Texts for messages, by kind of named thing. Actions can move a "movable". A "mover" is a movable or another robot."""
+"""Descriptions for messages, by kind of reference (see `ReferenceTo`)."""
 
 Names = Mapping[str, list[str] | None]
-"""Valid names by kind of named thing; None for a kind if its names are not known.
+"""Valid names by kind of reference (see `ReferenceTo`); None for a kind if its names are not known.
 
-The names in a world from SDF or a map are not known before the world is built. The names of verdicts are not known for
-one of several robots.
+The names in a world from SDF or a map are not known before the world is built. The names of verdicts are not known in
+the view of one of several robots.
 """
 
 
@@ -65,7 +65,7 @@ def event_names(loaded: LoadedScenario) -> list[str]:
 def _names_in_files(loaded: LoadedScenario) -> Names:
     """Return the names of places, regions, doors, and objects, as far as they are known without a built world."""
     world = loaded.world.spec
-    imported = loaded.world.map is not None or loaded.world.sdf is not None
+    is_imported = loaded.world.map is not None or loaded.world.sdf is not None
     spawned = spawned_names(loaded)
     names: dict[str, list[str] | None] = {
         "place": list(world.places) if world else [],
@@ -74,20 +74,20 @@ def _names_in_files(loaded: LoadedScenario) -> Names:
         "object": None,
         "movable": None,
     }
-    if world is not None and not imported:
+    if world is not None and not is_imported:
         names["object"] = _distinct(_object_names(world), spawned, list(loaded.other_robots))
         names["movable"] = _distinct(_movable_names(world), spawned)
     return names
 
 
 def _names_in_built_world(loaded: LoadedScenario, world: World) -> Names:
-    moving, spawned = [body.name for body in world.bodies], spawned_names(loaded)
+    body_names, spawned = [body.name for body in world.bodies], spawned_names(loaded)
     return {
         "place": list(world.places),
         "region": list(world.regions),
         "door": list(world.doors),
-        "object": _distinct(moving, [solid.name for solid in world.solids], spawned, list(loaded.other_robots)),
-        "movable": _distinct(moving, spawned),
+        "object": _distinct(body_names, [solid.name for solid in world.solids], spawned, list(loaded.other_robots)),
+        "movable": _distinct(body_names, spawned),
     }
 
 
@@ -105,22 +105,22 @@ def spawned_names(loaded: LoadedScenario) -> list[str]:
 
 def pedestrian_names(loaded: LoadedScenario) -> list[str]:
     """Return the names of the pedestrians that events add to the world, alone or in crowds."""
-    crowds = [one.spec.names for step in loaded.spec.steps for one in step.actions if one.kind == "crowd"]
+    crowds = [action.spec.names for action in loaded.all_actions if action.kind == "crowd"]
     return _names_in_actions(loaded, "pedestrian") + [name for crowd in crowds for name in crowd]
 
 
 def _names_in_actions(loaded: LoadedScenario, kind: str) -> list[str]:
-    """Return the value of `name` in all actions of one kind, such as "spawn". Goals of other robots are left out."""
-    actions = loaded.actions if kind == "new_goal" else [one for step in loaded.spec.steps for one in step.actions]
-    return [str(one.spec.name) for one in actions if one.kind == kind]
+    """Return the names in all actions of one kind, such as "spawn". New goals of other robots are left out."""
+    actions = loaded.actions if kind == "new_goal" else loaded.all_actions
+    return [str(action.spec.name) for action in actions if action.kind == kind]
 
 
 def _movable_names(world: WorldSpec) -> list[str]:
-    return [*(thing.name for thing in world.objects), *(door.name for door in world.doors)]
+    return [*(movable.name for movable in world.objects), *(door.name for door in world.doors)]
 
 
 def _object_names(world: WorldSpec) -> list[str]:
-    """Return the names of all solid things of a world file, including its walls."""
+    """Return the names of all solid objects of a world file, including walls, ramps, and doors."""
     return [
         *_movable_names(world),
         *(obstacle.name for obstacle in world.obstacles),

@@ -158,15 +158,20 @@ class LoadedScenario:
     def may_do(self, *kinds: str) -> bool:
         """Return whether an action of an event can have the effect of an action of one of these kinds.
 
-        Actions of installed packages can have any effect. Without kinds, return whether there is such an action.
+        Actions of installed packages can have any effect. Without kinds, return whether an action is from such a
+        package.
         """
-        return any(one.action.may_do(*kinds) for step in self.spec.steps for one in step.actions)
+        return any(action.choice.may_do(*kinds) for action in self.all_actions)
+
+    @property
+    def all_actions(self) -> "list[LocatedAction]":
+        """Actions of all events in order. In a view, they include actions on other robots."""
+        return [action for step in self.spec.steps for action in step.actions]
 
     @property
     def actions(self) -> "list[LocatedAction]":
-        """Actions of all events that apply to this view, in order."""
-        actions = (one for step in self.spec.steps for one in step.actions)
-        return [one for one in actions if self.includes_robot(one.action.robot)]
+        """Actions of all events in order, without actions on the robots of other views."""
+        return [action for action in self.all_actions if self.includes_robot(action.choice.robot)]
 
     @property
     def title(self) -> str:

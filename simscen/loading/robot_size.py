@@ -30,7 +30,7 @@ class RobotSize:
     """Height of the underside of an omnidirectional or mecanum base above the floor; None for bases that climb."""
 
     @property
-    def inscribed(self) -> float:
+    def inscribed_radius(self) -> float:
         """Radius of the largest circle inside the footprint, around the origin of the base frame."""
         return self.radius if self.radius is not None else inscribed_radius(self.footprint)
 
@@ -45,7 +45,8 @@ def robot_size(loaded: LoadedScenario) -> RobotSize:
         and spec.drive.type != "mecanum"
     ):
         check_ground_clearance(spec, loaded.robot.path)
-        corners = _circle(spec.radius or 0.0) if spec.footprint is None else tuple((x, y) for x, y in spec.footprint)
+        polygon = spec.footprint
+        corners = _circle_corners(spec.radius or 0.0) if polygon is None else tuple((x, y) for x, y in polygon)
         underside = min(part.z for part in spec.body) if spec.drive.type == "omnidirectional" else None
         height = max(part.z + part.total_height for part in spec.body)
         return RobotSize(corners, spec.radius, height, underside)
@@ -57,13 +58,13 @@ def robot_size(loaded: LoadedScenario) -> RobotSize:
     return RobotSize(body.footprint, body.radius, max(float(z.max()) for z in heights), underside)
 
 
-def _circle(radius: float) -> Polygon:
+def _circle_corners(radius: float) -> Polygon:
     angles = [2 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS)]
     return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
 
 
 def blocking_solids(solids: tuple[Solid, ...], body: RobotBody) -> tuple[Solid, ...]:
-    """Return the solids that block a robot. Solids that it can drive over or climb, such as ramps, are left out."""
+    """Return the solids that block a robot: all except those that it can drive over or climb, such as ramps."""
     reach = max((wheel.radius for wheel in body.wheels), default=0.0)
     if has_no_drivable_solids(solids, reach):
         return solids

@@ -98,21 +98,24 @@ class SequenceStep:
 
 
 class LocatedAction(NamedTuple):
-    """Action of an event or step. `keys` lead to its specification in the scenario: ("events", 0, "do", "spawn")."""
+    """Action of an event or step. `keys` lead to the specification of the action: ("events", 0, "do", "spawn").
+
+    `choice` is the action with its key in YAML, e.g. `spawn: {…}`.
+    """
 
     step: SequenceStep
     keys: tuple[str | int, ...]
-    action: AnyAction
+    choice: AnyAction
 
     @property
     def kind(self) -> str:
         """Key of the action in YAML, e.g. "spawn"."""
-        return self.action.kind
+        return self.choice.kind
 
     @property
     def spec(self) -> Any:
         """Specification under this key."""
-        return self.action.chosen
+        return self.choice.chosen
 
 
 def steps_of(events: Sequence[EventEntry]) -> list[SequenceStep]:

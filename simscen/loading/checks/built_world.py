@@ -15,7 +15,7 @@ from simscen.worlds.geometry.overlaps import first_solid_in_disc
 BLOCKING_HEIGHTS_M = 0.02, 0.4
 """Lowest and highest z in m between which an obstacle blocks most robots."""
 RAMP_ROBOT_WHEEL_RADIUS_M, RAMP_ROBOT_MAX_SLOPE_RAD, RAMP_ROBOT_MAX_STEP_M = 0.1, 0.35, 0.03
-"""Wheel radius, maximum slope, and maximum step of an assumed robot that can climb typical ramps."""
+"""Wheel radius, maximum slope, and maximum step height of an assumed robot that can climb typical ramps."""
 
 
 def check_built_world(world: World, source: LoadedWorld) -> list[Problem]:
@@ -42,10 +42,10 @@ def places_in_obstacles(world: World, spec: WorldSpec) -> Iterator[CheckProblem]
 @BUILT_WORLD.check("SC304", severity="warning")
 def motions_into_obstacles(world: World, spec: WorldSpec) -> Iterator[CheckProblem]:
     """Find motions of objects with keyframes or waypoints inside obstacles."""
-    for index, thing in enumerate(spec.objects):
-        for keys, what, (x, y) in motion_stops(thing.move) if thing.move is not None else ():
+    for index, movable in enumerate(spec.objects):
+        for keys, description, (x, y) in motion_stops(movable.move) if movable.move is not None else ():
             if solid := first_solid_in_disc(world.solids, (x, y), TOUCH_M, BLOCKING_HEIGHTS_M):
-                message = f'{what} of {quoted(thing.name)} ({x:g}, {y:g}) is inside obstacle "{solid}"'
+                message = f'{description} of {quoted(movable.name)} ({x:g}, {y:g}) is inside obstacle "{solid}"'
                 yield CheckProblem(("objects", index, "move", *keys), message)
 
 

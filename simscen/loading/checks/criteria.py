@@ -6,7 +6,7 @@ from typing import Any
 
 from simscen.core.messages.navigation import ErrorCode
 from simscen.criteria.registry import verdict_names
-from simscen.loading.checks.possible_run import why_no_recovery
+from simscen.loading.checks.event_feasibility import no_recovery_reason
 from simscen.loading.checks.registry import MEANING, CheckProblem
 from simscen.loading.known_names import goal_names
 from simscen.loading.loaded import LoadedScenario
@@ -14,7 +14,7 @@ from simscen.loading.yaml.tree import Keys
 from simscen.model.navigation import expected_failure_name
 
 GOAL_CRITERIA = frozenset({"goals_reached", "time_to_goal", "no_false_success", "stuck", "result", "error_code"})
-"""Criteria that have nothing to judge if the robot gets no goal."""
+"""Kinds of criteria that have nothing to judge if the robot gets no goal."""
 LOOSE_SPEED_RATIO = 1.2
 """Bounds on the speed above this multiple of the top speed are loose."""
 LOOSE_PATH_RATIO = 10.0
@@ -28,7 +28,7 @@ TIME_BOUNDS = {
     "stopped_within": "time",
     "relocalized_within": "time",
 }
-"""Keys of bounds that are times, by kind of the criterion. They are loose if they are not below the time limit."""
+"""Keys of bounds that are times, by kind of criterion. These bounds are loose if they are not below the time limit."""
 
 
 @MEANING.check("SC036")
@@ -44,7 +44,7 @@ def criteria_beyond_time_limit(loaded: LoadedScenario) -> Iterator[CheckProblem]
 
 @MEANING.check("SC036")
 def too_short_time_limits(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find time limits before the second sample of the ground truth. Without it, no motion can be judged."""
+    """Find time limits before the second sample of the ground truth. No motion can be judged with a single sample."""
     period = 1.0 / loaded.spec.physics.truth_rate
     if loaded.spec.time_limit < period:
         message = f"nothing can be judged: the second sample of the ground truth is at t = {period:g} s"
@@ -55,17 +55,17 @@ def too_short_time_limits(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 def impossible_criteria(loaded: LoadedScenario) -> Iterator[CheckProblem]:
     """Find criteria that no run can pass."""
     for index, entry in enumerate(loaded.spec.pass_):
-        if reason := _why_impossible(loaded, entry.kind, entry.chosen):
+        if reason := _impossibility_reason(loaded, entry.kind, entry.chosen):
             yield CheckProblem(("pass", index, entry.kind), f"{entry.kind} can never hold: {reason}", at_key=True)
 
 
-def _why_impossible(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:
+def _impossibility_reason(loaded: LoadedScenario, kind: str, criterion: Any) -> str | None:
     """Return the reason why no run can pass a criterion of this kind; None if a run can."""
     needs_goal = kind in GOAL_CRITERIA or (kind == "path_length" and criterion.max_ratio is not None)
     if needs_goal and not goal_names(loaded):
         return "the robot gets no goal"
     if kind == "recoveries" and criterion.min:
-        return why_no_recovery(loaded, criterion.name)
+        return no_recovery_reason(loaded, criterion.name)
     if kind != "result":
         return None
     if criterion.status == "CANCELED" and not loaded.may_do("cancel_goal"):
@@ -130,7 +130,7 @@ def loose_bounds(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 
 def _loose_bounds_of(loaded: LoadedScenario, kind: str, criterion: Any) -> Iterator[tuple[str, str]]:
-    """Yield the key and the reason of each loose bound of a criterion; without the keys in TIME_BOUNDS."""
+    """Yield the key and the reason of each loose bound of a criterion. Bounds in TIME_BOUNDS are left out."""
     robot = loaded.robot.spec
     match kind:
         case "speed" if robot is not None:
@@ -162,7 +162,7 @@ def only_warnings(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC051")
 def expected_warnings(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find criteria with `severity: warn` under `expected.criteria`, which must fail although they cannot."""
+    """Find criteria under `expected.criteria` that cannot fail the run, because they have `severity: warn`."""
     spec = loaded.spec
     severities = dict(zip(verdict_names(spec.pass_), (entry.severity for entry in spec.pass_), strict=True))
     for index, name in enumerate(spec.expected.criteria if spec.expected else ()):

@@ -70,15 +70,15 @@ def unsuitable_faults(scope: NameScope) -> Iterator[CheckProblem]:
         keys = ("faults", index, entry.kind)
         if target.kind not in entry.fault.affects:
             assert loaded.robot.spec is not None
-            suitable = [name for name, one in targets.items() if one.kind in entry.fault.affects]
+            suitable = [name for name, other in targets.items() if other.kind in entry.fault.affects]
             hint = f"it can affect: {', '.join(suitable)}" if suitable else "it can affect nothing on this robot"
-            what = TARGET_DESCRIPTIONS.get(target.kind) or with_article(loaded.robot.spec.sensors[entry.sensor].kind)
-            message = f"fault `{entry.kind}` cannot affect {what} (`{entry.sensor}`)"
+            sensor = TARGET_DESCRIPTIONS.get(target.kind) or with_article(loaded.robot.spec.sensors[entry.sensor].kind)
+            message = f"fault `{entry.kind}` cannot affect {sensor} (`{entry.sensor}`)"
             yield CheckProblem(keys, message, hint, at_key=True)
         elif unsuitable := entry.fault.unsuitable_key(target):
-            inner_keys = (unsuitable[0],) if unsuitable[0] else ()
-            message = f"fault `{entry.kind}` does not fit `{entry.sensor}`: {unsuitable[1]}"
-            yield CheckProblem((*keys, *inner_keys), message, at_key=True)
+            key, reason = unsuitable
+            message = f"fault `{entry.kind}` does not fit `{entry.sensor}`: {reason}"
+            yield CheckProblem((*keys, key) if key else keys, message, at_key=True)
 
 
 @NAMES.check("SC032")
@@ -119,7 +119,7 @@ def _suitable_faults(loaded: LoadedScenario) -> Iterator[tuple[int, FaultEntry, 
 
 @MEANING.check("SC050")
 def faults_between_messages(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find faults that can begin and end between two messages of their sensor."""
+    """Find faults that can begin and end between two messages of the sensor, so that they have no effect."""
     if loaded.robot.spec is None:
         return
     rates = {name: getattr(sensor.chosen, "rate", None) for name, sensor in loaded.robot.spec.sensors.items()}
@@ -129,12 +129,12 @@ def faults_between_messages(loaded: LoadedScenario) -> Iterator[CheckProblem]:
         if entry.for_ is None or rate is None or entry.for_ * rate >= 1 - 1e-9:
             continue
         begin = _start_time_s(entry.when)
-        between = begin is not None and math.ceil(begin * rate - 1e-6) > (begin + entry.for_) * rate + 1e-6
-        if begin is None or between:
-            when = "begins and ends" if between else "may begin and end"
-            message = f"`{entry.label}` {when} between two messages: `{entry.sensor}` sends {rate:g} per second"
+        is_between = begin is not None and math.ceil(begin * rate - 1e-6) > (begin + entry.for_) * rate + 1e-6
+        if begin is None or is_between:
+            verb = "begins and ends" if is_between else "may begin and end"
+            message = f"`{entry.label}` {verb} between two messages: `{entry.sensor}` sends {rate:g} per second"
             hint = f"make it last at least {1 / rate:g} s"
-            yield CheckProblem(("faults", index, "for"), message, hint, warning=not (between and entry.required))
+            yield CheckProblem(("faults", index, "for"), message, hint, is_warning=not (is_between and entry.required))
 
 
 def _start_time_s(when: Trigger | None) -> float | None:

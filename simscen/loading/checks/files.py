@@ -1,4 +1,4 @@
-"""Recognition of the kind of a file (scenario, world, robot, …), and check of a file of any kind."""
+"""Recognizes the kind of a file (scenario, world, robot, …), and checks a file of any kind."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -30,7 +30,7 @@ from simscen.model.scenario import ScenarioSpec
 CHECKED_VARIATIONS = range(1, 21)
 """Numbers of the variations of a study that are checked, from 1."""
 STACK_KINDS = ("stack", NAV2_FILE_KIND)
-"""Kinds of files with the parameters of a stack."""
+"""Kinds of files that contain parameters of a stack."""
 _SUFFIXES_BY_KIND = (
     ("scenario", SCENARIO_SUFFIXES),
     ("study", STUDY_SUFFIXES),
@@ -42,14 +42,14 @@ _SUFFIXES_BY_KIND = (
 
 
 def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = ()) -> list[Problem]:
-    """Return the errors and warnings of a file of this kind (see `file_kind`) and of the files that it names."""
+    """Return the errors and warnings of a file and of the files that it names. `kind` is from `file_kind`."""
     if kind in ("scenario", "study"):
         loaded = try_variations(
             file, root, world_path, variation_numbers=CHECKED_VARIATIONS if kind == "study" else None
         )
         if isinstance(loaded, list):
             return loaded
-        return merge_problems([VariationProblems(one.variation, one.varied_paths, one.notes) for one in loaded])
+        return merge_problems([VariationProblems(s.variation, s.varied_paths, s.notes) for s in loaded])
     library = Library(PathSandbox.around(root, world_path))
     if isinstance(path := library.sandbox.resolve_argument(file), Problem):
         return [path]
@@ -73,7 +73,7 @@ def check_file(kind: str, file: Path, root: Path, world_path: Sequence[Path] = (
 def file_kind(file: Path, root: Path) -> str:
     """Return the kind of a file, recognized by its suffix or its top-level keys.
 
-    It is "study", "world", "robot", "stack", "base", "map" (a ROS map), NAV2_FILE_KIND, or else "scenario".
+    The kind is "study", "world", "robot", "stack", "base", "map" (a ROS map), NAV2_FILE_KIND, or else "scenario".
     """
     if file.name == DEFAULTS_FILE:
         return "base"
@@ -106,6 +106,7 @@ def _base_file_problems(file: Path, library: Library) -> list[Problem]:
 
 
 def _load_named_files(tree: MappingNode, assets: Assets) -> None:
+    """Load the world, robot, maps, and masks that a scenario tree names. Problems are added to `assets`."""
     masks = [
         ("pass", index, *keys)
         for index in range(len(items_of(child(tree, "pass"))))

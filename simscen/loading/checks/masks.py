@@ -18,12 +18,12 @@ from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.tree import Keys
 
 ZoneTest = Callable[[Pose2, float], bool]
-"""Function that returns whether a zone contains all positions within a distance in m of a pose."""
+"""Function of a pose and a margin in m that returns whether all positions within the margin are in a zone."""
 
 MIN_DEPTH_M = 0.1
 """Depth inside a zone at which a goal is certainly forbidden, although costmaps round zones to cells."""
 ESTIMATE_ERROR_M = 0.5
-"""Possible error of the initial estimate. A start is only reported if it is this deep inside a zone."""
+"""Possible error of the initial estimate. A start is reported only if it is at least this deep inside a zone."""
 NO_LIMIT_REASON = "no cell of the mask limits the speed with this `base` and `multiplier`"
 
 
@@ -39,7 +39,7 @@ def criterion_masks(scene: Scene) -> Mapping[str, MaskBlocks]:
 
 @WORLD.check("SC302")
 def forbidden_goals_and_starts(scene: Scene) -> Iterator[CheckProblem]:
-    """Find goals and starts in keepout zones of the stack. A start is only a warning."""
+    """Find goals and starts in keepout zones of the stack. For a start, the problem is only a warning."""
     regions = scene.world.regions
     zones: list[tuple[Keys, str, ZoneTest]] = [
         (("stack", "keepout", index), f"in `{region}`", _region_test(regions[region]))
@@ -57,18 +57,21 @@ def forbidden_goals_and_starts(scene: Scene) -> Iterator[CheckProblem]:
         if forbids(scene.start, ESTIMATE_ERROR_M) and not expects_start_failure(scene.loaded.spec):
             message = f"the robot starts {where}, which the stack keeps out of"
             hint = f"move one of them, or {required_failure_hint('START_OCCUPIED')}"
-            yield CheckProblem(keys, message, hint, warning=True)
+            yield CheckProblem(keys, message, hint, is_warning=True)
 
 
 def _region_test(corners: Polygon) -> ZoneTest:
-    return lambda pose, within: depth_inside_polygon(pose, corners) > within
+    return lambda pose, margin: depth_inside_polygon(pose, corners) > margin
 
 
 def _mask_test(mask: OccupancyGrid) -> ZoneTest:
-    """Return the test for the area that a keepout mask forbids. It samples positions at the spacing of the cells."""
+    """Return the test for the area that a keepout mask forbids.
 
-    def forbids(pose: Pose2, within: float) -> bool:
-        steps = np.linspace(-within, within, 2 * int(np.ceil(within / min(mask.resolution, MIN_DEPTH_M))) + 1)
+    The test samples a square around the pose, in steps of at most one cell.
+    """
+
+    def forbids(pose: Pose2, margin: float) -> bool:
+        steps = np.linspace(-margin, margin, 2 * int(np.ceil(margin / min(mask.resolution, MIN_DEPTH_M))) + 1)
         offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
         return bool(in_keepout_mask(mask, offsets + np.array((pose.x, pose.y))).all())
 
@@ -114,7 +117,7 @@ def criterion_masks_without_effect(scene: Scene) -> Iterator[CheckProblem]:
 
 @WORLD.check("SC051")
 def keepout_masks_on_goals(scene: Scene) -> Iterator[CheckProblem]:
-    """Find keepout criteria for the whole run with a mask that forbids the start or a goal."""
+    """Find keepout criteria that apply to the whole run, and whose mask forbids the start or a goal."""
     masks = scene.cached(criterion_masks)
     for index, entry in enumerate(scene.loaded.spec.pass_):
         if entry.kind != "keepout" or entry.chosen.mask is None or entry.chosen.while_on:

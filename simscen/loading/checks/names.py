@@ -32,33 +32,33 @@ def unknown_names(scope: NameScope) -> Iterator[CheckProblem]:
 
 
 @NAMES.check("SC035")
-def names_of_immovable_things(scope: NameScope) -> Iterator[CheckProblem]:
+def names_of_immovable_objects(scope: NameScope) -> Iterator[CheckProblem]:
     """Find names of fixed objects or robots where the name of a movable object is expected."""
     for reference, _, is_immovable in _unknown_references(scope):
         if is_immovable:
             is_robot = reference.name in _forbidden_robots(scope, reference)
-            what = "one of the robots" if is_robot else "a fixed part of the world"
-            message = f"{quoted(reference.name)} is {what}, which cannot be moved or followed"
+            kind = "one of the robots" if is_robot else "a fixed part of the world"
+            message = f"{quoted(reference.name)} is {kind}, which cannot be moved or followed"
             yield CheckProblem(reference.keys, message, "name an object, a door or something that an event spawns")
 
 
 def _unknown_references(scope: NameScope) -> Iterator[tuple[Reference, list[str], bool]]:
-    """Yield each reference with an invalid name, the valid names, and whether it names an immovable thing.
+    """Yield (reference, valid names, is_immovable) for each reference with an invalid name.
 
-    A reference to a movable object must not name a fixed object, or one of certain robots.
+    `is_immovable`: whether a movable object is expected, but the name is that of a fixed object or a forbidden robot.
     """
     loaded, known = scope.loaded, known_names(scope.loaded, scope.world)
     for reference in references(loaded.spec, includes_robot=loaded.includes_robot):
         names = known.get(reference.target)
         if names is not None and reference.name not in names:
-            immovable = (*_forbidden_robots(scope, reference), *(known["object"] or ()))
-            yield reference, names, reference.target in ("movable", "mover") and reference.name in immovable
+            immovable_names = (*_forbidden_robots(scope, reference), *(known["object"] or ()))
+            yield reference, names, reference.target in ("movable", "mover") and reference.name in immovable_names
 
 
 def _forbidden_robots(scope: NameScope, reference: Reference) -> tuple[str, ...]:
     """Return the names of the robots that a reference to a movable object must not name."""
-    own = (scope.loaded.robot_name,) if reference.target == "movable" else ()
-    return (*own, *scope.loaded.other_robots)
+    this_robot = (scope.loaded.robot_name,) if reference.target == "movable" else ()
+    return (*this_robot, *scope.loaded.other_robots)
 
 
 @NAMES.check("SC031")
@@ -69,10 +69,10 @@ def unknown_lidars(scope: NameScope) -> Iterator[CheckProblem]:
         return
     lidars = [name for name, sensor in loaded.robot.spec.sensors.items() if sensor.reading_type == "Scan"]
     for keys, part in walk(loaded.spec, includes_robot=loaded.includes_robot):
-        named = getattr(getattr(part, "scan_age", None), "sensor", None)
-        if named is not None and named not in lidars:
-            message = f"robot `{loaded.robot.name}` has no lidar called {quoted(named)}"
-            yield CheckProblem((*keys, "scan_age", "sensor"), message, suggestion(named, lidars) or "it has no lidar")
+        sensor = getattr(getattr(part, "scan_age", None), "sensor", None)
+        if sensor is not None and sensor not in lidars:
+            message = f"robot `{loaded.robot.name}` has no lidar called {quoted(sensor)}"
+            yield CheckProblem((*keys, "scan_age", "sensor"), message, suggestion(sensor, lidars) or "it has no lidar")
 
 
 @NAMES.check("SC033")
@@ -84,12 +84,12 @@ def duplicate_names(scope: NameScope) -> Iterator[CheckProblem]:
         "event": [(step.keys, step.entry.name) for step in loaded.spec.steps],
         "fault": [(("faults", k), fault.name) for k, fault in enumerate(loaded.spec.faults)],
     }
-    for what, named in lists.items():
+    for kind, names in lists.items():
         seen: dict[str, Keys] = {}
-        for keys, name in named:
+        for keys, name in names:
             if name is not None and name in seen:
                 first = loaded.position_of(*seen[name], "name")
-                message = f"{what} {quoted(name)} is already defined at {first.line}:{first.col}"
+                message = f"{kind} {quoted(name)} is already defined at {first.line}:{first.col}"
                 yield CheckProblem((*keys, "name"), message, "choose another name")
             seen.setdefault(name or "", keys)
     for index, fault in enumerate(loaded.spec.faults):
@@ -104,15 +104,15 @@ def duplicate_marks_and_new_goals(scope: NameScope) -> Iterator[CheckProblem]:
     loaded = scope.loaded
     disturbances = [*event_names(loaded), *(fault.label for fault in loaded.spec.faults)]
     goals = listed_goal_names(loaded)
-    for one in (one for step in loaded.spec.steps for one in step.actions):
-        if one.kind == "mark" and one.spec.name in disturbances:
-            message = f"an event or a fault is also called {quoted(one.spec.name)}; criteria cannot distinguish them"
-            yield CheckProblem((*one.keys, "name"), message, RENAME_HINT)
-        if one.kind == "new_goal" and loaded.includes_robot(one.action.robot):
-            if one.spec.name in goals:
-                message = f"another goal is also called {quoted(one.spec.name)}; criteria cannot distinguish them"
-                yield CheckProblem((*one.keys, "name"), message, "choose another name")
-            goals.append(one.spec.name)
+    for action in loaded.all_actions:
+        if action.kind == "mark" and action.spec.name in disturbances:
+            message = f"an event or a fault is also called {quoted(action.spec.name)}; criteria cannot distinguish them"
+            yield CheckProblem((*action.keys, "name"), message, RENAME_HINT)
+        if action.kind == "new_goal" and loaded.includes_robot(action.choice.robot):
+            if action.spec.name in goals:
+                message = f"another goal is also called {quoted(action.spec.name)}; criteria cannot distinguish them"
+                yield CheckProblem((*action.keys, "name"), message, "choose another name")
+            goals.append(action.spec.name)
 
 
 @NAMES.check("SC033")
@@ -129,15 +129,15 @@ def duplicate_pedestrians(scope: NameScope) -> Iterator[CheckProblem]:
     """Find pedestrians that have the same name as an object or another pedestrian."""
     loaded = scope.loaded
     used_names = dict.fromkeys(world_object_names(loaded, scope.world), "an object of the world")
-    for one in (one for step in loaded.spec.steps for one in step.actions):
-        if one.kind not in ("spawn", "pedestrian", "crowd"):
+    for action in loaded.all_actions:
+        if action.kind not in ("spawn", "pedestrian", "crowd"):
             continue
-        names = one.spec.names if one.kind == "crowd" else [one.spec.name]
+        names = action.spec.names if action.kind == "crowd" else [action.spec.name]
         repeated = [name for name in names if name in used_names]
-        if repeated and (one.kind != "spawn" or used_names[repeated[0]] == "a pedestrian"):
+        if repeated and (action.kind != "spawn" or used_names[repeated[0]] == "a pedestrian"):
             message = f"{used_names[repeated[0]]} is also called {quoted(repeated[0])}"
-            yield CheckProblem((*one.keys, "name"), message, RENAME_HINT)
-        used_names.update(dict.fromkeys(names, "a spawned object" if one.kind == "spawn" else "a pedestrian"))
+            yield CheckProblem((*action.keys, "name"), message, RENAME_HINT)
+        used_names.update(dict.fromkeys(names, "a spawned object" if action.kind == "spawn" else "a pedestrian"))
 
 
 @NAMES.check("SC033")
@@ -166,7 +166,7 @@ def unknown_robots(spec: ScenarioSpec) -> Iterator[CheckProblem]:
 
 @ROBOT_NAMES.check("SC043")
 def missing_robot_names(spec: ScenarioSpec) -> Iterator[CheckProblem]:
-    """In a scenario of several robots, find triggers and actions that concern one robot but do not name it."""
+    """In a scenario of several robots, find triggers and actions that apply to one robot, but do not name the robot."""
     if not spec.robots:
         return
     events = {step.name for step in spec.steps}
@@ -174,7 +174,9 @@ def missing_robot_names(spec: ScenarioSpec) -> Iterator[CheckProblem]:
     hint = f"add {' or '.join(f'`robot: {name}`' for name in sorted(spec.robots))}"
     for step in spec.steps:
         unnamed = [] if step.when is None else list(_conditions_without_robot(step.when, (*step.keys, "when"), faults))
-        unnamed += [one.keys for one in step.actions if one.action.robot is None and one.spec.is_robot_specific]
+        unnamed += [
+            action.keys for action in step.actions if action.choice.robot is None and action.spec.is_robot_specific
+        ]
         for keys in unnamed:
             yield CheckProblem(keys, f"`{keys[-1]}` must name one of the robots", hint, at_key=True)
 
@@ -205,7 +207,7 @@ def unknown_expected_verdicts(spec: ScenarioSpec) -> Iterator[CheckProblem]:
         known += [f"{name}/{verdict}" for verdict in verdicts]
     for number, expected in enumerate(spec.expected.criteria if spec.expected else ()):
         if expected not in known:
-            matches = [one for one in known if one.partition("/")[2] == expected]
+            matches = [verdict for verdict in known if verdict.partition("/")[2] == expected]
             hint = f"write {' or '.join(f'`{match}`' for match in matches)}" if matches else suggestion(expected, known)
             message = f"no criterion, event or fault is called {quoted(expected)}"
             yield CheckProblem(("expected", "criteria", number), message, hint)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 FREE_SPACE_HINT = "move it to free space"
 MAX_PLATFORM_HEIGHT_M = 0.3
-"""Largest height up to which an obstacle in a Gazebo world could be the floor."""
+"""Maximum height of an obstacle in a Gazebo world that could be the floor."""
 TOLERANCE_FRACTIONS = (-0.9, 0.0, 0.9)
 """Offsets from the pose of a blocked goal that are tried, as fractions of its tolerances."""
 
@@ -42,10 +42,10 @@ def blocked_poses(scene: Scene) -> dict[Keys, CheckProblem]:
         solids = (*scene.world.solids, *scene.bodies)
         found += _pose_problem(scene, START, "the robot's start", scene.start, solids, FREE_SPACE_HINT)
     found += _blocked_goals(scene)
-    for one in scene.loaded.actions:
-        if one.kind == "kidnap":
-            keys, what = (*one.keys, "pose"), "the pose to which the robot is kidnapped"
-            found += _pose_problem(scene, keys, what, one.spec.pose.pose, scene.world.solids, FREE_SPACE_HINT)
+    for action in scene.loaded.actions:
+        if action.kind == "kidnap":
+            keys, description = (*action.keys, "pose"), "the pose to which the robot is kidnapped"
+            found += _pose_problem(scene, keys, description, action.spec.pose.pose, scene.world.solids, FREE_SPACE_HINT)
     return {problem.keys: problem for problem in found}
 
 
@@ -56,50 +56,57 @@ def blocked_robot_poses(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _blocked_goals(scene: Scene) -> Iterator[CheckProblem]:
-    """Yield an error for each goal that fixed solids block, and a warning for each goal inside an unmoved body."""
+    """Yield an error for each goal that fixed solids block, and a warning for each goal inside an unmoved body.
+
+    Unmoved bodies are those in `Scene.unmoved_bodies`.
+    """
     for keys, goal in scene.expected_goals:
-        code = "GOAL_OUTSIDE_MAP" if scene.why_outside(goal.pose) else "GOAL_OCCUPIED"
+        code = "GOAL_OUTSIDE_MAP" if scene.outside_reason(goal.pose) else "GOAL_OCCUPIED"
         hint = f"move it, or {expected_failure_hint(keys, code)}"
         found = list(_pose_problem(scene, keys, f"goal `{goal.name}`", goal.pose, scene.world.solids, hint))
         if found and not _fits_nearby(scene, goal):
             yield from found
         position = goal.pose.x, goal.pose.y
-        if not found and (thing := first_solid_in_disc(scene.unmoved_bodies, position, TOUCH_M, scene.z_range)):
-            message = f"goal `{goal.name}` is inside `{thing}`, and no event moves or removes `{thing}`"
-            yield CheckProblem(keys, message, hint, warning=True)
+        if not found and (body := first_solid_in_disc(scene.unmoved_bodies, position, TOUCH_M, scene.z_range)):
+            message = f"goal `{goal.name}` is inside `{body}`, and no event moves or removes `{body}`"
+            yield CheckProblem(keys, message, hint, is_warning=True)
 
 
 def _fits_nearby(scene: Scene, goal: Goal) -> bool:
     """Return whether a pose within the tolerances of a blocked goal is free.
 
-    Poses are only tried for a footprint that is not round, and if its inscribed circle is free at the goal.
+    Return False without a search for a round footprint, or if the inscribed circle of the footprint is not free at
+    the goal.
     """
-    outside = scene.why_outside(goal.pose)
-    if outside or scene.size.radius is not None or scene.circle_conflict(goal.pose, scene.world.solids):
+    is_outside = scene.outside_reason(goal.pose) is not None
+    if is_outside or scene.size.radius is not None or scene.circle_conflict(goal.pose, scene.world.solids):
         return False
     x, y, yaw = goal.pose
-    near = (
+    nearby_poses = (
         Pose2(x + a * goal.xy_tolerance, y + b * goal.xy_tolerance, yaw + c * goal.yaw_tolerance)
         for a, b, c in product(TOLERANCE_FRACTIONS, repeat=3)
         if math.hypot(a, b) <= 1
     )
-    return any(scene.footprint_conflict(pose, scene.world.solids) is None for pose in near)
+    return any(scene.footprint_conflict(pose, scene.world.solids) is None for pose in nearby_poses)
 
 
 def _pose_problem(
-    scene: Scene, keys: Keys, what: str, pose: Pose2, solids: tuple[Solid, ...], hint: str
+    scene: Scene, keys: Keys, description: str, pose: Pose2, solids: tuple[Solid, ...], hint: str
 ) -> Iterator[CheckProblem]:
-    """Yield a problem if a pose overlaps `solids`, or is outside the area. `what` describes the pose in the message."""
-    conflict = scene.why_outside(pose) or scene.footprint_conflict(pose, solids)
+    """Yield a problem if the robot at a pose overlaps `solids`, or is outside the map or the world.
+
+    `description` describes the pose in the message.
+    """
+    conflict = scene.outside_reason(pose) or scene.footprint_conflict(pose, solids)
     if conflict:
         if scene.loaded.world.sdf is not None:
             hint = _hint_in_gazebo_world(scene, pose, solids, hint)
-        yield CheckProblem(keys, f"{what} ({pose.x:g}, {pose.y:g}) is {conflict}", hint)
+        yield CheckProblem(keys, f"{description} ({pose.x:g}, {pose.y:g}) is {conflict}", hint)
 
 
 def _hint_in_gazebo_world(scene: Scene, pose: Pose2, solids: tuple[Solid, ...], hint: str) -> str:
     """Return `hint`, or a better hint for a pose outside the world or inside an obstacle that could be the floor."""
-    if scene.why_outside(pose):
+    if scene.outside_reason(pose):
         return f"{hint}; or drive with `map: none`"
     position = pose.x, pose.y
     solid = next((each for each in solids if first_solid_in_disc([each], position, TOUCH_M, scene.z_range)), None)
@@ -111,12 +118,14 @@ def _hint_in_gazebo_world(scene: Scene, pose: Pose2, solids: tuple[Solid, ...], 
 @WORLD.check("SC304")
 def blocked_spawns(scene: Scene) -> Iterator[CheckProblem]:
     """Find objects that would be spawned inside an obstacle or on the robot."""
-    for one in scene.loaded.actions:
-        if one.kind == "spawn":
-            when = one.step.when if one.step.after is None else None  # later steps count from the step before them
-            if where := _inside_obstacle(scene, one.spec) or _on_robot(scene, one.spec, when):
-                message = f"`{one.spec.name}` would appear {where}"
-                yield CheckProblem((*one.keys, "name"), message, "choose another pose")
+    for action in scene.loaded.actions:
+        if action.kind == "spawn":
+            when = (
+                action.step.when if action.step.after is None else None
+            )  # later steps count from the step before them
+            if where := _inside_obstacle(scene, action.spec) or _on_robot(scene, action.spec, when):
+                message = f"`{action.spec.name}` would appear {where}"
+                yield CheckProblem((*action.keys, "name"), message, "choose another pose")
 
 
 def _inside_obstacle(scene: Scene, spawn: "Spawn") -> str | None:
@@ -134,7 +143,7 @@ def _inside_obstacle(scene: Scene, spawn: "Spawn") -> str | None:
 
 
 def _on_robot(scene: Scene, spawn: "Spawn", when: "Trigger | None") -> str | None:
-    """Return "on the robot" if a spawned object overlaps the robot; None if not, or if it depends on the run."""
+    """Return "on the robot" if a spawned object overlaps the robot; None if it does not, or if the run decides."""
     if spawn.z >= scene.size.height:
         return None
     if spawn.ahead is not None:
@@ -157,32 +166,32 @@ def _outline(spawn: "Spawn") -> Polygon:
 def blocked_pedestrians(scene: Scene) -> Iterator[CheckProblem]:
     """Find pedestrians with a start or goal that is closer to an obstacle than the radius of the pedestrian."""
     solids = (*scene.world.solids, *scene.immovable_bodies)
-    for one in scene.loaded.actions:
-        if one.kind != "pedestrian":
+    for action in scene.loaded.actions:
+        if action.kind != "pedestrian":
             continue
-        spec = one.spec
+        spec = action.spec
         stops: list[MotionStop] = [(("pose",), f"the start of `{spec.name}`", (spec.pose.x, spec.pose.y))]
         stops += [(("goals", k), f"goal {k + 1} of `{spec.name}`", (x, y)) for k, (x, y) in enumerate(spec.goals)]
-        for below, what, (x, y) in stops:
+        for below, description, (x, y) in stops:
             if solid := first_solid_in_disc(solids, (x, y), spec.radius, (SILL_M, spec.height)):
-                message = f'{what} ({x:g}, {y:g}) is closer to obstacle "{solid}" than {spec.radius:g} m'
-                yield CheckProblem((*one.keys, *below), message, "choose a position with enough room")
+                message = f'{description} ({x:g}, {y:g}) is closer to obstacle "{solid}" than {spec.radius:g} m'
+                yield CheckProblem((*action.keys, *below), message, "choose a position with enough room")
 
 
 @WORLD.check("SC304", severity="warning")
 def motions_into_walls(scene: Scene) -> Iterator[CheckProblem]:
     """Find `move` actions with keyframes or waypoints, and `teleport` actions with poses, inside fixed obstacles."""
-    for one in scene.loaded.actions:
+    for action in scene.loaded.actions:
         stops: list[MotionStop] = []
-        if one.kind == "move":
-            stops = motion_stops(one.spec)
-        elif one.kind == "teleport":
-            stops = [(("pose",), "the new pose", (one.spec.pose.x, one.spec.pose.y))]
-        for below, what, (x, y) in stops:
+        if action.kind == "move":
+            stops = motion_stops(action.spec)
+        elif action.kind == "teleport":
+            stops = [(("pose",), "the new pose", (action.spec.pose.x, action.spec.pose.y))]
+        for below, description, (x, y) in stops:
             if solid := first_solid_in_disc(scene.world.solids, (x, y), TOUCH_M, scene.z_range):
-                message = f'{what} of `{one.spec.name}` ({x:g}, {y:g}) is inside obstacle "{solid}"'
+                message = f'{description} of `{action.spec.name}` ({x:g}, {y:g}) is inside obstacle "{solid}"'
                 hint = "move it to free space: walls do not stop scripted motions"
-                yield CheckProblem((*one.keys, *below), message, hint)
+                yield CheckProblem((*action.keys, *below), message, hint)
 
 
 @WORLD.check("SC305")
@@ -199,27 +208,30 @@ def too_fast_motions(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _motions(scene: Scene) -> Iterator[tuple[Keys, MappingNode | None, str, MotionPath, Sequence[Solid]]]:
-    """Yield keys, YAML tree (None: the scenario), body name, path, and solids of each motion known before the run."""
+    """Yield (keys, YAML tree, body name, path, solids) of each motion that is known before the run.
+
+    `keys` lead to the motion in the YAML tree; None is the tree of the scenario.
+    """
     bodies = {body.name: body for body in scene.world.bodies}
     file = scene.loaded.world
-    own = [thing.name for thing in file.spec.objects] if file.spec is not None else []
+    names = [world_object.name for world_object in file.spec.objects] if file.spec is not None else []
     for body in scene.world.bodies:
-        if body.path is not None and body.name in own:
-            yield ("objects", own.index(body.name), "move"), file.tree, body.name, body.path, body.solids
+        if body.path is not None and body.name in names:
+            yield ("objects", names.index(body.name), "move"), file.tree, body.name, body.path, body.solids
         elif body.path is not None:  # an actor of a Gazebo world
             yield ("world",), None, body.name, body.path, body.solids
-    spawned = {one.spec.name: one.spec for one in scene.loaded.actions if one.kind == "spawn"}
-    for one in scene.loaded.actions:
-        name, keys = getattr(one.spec, "name", ""), (*one.keys, "name")
-        if one.kind in ("open", "close") and name in scene.world.doors:
+    spawned = {action.spec.name: action.spec for action in scene.loaded.actions if action.kind == "spawn"}
+    for action in scene.loaded.actions:
+        name, keys = getattr(action.spec, "name", ""), (*action.keys, "name")
+        if action.kind in ("open", "close") and name in scene.world.doors:
             from simscen.actions.doors import panel_path
 
-            keys = (*one.keys, "duration") if "duration" in one.spec.model_fields_set else keys
-            yield keys, None, name, panel_path(*scene.world.doors[name], one.spec.duration), bodies[name].solids
-        elif one.kind == "move" and name in bodies:
-            yield keys, None, name, one.spec.path(bodies[name].pose.plane), bodies[name].solids
-        elif one.kind == "move" and (spawn := spawned.get(name)) is not None and spawn.pose is not None:
-            yield keys, None, name, one.spec.path(spawn.pose.pose), (spawn.solid(name),)
+            keys = (*action.keys, "duration") if "duration" in action.spec.model_fields_set else keys
+            yield keys, None, name, panel_path(*scene.world.doors[name], action.spec.duration), bodies[name].solids
+        elif action.kind == "move" and name in bodies:
+            yield keys, None, name, action.spec.path(bodies[name].pose.plane), bodies[name].solids
+        elif action.kind == "move" and (spawn := spawned.get(name)) is not None and spawn.pose is not None:
+            yield keys, None, name, action.spec.path(spawn.pose.pose), (spawn.solid(name),)
 
 
 def motion_stops(motion: Motion) -> list[MotionStop]:
@@ -230,11 +242,11 @@ def motion_stops(motion: Motion) -> list[MotionStop]:
 
 
 def overlapping_start_problems(scenes: Sequence[Scene]) -> Iterator[Problem]:
-    """Yield a problem for each pair of robots of a scenario with overlapping footprints at their starts."""
-    for one, other in combinations(scenes, 2):
-        outlines = [transform_polygon(scene.start, scene.size.footprint) for scene in (one, other)]
+    """Yield a problem for each pair of robots with overlapping footprints at the start. Each robot has one scene."""
+    for first, second in combinations(scenes, 2):
+        outlines = [transform_polygon(scene.start, scene.size.footprint) for scene in (first, second)]
         if polygons_overlap(*outlines):
-            first, second = one.loaded.robot_name, other.loaded.robot_name
-            where = f"({other.start.x:g}, {other.start.y:g}) and ({one.start.x:g}, {one.start.y:g})"
-            message = f"robot `{second}` overlaps robot `{first}` at the start: {where}"
-            yield other.loaded.problem(START, "SC044", message, "move one of them farther away")
+            names = f"robot `{second.loaded.robot_name}` overlaps robot `{first.loaded.robot_name}`"
+            positions = f"({second.start.x:g}, {second.start.y:g}) and ({first.start.x:g}, {first.start.y:g})"
+            message = f"{names} at the start: {positions}"
+            yield second.loaded.problem(START, "SC044", message, "move one of them farther away")

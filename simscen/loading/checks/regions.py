@@ -1,4 +1,4 @@
-"""Checks for unreachable trigger areas, keepout regions on goals, goals reached at once, and loose bounds."""
+"""Checks for unreachable trigger areas, keepout regions on goals, goals that are already reached, and loose bounds."""
 
 import math
 from collections.abc import Iterator
@@ -6,8 +6,8 @@ from itertools import pairwise
 
 from simscen.core.geometry import Pose2, wrap
 from simscen.core.geometry.polygons import depth_inside_polygon, transform_polygon
+from simscen.loading.checks.event_feasibility import MAX_SPEED_RATIO
 from simscen.loading.checks.placement import blocked_poses
-from simscen.loading.checks.possible_run import MAX_SPEED_RATIO
 from simscen.loading.checks.registry import WORLD, CheckProblem
 from simscen.loading.checks.route_search import robot_routes, trigger_areas
 from simscen.loading.checks.scene import START, Scene
@@ -20,23 +20,24 @@ def _start_is_blocked(scene: Scene) -> bool:
 
 @WORLD.check("SC050")
 def unreachable_triggers(scene: Scene) -> Iterator[CheckProblem]:
-    """Find events and faults that wait for the robot in an area that it cannot reach within the time limit."""
+    """Find events and faults that wait for the robot in an area that the robot cannot reach within the time limit."""
     if _start_is_blocked(scene) or scene.loaded.may_do():  # actions of installed packages may take the robot anywhere
         return
     starts, robot, limit = scene.start_poses, scene.loaded.robot.spec, scene.loaded.spec.time_limit
-    for keys, name, what, corners, distance, required in scene.cached(trigger_areas):
+    for keys, name, description, corners, distance, is_required in scene.cached(trigger_areas):
         center = Pose2(*(sum(values) / len(corners) for values in zip(*corners, strict=True)))
         if not scene.cached(robot_routes).can_enter(starts, center, distance):
-            message = f"`{name}` can never happen: no route leads the robot to {what}"
-            yield CheckProblem(keys, message, warning=not required)
+            message = f"`{name}` can never happen: no route leads the robot to {description}"
+            yield CheckProblem(keys, message, is_warning=not is_required)
         elif robot is not None and min(map(distance, starts)) > MAX_SPEED_RATIO * robot.top_speed * limit:
-            reason = f"at {robot.top_speed:g} m/s, its top speed, the robot does not reach {what} within the time limit"
-            yield CheckProblem(keys, f"`{name}` can never happen: {reason}", warning=not required)
+            top_speed = f"at {robot.top_speed:g} m/s, its top speed,"
+            reason = f"{top_speed} the robot does not reach {description} within the time limit"
+            yield CheckProblem(keys, f"`{name}` can never happen: {reason}", is_warning=not is_required)
 
 
 @WORLD.check("SC051")
 def keepout_regions_on_goals(scene: Scene) -> Iterator[CheckProblem]:
-    """Find keepout criteria for the whole run with a region that contains the start or a goal."""
+    """Find keepout criteria that apply to the whole run, and whose region contains the start or a goal."""
     if _start_is_blocked(scene):
         return
     for index, entry in enumerate(scene.loaded.spec.pass_):
@@ -61,9 +62,9 @@ def goals_reached_at_once(scene: Scene) -> Iterator[CheckProblem]:
     """Find goals that are already reached when they are sent."""
     if _start_is_blocked(scene):
         return
-    own = [(keys, goal) for keys, goal in scene.expected_goals if keys[0] == "goals"]
-    poses = [scene.start, *(goal.pose for _, goal in own)]
-    for (before, _), (keys, goal) in zip(pairwise(poses), own, strict=True):
+    goals = [(keys, goal) for keys, goal in scene.expected_goals if keys[0] == "goals"]
+    poses = [scene.start, *(goal.pose for _, goal in goals)]
+    for (before, _), (keys, goal) in zip(pairwise(poses), goals, strict=True):
         turned = abs(wrap(before.yaw - goal.pose.yaw))
         if before.distance(goal.pose) <= goal.xy_tolerance and turned <= goal.yaw_tolerance:
             message = f"the robot is already within the tolerances of goal `{goal.name}` when it is sent there"

@@ -5,9 +5,9 @@ A check is a generator function that yields problems. It is registered for a sta
     @MEANING.check("SC050")
     def impossible_triggers(loaded: LoadedScenario) -> Iterator[CheckProblem]: ...
 
-The stages run in the order of the table. If a stage finds errors, later stages do not run, but NAMES runs even if
-WORLD_FILE finds errors. If names come from a ROS map, an SDF file, or a URDF, NAMES and MEANING run again with the
-built world. A view is the part of a scenario that concerns one robot.
+The stages run in the order of the table. If a stage finds errors, later stages do not run. Exception: NAMES runs even
+if WORLD_FILE finds errors. If names come from a ROS map, an SDF file, or a URDF, NAMES and MEANING run again with the
+built world. A view is the part of a scenario that applies to one robot.
 
 | stage | subject | finds, for example |
 |---|---|---|
@@ -31,7 +31,7 @@ from simscen.loading.yaml.tree import Keys, MappingNode, key_position, value_pos
 
 
 class CheckProblem(NamedTuple):
-    """Problem that a check has found, at the keys of a value instead of at a position in a file."""
+    """Problem that a check has found. Its place is given by the keys of a value instead of a position in a file."""
 
     keys: Keys
     """Keys that lead to the value that the message marks, e.g. ("goals", 0, "pose")."""
@@ -39,8 +39,8 @@ class CheckProblem(NamedTuple):
     hint: str = ""
     at_key: bool = False
     """Whether the message marks the last key instead of its value."""
-    warning: bool = False
-    """Whether this problem is a warning, although the check reports errors."""
+    is_warning: bool = False
+    """Whether this problem is a warning, although the other problems of the check are errors."""
     tree: MappingNode | None = None
     """YAML tree that contains `keys`, such as the robot file; None for the tree that the stage checks."""
 
@@ -48,7 +48,7 @@ class CheckProblem(NamedTuple):
         """Return the problem with its position in `tree`, but without its source line."""
         position_of = key_position if self.at_key else value_position
         position = position_of(self.tree or tree, self.keys)
-        return Problem(*position, code, self.message, self.hint, "warning" if self.warning else severity)
+        return Problem(*position, code, self.message, self.hint, "warning" if self.is_warning else severity)
 
 
 CheckFunction = TypeVar("CheckFunction", bound=Callable[..., Iterable[CheckProblem]])
@@ -71,9 +71,9 @@ class CheckStage:
         return register
 
     def problems(self, tree: MappingNode, *subject: Any) -> list[Problem]:
-        """Return the problems of a subject, without source lines.
+        """Return the problems that the checks find, without source lines.
 
-        The checks are called with the arguments `subject`. Their problems are at keys of the YAML `tree`.
+        Each check is called with the arguments `subject`. The keys of its problems lead to values in the YAML `tree`.
         """
         return [
             found.problem(code, tree, severity)
@@ -83,7 +83,7 @@ class CheckStage:
 
 
 class NameScope(NamedTuple):
-    """View of a scenario whose names are checked. `world` is the built world; None before it is built."""
+    """View of a scenario whose names are checked. `world` is the built world; None before the world is built."""
 
     loaded: LoadedScenario
     world: World | None = None
@@ -91,4 +91,5 @@ class NameScope(NamedTuple):
 
 ROBOT_NAMES, WORLD_FILE, NAMES, MEANING = CheckStage(), CheckStage(), CheckStage(), CheckStage()
 BUILT_WORLD, WORLD, TIMING = CheckStage(), CheckStage(), CheckStage()
-"""Stages of the table above. The modules `runner` and `scene_runner` run them."""
+"""Stages of the table above. `load_scenario` runs ROBOT_NAMES; the modules `runner` and `scene_runner` run the others.
+"""

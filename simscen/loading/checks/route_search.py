@@ -30,10 +30,10 @@ MAX_ROUTE_SILL_M = 0.03
 
 @dataclass(frozen=True)
 class RobotRoutes:
-    """Routes of the largest disc inside the robot's footprint. If the disc has no route, the robot has none either.
+    """Routes of the largest disc inside the robot's footprint. If the disc has no route, the robot has no route.
 
-    `stops` are starts, goals, and corners of trigger areas. The obstacles are `solids`, or the fixed solids of the
-    world in methods without this parameter.
+    `stops` are starts, goals, and corners of trigger areas. The obstacles are the `solids` of a method; the fixed
+    solids of the world for methods without this parameter.
     """
 
     scene: Scene
@@ -49,8 +49,8 @@ class RobotRoutes:
     def can_enter(self, starts: Sequence[Pose2], towards: Pose2, distance: Callable[[Pose2], float]) -> bool:
         """Return whether there may be a route from one of `starts` into an area; False proves that there is none.
 
-        `distance` returns the distance in m of a pose from the area, at most 0 inside. `towards` is a point in the
-        area, to which the search is directed.
+        `distance` returns the distance in m of a pose from the area; 0 or less inside. `towards` is a point in the area
+        that guides the search.
         """
         approximate = self._approximate_paths(self.scene.world.solids)
 
@@ -82,10 +82,10 @@ class RobotRoutes:
 
     def _approximate_paths(self, solids: tuple[Solid, ...]) -> SimplePaths | None:
         """Return the fast path search between `solids`; None if a solid is too complex for it."""
-        return self.scene.cache.simple_paths(solids, self.scene.size.inscribed, self.z_range)
+        return self.scene.cache.simple_paths(solids, self.scene.size.inscribed_radius, self.z_range)
 
     def _exact_paths(self, solids: tuple[Solid, ...]) -> ShortestPaths:
-        return self.scene.cache.shortest_paths(solids, self.bounds, self.scene.size.inscribed, self.z_range)
+        return self.scene.cache.shortest_paths(solids, self.bounds, self.scene.size.inscribed_radius, self.z_range)
 
 
 class TriggerArea(NamedTuple):
@@ -100,13 +100,13 @@ class TriggerArea(NamedTuple):
     corners: Polygon
     """Corners (x, y) in m of the region, or the center of a circle."""
     distance: Callable[[Pose2], float]
-    """Function that returns the distance in m of a pose from the area, at most 0 inside."""
-    required: bool = True
+    """Function that returns the distance in m of a pose from the area; 0 or less inside."""
+    is_required: bool = True
     """Whether the run fails if the event or fault never happens."""
 
 
 def trigger_areas(scene: Scene) -> list[TriggerArea]:
-    """Return the areas that the triggers of events and faults wait for."""
+    """Return the areas that the robot must enter before events and faults can start."""
     spec = scene.loaded.spec
     conditions: list[tuple[Keys, str, AnyCondition | None, bool]] = [
         ((*step.keys, "when"), step.name, step.when, step.required) for step in spec.steps
@@ -114,8 +114,8 @@ def trigger_areas(scene: Scene) -> list[TriggerArea]:
     for k, fault in enumerate(spec.faults):
         conditions.append((("faults", k, "when"), fault.label, fault.when, fault.required))
     return [
-        area._replace(required=required)
-        for keys, name, condition, required in conditions
+        area._replace(is_required=is_required)
+        for keys, name, condition, is_required in conditions
         if condition is not None
         for area in _required_areas(scene, condition, keys, name)
     ]
@@ -137,12 +137,12 @@ def _required_areas(scene: Scene, condition: AnyCondition, keys: Keys, name: str
     near = f"a position within {max_distance:g} m of " if condition.kind == "robot_within" else ""
     if spec.region is not None:
         corners = scene.world.regions[spec.region]
-        what = f"{near}region `{spec.region}`"
-        yield TriggerArea(keys, name, what, corners, lambda pose: distance_to_polygon(pose, corners) - max_distance)
+        area = f"{near}region `{spec.region}`"
+        yield TriggerArea(keys, name, area, corners, lambda pose: distance_to_polygon(pose, corners) - max_distance)
     elif isinstance(spec.of, list):
         x, y = spec.of
-        what = f"{near}({x:g}, {y:g})"
-        yield TriggerArea(keys, name, what, ((x, y),), lambda pose: pose.distance(Pose2(x, y)) - max_distance)
+        area = f"{near}({x:g}, {y:g})"
+        yield TriggerArea(keys, name, area, ((x, y),), lambda pose: pose.distance(Pose2(x, y)) - max_distance)
 
 
 def robot_routes(scene: Scene) -> RobotRoutes:

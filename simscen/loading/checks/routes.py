@@ -1,4 +1,4 @@
-"""Checks for goals without a route, and for bounds on time or path length that no drive can meet."""
+"""Checks for goals without a route, and for bounds on time or path length that no drive to the goals can meet."""
 
 import math
 from collections.abc import Iterator
@@ -20,11 +20,11 @@ from simscen.model.robot import RobotSpec
 from simscen.worlds.geometry.overlaps import first_solid_in_disc
 
 GAP_EDGE_M = 0.03
-"""Distance from a side of a gap within which the solid at this side is searched."""
+"""Maximum distance of a solid from the side of a gap that the solid forms."""
 
 
 class Gap(NamedTuple):
-    """Narrowest place on the widest way to a goal: its description for messages, and its position (x, y) in m."""
+    """Narrowest place on the widest way to a goal: its description in messages, and its position (x, y) in m."""
 
     description: str
     position: tuple[float, float]
@@ -44,12 +44,12 @@ def unreachable_goals(scene: Scene) -> list[tuple[CheckProblem, Gap]]:
         gap = _widest_gap(scene, goal.pose, solids)
         message = f"goal `{goal.name}` cannot be reached from the start: {gap.description}"
         if solids is not world and routes.is_reachable(starts, goal.pose, world):
-            problem = CheckProblem(keys, message, "no event opens, moves or removes it", warning=True)
+            problem = CheckProblem(keys, message, "no event opens, moves or removes it", is_warning=True)
         elif scene.loaded.may_do():
             hint = "unless an action of an installed package opens a route"
-            problem = CheckProblem(keys, message, hint, warning=True)
+            problem = CheckProblem(keys, message, hint, is_warning=True)
         elif len(scene.certain_walls) < len(world) and routes.is_reachable(starts, goal.pose, scene.certain_walls):
-            problem = CheckProblem(keys, message, _ramp_hint(scene), warning=True)
+            problem = CheckProblem(keys, message, _ramp_hint(scene), is_warning=True)
         else:
             problem = CheckProblem(keys, message, f"widen the gap, or {expected_failure_hint(keys, 'NO_VALID_PATH')}")
         found.append((problem, gap))
@@ -63,7 +63,7 @@ def goals_without_route(scene: Scene) -> Iterator[CheckProblem]:
 
 
 def _ramp_hint(scene: Scene) -> str:
-    """Return the hint that a tilted solid on the way could be a ramp, and which slopes the robot can climb."""
+    """Return the hint that a tilted solid on the way could be a ramp, with the maximum slope that the robot climbs."""
     from simscen.loading.builders import load_robot
     from simscen.sim.body.climb_limits import compute_climb_limits
 
@@ -73,31 +73,31 @@ def _ramp_hint(scene: Scene) -> str:
 
 
 def _widest_gap(scene: Scene, goal: Pose2, solids: tuple[Solid, ...]) -> Gap:
-    """Return the gap between `solids` that is too narrow, on the widest way to the goal."""
+    """Return the narrowest gap between `solids` on the widest way to the goal."""
     from simscen.worlds.geometry.triangulation import merge_solids
     from simscen.worlds.routes.clearance import clearance_field, search_grid
     from simscen.worlds.routes.narrow_gaps import narrowest_gap
 
-    routes, radius = scene.cached(robot_routes), scene.size.inscribed
+    routes, radius = scene.cached(robot_routes), scene.size.inscribed_radius
     field = clearance_field(merge_solids(solids), search_grid(routes.bounds, radius), routes.z_range)
     gap = narrowest_gap(field, (scene.start, goal), radius)
     position = f"({gap.x:.2f}, {gap.y:.2f})"
     sides = gap.sides or ((gap.x, gap.y), (gap.x, gap.y))
     names = [first_solid_in_disc(solids, side, GAP_EDGE_M, routes.z_range) for side in sides]
     if gap.width <= 0:
-        what = f"`{names[0]}`" if names[0] else "a wall"
-        return Gap(f"{what} closes the last route at {position}", (gap.x, gap.y))
+        obstacle = f"`{names[0]}`" if names[0] else "a wall"
+        return Gap(f"{obstacle} closes the last route at {position}", (gap.x, gap.y))
     between = f" between `{names[0]}` and `{names[1]}`" if names[0] and names[1] else ""
     robot_width = f"the robot is at least {2 * radius:.2f} m wide"
     return Gap(f"the widest gap is {gap.width:.2f} m wide at {position}{between}, but {robot_width}", (gap.x, gap.y))
 
 
 MIN_PATH_RATIO = 0.97
-"""Lower bound on the length of a drive, divided by the length of the computed shortest path, which is not exact."""
+"""Lower bound on the length of a drive, divided by the computed length of the shortest path, which has an error."""
 MAX_AVERAGE_SPEED_RATIO = 1.02
 """Upper bound on the average speed of a drive, divided by the top speed of the robot."""
 SHORTCUT_ACTIONS = ("kidnap", "push", "new_goal", "cancel_goal")
-"""Kinds of actions with which the robot can arrive earlier than by driving to its goals."""
+"""Kinds of actions because of which the robot may not have to drive the whole way to its goals."""
 
 
 @dataclass(frozen=True)
@@ -107,14 +107,14 @@ class Drive:
     goals: tuple[Goal, ...]
     robot: RobotSpec
     leg_lengths: list[float]
-    """Length in m of the shortest path of each leg."""
+    """Length in m of the shortest path of each leg, or an upper bound on this length."""
 
     @property
     def min_leg_lengths(self) -> list[float]:
         """Lower bound on the driven length of each leg in m, considering the tolerances of the goals."""
-        slack = [0.0, *(goal.xy_tolerance for goal in self.goals)]
-        pairs = zip(self.leg_lengths, pairwise(slack), strict=True)
-        return [max(0.0, MIN_PATH_RATIO * length - a - b) for length, (a, b) in pairs]
+        tolerances = [0.0, *(goal.xy_tolerance for goal in self.goals)]
+        pairs = zip(self.leg_lengths, pairwise(tolerances), strict=True)
+        return [max(0.0, MIN_PATH_RATIO * length - begin - end) for length, (begin, end) in pairs]
 
     @property
     def min_leg_times(self) -> list[float]:
@@ -142,7 +142,7 @@ def impossible_time_bounds(scene: Scene) -> Iterator[CheckProblem]:
     if not goals or robot is None or failing or scene.loaded.may_do(*SHORTCUT_ACTIONS):
         return
     routes, stops = scene.cached(robot_routes), (scene.start, *(goal.pose for goal in goals))
-    # Upper bounds on the lengths are cheap. If a drive of these lengths meets all bounds, so does the shortest drive.
+    # The fast search returns upper bounds on the lengths. If these lengths meet all bounds, the exact ones do as well.
     upper = [routes.length_upper_bound(a, b, scene.world.solids) for a, b in pairwise(stops)]
     if all(map(math.isfinite, upper)) and not list(_violated_bounds(scene, Drive(goals, robot, upper))):
         return
@@ -177,9 +177,10 @@ def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tu
     times, lengths = drive.min_leg_times, drive.min_leg_lengths
     if entry.kind == "time_to_goal":
         goal = criterion.goal
-        least = sum(times) if goal is None else min(t for t, n in zip(times, names, strict=True) if is_named(n, goal))
-        if least > criterion.max:
-            reason = f"the path to `{goal}` alone takes at least {least:.1f} s"
+        goal_times = (t for t, name in zip(times, names, strict=True) if is_named(name, goal))
+        min_time = sum(times) if goal is None else min(goal_times)
+        if min_time > criterion.max:
+            reason = f"the path to `{goal}` alone takes at least {min_time:.1f} s"
             yield "max", drive.description if goal is None else reason
     if entry.kind == "path_length":
         if criterion.max is not None and sum(lengths) > criterion.max:
@@ -187,11 +188,11 @@ def _violated_criterion_bounds(entry: AnyCriterion, drive: Drive) -> Iterator[tu
         if criterion.max_ratio is not None and sum(lengths) > criterion.max_ratio * sum(drive.leg_lengths):
             yield "max_ratio", "no path is shorter than the shortest one"
     if entry.kind == "goals_reached" and criterion.within is not None:
-        within, chosen = criterion.within, criterion.goals or names
-        too_late = [k for k, name in enumerate(names) if times[k] > within and any(is_named(name, c) for c in chosen)]
-        if too_late:
-            k = too_late[0]
-            yield "within", f"the path of {drive.leg_lengths[k]:.2f} m to `{names[k]}` takes {times[k]:.1f} s"
+        judged_goals = criterion.goals or names
+        for name, time, length in zip(names, times, drive.leg_lengths, strict=True):
+            if time > criterion.within and any(is_named(name, goal) for goal in judged_goals):
+                yield "within", f"the path of {length:.2f} m to `{name}` takes {time:.1f} s"
+                return
 
 
 def _requires_success(entry: AnyCriterion) -> bool:

@@ -1,4 +1,4 @@
-"""Runner of the checks that do not need the built world: stages ROBOT_NAMES, WORLD_FILE, NAMES, and MEANING."""
+"""Runs the checks that do not need the built world: the stages WORLD_FILE, NAMES, and MEANING."""
 
 from collections.abc import Iterable
 
@@ -17,7 +17,7 @@ def check_scenario(
 ) -> list[Problem]:
     """Return the errors and warnings of a scenario of one robot, or of a view, including `unknown_places`.
 
-    `world` is the built world; it is only needed to check names in a world from a ROS map or SDF file.
+    `world` is the built world. It is only needed to check names in a world from a ROS map or SDF file.
     """
     problems = [
         *unknown_places,

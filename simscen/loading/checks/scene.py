@@ -24,10 +24,11 @@ from simscen.worlds.geometry.prisms import upright_prism
 SILL_M = 0.02
 """Height below which an obstacle does not block the start or a goal of a robot on wheels."""
 MIN_HULL_OVERLAP_M = 0.002
-"""Height by which an obstacle must exceed the underside of a hull to count as touching the hull."""
+"""Height above the underside of a hull that an obstacle must reach to touch the hull."""
 TOUCH_M = 1e-6
 """Distance below which a point counts as inside a solid."""
 START = ("robot", "pose")
+"""Keys of the start pose in a scenario of one robot."""
 MOVING_ACTIONS = frozenset({"open", "close", "move", "remove", "spawn", "teleport", "push"})
 """Kinds of actions that can move, remove, or replace a body."""
 
@@ -36,9 +37,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Scene:
-    """Scenario of one robot, or the view of one of several robots, in its built world.
+    """Scenario of one robot, or the view of one of several robots, in the built world.
 
-    `world` contains only the solids that block the robot. Positions are in m in the frame of the world.
+    `world` contains only the solids that block the robot. Positions are in m in the frame of the world. `cache` keeps
+    path searches for further scenes.
     """
 
     loaded: LoadedScenario
@@ -60,7 +62,7 @@ class Scene:
         return self.heights_above(SILL_M)
 
     def heights_above(self, sill: float) -> tuple[float, float]:
-        """Return the z range in m in which obstacles block the robot, whose wheels climb `sill` m."""
+        """Return the lowest and highest z in m between which an obstacle blocks a robot whose wheels climb `sill` m."""
         underside = self.size.underside
         lowest = sill if underside is None else underside + MIN_HULL_OVERLAP_M
         return lowest, max(lowest + sill, self.size.height)
@@ -73,17 +75,20 @@ class Scene:
     @property
     def start_poses(self) -> list[Pose2]:
         """Start pose, and poses to which events move (kidnap) the robot."""
-        return [self.start, *(one.spec.pose.pose for one in self.loaded.actions if one.kind == "kidnap")]
+        return [self.start, *(action.spec.pose.pose for action in self.loaded.actions if action.kind == "kidnap")]
 
     @cached_property
     def _map(self) -> OccupancyGrid | None:
-        """Map of the robot; None for a drive without a map, and for a map that will be made of the world."""
+        """Map of the robot; None with `map: none`, and for a map that will be made from the world."""
         if self.loaded.map == "none":
             return None
         return self.world.grid if self.loaded.map is None else load_map(self.loaded.map)
 
-    def why_outside(self, pose: Pose2) -> str | None:
-        """Return text such as "outside the map (…)" for a pose off the map, or off a world without map; else None."""
+    def outside_reason(self, pose: Pose2) -> str | None:
+        """Return "outside the map (…)" or "outside the world (…)" for a pose outside; None for a pose inside.
+
+        The robot's map counts if there is one; otherwise the bounds of the world, unless the robot has `map: none`.
+        """
         grid = self._map
         if grid is not None:
             if grid.inside(grid.cell_of(np.array([[pose.x, pose.y]])))[0]:
@@ -115,22 +120,22 @@ class Scene:
     def _unmoved(self) -> list[Body]:
         if self.loaded.may_do():
             return []
-        moved = {one.spec.name for one in self.loaded.actions if one.kind in MOVING_ACTIONS}
-        return [body for body in self.world.bodies if body.path is None and body.name not in moved]
+        moved_names = {action.spec.name for action in self.loaded.actions if action.kind in MOVING_ACTIONS}
+        return [body for body in self.world.bodies if body.path is None and body.name not in moved_names]
 
     @cached_property
     def certain_walls(self) -> tuple[Solid, ...]:
         """Fixed solids that are certainly no ramps: upright prisms, and walls from a map."""
-        mapped = self.world.grid is not None
-        return tuple(s for s in self.world.solids if upright_prism(s) is not None or (mapped and s.name == "map"))
+        has_map = self.world.grid is not None
+        return tuple(s for s in self.world.solids if upright_prism(s) is not None or (has_map and s.name == "map"))
 
     @cached_property
     def expected_goals(self) -> list[tuple[Keys, Goal]]:
         """Goals without an expected failure, including goals of events, with the keys of their poses."""
         spec = self.loaded.spec
-        first = scenario_goals(spec)[: len(spec.goals)]  # further loops lead to the same poses
-        own: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(first)}
-        goals = {**own, **event_goals(self.loaded)}
+        first_loop = scenario_goals(spec)[: len(spec.goals)]  # further loops lead to the same poses
+        listed: dict[Keys, Goal] = {("goals", k): goal for k, goal in enumerate(first_loop)}
+        goals = {**listed, **event_goals(self.loaded)}
         return [((*keys, "pose"), goal) for keys, goal in goals.items() if not expects_failure(spec, goal.name)]
 
     def footprint_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
@@ -139,7 +144,7 @@ class Scene:
             return f'inside obstacle "{solid}"'
         if solid := self.circle_conflict(pose, solids):
             radius = "radius" if self.size.radius is not None else "inscribed radius"
-            return f'closer to obstacle "{solid}" than the robot\'s {radius} of {self.size.inscribed:.2f} m'
+            return f'closer to obstacle "{solid}" than the robot\'s {radius} of {self.size.inscribed_radius:.2f} m'
         size = self.size
         if size.radius is None and (solid := first_solid_in_footprint(solids, size.footprint, pose, self.z_range)):
             return f'so close to obstacle "{solid}" that the robot\'s footprint overlaps it at this heading'
@@ -147,7 +152,7 @@ class Scene:
 
     def circle_conflict(self, pose: Pose2, solids: Iterable[Solid]) -> str | None:
         """Return the name of a solid that overlaps the robot's inscribed circle at a pose; None if there is none."""
-        return first_solid_in_disc(solids, (pose.x, pose.y), self.size.inscribed, self.z_range)
+        return first_solid_in_disc(solids, (pose.x, pose.y), self.size.inscribed_radius, self.z_range)
 
 
 def _at_initial_pose(bodies: Iterable[Body]) -> Iterator[Solid]:

@@ -1,4 +1,4 @@
-"""Runner of the checks that need the built world: stages BUILT_WORLD, WORLD, and TIMING."""
+"""Runs the checks that need the built world: the stages BUILT_WORLD, WORLD, and TIMING."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -26,19 +26,19 @@ MODULES = (masks, placement, routes, regions)
 
 
 def check_in_world(
-    loaded: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None
+    loaded: LoadedScenario, cache: WorldCache | None = None, picture_folder: Path | None = None
 ) -> list[Problem]:
     """Return the errors and warnings of a scenario in its built world.
 
     `cache` keeps built worlds for further calls. If there are problems, a picture of the world is written to the
-    folder `pictures`, unless it is None. Raises InvalidInput for unusable files, and UsageError if the picture
+    folder `picture_folder`, unless it is None. Raises InvalidInput for unusable files, and UsageError if the picture
     cannot be written.
     """
     cache = cache or WorldCache()
     world = with_stops_in_bounds(cache.world(loaded), loaded)
     if not loaded.robots:
-        return _check_robot(loaded, world, cache, pictures)
-    found = [problem for view in loaded.robots.values() for problem in _check_robot(view, world, cache, pictures)]
+        return _check_robot(loaded, world, cache, picture_folder)
+    found = [problem for view in loaded.robots.values() for problem in _check_robot(view, world, cache, picture_folder)]
     problems = list(dict.fromkeys(found))  # the robots share most problems
     if not _has_errors(problems):
         views = [_with_robot_spec(view) for view in loaded.robots.values()]
@@ -48,16 +48,16 @@ def check_in_world(
 
 
 def world_problems(
-    loaded: LoadedScenario, cache: WorldCache | None = None, pictures: Path | None = None
+    loaded: LoadedScenario, cache: WorldCache | None = None, picture_folder: Path | None = None
 ) -> list[Problem]:
-    """Return the problems of `check_in_world`, or those for which it raises InvalidInput."""
+    """Return the problems of `check_in_world`; for unusable files, the problems of InvalidInput."""
     try:
-        return check_in_world(loaded, cache, pictures)
+        return check_in_world(loaded, cache, picture_folder)
     except InvalidInput as error:
         return error.problems
 
 
-def _check_robot(loaded: LoadedScenario, world: World, cache: WorldCache, pictures: Path | None) -> list[Problem]:
+def _check_robot(loaded: LoadedScenario, world: World, cache: WorldCache, picture_folder: Path | None) -> list[Problem]:
     loaded = _with_robot_spec(loaded)
     blocking = blocking_world(loaded, world)
     problems: list[Problem] = []
@@ -74,19 +74,19 @@ def _check_robot(loaded: LoadedScenario, world: World, cache: WorldCache, pictur
         file_problems += dimension_warnings(loaded.robot, load_robot(loaded)[1])
     problems += [loaded.with_source_line(problem) for problem in file_problems]
     if not _has_errors(problems):
-        problems += _check_scene(Scene(loaded, blocking, robot_size(loaded), cache), pictures)
+        problems += _check_scene(Scene(loaded, blocking, robot_size(loaded), cache), picture_folder)
     return [*problems, *world_reader_notes(world, loaded.world, loaded.root)]
 
 
-def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
+def _check_scene(scene: Scene, picture_folder: Path | None) -> list[Problem]:
     """Return the problems that the stages WORLD and TIMING find. Their hints contain the path of a picture."""
     problems = WORLD.problems(scene.loaded.tree, scene)
     if not _has_errors(problems):
         problems += TIMING.problems(scene.loaded.tree, scene)
     problems = [scene.loaded.with_source_line(problem) for problem in sorted(problems)]
-    if problems and pictures is not None:
+    if problems and picture_folder is not None:
         gaps = [gap.position for _, gap in scene.cached(routes.unreachable_goals)]
-        file = draw_picture(scene, gaps, pictures)
+        file = draw_picture(scene, gaps, picture_folder)
         problems = [replace(problem, hint=f"{problem.hint}; picture: {file}".lstrip("; ")) for problem in problems]
     return problems
 
@@ -94,7 +94,7 @@ def _check_scene(scene: Scene, pictures: Path | None) -> list[Problem]:
 def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path) -> Path:
     """Draw the world, the robot at its start and goals, and `gaps` (x, y) in m. Return the path of the picture.
 
-    Raises UsageError if it cannot be written to `folder`.
+    Raises UsageError if the picture cannot be written to `folder`.
     """
     from simscen.worlds.built_world import build_world_and_map
     from simscen.worlds.maps.world_picture import draw_world
@@ -118,7 +118,7 @@ def draw_picture(scene: Scene, gaps: Sequence[tuple[float, float]], folder: Path
 
 
 def world_file_warnings(source: LoadedWorld, root: Path, world_path: Sequence[Path], lenient: bool) -> list[Problem]:
-    """Build the world of the file `source`, and return warnings about it. Raises InvalidInput for unusable files."""
+    """Build the world `source`, and return warnings about the world. Raises InvalidInput for unusable files."""
     notes = list(source.map.notes) if source.map else []
     world = world_from_file(source, root, world_path, lenient)
     return [*notes, *check_built_world(world, source), *world_reader_notes(world, source, root)]

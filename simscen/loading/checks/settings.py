@@ -17,11 +17,12 @@ from simscen.model.scenario import MAX_GOALS
 from simscen.model.stack import StackSpec
 
 TICK_RATE_KEYS = ("physics", "tick_rate")
+"""Keys of the tick rate in a scenario."""
 
 
 @NAMES.check("SC034")
 def uneven_rates(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find rates that do not divide the tick rate. The problem marks the tick rate if the scenario sets it."""
+    """Find rates that do not divide the tick rate. If the scenario sets the tick rate, the problem marks it."""
     loaded = scope.loaded
     rates: list[tuple[MappingNode | None, Keys, float]] = [
         (loaded.tree, ("stack", "controller_frequency"), loaded.spec.stack.controller_frequency),
@@ -55,18 +56,18 @@ def goals_that_do_not_fit_the_mode(scope: NameScope) -> Iterator[CheckProblem]:
     if spec.navigation.mode != "navigate_through_poses":
         return
     for index, goal in enumerate(spec.goals[:-1]):
-        for key, used, why in (
+        for key, value, reason in (
             ("on_reached", goal.on_reached.wait, "does not stop"),
             ("expect", expected_failure_name(goal.expect), "reports no result"),
         ):
-            if used and key in goal.model_fields_set:
-                message = f"only the last goal of navigate_through_poses can have `{key}`: elsewhere the robot {why}"
+            if value and key in goal.model_fields_set:
+                message = f"only the last goal of navigate_through_poses can have `{key}`: elsewhere the robot {reason}"
                 yield CheckProblem(("goals", index, key), message)
 
 
 @NAMES.check("SC016")
 def empty_ranges_of_the_local_costmap(scope: NameScope) -> Iterator[CheckProblem]:
-    """Find a minimum of the local costmap that exceeds its maximum, of which `costmap` supplies one."""
+    """Find minimums of the local costmap that exceed their maximums, after values of `costmap` are filled in."""
     stack = scope.loaded.spec.stack
     local = stack.local_costmap.with_defaults_from(stack.costmap) if isinstance(stack, StackSpec) else None
     if local is not None and (problem := local.range_problem()):
@@ -91,7 +92,7 @@ def late_timeouts(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC053", severity="warning")
 def degrees_as_radians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find angles above one turn without a unit in the scenario, its world, or its robot file; one for each list."""
+    """Find angles above one turn without a unit in the scenario, world, or robot file. Report one angle per list."""
     files: list[tuple[BaseModel | None, MappingNode | None]] = [
         (loaded.spec, loaded.tree),
         (loaded.world.spec, loaded.world.tree),
@@ -101,9 +102,9 @@ def degrees_as_radians(loaded: LoadedScenario) -> Iterator[CheckProblem]:
         found: set[Keys] = set()
         for keys, value in angles_of(spec) if spec is not None and tree is not None else ():
             node = node_at(tree or loaded.tree, keys)
-            without_unit = isinstance(node, ScalarNode) and isinstance(node.value, int | float)
+            has_no_unit = isinstance(node, ScalarNode) and isinstance(node.value, int | float)
             key_count = max(number for number, key in enumerate(keys, start=1) if isinstance(key, str))
-            if without_unit and abs(value) > FULL_TURN_RAD + 1e-3 and keys[:key_count] not in found:
+            if has_no_unit and abs(value) > FULL_TURN_RAD + 1e-3 and keys[:key_count] not in found:
                 found.add(keys[:key_count])
                 written = f"{dotted_path(keys[key_count - 1 :])}: {value:g}"
                 turns = value / FULL_TURN_RAD
@@ -170,7 +171,7 @@ def latency_without_values(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC055", severity="warning")
 def speeds_above_the_top_speed(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find speed limits of zones and speeds of controllers above the top speed of the robot."""
+    """Find speed limits of zones, and maximum speeds of controllers, above the top speed of the robot."""
     robot, stack = loaded.robot.spec, loaded.spec.stack
     if robot is None:
         return

@@ -64,9 +64,9 @@ class Director:
                 self._begin_fault(index)
 
     def _perform_step(self, index: int, step: SequenceStep) -> None:
-        kinds: list[Value] = [one.kind for one in step.actions]
+        kinds: list[Value] = [action.kind for action in step.actions]
         self._stage.record_world_event(Event(0, EventKind.EVENT_STARTED, step.name, {"entry": index, "actions": kinds}))
-        effects = [one.action.perform(self._stage) for one in step.actions]
+        effects = [action.choice.perform(self._stage) for action in step.actions]
         effect_data: list[Value] = [{"happened": effect.happened, "what": effect.what} for effect in effects]
         self._stage.record_world_event(
             Event(0, EventKind.EVENT_ENDED, step.name, {"entry": index, "effects": effect_data})

@@ -135,7 +135,7 @@ robots:
   west: {pose: {x: 1, y: 4}, goals: [{pose: {x: 20, y: 4}}]}
 pass: [{collisions: {max: 0}}]
 """)
-    problems = check_in_world(load_scenario(file, tmp_path), pictures=tmp_path / "pictures")
+    problems = check_in_world(load_scenario(file, tmp_path), picture_folder=tmp_path / "pictures")
     for name in ("east", "west"):
         picture = tmp_path / "pictures" / f"a_{name}.png"
         assert picture.is_file()

@@ -1,6 +1,6 @@
-"""Analysis of which events, faults, and marks of a scenario can happen.
+"""Analysis of which events, faults, and marks of a scenario can happen (are feasible).
 
-Here, a step is an event, or one of the entries of its sequence (`then`).
+A step is an event, or a step of the sequence (`then`) of an event.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
     from simscen.triggers.base import AnyCondition, Trigger
 
 LocatedReason = tuple[Keys, str]
-"""Keys of the part of a trigger that prevents it from firing, and the reason as text for messages."""
+"""Keys of the part of a trigger that prevents the trigger from firing, and the reason as text for messages."""
 
 LATCHING_CONDITIONS = frozenset(
     {"time", "travelled", "goal", "waypoint", "replan", "recovery", "collision", "pedestrian", "event"}
 )
 """Kinds of conditions that stay true after they have become true."""
 MAX_SPEED_RATIO = 1.1
-"""Upper bound on the speed of a robot, divided by its top speed, because a robot can overshoot its top speed."""
+"""Upper bound on the speed of a robot, divided by its top speed. It is above 1 because robots overshoot."""
 MAX_TRUTH_ERROR_M = 0.5
 """Upper bound on the localization error if the stack gets the true pose."""
 
 
-def why_no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:
+def no_recovery_reason(loaded: LoadedScenario, behavior: str | None) -> str | None:
     """Return the reason why a recovery behavior never runs; None if it can run. `behavior` is None for any behavior."""
     if not isinstance(loaded.spec.stack, StackSpec):
         return None
@@ -47,24 +47,28 @@ def why_no_recovery(loaded: LoadedScenario, behavior: str | None) -> str | None:
     return None
 
 
-def possible_run(loaded: LoadedScenario) -> PossibleRun:
-    """Return which events, faults, and marks can happen: start with none, and repeatedly add what they enable."""
-    run = PossibleRun(loaded, frozenset())
-    while (possible := run.next_possible) != run.possible:
-        run = replace(run, possible=possible)
-    return run
+def analyze_events(loaded: LoadedScenario) -> EventFeasibility:
+    """Return which events, faults, and marks can happen.
+
+    The search starts with an empty set, and adds steps whose triggers can fire, until nothing is added.
+    """
+    analysis = EventFeasibility(loaded, frozenset())
+    while (feasible := analysis.next_feasible) != analysis.feasible:
+        analysis = replace(analysis, feasible=feasible)
+    return analysis
 
 
 @dataclass(frozen=True)
-class PossibleRun:
-    """Analysis that assumes that the events, faults, and marks with the names `possible` can happen.
+class EventFeasibility:
+    """Analysis under the assumption that the events, faults, and marks with the names `feasible` can happen.
 
-    There is a method `_why_never_KIND`, such as `_why_never_goal`, for each kind of condition that can be impossible.
-    It takes the specification of a condition, and returns the reason why the condition can never be true, or None.
+    A kind of condition that can be infeasible has a method `_infeasibility_of_KIND`, such as `_infeasibility_of_goal`.
+    The method takes the specification of a condition, and returns the reason why the condition can never be true; None
+    if it can be true.
     """
 
     loaded: LoadedScenario
-    possible: frozenset[str]
+    feasible: frozenset[str]
 
     @cached_property
     def steps(self) -> list[SequenceStep]:
@@ -81,8 +85,8 @@ class PossibleRun:
             yield ("faults", index, "when"), fault.when, fault.label, fault.required
 
     def is_reachable(self, step: SequenceStep) -> bool:
-        """Return whether the previous step in the sequence of a step can happen; True for the first step."""
-        return step.after is None or self.steps[step.after].name in self.possible
+        """Return whether the previous step of the same sequence can happen; True for an event."""
+        return step.after is None or self.steps[step.after].name in self.feasible
 
     def earlier_steps(self, step: SequenceStep) -> frozenset[str]:
         """Return the names of the steps before `step` in its sequence."""
@@ -91,14 +95,14 @@ class PossibleRun:
         return self.earlier_steps(self.steps[step.after]) | {self.steps[step.after].name}
 
     @property
-    def next_possible(self) -> frozenset[str]:
-        """Names of the events, faults, and marks that can happen if the ones in `possible` can happen."""
-        happening = {name for keys, when, name, _ in self.triggers if when is None or not self.why_never(when, keys)}
-        actions = (one for step in self.steps if step.name in happening for one in step.actions)
-        return frozenset(happening | {one.spec.name for one in actions if one.kind == "mark"})
+    def next_feasible(self) -> frozenset[str]:
+        """Names of the events, faults, and marks that can happen if those in `feasible` can happen."""
+        names = {name for keys, when, name, _ in self.triggers if when is None or not self.infeasibility(when, keys)}
+        actions = (action for step in self.steps if step.name in names for action in step.actions)
+        return frozenset(names | {action.spec.name for action in actions if action.kind == "mark"})
 
-    def why_never(self, trigger: Trigger, keys: Keys) -> LocatedReason | None:
-        """Return the reason why the trigger at `keys` never fires; None if it can."""
+    def infeasibility(self, trigger: Trigger, keys: Keys) -> LocatedReason | None:
+        """Return the reason why the trigger at `keys` never fires; None if it can fire."""
         limit = self.loaded.spec.time_limit
         if trigger.probability == 0:
             return (*keys, "probability"), "its probability is 0"
@@ -108,9 +112,9 @@ class PossibleRun:
         if trigger.edge == "rising" and earliest >= limit:
             key = "delay" if trigger.delay else "for" if trigger.for_ else trigger.kind
             return (*keys, key), f"{earliest:g} s is not before the time limit of {limit:g} s"
-        return self._why_never_true(trigger, keys)
+        return self._never_true_reason(trigger, keys)
 
-    def _why_never_true(self, condition: AnyCondition, keys: Keys) -> LocatedReason | None:
+    def _never_true_reason(self, condition: AnyCondition, keys: Keys) -> LocatedReason | None:
         """Return the reason why the condition at `keys` is never true; None if it can be true."""
         if not self.loaded.includes_robot(condition.robot):
             return None
@@ -118,64 +122,66 @@ class PossibleRun:
         if condition.for_ is not None and condition.for_ >= limit:
             return (*keys, "for"), f"{condition.for_:g} s is not less than the time limit of {limit:g} s"
         if condition.all is not None:
-            reasons = [self._why_never_true(part, (*keys, "all", k)) for k, part in enumerate(condition.all)]
+            reasons = [self._never_true_reason(part, (*keys, "all", k)) for k, part in enumerate(condition.all)]
             return next(filter(None, reasons), None)
         if condition.any is not None:
-            reasons = [self._why_never_true(part, (*keys, "any", k)) for k, part in enumerate(condition.any)]
+            reasons = [self._never_true_reason(part, (*keys, "any", k)) for k, part in enumerate(condition.any)]
             return reasons[0] if all(reasons) else None
         if condition.not_ is not None:
             always = condition.not_.time is not None and earliest_true_s(condition.not_) == 0
             return ((*keys, "not"), "the condition under `not` is always true") if always else None
-        check = getattr(self, f"_why_never_{condition.kind}", None)
-        reason = check(condition.chosen) if check else None
+        find_reason = getattr(self, f"_infeasibility_of_{condition.kind}", None)
+        reason = find_reason(condition.chosen) if find_reason else None
         return ((*keys, condition.kind), reason) if reason else None
 
     @property
-    def _possible_actions(self) -> list[LocatedAction]:
-        return [one for step in self.steps if step.name in self.possible for one in step.actions]
+    def _feasible_actions(self) -> list[LocatedAction]:
+        return [action for step in self.steps if step.name in self.feasible for action in step.actions]
 
     def may_do(self, *kinds: str) -> bool:
-        """Return whether a possible step has an action of one of these kinds, or an action of a plug-in."""
-        return any(one.action.may_do(*kinds) for one in self._possible_actions)
+        """Return whether a feasible step has an action of one of these kinds, or an action of a plug-in."""
+        return any(action.choice.may_do(*kinds) for action in self._feasible_actions)
 
     def goal_count(self, goal: str | None) -> int:
         """Return how many goals with this name the robot can get. `goal` is None for any name."""
         listed = [name for name in listed_goal_names(self.loaded) if matches_goal_name(name, goal)]
         sent = sum(
-            1 if one.step.when is None else one.step.when.times
-            for one in self._possible_actions
-            if one.kind == "new_goal" and self.loaded.includes_robot(one.action.robot) and goal in (None, one.spec.name)
+            1 if action.step.when is None else action.step.when.times
+            for action in self._feasible_actions
+            if action.kind == "new_goal"
+            and self.loaded.includes_robot(action.choice.robot)
+            and goal in (None, action.spec.name)
         )
         return len(listed) + sent
 
-    def _why_never_time(self, time: Any) -> str | None:
+    def _infeasibility_of_time(self, time: Any) -> str | None:
         limit = self.loaded.spec.time_limit
         return f"{time.root:g} s is not before the time limit of {limit:g} s" if time.root >= limit else None
 
-    def _why_never_travelled(self, travelled: Any) -> str | None:
+    def _infeasibility_of_travelled(self, travelled: Any) -> str | None:
         top, limit = self._top_speed, self.loaded.spec.time_limit
         if top is None or travelled.root <= MAX_SPEED_RATIO * top * limit:
             return None
         return f"at its top speed of {top:g} m/s the robot drives {top * limit:g} m within the time limit"
 
-    def _why_never_speed_above(self, speed: Any) -> str | None:
+    def _infeasibility_of_speed_above(self, speed: Any) -> str | None:
         top = self._top_speed
         if top is None or speed.root <= MAX_SPEED_RATIO * top:
             return None
         return f"the robot's top speed is {top:g} m/s"
 
-    def _why_never_turning_above(self, rate: Any) -> str | None:
+    def _infeasibility_of_turning_above(self, rate: Any) -> str | None:
         spec = self.loaded.robot.spec
         if spec is None or self._may_be_pushed or rate.root <= MAX_SPEED_RATIO * spec.limits.angular:
             return None
         return f"the robot's maximum turn rate is {spec.limits.angular:g} rad/s"
 
-    def _why_never_distance_remaining(self, _: Any) -> str | None:
+    def _infeasibility_of_distance_remaining(self, _: Any) -> str | None:
         return None if self.goal_count(None) else "the robot has no goal"
 
-    _why_never_believed_distance_remaining = _why_never_distance_remaining
+    _infeasibility_of_believed_distance_remaining = _infeasibility_of_distance_remaining
 
-    def _why_never_localization_error(self, error: Any) -> str | None:
+    def _infeasibility_of_localization_error(self, error: Any) -> str | None:
         stack = self.loaded.spec.stack
         targets = [KIND_BY_TARGET_NAME.get(fault.sensor) for fault in self.loaded.spec.faults]
         is_displaced = self.may_do("kidnap") or BELIEF in targets
@@ -183,10 +189,10 @@ class PossibleRun:
         too_large = getattr(error, "root", error) >= MAX_TRUTH_ERROR_M
         return "the localizer gets the true pose" if gets_truth and too_large else None
 
-    def _why_never_localization_lost(self, lost: Any) -> str | None:
-        return self._why_never_localization_error(lost.tolerance) if lost.std is None else None
+    def _infeasibility_of_localization_lost(self, lost: Any) -> str | None:
+        return self._infeasibility_of_localization_error(lost.tolerance) if lost.std is None else None
 
-    def _why_never_goal(self, goal: Any) -> str | None:
+    def _infeasibility_of_goal(self, goal: Any) -> str | None:
         count, suffix = self.goal_count(goal.name), "" if goal.name is None else f" called `{goal.name}`"
         if goal.count > count:
             return f"the robot gets {f'only {count}' if count else 'no'} goal{'' if count == 1 else 's'}{suffix}"
@@ -199,22 +205,22 @@ class PossibleRun:
             return "the run ends after the first failed goal (`on_goal_failure: stop`)"
         return None
 
-    def _why_never_waypoint(self, waypoint: Any) -> str | None:
-        return self._why_never_goal(SimpleNamespace(status="reached", name=waypoint.name, count=waypoint.count))
+    def _infeasibility_of_waypoint(self, waypoint: Any) -> str | None:
+        return self._infeasibility_of_goal(SimpleNamespace(status="reached", name=waypoint.name, count=waypoint.count))
 
-    def _why_never_replan(self, _: Any) -> str | None:
+    def _infeasibility_of_replan(self, _: Any) -> str | None:
         return None if self.goal_count(None) else "the robot has no goal to plan for"
 
-    def _why_never_recovery(self, recovery: Any) -> str | None:
+    def _infeasibility_of_recovery(self, recovery: Any) -> str | None:
         if not self.goal_count(None):
             return "the robot has no goal to recover for"
-        return why_no_recovery(self.loaded, recovery.name)
+        return no_recovery_reason(self.loaded, recovery.name)
 
-    def _why_never_pedestrian(self, _: Any) -> str | None:
+    def _infeasibility_of_pedestrian(self, _: Any) -> str | None:
         return None if self.may_do("pedestrian", "crowd") else "no event adds a pedestrian"
 
-    def _why_never_event(self, event: Any) -> str | None:
-        if event.name not in self.possible:
+    def _infeasibility_of_event(self, event: Any) -> str | None:
+        if event.name not in self.feasible:
             return f"it waits for `{event.name}`, which can never happen"
         lasting = [fault for fault in self.loaded.spec.faults if fault.label == event.name and fault.for_ is None]
         if event.status == "ended" and lasting and event.name not in [step.name for step in self.steps]:
@@ -234,7 +240,7 @@ class PossibleRun:
         if world.spec is None or world.sdf is not None or self.loaded.other_robots:
             return True
         pushing = self.may_do("push", "move", "close", "open", "pedestrian", "crowd", "spawn", "teleport")
-        return pushing or any(thing.move for thing in world.spec.objects)
+        return pushing or any(world_object.move for world_object in world.spec.objects)
 
 
 def stays_true(condition: AnyCondition) -> bool:
