@@ -42,11 +42,11 @@ def _wheel_warnings(wheels: list[WheelJoint], ground: float) -> Iterator[Problem
 
 
 def _caster_warnings(tree: LinkTree, wheels: list[WheelJoint], ground: float, needs_caster: bool) -> Iterator[Problem]:
-    rolling = {link for wheel in wheels for link in tree.subtree(wheel.joint.child)}
+    rolling_links = {link for wheel in wheels for link in tree.subtree(wheel.joint.child)}
     points = {
         name: np.concatenate([tree.poses[name].compose(s.pose).apply(hull_points(s.shape)) for s in link.solids])
         for name, link in tree.links.items()
-        if name not in rolling and link.solids
+        if name not in rolling_links and link.solids
     }
     gaps = {name: float(corners[:, 2].min()) - ground for name, corners in points.items()}
     for name, gap in gaps.items():
@@ -54,16 +54,18 @@ def _caster_warnings(tree: LinkTree, wheels: list[WheelJoint], ground: float, ne
             message = (
                 f"link {name!r} reaches {-1e3 * gap:.1f} mm below the wheels, which would lose contact with the ground"
             )
-            substitute = "uses frictionless spheres as casters instead" if needs_caster else "leaves it out of the hull"
-            hint = f"raise it by {-gap:.4g} m; simscen {substitute}"
+            consequence = (
+                "uses frictionless spheres as casters instead" if needs_caster else "leaves it out of the hull"
+            )
+            hint = f"raise it by {-gap:.4g} m; simscen {consequence}"
             yield tree.links[name].element.problem(message, hint)
-    nearest = min(gaps, key=lambda name: gaps[name], default=None)
-    if not needs_caster or nearest is None:
+    lowest = min(gaps, key=lambda name: gaps[name], default=None)
+    if not needs_caster or lowest is None:
         return
-    size = np.ptp(points[nearest][:, :2], axis=0).max()
-    if MAX_CASTER_GAP_M < gaps[nearest] < MAX_INTENDED_CASTER_GAP_M and size <= MAX_CASTER_SIZE_M:
+    size = np.ptp(points[lowest][:, :2], axis=0).max()
+    if MAX_CASTER_GAP_M < gaps[lowest] < MAX_INTENDED_CASTER_GAP_M and size <= MAX_CASTER_SIZE_M:
         message = (
-            f"link {nearest!r} is {1e3 * gaps[nearest]:.1f} mm above the ground, so that the robot would tip onto it"
+            f"link {lowest!r} is {1e3 * gaps[lowest]:.1f} mm above the ground, so that the robot would tip onto it"
         )
-        hint = f"lower it by {gaps[nearest]:.4g} m; simscen uses spheres that touch the ground as casters instead"
-        yield tree.links[nearest].element.problem(message, hint)
+        hint = f"lower it by {gaps[lowest]:.4g} m; simscen uses spheres that touch the ground as casters instead"
+        yield tree.links[lowest].element.problem(message, hint)

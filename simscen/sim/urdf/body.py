@@ -26,7 +26,7 @@ MAX_CASTER_SIZE_RATIO = 0.35
 MAX_CASTER_AXIS_Z = 0.1
 """Largest z component of the axis of a cylinder that is a caster (6 degrees)."""
 MIN_INERTIA_RATIO = 1e-6
-"""Smallest principal moment of inertia divided by the sum of all three; a smaller one counts as missing."""
+"""Smallest principal moment of inertia divided by the sum of all three. A smaller moment counts as missing."""
 ROUNDING_M = 1e-6
 """Rounding error in m of a radius that a xacro file computes."""
 
@@ -49,9 +49,10 @@ def read_spec_tree(
     folders = AllowedFolders.of(roots or (folder,), robot_files.packages if robot_files else None)
     try:
         path = robot_files.urdf if robot_files else folders.find(spec.urdf, folder)
-    except UnusableFile as trouble:
-        shown = folders.display_path(file.resolve()) if file else ""
-        raise InvalidInput([Problem(shown, 0, 0, URDF_ERROR_CODE, f"urdf {spec.urdf[:200]!r}: {trouble}")]) from trouble
+    except UnusableFile as error:
+        shown_path = folders.display_path(file.resolve()) if file else ""
+        message = f"urdf {spec.urdf[:200]!r}: {error}"
+        raise InvalidInput([Problem(shown_path, 0, 0, URDF_ERROR_CODE, message)]) from error
     arguments = {
         name: str(value).lower() if isinstance(value, bool) else str(value) for name, value in spec.arguments.items()
     }
@@ -80,11 +81,11 @@ def body_from_tree(spec: RobotSpec, tree: LinkTree) -> RobotBody:
     """Build the body of a robot from its links. All joints except wheel joints are fixed at 0. Raises InvalidInput."""
     joints = select_wheels(tree, spec.drive)
     _check_wheels(spec, tree, joints)
-    rolling = {link for wheel in joints for link in tree.subtree(wheel.joint.child)}
-    fixed = [name for name in tree.links if name not in rolling]
+    rolling_links = {link for wheel in joints for link in tree.subtree(wheel.joint.child)}
+    fixed_links = [name for name in tree.links if name not in rolling_links]
     solids = [
         Solid(solid.shape, tree.poses[name].compose(solid.pose), name)
-        for name in fixed
+        for name in fixed_links
         for solid in tree.links[name].solids
     ]
     if not solids:
@@ -92,7 +93,7 @@ def body_from_tree(spec: RobotSpec, tree: LinkTree) -> RobotBody:
     base_from_root = _base_from_root(joints, solids)
     hull = tuple(replace(solid, pose=base_from_root.compose(solid.pose)) for solid in solids)
     scale = _mass_scale(spec, tree)
-    chassis = _with_possible_inertia(_combine_masses(tree, fixed, base_from_root, scale), hull)
+    chassis = _with_valid_inertia(_combine_masses(tree, fixed_links, base_from_root, scale), hull)
     wheels = tuple(_build_wheel(tree, joint, base_from_root, scale, spec) for joint in joints)
     if wheels:  # an omnidirectional base has no ground contact
         hull = _without_casters(tree, hull, max(wheel.radius for wheel in wheels))
@@ -156,10 +157,10 @@ def _combine_masses(tree: LinkTree, links: Sequence[str], base_from_root: Pose3,
     return MassProperties(whole.mass * scale, whole.center, whole.tensor * scale)
 
 
-def _with_possible_inertia(chassis: MassProperties, solids: Sequence[Solid]) -> MassProperties:
-    """Return the chassis, with the inertia of solids of uniform density if a moment of inertia is missing or negative.
+def _with_valid_inertia(chassis: MassProperties, solids: Sequence[Solid]) -> MassProperties:
+    """Return the chassis. If a moment of inertia is missing or negative, use the inertia of solids of uniform density.
 
-    With such a moment, the wheels could not move the robot as commanded.
+    With a missing or negative moment, the wheels could not move the robot as commanded.
     """
     if np.linalg.eigvalsh(chassis.tensor)[0] > MIN_INERTIA_RATIO * np.trace(chassis.tensor):
         return chassis
@@ -167,6 +168,7 @@ def _with_possible_inertia(chassis: MassProperties, solids: Sequence[Solid]) -> 
 
 
 def _build_wheel(tree: LinkTree, wheel: WheelJoint, base_from_root: Pose3, scale: float, spec: RobotSpec) -> Wheel:
+    """Return the wheel on a joint, with the mass of all links below the joint multiplied by `scale`."""
     x, y, _ = base_from_root.compose(Pose3(*wheel.center)).position
     links = [(tree.poses[name], tree.links[name].mass) for name in tree.subtree(wheel.joint.child)]
     parts = [mass.transformed(pose) for pose, mass in links if mass is not None and mass.mass > 0]
@@ -187,18 +189,18 @@ def _without_casters(tree: LinkTree, hull: tuple[Solid, ...], wheel_radius: floa
     `wheel_radius` is the radius of the largest wheel in m. Raises InvalidInput if any other part touches the ground.
     """
     points = [solid.pose.apply(hull_points(solid.shape)) for solid in hull]
-    whole = np.ptp(np.concatenate(points)[:, :2], axis=0)
+    hull_size = np.ptp(np.concatenate(points)[:, :2], axis=0)
     kept = []
     for solid, corners in zip(hull, points, strict=True):
         height = corners[:, 2].min()
         if height >= MIN_GROUND_CLEARANCE_M:
             kept.append(solid)
         elif not (
-            (np.ptp(corners[:, :2], axis=0) <= MAX_CASTER_SIZE_RATIO * whole).all()
+            (np.ptp(corners[:, :2], axis=0) <= MAX_CASTER_SIZE_RATIO * hull_size).all()
             or _is_round_caster(solid, wheel_radius)
         ):
-            place = f"is {1e3 * height:.1f} mm above" if height >= 0 else f"reaches {-1e3 * height:.1f} mm below"
-            message = f"link {solid.name!r} {place} the lowest point of the wheels: it would drag over the ground"
+            relation = f"is {1e3 * height:.1f} mm above" if height >= 0 else f"reaches {-1e3 * height:.1f} mm below"
+            message = f"link {solid.name!r} {relation} the lowest point of the wheels: it would drag over the ground"
             hint = f"its <collision> must be at least {1e3 * MIN_GROUND_CLEARANCE_M:g} mm above this point"
             raise InvalidInput([tree.links[solid.name].element.problem(message, hint)])
     return tuple(kept)

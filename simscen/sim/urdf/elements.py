@@ -58,8 +58,8 @@ class Joint:
 class MeshSource:
     """Finds and reads the meshes of a URDF.
 
-    `folder` is the folder of the URDF, and `folders` are the folders that may be read. `read` is None if meshes are not
-    supported. Absolute paths are allowed if the URDF `is_from_xacro`.
+    `folder` is the folder of the URDF, and `folders` are the folders that may be read. `read` reads a mesh file; it is
+    None if meshes are not supported. Absolute paths are allowed if the URDF `is_from_xacro`.
     """
 
     folder: Path
@@ -67,8 +67,8 @@ class MeshSource:
     read: MeshReader | None
     is_from_xacro: bool = False
 
-    def mesh(self, element: Element) -> Mesh:
-        """Read the file of a `<mesh>` element, and apply its scale; raises InvalidElement."""
+    def load_mesh(self, element: Element) -> Mesh:
+        """Read the file of a `<mesh>` element, and apply the element's scale; raises InvalidElement."""
         uri = element.text("filename")
         scale = element.numbers("scale", 3, (1.0, 1.0, 1.0))
         try:
@@ -113,8 +113,9 @@ def parse_link(element: Element, meshes: MeshSource) -> Link:
 
 def parse_joint(element: Element) -> Joint:
     """Parse a `<joint>`; raises InvalidElement."""
-    given = None if element.attributes.get("type") in ("fixed", "floating") else element.child("axis")
-    axis = (1.0, 0.0, 0.0) if given is None else given.numbers("xyz", 3, (1.0, 0.0, 0.0))
+    has_axis = element.attributes.get("type") not in ("fixed", "floating")
+    axis_element = element.child("axis") if has_axis else None
+    axis = (1.0, 0.0, 0.0) if axis_element is None else axis_element.numbers("xyz", 3, (1.0, 0.0, 0.0))
     length = math.hypot(*axis)
     if length == 0:
         raise InvalidElement(element, f"joint {element.name!r} turns about an axis of length 0")
@@ -164,7 +165,7 @@ def _parse_shape(geometry: Element, meshes: MeshSource) -> Shape:
             case "sphere":
                 return Sphere(element.positive("radius")[0])
             case "mesh":
-                return meshes.mesh(element)
+                return meshes.load_mesh(element)
             case other:
                 raise InvalidElement(
                     element, f"unknown geometry <{other}>", "use box, cylinder, sphere, capsule, or mesh"
@@ -183,5 +184,5 @@ def _parse_mass(inertial: Element) -> MassProperties:
         if min(values[0], values[3], values[5]) < 0:
             raise InvalidElement(tensor, "a moment of inertia must not be negative")
     xx, xy, xz, yy, yz, zz = values
-    own = MassProperties(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    return own.transformed(_parse_origin(inertial))
+    properties = MassProperties(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    return properties.transformed(_parse_origin(inertial))

@@ -28,19 +28,22 @@ MIN_STEERING_RAD, MAX_STEERING_RAD = 0.1, 1.0
 """Range to which the limit of a steering joint is clipped."""
 LIDAR_NAMES = ("laser", "lidar", "scan")
 """A link carries a lidar if its name contains one of these words."""
+LIDAR_GAP_M = 0.02
+"""Height of a lidar above the hull, if no link carries a lidar."""
 ROBOT_FILE_HINT = "write a *.robot.yaml next to it with its drive, limits, and sensors; see `simscen explain robot`"
 
 InferredDrive = Ackermann | Differential | SkidSteer
+"""Drives that `infer_robot_spec` can infer."""
 
 
 def infer_robot_spec(path: Path, roots: Sequence[Path] = (), read_mesh: MeshReader | None = None) -> RobotSpec:
     """Infer the specification of a robot from its URDF: the drive, its limits, and a lidar, odometry, and an IMU.
 
-    A robot with steered wheels has an Ackermann drive, one with a single axle a differential drive, and any other robot
-    a skid-steer drive. Speed limits are 1 m/s and 1.5 rad/s, or lower if the wheel joints are slower or far apart;
-    acceleration limits are 1 m/s² and 2 rad/s². The lidar is at a link with a name like LIDAR_NAMES, or on top of the
-    robot. All files must be in `roots` (default: the folder of `path`). Raises InvalidInput if the file is invalid or
-    its drive cannot be inferred.
+    A robot with steered wheels has an Ackermann drive, a robot with a single axle has a differential drive, and any
+    other robot has a skid-steer drive. Speed limits are 1 m/s and 1.5 rad/s, or lower if the wheel joints are slower or
+    far apart; acceleration limits are 1 m/s² and 2 rad/s². The lidar is at the first link whose name contains one of
+    LIDAR_NAMES, or on top of the robot. All files must be in `roots` (default: the folder of `path`). Raises
+    InvalidInput if the file is invalid or the drive cannot be inferred.
     """
     folders = AllowedFolders.of(roots or (path.resolve().parent,))
     tree = read_tree(path, folders, read_mesh)
@@ -73,34 +76,35 @@ def _infer_from_tree(tree: LinkTree, path: Path) -> RobotSpec:
 
 
 def _infer_drive(tree: LinkTree, wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> InferredDrive:
+    """Return the drive with these wheels; raises InvalidInput. `wheels` and `others` are from `examine_joints`."""
     driven = [wheel for wheel in wheels if not wheel.is_steered]
     left, right = ([w for w in driven if w.is_left is side] for side in (True, False))
     if not left or len(left) != len(right):
         message = f"the drive of the robot cannot be inferred from its wheels: {describe_wheels(wheels, others)}"
         raise InvalidInput([tree.element.problem(message, ROBOT_FILE_HINT)])
     separation = float(np.mean([w.center[1] for w in left]) - np.mean([w.center[1] for w in right]))
-    axles = [w.center[0] for w in driven]
+    wheel_positions = [w.center[0] for w in driven]
     radius, width = (float(np.mean(values)) for values in zip(*((w.radius, w.width) for w in driven), strict=True))
     size = {"wheel_radius": radius, "wheel_separation": separation, "wheel_width": width}
     steered = [wheel for wheel in wheels if wheel.is_steered and not wheel.is_caster]
     if steered:
         check_front_steering([*driven, *steered])
-        base = float(np.mean([wheel.center[0] for wheel in steered]) - np.mean(axles))
+        base = float(np.mean([wheel.center[0] for wheel in steered]) - np.mean(wheel_positions))
         steering = _max_steering(steered, max(abs(wheel.center[1]) for wheel in steered) / base)
         return Ackermann.model_validate({"type": "ackermann", "wheel_base": base, "max_steering": steering, **size})
-    if max(axles) - min(axles) < AXLE_TOLERANCE_M:
+    if max(wheel_positions) - min(wheel_positions) < AXLE_TOLERANCE_M:
         return Differential.model_validate({"type": "differential", **size})
-    base = max(axles) - min(axles)
-    scale = min(10.0, 1 + _skid_factor(axles) * (base / separation) ** 2)
+    base = max(wheel_positions) - min(wheel_positions)
+    scale = min(10.0, 1 + _skid_factor(wheel_positions) * (base / separation) ** 2)
     return SkidSteer.model_validate({"type": "skid_steer", "wheel_base": base, "turning_scale": scale, **size})
 
 
-def _skid_factor(axles: Sequence[float]) -> float:
-    """Return the factor k of turning_scale = 1 + k (wheel base / wheel separation)², for axles at x = `axles` in m.
+def _skid_factor(wheel_positions: Sequence[float]) -> float:
+    """Return the factor k of turning_scale = 1 + k (wheel base / wheel separation)², for wheels at these x in m.
 
     The factors for two, three, and more axles were measured with `simscen robot check`.
     """
-    gaps = sum(after - before > AXLE_TOLERANCE_M for before, after in pairwise(sorted(axles)))
+    gaps = sum(after - before > AXLE_TOLERANCE_M for before, after in pairwise(sorted(wheel_positions)))
     return {1: 1.2, 2: 0.1}.get(gaps, 0.3)
 
 
@@ -134,4 +138,4 @@ def _infer_lidar_mount(tree: LinkTree, draft: RobotSpec, wheels: list[WheelJoint
             x, y, z = float(pose.x - axle[0]), float(pose.y - axle[1]), float(pose.z - ground)
             roll = math.pi if pose.rotation()[2, 2] < MAX_UPSIDE_DOWN_Z else 0.0
             return Mount(x=x, y=y, z=max(0.0, z), roll=roll, yaw=pose.yaw)
-    return Mount(z=hull_height(body_from_tree(draft, tree)) + 0.02)
+    return Mount(z=hull_height(body_from_tree(draft, tree)) + LIDAR_GAP_M)

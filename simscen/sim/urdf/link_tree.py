@@ -20,7 +20,7 @@ class LinkTree:
 
     root:          name of the root link
     poses:         poses of all links in the frame of the root link, by name, with all joints at zero
-    child_joints:  joints below each link, by the name of the link
+    child_joints:  joints to the child links of each link, by the name of the parent link
     """
 
     name: str

@@ -36,8 +36,9 @@ MAX_LISTED_NAMES = 4
 class WheelJoint:
     """A wheel with its `center` in the root frame. Lengths are in m.
 
-    `joint` is the joint about which it rolls. `steering` is its steering joint (None: not steered), and `trail` the
-    distance along x between its center and the steering axis. A wheel that swivels freely counts as steered, too.
+    `joint` is the joint about which the wheel rolls. `steering` is the steering joint of the wheel, or None. `trail` is
+    the distance along x between the wheel's center and the steering axis. A wheel that swivels freely counts as
+    steered, too.
     """
 
     joint: Joint
@@ -65,7 +66,7 @@ class WheelJoint:
 
 
 def examine_joints(tree: LinkTree) -> tuple[list[WheelJoint], Mapping[str, list[str]]]:
-    """Return the wheels in a URDF, and the names of all other movable joints by the reason why they are not wheels.
+    """Return the wheels in a URDF, and the names of all other movable joints, by the reason why a joint has no wheel.
 
     A wheel is a round link that stands on the ground and turns without limits about the y axis.
     """
@@ -163,21 +164,23 @@ def select_wheels(tree: LinkTree, drive: Drive) -> list[WheelJoint]:
 
 
 def _steered_links(tree: LinkTree, steering_joints: Sequence[Joint]) -> set[str]:
+    """Return the names of all links that the steering joints turn."""
     return {link for joint in steering_joints for link in tree.subtree(joint.child)}
 
 
 def _measure_wheel(tree: LinkTree, joint: Joint, is_steered: bool) -> WheelJoint | None:
     """Return the wheel on a joint, with the size of its first round collision shape, or None if no shape is round."""
     for solid in tree.links[joint.child].solids:
-        place = tree.poses[joint.child].compose(solid.pose).position
+        center = tree.poses[joint.child].compose(solid.pose).position
         match solid.shape:
             case Cylinder(radius, length):
-                return WheelJoint(joint, place, radius, length, is_steered)
+                return WheelJoint(joint, center, radius, length, is_steered)
             case Sphere(radius):
-                return WheelJoint(joint, place, radius, radius / 2, is_steered)
+                return WheelJoint(joint, center, radius, radius / 2, is_steered)
             case Mesh() if (mesh := _round_mesh(joint, solid)) is not None:
-                center, radius, width = mesh
-                return WheelJoint(joint, tree.poses[joint.child].compose(center).position, radius, width, is_steered)
+                mesh_center, radius, width = mesh
+                center = tree.poses[joint.child].compose(mesh_center).position
+                return WheelJoint(joint, center, radius, width, is_steered)
             case _:
                 continue
     return None
@@ -203,10 +206,10 @@ def _round_mesh(joint: Joint, solid: Solid) -> tuple[Pose3, float, float] | None
 
 
 def _parallel_axis(tree: LinkTree, joint: Joint) -> str:
-    """Return the axis of the root frame ("x", "y", or "z") that is parallel to a joint axis, or "" if none is."""
+    """Return the axis of the root frame that is parallel to a joint axis: "x", "y", "z", or "" for no axis."""
     rotation = tree.poses[joint.child]._replace(x=0.0, y=0.0, z=0.0)
-    parts = rotation.compose(Pose3(*joint.axis)).position
-    return "".join(name for name, part in zip("xyz", parts, strict=True) if abs(part) >= MIN_AXIS_COSINE)
+    direction = rotation.compose(Pose3(*joint.axis)).position
+    return "".join(name for name, cosine in zip("xyz", direction, strict=True) if abs(cosine) >= MIN_AXIS_COSINE)
 
 
 def check_front_steering(wheels: Sequence[WheelJoint]) -> None:
@@ -228,14 +231,14 @@ def check_front_steering(wheels: Sequence[WheelJoint]) -> None:
 def describe_wheels(wheels: list[WheelJoint], others: Mapping[str, list[str]]) -> str:
     """Return a message with the names of all wheels, and the reasons why the other movable joints are not wheels."""
     if not wheels and not others:
-        return "it has no movable joints"
+        return "the URDF has no movable joints"
     groups: dict[str, list[str]] = {"left": [], "right": []}
     for wheel in wheels:
         group = "steered" if wheel.is_steered else "left" if wheel.is_left else "right"
         groups.setdefault(group, []).append(wheel.joint.name)
     found = [f"{group}: {_shortened(names)}" for group, names in groups.items()]
     reasons = [f"{_shortened(names)} ({reason})" for reason, names in others.items()][:MAX_LISTED_NAMES]
-    return "; ".join(found + ([f"no wheels: {', '.join(reasons)}"] if reasons else []))
+    return "; ".join(found + ([f"not wheels: {', '.join(reasons)}"] if reasons else []))
 
 
 def _shortened(names: Sequence[str]) -> str:

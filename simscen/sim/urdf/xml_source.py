@@ -42,9 +42,10 @@ class Element(markup.Element):
     def numbers(
         self, attribute: str, count: int, default: tuple[float, ...] | None = None, largest: float = 1e6
     ) -> tuple[float, ...]:
-        """Return the numbers in an attribute; `default` if it is missing. Without `default`, the attribute is required.
+        """Return the numbers in an attribute, or `default` if the attribute is missing.
 
-        Raises InvalidElement unless there are `count` numbers, each from -`largest` to `largest`.
+        Raises InvalidElement if the attribute is missing and `default` is None, or unless the attribute has `count`
+        numbers, each from -`largest` to `largest`.
         """
         if attribute not in self.attributes and default is not None:
             return default
@@ -99,6 +100,6 @@ def read_xml(path: Path, folders: AllowedFolders) -> Element:
     shown_path = folders.display_path(path)
     try:
         _, data = folders.read_file(path, MAX_URDF_BYTES)
-    except UnusableFile as trouble:
-        raise InvalidInput([Problem(shown_path, 0, 0, URDF_ERROR_CODE, str(trouble))]) from trouble
+    except UnusableFile as error:
+        raise InvalidInput([Problem(shown_path, 0, 0, URDF_ERROR_CODE, str(error))]) from error
     return parse_xml(data, shown_path)

@@ -37,15 +37,16 @@ def _parse_parameters(text: str) -> list[Parameter]:
 
 
 def resolve_macro(qualified_name: str, scope: Scope) -> tuple[Macro, Scope]:
-    """Return the macro `name` or `namespace.name`, and the scope that its body sees. Raises ExpansionError.
+    """Return the macro `name` or `namespace.name`, and the scope that encloses the body of the macro.
 
-    This is the scope of the namespace, or without a namespace that of the call.
+    This scope is the scope of the namespace; without a namespace, it is `scope`, the scope of the call. Raises
+    ExpansionError.
     """
-    *spaces, name = qualified_name.split(".")
-    for space in spaces:
-        inner = scope.find_namespace(space)
+    *namespaces, name = qualified_name.split(".")
+    for namespace in namespaces:
+        inner = scope.find_namespace(namespace)
         if inner is None:
-            raise ExpansionError(f"there is no namespace {space[:60]!r}")
+            raise ExpansionError(f"there is no namespace {namespace[:60]!r}")
         scope = inner
     macro = scope.find_macro(name)
     if macro is None:
@@ -85,8 +86,8 @@ def _default_value(parameter: Parameter, caller_scope: Scope, macro: Macro, text
         return texts.property(caller_scope, parameter.name)
     if parameter.default is not None:
         return texts.literal(parameter.default, caller_scope)
-    what = "there is no property to forward to" if parameter.is_forwarded else "a call lacks the argument"
-    raise ExpansionError(f"macro {macro.name!r}: {what} {parameter.name!r}")
+    reason = "there is no property to forward to" if parameter.is_forwarded else "a call lacks the argument"
+    raise ExpansionError(f"macro {macro.name!r}: {reason} {parameter.name!r}")
 
 
 def define_property(source: Element, scope: Scope, texts: TextEvaluator) -> None:
@@ -95,25 +96,24 @@ def define_property(source: Element, scope: Scope, texts: TextEvaluator) -> None
     if not name.isidentifier() or name.startswith("__"):
         raise ExpansionError(f"{name[:60]!r} is not a valid name of a property")
     value, default = source.attributes.get("value"), source.attributes.get("default")
-    remove = parse_bool(texts.value(source.attributes.get("remove", "false"), scope))
-    if (value is not None) + (default is not None) + remove > 1:
+    must_remove = parse_bool(texts.value(source.attributes.get("remove", "false"), scope))
+    if (value is not None) + (default is not None) + must_remove > 1:
         raise ExpansionError("value, default and remove exclude each other")
-    known = scope.find_scope(name) is not None
-    if remove and known:
+    is_defined = scope.find_scope(name) is not None
+    if must_remove and is_defined:
         scope.remove(name)
-    elif default is None or not known:
+    elif default is None or not is_defined:
         _set_property(source, name, value if default is None else default, scope, texts)
 
 
 def _set_property(source: Element, name: str, value: str | None, scope: Scope, texts: TextEvaluator) -> None:
     """Set a property to `value`, or to the children of `source` if `value` is None."""
-    lazy = parse_bool(texts.value(source.attributes.get("lazy_eval", "true"), scope))
-    where = source.attributes.get("scope", "")
-    into = {"global": scope.top(), "parent": scope.caller()}.get(where, scope)
+    is_lazy = parse_bool(texts.value(source.attributes.get("lazy_eval", "true"), scope))
+    target = {"global": scope.top(), "parent": scope.caller()}.get(source.attributes.get("scope", ""), scope)
     if value is None:
-        into.values[f"**{name}"] = Block(source, includes_element=False)
-    elif lazy and into is scope:
-        plain = parse_literal(value)
-        into.values[name] = LazyText(plain) if isinstance(plain, str) else plain
+        target.values[f"**{name}"] = Block(source, includes_element=False)
+    elif is_lazy and target is scope:
+        literal = parse_literal(value)
+        target.values[name] = LazyText(literal) if isinstance(literal, str) else literal
     else:
-        into.values[name] = texts.literal(value, scope)
+        target.values[name] = texts.literal(value, scope)

@@ -21,14 +21,12 @@ UNARY_OPERATORS: dict[type[ast.unaryop], Callable[[Any], object]] = {
 COMPARISON_OPERATORS: dict[type[ast.cmpop], Callable[[Any, Any], object]] = {
     ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
     ast.GtE: operator.ge, ast.Is: operator.is_, ast.IsNot: operator.is_not,
-    ast.In: lambda one, many: one in many, ast.NotIn: lambda one, many: one not in many,
+    ast.In: lambda value, container: value in container, ast.NotIn: lambda value, container: value not in container,
 }  # fmt: skip
-EXPRESSION_HINT = "supported are numbers, texts, lists, comparisons, `a if b else c`, math functions, and properties"
+EXPRESSION_HINT = "use only numbers, texts, lists, comparisons, `a if b else c`, math functions, and properties"
 
 PropertyLookup = Callable[[tuple[str, ...]], Value]
 """Returns the value of the property `a.b`, given as ("a", "b"); raises KeyError if it does not exist."""
-
-
 Functions = Mapping[tuple[str, ...], Function]
 """Functions by dotted name, such as ("xacro", "load_yaml")."""
 
@@ -71,24 +69,24 @@ class _Evaluation:
         match node:
             case ast.Constant(value):
                 return value
-            case ast.Attribute(whole, key) if not _is_dotted_name(whole):
-                return item(self.value(whole), key)
+            case ast.Attribute(mapping, key) if not _is_dotted_name(mapping):
+                return lookup(self.value(mapping), key)
             case ast.Name() | ast.Attribute():
                 return self._name(node)
             case ast.List(elts) | ast.Tuple(elts):
                 return [self.value(each) for each in elts]
-            case ast.BinOp(left, kind, right) if type(kind) in BINARY_OPERATORS:
-                return _binary(type(kind), self.value(left), self.value(right))
-            case ast.UnaryOp(kind, operand) if type(kind) in UNARY_OPERATORS:
-                return UNARY_OPERATORS[type(kind)](self.value(operand))
-            case ast.BoolOp(kind, values):
-                return self._boolean(values, isinstance(kind, ast.Or))
-            case ast.Compare(left, kinds, others):
-                return self._comparison(left, kinds, others)
+            case ast.BinOp(left, op, right) if type(op) in BINARY_OPERATORS:
+                return _binary(type(op), self.value(left), self.value(right))
+            case ast.UnaryOp(op, operand) if type(op) in UNARY_OPERATORS:
+                return UNARY_OPERATORS[type(op)](self.value(operand))
+            case ast.BoolOp(op, operands):
+                return self._boolean(operands, isinstance(op, ast.Or))
+            case ast.Compare(left, ops, comparators):
+                return self._comparison(left, ops, comparators)
             case ast.IfExp(test, body, orelse):
                 return self.value(body if self.value(test) else orelse)
-            case ast.Subscript(whole, index):
-                return self._subscript(self.value(whole), index)
+            case ast.Subscript(container, index):
+                return self._subscript(self.value(container), index)
             case ast.Call(function, arguments, keywords):
                 return self._call(function, arguments, keywords)
             case _:
@@ -99,77 +97,79 @@ class _Evaluation:
         try:
             return self._properties(path)
         except KeyError:
-            known = _find_builtin(path)
-        if isinstance(known, int | float):
-            return known
+            builtin = _find_builtin(path)
+        if isinstance(builtin, int | float):
+            return builtin
         raise ExpansionError(
-            f"{'.'.join(path)[:60]!r} is not defined" if known is None else f"{path[-1]} is a function, not a value"
+            f"{'.'.join(path)[:60]!r} is not defined" if builtin is None else f"{path[-1]} is a function, not a value"
         )
 
-    def _boolean(self, values: list[ast.expr], is_or: bool) -> Value:
-        """Return the value of `and` or `or`: the first operand that decides it, or the last one."""
-        for each in values:
-            value = self.value(each)
+    def _boolean(self, operands: list[ast.expr], is_or: bool) -> Value:
+        """Return the value of `and` or `or`: the first operand that decides the result, or the last operand."""
+        for operand in operands:
+            value = self.value(operand)
             if bool(value) is is_or:
                 break
         return value
 
-    def _comparison(self, left: ast.expr, kinds: list[ast.cmpop], others: list[ast.expr]) -> object:
-        before, result = self.value(left), True
-        for kind, other in zip(kinds, others, strict=True):
-            after = self.value(other)
-            result = bool(COMPARISON_OPERATORS[type(kind)](before, after))
+    def _comparison(self, left: ast.expr, ops: list[ast.cmpop], comparators: list[ast.expr]) -> object:
+        """Return the value of a chain of comparisons such as `a < b < c`."""
+        left_value, result = self.value(left), True
+        for op, right in zip(ops, comparators, strict=True):
+            right_value = self.value(right)
+            result = bool(COMPARISON_OPERATORS[type(op)](left_value, right_value))
             if not result:
                 break
-            before = after
+            left_value = right_value
         return result
 
-    def _subscript(self, whole: Any, index: ast.expr) -> object:
+    def _subscript(self, container: Any, index: ast.expr) -> object:
         if isinstance(index, ast.Slice):
-            ends = [None if end is None else self.value(end) for end in (index.lower, index.upper, index.step)]
-            return whole[slice(*ends)]
-        return whole[self.value(index)]
+            bounds = [None if bound is None else self.value(bound) for bound in (index.lower, index.upper, index.step)]
+            return container[slice(*bounds)]
+        return container[self.value(index)]
 
     def _call(self, function: ast.expr, arguments: list[ast.expr], keywords: list[ast.keyword]) -> object:
         match function:
             case ast.Name(name):
                 path: tuple[str, ...] = (name,)
-            case ast.Attribute(ast.Name(space), name) if space in NAMESPACES:
-                path = (space, name)
+            case ast.Attribute(ast.Name(namespace), name) if namespace in NAMESPACES:
+                path = (namespace, name)
             case _:
                 path = ()
         if path in (("isinstance",), ("python", "isinstance")) and len(arguments) == 2:
-            kind = _path(arguments[1])[-1]
-            if kind not in PYTHON_TYPES:
-                raise ExpansionError(f"isinstance() of {kind[:60]!r} is not supported")
-            return isinstance(self.value(arguments[0]), PYTHON_TYPES[kind])
-        known: Function | float | None
+            type_name = _path(arguments[1])[-1]
+            if type_name not in PYTHON_TYPES:
+                raise ExpansionError(f"isinstance() of {type_name[:60]!r} is not supported")
+            return isinstance(self.value(arguments[0]), PYTHON_TYPES[type_name])
+        found: Function | float | None
         if path:
-            known, receiver = self._functions.get(path) or _find_builtin(path), []
+            found, receiver = self._functions.get(path) or _find_builtin(path), []
         elif isinstance(function, ast.Attribute):
             value = self.value(function.value)
-            known, receiver = METHODS.get((type(value), function.attr)), [value]
+            found, receiver = METHODS.get((type(value), function.attr)), [value]
         else:
-            known, receiver = None, []
-        if not callable(known):
+            found, receiver = None, []
+        if not callable(found):
             raise ExpansionError(f"{ast.unparse(function)[:60]}() is not supported", EXPRESSION_HINT)
         named = {keyword.arg: self.value(keyword.value) for keyword in keywords if keyword.arg is not None}
-        if keywords and (known is not dict or len(named) < len(keywords)):
+        if keywords and (found is not dict or len(named) < len(keywords)):
             raise ExpansionError("arguments by name are not supported")
-        return known(*receiver, *(self.value(each) for each in arguments), **named)
+        return found(*receiver, *(self.value(each) for each in arguments), **named)
 
 
-def _binary(kind: type[ast.operator], left: Any, right: Any) -> object:
+def _binary(operator_type: type[ast.operator], left: Any, right: Any) -> object:
     """Return the result of a binary operator; raises ExpansionError if the result would be too large."""
-    if kind is ast.Mult and isinstance(left, str | list) != isinstance(right, str | list):
-        many, times = (left, right) if isinstance(left, str | list) else (right, left)
-        if isinstance(times, int) and size(many) * times > MAX_LENGTH:
+    if operator_type is ast.Mult and isinstance(left, str | list) != isinstance(right, str | list):
+        sequence, count = (left, right) if isinstance(left, str | list) else (right, left)
+        if isinstance(count, int) and size(sequence) * count > MAX_LENGTH:
             raise ExpansionError(f"the value is longer than {MAX_LENGTH}")
-    if kind is ast.Pow and isinstance(left, int) and isinstance(right, int) and left.bit_length() * right > MAX_BITS:
+    is_integer_power = operator_type is ast.Pow and isinstance(left, int) and isinstance(right, int)
+    if is_integer_power and left.bit_length() * right > MAX_BITS:
         raise ExpansionError("the number is too large")
-    if kind is ast.Mod and isinstance(left, str):
+    if operator_type is ast.Mod and isinstance(left, str):
         raise ExpansionError("formatting texts with % is not supported", "write ${…} between the words instead")
-    return BINARY_OPERATORS[kind](left, right)
+    return BINARY_OPERATORS[operator_type](left, right)
 
 
 def _path(node: ast.expr) -> tuple[str, ...]:
@@ -187,11 +187,11 @@ def _is_dotted_name(node: ast.expr) -> bool:
     return isinstance(node, ast.Name) or (isinstance(node, ast.Attribute) and _is_dotted_name(node.value))
 
 
-def item(whole: Value, key: str) -> Value:
-    """Return the value `whole.key` of a dictionary; raises ExpansionError if there is none."""
-    if not isinstance(whole, dict) or key not in whole:
+def lookup(mapping: Value, key: str) -> Value:
+    """Return the value `mapping.key` of a dictionary; raises ExpansionError if there is no such value."""
+    if not isinstance(mapping, dict) or key not in mapping:
         raise ExpansionError(f"there is no value {key[:60]!r}")
-    return whole[key]
+    return mapping[key]
 
 
 def _find_builtin(path: tuple[str, ...]) -> Function | float | None:
@@ -199,8 +199,8 @@ def _find_builtin(path: tuple[str, ...]) -> Function | float | None:
     match path:
         case (name,):
             return GLOBAL_FUNCTIONS.get(name)
-        case (space, name):
-            return NAMESPACES.get(space, {}).get(name)
+        case (namespace, name):
+            return NAMESPACES.get(namespace, {}).get(name)
         case _:
             return None
 

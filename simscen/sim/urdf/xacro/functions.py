@@ -9,6 +9,7 @@ from simscen.sim.urdf.xacro.limits import MAX_LENGTH, ExpansionError
 Function = Callable[..., object]
 
 PYTHON_TYPES: Mapping[str, type] = {"int": int, "float": float, "str": str, "bool": bool, "list": list, "dict": dict}
+"""Types by name, for conversions such as `int(…)` and for `isinstance`."""
 
 
 def _limited_round(number: float, digits: int | None = None) -> float:
@@ -50,7 +51,7 @@ PYTHON_FUNCTIONS: Mapping[str, Function] = {
     "round": _limited_round, "sorted": sorted, "sum": sum,
 }  # fmt: skip
 XACRO_FUNCTIONS: Mapping[str, Function] = {
-    # Messages of a file are meant for its authors.
+    # A message or warning is meant for the authors of the file and is not shown.
     "message": lambda *_: "", "warning": lambda *_: "", "error": _fail_with_message, "fatal": _fail_with_message,
     "tokenize": _tokenize,
 }  # fmt: skip

@@ -12,8 +12,8 @@ from simscen.sim.urdf.xml_source import Element
 class Parameter:
     """A parameter of a macro.
 
-    If a call has no argument for it, its value is `default` (None: the argument is required). If the parameter
-    `is_forwarded` (`^`), a property of the same name in the scope of the caller takes precedence over `default`.
+    If a call has no argument for the parameter, the value is `default` (None: the argument is required). If the
+    parameter `is_forwarded` (`^`), a property of the same name in the caller's scope takes precedence over `default`.
     """
 
     name: str
@@ -106,7 +106,7 @@ class Scope:
     def caller(self) -> "Scope":
         """Return the scope in which `<xacro:property scope="parent">` sets a property.
 
-        In a namespace, this is its parent scope. In a macro call, it is the innermost enclosing scope that is not a
+        In a namespace, this is the parent scope. In a macro call, this is the innermost enclosing scope that is not a
         namespace.
         """
         scope = self.parent

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from simscen.assets.folders import AllowedFolders, UnusableFile
-from simscen.sim.urdf.xacro.expression import Functions, evaluate, item
+from simscen.sim.urdf.xacro.expression import Functions, evaluate, lookup
 from simscen.sim.urdf.xacro.limits import MAX_LENGTH, Budget, ExpansionError, MissingFile, Value, parse_literal
 from simscen.sim.urdf.xacro.scopes import Block, EvaluationMarker, LazyText, Scope
 from simscen.sim.urdf.xml_source import Element
@@ -17,7 +17,10 @@ TOKEN = re.compile(r"\$\$+[{(]|\$\{[^}]*\}|\$\([^)]*\)|[^$]+|\$[^{($]+|\$\Z")
 
 
 class TextEvaluator:
-    """Evaluates texts of the xacro file `file`. `arguments` are the values of `<xacro:arg>` by name."""
+    """Evaluates texts of a xacro file. `arguments` are the values of `<xacro:arg>` by name.
+
+    `file` is the file whose texts are evaluated; it changes during the expansion of an included file.
+    """
 
     def __init__(self, folders: AllowedFolders, file: Path, budget: Budget, arguments: Mapping[str, str]) -> None:
         self.budget, self.file = budget, file
@@ -85,12 +88,13 @@ class TextEvaluator:
         """Return the property `a.b`, given as ("a", "b"); raises KeyError if it does not exist."""
         current: Value | Scope = scope
         for name in path:
-            current = self.property(current, name) if isinstance(current, Scope) else item(current, name)
+            current = self.property(current, name) if isinstance(current, Scope) else lookup(current, name)
         if isinstance(current, Scope):
             raise KeyError(path[-1])
         return current
 
     def _part(self, token: str, scope: Scope) -> Value:
+        """Return the value of one part of a text, which matches TOKEN."""
         if token.startswith("$$"):
             return token[1:]
         if token.startswith("${"):
@@ -118,8 +122,8 @@ class TextEvaluator:
             path = self._folders.find(filename, self.file.parent, allow_absolute=True)
             _, content = self._folders.read_file(path, MAX_YAML_BYTES)
             return parse_yaml_values(content, self._number)
-        except UnusableFile as trouble:
-            raise ExpansionError(f"{filename[:200]!r}: {trouble}", trouble.hint) from trouble
+        except UnusableFile as error:
+            raise ExpansionError(f"{filename[:200]!r}: {error}", error.hint) from error
 
     def _number(self, expression: str) -> float:
         """Return the number of an expression without properties; raises ExpansionError."""
@@ -142,8 +146,8 @@ class TextEvaluator:
             case ["find", package]:
                 try:
                     return str(self._folders.package_folder(package, self.file.parent))
-                except UnusableFile as trouble:
-                    raise MissingFile(f"$(find {package[:60]}): {trouble}", trouble.hint) from None
+                except UnusableFile as error:
+                    raise MissingFile(f"$(find {package[:60]}): {error}", error.hint) from None
             case ["dirname"]:
                 return str(self.file.parent)
             case ["env", *_]:

@@ -77,7 +77,7 @@ def test_wheels_on_a_suspension_are_not_steered(infer):
 
 
 def test_drive_of_a_robot_without_wheels_is_not_inferred(infer):
-    with pytest.raises(InvalidInput, match="cannot be inferred from its wheels: it has no movable joints"):
+    with pytest.raises(InvalidInput, match="cannot be inferred from its wheels: the URDF has no movable joints"):
         infer(to_urdf(build_robot_body(robot_spec("omni"))))
 
 
@@ -194,7 +194,7 @@ def test_revolute_joints_with_limits_of_many_turns_are_wheels(infer, limit, driv
     if drive:
         assert infer(text).drive.type == drive
     else:
-        with pytest.raises(InvalidInput, match=r"no wheels: .* \(revolute joint with limits\)"):
+        with pytest.raises(InvalidInput, match=r"not wheels: .* \(revolute joint with limits\)"):
             infer(text)
 
 
@@ -212,7 +212,7 @@ def test_revolute_joints_with_limits_of_many_turns_are_wheels(infer, limit, driv
 def test_the_reason_is_given_for_each_joint_without_a_wheel(infer, joint, reason):
     with pytest.raises(InvalidInput) as error:
         infer(add_joint(to_urdf(build_robot_body(robot_spec("omni"))), joint))
-    assert error.value.problems[0].message.endswith(f": left: none; right: none; no wheels: extra ({reason})")
+    assert error.value.problems[0].message.endswith(f": left: none; right: none; not wheels: extra ({reason})")
 
 
 def test_wheels_on_one_side_are_named(infer):
