@@ -10,6 +10,7 @@ import numpy as np
 from simscen.core.clock import NS_PER_SECOND
 from simscen.core.records.trace import Ticks
 from simscen.core.records.verdict import Evidence
+from simscen.record import topics
 from simscen.record.foreign.decoded_messages import DecodedMessages
 from simscen.record.foreign.goal_events import goal_events
 from simscen.record.foreign.options import ForeignLogOptions
@@ -124,13 +125,14 @@ class ForeignTraceReader:
     def _reason_missing(self, role: str, topic: str) -> str:
         """Return why the log has no messages with a role, followed by a list of the other topics that contain poses."""
         if role in self._decoded.problems:
-            return self._decoded.problems[role]
+            frames = ": name two frames, such as map:base_link" if topic == topics.TF.name else ""
+            return f"{self._decoded.problems[role]}{frames}"
         if topic in self._topics:
             return f"{topic} has no messages"
         poses = [name for name, kind in sorted(self._topics.items()) if kind in POSE_DECODERS and name != topic]
         candidates = f"; topics with poses: {', '.join(poses[:MAX_LISTED_TOPICS])}" if poses else ""
         if not topic:
-            return f"no ground truth: name a topic or two frames with --truth{candidates}"
+            return f"no ground truth: name a topic, or two frames such as map:base_link, with --truth{candidates}"
         return f"the log has no topic {topic}{candidates}"
 
     def _timebase(self, *tracks: Track | None) -> Timebase:

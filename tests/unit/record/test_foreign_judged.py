@@ -157,9 +157,16 @@ def test_criteria_are_inconclusive_without_their_ground_truth(simscen, limits, t
     ended = simscen("drive.mcap", "--scenario", file)
     assert ended.code == 1
     assert "speed: inconclusive: the log lacks the true pose of the robot and the true velocity" in ended.out
-    assert "name a topic or two frames with --truth; topics with poses: /amcl_pose, /mocap, /odom" in ended.out
+    assert "such as map:base_link, with --truth; topics with poses: /amcl_pose, /mocap, /odom" in ended.out
     assert "collisions: inconclusive: the log lacks the collisions of the robot" in ended.out
     assert ended.out.count("inconclusive") == 4
+
+
+def test_tf_as_the_truth_needs_two_frames(simscen, limits, tmp_path: Path) -> None:
+    write_mcap(tmp_path / "drive.mcap", drive())
+    ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/tf")
+    assert ended.code == 1
+    assert "name two frames, such as map:base_link" in ended.out
 
 
 def test_third_party_log_needs_criteria(simscen, tmp_path: Path) -> None:
