@@ -75,7 +75,8 @@ def test_missing_ground_truth_is_reported_with_possible_topics(
     log = read(drive(), ForeignLogOptions())
     assert len(log.trace.truth) == 0
     assert log.coverage.missing[Evidence.TRUTH] == (
-        "no ground truth: name a topic, or two frames such as map:base_link, with --truth; topics with poses: /amcl_pose, /mocap, /odom"
+        "no ground truth: name a topic, or two frames such as map:base_link, with --truth; "
+        "topics with poses: /amcl_pose, /mocap, /odom"
     )
     assert "no topic /vicon" in read(drive(), ForeignLogOptions(truth="/vicon")).coverage.missing[Evidence.TRUTH]
 

@@ -15,6 +15,7 @@ from foreign_logs import (
     SPEED,
     Message,
     drive,
+    link,
     stamped_pose,
     statuses,
     write_bag,
@@ -163,7 +164,7 @@ def test_criteria_are_inconclusive_without_their_ground_truth(simscen, limits, t
 
 
 def test_tf_as_the_truth_needs_two_frames(simscen, limits, tmp_path: Path) -> None:
-    write_mcap(tmp_path / "drive.mcap", drive())
+    write_mcap(tmp_path / "drive.mcap", [*drive(), Message("/tf", BEGIN, link(BEGIN, "map", "base_link", 0.0))])
     ended = simscen("drive.mcap", "--scenario", limits("speed: {max: 9 m/s}"), "--truth", "/tf")
     assert ended.code == 1
     assert "name two frames, such as map:base_link" in ended.out
