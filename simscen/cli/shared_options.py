@@ -12,7 +12,7 @@ from simscen.cli import completions
 from simscen.cli.diagnostics import escaped
 from simscen.core.errors import UsageError
 from simscen.record.foreign.options import TOPICS, Clock, ForeignLogOptions
-from simscen.run.kept_files import KeptLogs, WrittenFor
+from simscen.run.kept_files import LogRetention, OutcomeFilter
 
 
 class Format(str, Enum):
@@ -67,9 +67,11 @@ RootOption = Annotated[Path | None, typer.Option(help="Root folder; scenarios ma
 WorldPathOption = Annotated[
     list[Path] | None, typer.Option(help="Additional folder with worlds and models; repeatable.")
 ]
-ReplayOption = Annotated[WrittenFor, typer.Option(help="Runs for which replay.html is written; see `simscen replay`.")]
+ReplayOption = Annotated[
+    OutcomeFilter, typer.Option(help="Runs for which replay.html is written; see `simscen replay`.")
+]
 KeepLogsOption = Annotated[
-    KeptLogs,
+    LogRetention,
     typer.Option(help="`failed` keeps logs and pictures only of runs that do not pass: for thousands of runs."),
 ]
 LenientOption = Annotated[bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")]

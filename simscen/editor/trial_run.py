@@ -14,7 +14,7 @@ from simscen.core.records.run_result import RunResult
 from simscen.core.records.session_events import RunProgress, SessionEvent
 from simscen.loading.loaded import LoadedScenario
 from simscen.report.display_text import one_line
-from simscen.run.kept_files import WrittenFor
+from simscen.run.kept_files import OutcomeFilter
 from simscen.run.process.jobs import Backend, Job
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
@@ -117,7 +117,7 @@ class TrialRuns:
             if isinstance(event, RunProgress):
                 trial.seconds = event.simulated
 
-        job = Job(0, loaded, loaded.key(loaded.spec.seed), trial.folder, WALL_LIMIT_S, WrittenFor.ALL)
+        job = Job(0, loaded, loaded.key(loaded.spec.seed), trial.folder, WALL_LIMIT_S, OutcomeFilter.ALL)
         try:
             with self._run_lock:
                 if trial.is_canceled:

@@ -30,7 +30,7 @@ from simscen.pytesting import OUT_OPTION, positive_number
 from simscen.report.display_text import plain_text
 from simscen.report.session_lines import violation_lines
 from simscen.report.violations import error_summary, reported_violations, scenario_file, short_run_name
-from simscen.run.kept_files import WrittenFor
+from simscen.run.kept_files import OutcomeFilter
 from simscen.run.process.jobs import Ended, Job
 from simscen.run.process.supervisor import Supervisor
 from simscen.run.sessions.output_folder import DEFAULT_FOLDER, run_folder
@@ -53,7 +53,7 @@ class Runner:
     def run(self, scenario: LoadedScenario, seed: int) -> RunFinished:
         """Run a scenario with a seed and return the result."""
         key = scenario.key(seed)
-        job = Job(next(self._numbers), scenario, key, run_folder(self.folder, key), WALL_LIMIT_S, WrittenFor.FAILED)
+        job = Job(next(self._numbers), scenario, key, run_folder(self.folder, key), WALL_LIMIT_S, OutcomeFilter.FAILED)
         ends = [update.end for update in self._supervisor.run([job], plugins_of(scenario)) if isinstance(update, Ended)]
         return finished_run(job, ends[0])
 

@@ -80,7 +80,7 @@ def assemble(prepared: PreparedScenario, seed: int, stack_log: Path | None = Non
 def _directors(
     prepared: PreparedScenario, streams: Streams, robots: Mapping[str, RobotUnderTest]
 ) -> Iterator[Director]:
-    """Yield one director for the events and faults; with several robots, one for the events and one for each robot."""
+    """Yield the director of all events and faults; with several robots, one for events and one per robot for faults."""
     spec = prepared.spec
     first, *_ = robots.values()
     if not prepared.robots:
@@ -119,7 +119,7 @@ def _build_robot(
     truth_period = clock.period(spec.physics.truth_rate)
     control_period = clock.period(prepared.stack.controller_frequency)
     if prepared.stack.gets_ground_truth:
-        # Last, because the log treats the first odometry as that of the robot.
+        # The last sensor, because the log treats the first odometry sensor as the robot's odometry.
         sensors = (*sensors, TruthSensor(robot, control_period))
     suite = SensorSuite(sensors, sensor_latencies(prepared, clock))
 
@@ -127,9 +127,9 @@ def _build_robot(
         return faults.belief(simulation.tick, belief)
 
     stack = _build_stack(prepared, clock, streams, seed, stack_log, disturb_belief)
-    world, sent = prepared.built.world, prepared.case.sent
+    world, event_goals = prepared.built.world, prepared.case.sent
     filters = CostmapFilters(prepared.stack, world.regions, prepared.masks)
-    stage = LiveStage(world, simulation, robot, stack, filters, clock, sent, pedestrians, Streams(seed), stages)
+    stage = LiveStage(world, simulation, robot, stack, filters, clock, event_goals, pedestrians, Streams(seed), stages)
     settings = FaultSettingFactory(prepared.robot, clock, lambda: simulation.tick, robot, prepared.built.mesh)
     link = CommandLink(control_period, clock.ticks(prepared.robot.limits.command_timeout))
     faults = FaultInjector(spec.faults, streams, settings, link, stage.record_event, prepared.map_faults)
@@ -201,7 +201,7 @@ class TruthSensor:
 
 
 class SensorWithFaults:
-    """The sensor `inner`, but `disturb` changes its measurements."""
+    """Sensor with the measurements of the sensor `inner`, changed by `disturb`."""
 
     def __init__(self, inner: Sensor, disturb: Callable[[Reading], Reading]) -> None:
         self._inner, self._disturb = inner, disturb
@@ -213,7 +213,7 @@ class SensorWithFaults:
 
 
 class LocalizerWithFaults:
-    """The localizer `inner`, but `disturb` changes its published beliefs (pose estimates)."""
+    """Localizer with the published beliefs (pose estimates) of the localizer `inner`, changed by `disturb`."""
 
     def __init__(self, inner: Localizer, disturb: Callable[[Belief], Belief]) -> None:
         self._inner, self._disturb = inner, disturb

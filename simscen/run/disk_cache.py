@@ -1,4 +1,4 @@
-"""Cache of the user on disk: one file for each entry, in a folder to which only the user can write."""
+"""Disk cache of the current user: one file for each entry, in a folder to which only this user can write."""
 
 import contextlib
 import hashlib
@@ -41,6 +41,7 @@ class DiskCache:
     def __init__(self, folder: Path | None, max_bytes: int = MAX_CACHE_BYTES) -> None:
         self._folder, self._max_bytes = folder, max_bytes
         self._remaining_bytes: int | None = None
+        """Number of bytes that can be written before entries must be deleted; None before the first write."""
 
     @property
     def is_enabled(self) -> bool:
@@ -60,7 +61,7 @@ class DiskCache:
                 data = file.read(MAX_ENTRY_BYTES)
                 with contextlib.suppress(OSError):  # a read-only file system
                     os.utime(descriptor)
-        except OSError:  # missing or unreadable: the caller computes it again
+        except OSError:  # missing or unreadable: the caller computes the entry again
             return None
         content = data[_DIGEST_BYTES:]
         return content if hashlib.sha256(key.encode() + content).digest() == data[:_DIGEST_BYTES] else None
@@ -77,6 +78,7 @@ class DiskCache:
                 self._write(self._folder, key, data)
 
     def _write(self, folder: Path, key: str, data: bytes) -> None:
+        """Write an entry atomically. Deletes old entries first if the cache would become too large."""
         if self._remaining_bytes is None or self._remaining_bytes < len(data):
             self._remaining_bytes = self._max_bytes - _prune(folder, self._max_bytes - len(data))
         self._remaining_bytes -= len(data)

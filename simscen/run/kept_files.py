@@ -5,15 +5,15 @@ from enum import Enum
 from simscen.core.records.run_result import Outcome
 
 
-class KeptLogs(str, Enum):
-    """Option: the runs that keep their log, picture, and other files besides result.json."""
+class LogRetention(str, Enum):
+    """Values of the option --keep-logs: runs of which all files are kept. Other runs keep only result.json."""
 
     ALL = "all"
     FAILED = "failed"
 
 
-class WrittenFor(str, Enum):
-    """Option: the runs for which a file is written, such as a replay page or a picture."""
+class OutcomeFilter(str, Enum):
+    """Outcomes of the runs for which a file is written, such as a replay page or a picture."""
 
     NONE = "none"
     FAILED = "failed"
@@ -21,4 +21,4 @@ class WrittenFor(str, Enum):
 
     def includes(self, outcome: Outcome) -> bool:
         """Return whether the file is written for a run with this outcome."""
-        return self is WrittenFor.ALL or (self is WrittenFor.FAILED and not outcome.is_good)
+        return self is OutcomeFilter.ALL or (self is OutcomeFilter.FAILED and not outcome.is_good)

@@ -70,7 +70,7 @@ class EndCondition:
 def run_end_event(tick: int, conditions: Iterable[EndCondition]) -> Event | None:
     """Return the event that ends the run at `tick`, or None if a robot is not done yet.
 
-    It is the event TIME_LIMIT if the time limit ended the drive of any robot.
+    The event has the name TIME_LIMIT if the time limit ended the drive of any robot.
     """
     run_end: Event | None = None
     for condition in conditions:
@@ -85,7 +85,7 @@ def run_end_event(tick: int, conditions: Iterable[EndCondition]) -> Event | None
 class RobotUnderTest:
     """A robot with its sensors, its stack, its faults, and its logs.
 
-    Call `observe` at each beat of any robot. If `is_due` is true afterwards, call `decide`, `record`, and `drive`.
+    Call `observe` at each beat of any robot. If it sets `is_due`, then call `decide`, `record`, and `drive`.
     """
 
     robot: Robot
@@ -112,7 +112,7 @@ class RobotUnderTest:
         """Set `is_due`, sample the true state if a sample is due, and record new collisions."""
         self.is_due = tick == self.next_tick
         if self.is_due:
-            self.next_tick = tick + self.schedule.until_next(tick)
+            self.next_tick = tick + self.schedule.ticks_until_next(tick)
             if tick < self.end_condition.time_limit_tick < self.next_tick:
                 self.next_tick = self.end_condition.time_limit_tick
         is_sampled = tick % self.truth_period == 0 or tick == self.end_condition.time_limit_tick

@@ -35,6 +35,7 @@ from simscen.sim.urdf.writer import to_urdf
 from simscen.worlds.routes.shortest_paths import Z_RANGE_M
 
 _HEADERS: WeakKeyDictionary[PreparedScenario, LogHeader] = WeakKeyDictionary()
+"""Cache of headers without the seed."""
 
 
 def log_header(prepared: PreparedScenario, seed: int) -> LogHeader:
@@ -74,14 +75,14 @@ def world_scenery(prepared: PreparedScenario) -> Scenery:
     """Return the objects, regions, and zones that viewers show."""
     world, by_robot = prepared.built.world, prepared.by_robot
     diameter = max((2 * wheel.radius for part in by_robot.values() for wheel in part.body.wheels), default=0.0)
-    same = all(part.map is prepared.built.map for part in by_robot.values())
+    all_use_world_map = all(part.map is prepared.built.map for part in by_robot.values())
     return Scenery(
         places=dict(world.places),
         things=tuple(_movable_object(body, world) for body in world.bodies),
         ground=tuple(_drivable_surfaces(prepared.built.mesh, diameter)),
         floors=tuple(FrictionRegion(name, world.regions[name], friction) for name, friction in world.friction.items()),
         zones=tuple(zone for name, part in by_robot.items() for zone in _zones(part, name)),
-        map=None if same else CompressedGrid.of(prepared.built.map),
+        map=None if all_use_world_map else CompressedGrid.of(prepared.built.map),
     )
 
 
@@ -97,11 +98,11 @@ def _drivable_surfaces(mesh: TriangleMesh, diameter: float) -> Iterator[Drivable
     owners = sorted(drivable_solids(mesh, diameter))
     if not owners:
         return  # most worlds have none, and computing the normals of many thousand faces is slow
-    up, slopes = upward_faces(mesh), face_normals(mesh)
+    is_upward, normals = upward_faces(mesh), face_normals(mesh)
     for owner in owners:
-        selected = mesh.owners == owner
-        corners = mesh.vertices[mesh.faces[selected]].reshape(-1, 3)
-        normal = max(slopes[selected & up].tolist(), key=lambda slope: -slope[2])  # its steepest part
+        is_owned = mesh.owners == owner
+        corners = mesh.vertices[mesh.faces[is_owned]].reshape(-1, 3)
+        normal = min(normals[is_owned & is_upward].tolist(), key=lambda normal: normal[2])  # of the steepest face
         uphill = (round(-normal[0] / normal[2], DECIMALS) + 0.0, round(-normal[1] / normal[2], DECIMALS) + 0.0)
         outline = convex_hull(np.round(corners[:, :2], DECIMALS))
         yield DrivableSurface(mesh.names[owner], outline, round(float(corners[:, 2].max()), DECIMALS), uphill)

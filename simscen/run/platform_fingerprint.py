@@ -30,7 +30,7 @@ def software_versions() -> dict[str, str]:
 
 
 def cpu_flags() -> list[str]:
-    """Return the instruction sets of this machine that affect results; empty if it is not an x86 machine with Linux."""
+    """Return the instruction sets of this machine that affect results; empty except on x86 machines with Linux."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -69,7 +69,7 @@ def arithmetic_fingerprints() -> dict[str, str]:
         "blas": hashlib.sha256(b"".join(part.tobytes() for part in blas)).hexdigest()[:16],
         "libm": hashlib.sha256(repr(libm).encode()).hexdigest()[:16],
         "numpy": hashlib.sha256(b"".join(part.tobytes() for part in array_results)).hexdigest()[:16],
-        "numpy_dispatch": " ".join(sorted(name for name, used in cpu_features.items() if used)),
+        "numpy_dispatch": " ".join(sorted(name for name, is_available in cpu_features.items() if is_available)),
     }
 
 

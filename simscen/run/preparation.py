@@ -46,10 +46,22 @@ DEFAULT_LIDAR_HEIGHT_M = 0.2
 class PreparedScenario:
     """A scenario with its world, map, and robots: everything about a run except the seed.
 
-    The stack receives `map` (None: no map), `masks`, and `estimate` (the initial pose estimate). `start` is the true
-    initial pose. `case` has the facts that criteria need besides the log. With several robots, `robots` has a
-    PreparedScenario for each robot by name, and the other fields, except `loaded` and `plugins`, are those of the first
-    robot.
+    With several robots, all attributes except `loaded`, `plugins`, and `robots` are those of the first robot.
+
+    Attributes:
+        built: World with its mesh and its map.
+        map: Map that the stack receives; None without a map.
+        masks: Filter masks that the stack receives.
+        robot: Specification of the robot.
+        body: Physical model of the robot.
+        stack: Specification of the stack.
+        start: True initial pose in the world frame.
+        estimate: Initial pose estimate that the stack receives.
+        case: Facts that criteria need besides the log.
+        obstacles: The part of the world's mesh that blocks the robot.
+        map_faults: Indices of the faults of the scenario that have changed `map`; see `apply_map_faults`.
+        plugins: Plug-ins that the scenario uses.
+        robots: Prepared scenario of each of several robots by name; empty for a single robot.
     """
 
     loaded: LoadedScenario
@@ -63,11 +75,8 @@ class PreparedScenario:
     estimate: Estimate
     case: Case
     obstacles: TriangleMesh
-    """The part of the world's mesh that blocks the robot."""
     map_faults: tuple[int, ...] = ()
-    """Indices of the faults of the scenario that have changed `map`; see `apply_map_faults`."""
     plugins: tuple[RegisteredType, ...] = ()
-    """Plug-ins that the scenario uses."""
     robots: Mapping[str, "PreparedScenario"] = field(default_factory=dict)
 
     @property
@@ -102,14 +111,17 @@ def lidar_height(robot: RobotSpec) -> float:
 
 def map_resolution(loaded: LoadedScenario, world: World) -> float:
     """Return the cell size in m of the world's map. It is larger if the world is large and no robot uses the map."""
-    is_used = any(view.map is None for view in loaded.robot_views.values())  # a robot without `map` uses it
+    is_used = any(view.map is None for view in loaded.robot_views.values())  # by robots without the key `map`
     return MAP_RESOLUTION_M if is_used else fitting_resolution(world.bounds)
 
 
 def prepare(
     loaded: LoadedScenario, build: BuildWorld = build_world, find_legs: FindLegs = legs_between
 ) -> PreparedScenario:
-    """Return the prepared scenario. Raises InvalidInput for unusable files."""
+    """Return the prepared scenario, with the world from `build` and the shortest paths from `find_legs`.
+
+    Raises InvalidInput for unusable files.
+    """
     build_once = cache(partial(build, loaded))  # the world is built once for each height of the robots' lidars
     if not loaded.robots:
         return _prepare_robot(loaded, build_once, find_legs)
@@ -168,11 +180,11 @@ def _with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh,
 
     The path to a goal starts at the previous goal that the robot is expected to reach, or at the initial pose.
     """
-    ends, pose = [], case.start
+    starts_and_goals, pose = [], case.start
     for goal in case.goals:
-        ends.append((pose, goal))
+        starts_and_goals.append((pose, goal))
         pose = pose if goal.name in case.expected else goal.pose  # `expected` has the goals that should fail
-    legs = find_legs(replace(built, mesh=obstacles), ends, case.inscribed_radius)
+    legs = find_legs(replace(built, mesh=obstacles), starts_and_goals, case.inscribed_radius)
     return replace(
         case,
         shortest={goal.name: leg.length for goal, leg in zip(case.goals, legs, strict=True)},
@@ -183,8 +195,8 @@ def _with_shortest_paths(case: Case, built: BuiltWorld, obstacles: TriangleMesh,
 def _clearance_range(spec: ScenarioSpec) -> float:
     """Return the largest clearance in m that a criterion or trigger uses, at least CLEARANCE_RANGE_M."""
     ranges = [entry.chosen.clearance_range for entry in spec.pass_ if isinstance(entry.chosen, Criterion)]
-    near = (test.clearance_below for trigger in spec.triggers for test in trigger.walk())
-    ranges += [condition.root for condition in near if isinstance(condition, ClearanceBelow)]
+    conditions = (part.clearance_below for trigger in spec.triggers for part in trigger.walk())
+    ranges += [condition.root for condition in conditions if isinstance(condition, ClearanceBelow)]
     return max([CLEARANCE_RANGE_M, *ranges])
 
 

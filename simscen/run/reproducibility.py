@@ -1,6 +1,6 @@
 """Digests of the files, plug-ins, and software on which the results of a scenario depend.
 
-They show whether an earlier result can be reused, and whether two results can be compared.
+The digests show whether an earlier result can be reused, and whether two results can be compared.
 """
 
 import hashlib
@@ -23,11 +23,11 @@ from simscen.spec.registry import RegisteredType
 def plugin_packages(plugins: Sequence[RegisteredType]) -> dict[str, dict[str, object]]:
     """Return the `version` and the `used` entry points of each package with plug-ins, by package name."""
     return {
-        package.distribution: {
-            "version": package.version,
-            "used": [f"{entry.group} {entry.name}" for entry in plugins if entry.distribution == package.distribution],
+        plugin.distribution: {
+            "version": plugin.version,
+            "used": [f"{entry.group} {entry.name}" for entry in plugins if entry.distribution == plugin.distribution],
         }
-        for package in plugins
+        for plugin in plugins
     }
 
 
@@ -88,7 +88,7 @@ class ScenarioDigests(NamedTuple):
 def scenario_digests(loaded: LoadedScenario) -> ScenarioDigests:
     """Return the digests of a scenario. Raises OSError if a file cannot be read.
 
-    `run` depends on the paths of files. `definition` depends neither on their folders nor on comments in the scenario.
+    `run` depends on the paths of files. `definition` depends neither on the folders of files nor on comments.
     """
     texts = {name: text.encode() for name, text in sorted(loaded.sources.items())}
     root = loaded.root
@@ -99,9 +99,11 @@ def scenario_digests(loaded: LoadedScenario) -> ScenarioDigests:
     run = hashlib.sha256(json.dumps(_run_inputs(loaded), sort_keys=True).encode())
     for name, data in (*texts.items(), *files.items()):
         _hash_file(run, name, data)
-    defining = {name: data for name, data in texts.items() if name.endswith(DEFINING_SUFFIXES)} | files
+    definition_texts = {name: data for name, data in texts.items() if name.endswith(DEFINITION_SUFFIXES)}
     # Only the names of files, because the shipped robots are installed elsewhere on another machine.
-    contents = sorted((PurePath(name).name, hashlib.sha256(data).hexdigest()) for name, data in defining.items())
+    contents = sorted(
+        (PurePath(name).name, hashlib.sha256(data).hexdigest()) for name, data in (definition_texts | files).items()
+    )
     definition = json.dumps([_definition(loaded), contents], sort_keys=True, default=str)
     return ScenarioDigests(run.hexdigest(), hashlib.sha256(definition.encode()).hexdigest())
 
@@ -128,7 +130,7 @@ def _without_stack_parameters(entry: Mapping[str, Any]) -> dict[str, Any]:
     return {**{key: value for key, value in entry.items() if key not in ("stack", "extends")}, "stack": common}
 
 
-DEFINING_SUFFIXES = (".world.yaml", ".robot.yaml", ".sdf", ".world")
+DEFINITION_SUFFIXES = (".world.yaml", ".robot.yaml", ".sdf", ".world")
 """Suffixes of the text files (worlds and robots) that are part of the digest `definition`."""
 
 

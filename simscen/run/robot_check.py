@@ -11,7 +11,7 @@ from simscen.sim.body.climb_limits import ClimbLimits, compute_climb_limits
 from simscen.sim.body.robot_body import RobotBody
 
 MAX_REST_TILT_RAD, MAX_REST_HEIGHT_M, MAX_REST_DRIFT_M = math.radians(1.0), 0.002, 0.001
-"""Largest values at rest: tilt, distance of the wheels from the ground, and drift in a second."""
+"""Largest values at rest: tilt, distance of the base frame from the ground, and drift in a second."""
 MAX_DISTANCE_ERROR, MAX_ODOMETRY_ERROR = 0.02, 0.01
 """Largest relative errors on a line: true distance compared with the command, and odometry compared with the truth."""
 MAX_HEADING_RAD, MAX_DRIVING_TILT_RAD = math.radians(2.0), math.radians(3.0)
@@ -26,7 +26,7 @@ class TurnLimits(NamedTuple):
     Attributes:
         angle: True angle of the turn, compared with the commanded angle.
         odometry: Angle of the turn by odometry, compared with the true angle.
-        square_end: Distance from the true end of the square to its end by odometry, relative to its length.
+        square_end: Distance from the true end of the square to its end by odometry, relative to its perimeter.
         offset: Distance from the start while turning in place, relative to the circumscribed radius.
     """
 
@@ -43,7 +43,10 @@ SKID_STEER_LIMITS = TurnLimits(angle=0.10, odometry=0.03, square_end=0.04, offse
 
 @dataclass(frozen=True)
 class DriveCheck:
-    """A measured value and its upper limit, both in `unit`. `advice` is a possible correction of the robot, or ""."""
+    """A measured value and its upper limit, both in `unit`.
+
+    `advice` is a possible cause of a failed check, or a correction of the robot file; "" for none.
+    """
 
     name: str
     value: float
@@ -59,7 +62,7 @@ class DriveCheck:
 
 @dataclass(frozen=True)
 class RobotCheckResult:
-    """Results of all checks of a robot. `climb` has the steepest slope and the highest step that it can climb."""
+    """Results of all checks of a robot. `climb` has the limits of the slopes and steps that the robot can climb."""
 
     rest: RestingState
     trials: tuple[Trial, ...]
@@ -81,6 +84,7 @@ def check_robot(body: RobotBody) -> RobotCheckResult:
 
 
 def _checks(body: RobotBody, rest: RestingState, trials: dict[str, Trial]) -> Iterator[DriveCheck]:
+    """Yield all checks of a robot. `trials` are the trials by name."""
     limits = SKID_STEER_LIMITS if isinstance(body.drive, SkidSteer) else ROLLING_LIMITS
     yield DriveCheck(
         "at rest: tilt", math.degrees(rest.tilt), math.degrees(MAX_REST_TILT_RAD), "deg", "its wheels do not carry it"
@@ -89,21 +93,21 @@ def _checks(body: RobotBody, rest: RestingState, trials: dict[str, Trial]) -> It
     yield DriveCheck("at rest: motion within a second", 1e3 * rest.drift, 1e3 * MAX_REST_DRIFT_M, "mm")
     line = trials["line"]
     yield _deviation_check(
-        "line: true distance against command", line.truth.driven, line.command.driven, MAX_DISTANCE_ERROR
+        "line: true distance against command", line.truth.distance, line.command.distance, MAX_DISTANCE_ERROR
     )
     heading = abs(math.degrees(line.truth.end.yaw))
     yield DriveCheck("line: heading at its end", heading, math.degrees(MAX_HEADING_RAD), "deg")
     advice = _wheel_radius_advice(body.drive, line)
     yield _deviation_check(
-        "line: odometry against true distance", line.odometry.driven, line.truth.driven, MAX_ODOMETRY_ERROR, advice
+        "line: odometry against true distance", line.odometry.distance, line.truth.distance, MAX_ODOMETRY_ERROR, advice
     )
     turn = trials.get("turn") or trials["circle"]
     advice = _track_width_advice(body.drive, turn, line) or advice
     yield _deviation_check(
-        f"{turn.name}: true angle against command", turn.truth.turned, turn.command.turned, limits.angle, advice
+        f"{turn.name}: true angle against command", turn.truth.angle, turn.command.angle, limits.angle, advice
     )
     yield _deviation_check(
-        f"{turn.name}: odometry against true angle", turn.odometry.turned, turn.truth.turned, limits.odometry, advice
+        f"{turn.name}: odometry against true angle", turn.odometry.angle, turn.truth.angle, limits.odometry, advice
     )
     if turn.name == "turn":
         offset = max(math.hypot(pose.x, pose.y) for pose in turn.truth.path)
@@ -117,21 +121,21 @@ def _checks(body: RobotBody, rest: RestingState, trials: dict[str, Trial]) -> It
     if sideways := trials.get("sideways"):
         yield _deviation_check(
             "sideways: true distance against command",
-            sideways.truth.driven,
-            sideways.command.driven,
+            sideways.truth.distance,
+            sideways.command.distance,
             MAX_DISTANCE_ERROR,
         )
         yield _deviation_check(
             "sideways: odometry against true distance",
-            sideways.odometry.driven,
-            sideways.truth.driven,
+            sideways.odometry.distance,
+            sideways.truth.distance,
             MAX_ODOMETRY_ERROR,
         )
     square = trials["square"]
     gap = square.odometry.end.distance(square.truth.end)
-    yield DriveCheck("square: error of odometry at the end", gap, limits.square_end * square.command.driven, "m")
+    yield DriveCheck("square: error of odometry at the end", gap, limits.square_end * square.command.distance, "m")
     tilt, max_tilt = math.degrees(max(trial.tilt for trial in trials.values())), math.degrees(MAX_DRIVING_TILT_RAD)
-    yield DriveCheck("driving: tilt", tilt, max_tilt, "deg", "lower its mass, or its limits")
+    yield DriveCheck("driving: tilt", tilt, max_tilt, "deg", "lower its center of mass, or its acceleration limits")
 
 
 def _deviation_check(name: str, value: float, expected: float, limit: float, advice: str = "") -> DriveCheck:
@@ -150,17 +154,17 @@ def _offset_advice(body: RobotBody) -> str:
 def _wheel_radius_advice(drive: Drive, line: Trial) -> str:
     """Return a message with the wheel radius that makes odometry correct, or "" if it is unknown."""
     radius = getattr(drive, "wheel_radius", None)
-    if radius is None or line.odometry.driven <= 0:
+    if radius is None or line.odometry.distance <= 0:
         return ""
-    return f"wheel_radius {radius:g} m: {radius * line.truth.driven / line.odometry.driven:.4g} m fits"
+    return f"wheel_radius {radius:g} m: {radius * line.truth.distance / line.odometry.distance:.4g} m fits"
 
 
 def _track_width_advice(drive: Drive, turn: Trial, line: Trial) -> str:
     """Return a message with the track width that makes odometry correct, or "" if it is correct or unknown."""
     separation = getattr(drive, "wheel_separation", None)
-    if separation is None or turn.truth.turned * turn.odometry.turned <= 0 or line.odometry.driven <= 0:
+    if separation is None or turn.truth.angle * turn.odometry.angle <= 0 or line.odometry.distance <= 0:
         return ""
-    ratio = turn.odometry.turned / turn.truth.turned * line.truth.driven / line.odometry.driven
+    ratio = turn.odometry.angle / turn.truth.angle * line.truth.distance / line.odometry.distance
     if abs(ratio - 1) <= NEGLIGIBLE_CORRECTION:
         return ""
     if isinstance(drive, Mecanum):

@@ -57,7 +57,7 @@ StackT = TypeVar("StackT", bound=StackBase)
 
 
 def with_robot_latency(stack: StackT, robot: RobotSpec) -> StackT:
-    """Return the stack; if it has `latency: robot`, with the latencies of the robot's specification."""
+    """Return the stack, with the latencies of the robot's specification instead of `latency: robot`."""
     if not _uses_robot_latency(stack):
         return stack
     return stack.model_copy(
@@ -92,7 +92,7 @@ class SensorSuite:
     """Sensors of a robot. A reading reaches the stack after the latency of its sensor."""
 
     def __init__(self, sensors: Sequence[Sensor], latencies: Mapping[str, int]) -> None:
-        """`latencies` are in ticks by sensor name; 0 for sensors that are missing."""
+        """`latencies` are in ticks by sensor name. Sensors that are missing in it have no latency."""
         self._sensors = tuple(sensors)
         self._latencies = [latencies.get(sensor.name, 0) for sensor in self._sensors]
         delayed: list[deque[Reading]] = [deque() for _ in self._sensors]
@@ -128,21 +128,19 @@ class TickSchedule:
 
     def __init__(self, periods: Iterable[int], delayed: Iterable[tuple[int, int]] = ()) -> None:
         """`delayed` are pairs (period, delay after each multiple of this period). All numbers are in ticks."""
-        offsets = {(period, 0) for period in periods} | {(period, ticks % period) for period, ticks in delayed}
-        first, *others = sorted(
-            offset for offset in offsets if not any(_is_covered_by(offset, other) for other in offsets)
-        )
+        series = {(period, 0) for period in periods} | {(period, ticks % period) for period, ticks in delayed}
+        first, *others = sorted(each for each in series if not any(_is_covered_by(each, other) for other in series))
         (self._period, self._offset), self._others = first, others
 
-    def until_next(self, tick: int) -> int:
+    def ticks_until_next(self, tick: int) -> int:
         """Return the number of ticks from `tick` to the next tick of the schedule; at least 1."""
         remaining = self._period - (tick - self._offset) % self._period
-        if self._others:  # most robots have a single period left
+        if self._others:  # most robots have a single series
             return min(remaining, *[period - (tick - ticks) % period for period, ticks in self._others])
         return remaining
 
 
-def _is_covered_by(one: tuple[int, int], other: tuple[int, int]) -> bool:
-    """Return whether all ticks of `one` belong to the different `other`; both are (period, offset) in ticks."""
-    (period, offset), (other_period, other_offset) = one, other
-    return one != other and period % other_period == 0 and offset % other_period == other_offset
+def _is_covered_by(series: tuple[int, int], other: tuple[int, int]) -> bool:
+    """Return whether another series contains all ticks of `series`. A series is (period, offset) in ticks."""
+    (period, offset), (other_period, other_offset) = series, other
+    return series != other and period % other_period == 0 and offset % other_period == other_offset

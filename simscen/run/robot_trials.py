@@ -31,10 +31,13 @@ CIRCLE_RADIUS_FACTOR = 1.05
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion from the origin along the poses of `path`: distance `driven` in m, and angle `turned` in rad."""
+    """A motion from the origin along the poses of `path`.
 
-    driven: float
-    turned: float
+    `distance` is the driven distance in m. `angle` is the sum of all rotations in rad, counterclockwise.
+    """
+
+    distance: float
+    angle: float
     path: tuple[Pose2, ...]
 
     @property
@@ -76,7 +79,7 @@ class _TrialLeg:
 
 
 def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
-    """Drive a line, a turn in place, and a square; return the resting state before, and all trials.
+    """Drive a line, a turn in place, and a square; return the state at rest before the trials, and all trials.
 
     An Ackermann robot drives a circle instead of the turn. A holonomic robot also drives sideways.
 
@@ -93,6 +96,7 @@ def run_trials(body: RobotBody) -> tuple[RestingState, tuple[Trial, ...]]:
 
 
 def _legs_by_trial(body: RobotBody) -> dict[str, list[_TrialLeg]]:
+    """Return the legs of each trial by the name of the trial."""
     model = robot_model(body)
     radius = CIRCLE_RADIUS_FACTOR * model.turning_radius
     circle, corner = (_TrialLeg(turn * radius, 0.0, turn) for turn in (2 * math.pi, math.pi / 2))
@@ -160,11 +164,11 @@ def _commands(leg: _TrialLeg, body: RobotBody) -> Iterator[Twist]:
 
 
 def _to_motion(path: list[Pose2]) -> Motion:
-    driven = turned = 0.0
-    for pose, following in pairwise(path):
-        driven += pose.distance(following)
-        turned += wrap(following.yaw - pose.yaw)
-    return Motion(driven, turned, tuple(path))
+    distance = angle = 0.0
+    for pose, next_pose in pairwise(path):
+        distance += pose.distance(next_pose)
+        angle += wrap(next_pose.yaw - pose.yaw)
+    return Motion(distance, angle, tuple(path))
 
 
 def _tilt(pose: Pose3, level: Pose3) -> float:

@@ -29,7 +29,7 @@ def execute_run(
 
     The files are run.mcap, result.json, scenario.yaml, and for an external stack stack.log and stack.json (with several
     robots stack.ROBOT.log and stack.ROBOT.json). `write_extras` writes more files. The moments (recorded beats) of the
-    first robot are also sent to `logs`. Returns a dict with the keys `outcome` and `sha256` (of run.mcap).
+    first robot are also appended to `logs`. Returns a dict with the keys `outcome` and `sha256` (of run.mcap).
     """
     if not prepared.plugins:  # plug-ins can create any amount of garbage
         gc.set_threshold(GC_THRESHOLD)
@@ -37,9 +37,9 @@ def execute_run(
     (folder / "scenario.yaml").write_text(log_header(prepared, seed).scenario, encoding="utf-8")
     run = simulate(prepared, seed, log=log, attach=lambda *_: logs, stack_log=folder / "stack.log")
     (folder / "result.json").write_text(to_json(run.result), encoding="utf-8")
-    for name, one in (run.robots or {SINGLE_ROBOT_NAME: run}).items():
-        if one.stack:
+    for name, robot_run in (run.robots or {SINGLE_ROBOT_NAME: run}).items():
+        if robot_run.stack:
             file = robot_file(folder / "stack.json", name)
-            file.write_text(json.dumps(one.stack, indent=1) + "\n", encoding="utf-8")
+            file.write_text(json.dumps(robot_run.stack, indent=1) + "\n", encoding="utf-8")
     write_extras(prepared, run, folder)
     return {"outcome": run.result.outcome.value, "sha256": hashlib.sha256(log.read_bytes()).hexdigest()}

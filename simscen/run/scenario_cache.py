@@ -97,6 +97,7 @@ def _update_hash(sha: "hashlib._Hash", part: object) -> None:
 
 
 def _legs_from_bytes(data: bytes | None, count: int) -> list[Leg] | None:
+    """Decode an entry of the cache with `count` paths; return None if the entry is missing or invalid."""
     try:
         legs = None if data is None else _LEGS.validate_json(data)
     except ValidationError:
@@ -105,6 +106,7 @@ def _legs_from_bytes(data: bytes | None, count: int) -> list[Leg] | None:
 
 
 def _map_from_bytes(data: bytes | None) -> OccupancyGrid | None:
+    """Decode an entry of the cache with a map; return None if the entry is missing or invalid."""
     if data is None or len(data) < _MAP_HEADER.size:
         return None
     rows, columns, resolution, x, y, yaw = _MAP_HEADER.unpack_from(data)

@@ -40,7 +40,7 @@ def simulate(
 ) -> Run:
     """Run a prepared scenario with a seed (default: the scenario's own) and judge the run.
 
-    `log` is the MCAP file to write (None: no log). `attach` is called before the simulation starts. `stack_log` is the
+    `log` is the MCAP file to write (None: no log). `attach` adds logs before the simulation starts. `stack_log` is the
     file for the output of an external stack; with several robots, the name of the robot is added to the file name.
 
     *Given* the same scenario and seed *then* the same run and the same bytes in `log`, regardless of earlier runs in
@@ -75,36 +75,37 @@ def _run_and_judge(
         }
         setup = assemble(prepared, seed, stack_log)
         cleanup.callback(setup.simulation.close)
-        agents = dict(zip(prepared.by_robot, setup.robots, strict=True))
-        externals = {name: agent.stack for name, agent in agents.items() if isinstance(agent.stack, ExternalStack)}
-        cleanup.callback(_close, externals.values())
-        for name, stack in externals.items():
+        robots = dict(zip(prepared.by_robot, setup.robots, strict=True))
+        stacks = {name: robot.stack for name, robot in robots.items()}
+        external_stacks = {name: stack for name, stack in stacks.items() if isinstance(stack, ExternalStack)}
+        cleanup.callback(_close, external_stacks.values())
+        for name, stack in external_stacks.items():
             stack.begin(prepared.by_robot[name].estimate)
-        for name, agent in agents.items():
+        for name, robot in robots.items():
             part = prepared.by_robot[name]
-            agent.stack.start(part.estimate, part.case.goals)
-        logs = [(builders[name], robot_logs[name]) if robot_logs else (builders[name],) for name in agents]
-        for agent, robot_sinks in zip(setup.robots, logs, strict=True):
-            agent.logs = (backlog.sink(*robot_sinks),)
+            robot.stack.start(part.estimate, part.case.goals)
+        logs = [(builders[name], robot_logs[name]) if robot_logs else (builders[name],) for name in robots]
+        for robot, robot_sinks in zip(setup.robots, logs, strict=True):
+            robot.logs = (backlog.sink(*robot_sinks),)
         setup.robots[0].logs += tuple(attach(setup, logs[0])) if attach else ()
         end = run_lockstep(setup)
         backlog.flush()
-        for stack in externals.values():
+        for stack in external_stacks.values():
             stack.end(end.name)
-        for stack in externals.values():
+        for stack in external_stacks.values():
             stack.finish()
-        _close(externals.values())
+        _close(external_stacks.values())
         run = _judge_traces(prepared, seed, {name: builder.finish(end.tick) for name, builder in builders.items()}, log)
         if recorder:
             facts = {  # by `FACT` for a single robot, else by `ROBOT.FACT`
                 f"{name}.{fact}" if name else fact: value
-                for name, stack in externals.items()
+                for name, stack in external_stacks.items()
                 for fact, value in stack.facts.items()
             }
             recorder.close(end.tick, to_json(run.result), facts)
-    descriptions = {name: stack.description for name, stack in externals.items()}
-    robots = {name: replace(one, stack=descriptions.get(name, {})) for name, one in run.robots.items()}
-    return replace(run, robots=robots, stack=descriptions.get(next(iter(robots), SINGLE_ROBOT_NAME), {}))
+    descriptions = {name: stack.description for name, stack in external_stacks.items()}
+    runs = {name: replace(robot_run, stack=descriptions.get(name, {})) for name, robot_run in run.robots.items()}
+    return replace(run, robots=runs, stack=descriptions.get(next(iter(runs), SINGLE_ROBOT_NAME), {}))
 
 
 def _close(stacks: Collection[ExternalStack]) -> None:
@@ -151,7 +152,7 @@ def plugin_error(error: Exception, plugins: Sequence[RegisteredType]) -> RunErro
         candidates = [entry for entry in plugins if entry.value.partition(":")[0].partition(".")[0] == package]
         if candidates:
             # The plug-in that is defined in this module, or else the first one of the package.
-            entry = next((one for one in candidates if one.value.partition(":")[0] == module), candidates[0])
+            entry = next((entry for entry in candidates if entry.value.partition(":")[0] == module), candidates[0])
             place = f"{frame.f_code.co_filename.rpartition('/')[2]}:{line}"
             summary = f"{type(error).__name__}: {error}".splitlines()[0]
             return RunError("crashed", f"{entry.group} `{entry.name}` of {entry.origin}: {summary} ({place})")

@@ -1,7 +1,7 @@
 """Names of the random streams (sequences of random numbers) of events and faults.
 
-A stream is named after its event or fault, so that a change of one entry does not affect the random numbers of others,
-except later ones with the same name or content.
+A stream is named after its event or fault. A change of one entry therefore does not affect the random numbers of other
+entries, except of later entries with the same name or content.
 """
 
 import json
@@ -19,7 +19,8 @@ from simscen.spec.choice import Choice
 def stream_names(entries: Sequence[EventEntry | StepEntry | FaultEntry]) -> list[str]:
     """Return the name of the random stream of each entry.
 
-    It is the `name` of the entry, or else its content, with a number that distinguishes equal names or contents.
+    The name of a stream contains the `name` of the entry, or the content of an entry without a name. A number
+    distinguishes entries with the same name or content.
     """
     contents = [f"/{entry.name}" if entry.name is not None else f"={_content_key(entry)}" for entry in entries]
     counts: Counter[str] = Counter()

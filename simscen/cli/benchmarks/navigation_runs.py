@@ -22,7 +22,7 @@ from simscen.record.log_reader import read_log
 from simscen.report.display_text import plain_text
 from simscen.report.journal import Journal
 from simscen.report.session_lines import RunNaming, run_lines
-from simscen.run.kept_files import WrittenFor
+from simscen.run.kept_files import OutcomeFilter
 from simscen.run.process.jobs import Job
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.run_session import SessionOptions, run_session
@@ -109,7 +109,7 @@ def _plan_jobs(experiments: Sequence[Experiment], out: Path) -> tuple[list[Job],
                 if key in drives:
                     raise ValueError(f"several runs of {key.scenario} with seed {seed}")
                 folder = run_folder(out, key)
-                jobs.append(Job(len(jobs), scenario, key, folder, WALL_LIMIT_S, picture=WrittenFor.FAILED))
+                jobs.append(Job(len(jobs), scenario, key, folder, WALL_LIMIT_S, picture=OutcomeFilter.FAILED))
                 drives[key] = number, drive
     return jobs, drives
 

@@ -29,7 +29,7 @@ from simscen.cli.shared_options import (
     WorldPathOption,
 )
 from simscen.core.errors import UsageError
-from simscen.run.kept_files import WrittenFor
+from simscen.run.kept_files import OutcomeFilter
 from simscen.run.sessions.run_session import SessionOptions
 from simscen.run.sessions.search import SearchMethod
 
@@ -90,7 +90,7 @@ def command(
     if probability is not None and method is not SearchMethod.RANDOM:
         raise UsageError("--probability needs --method random: only random values show a rate")
     workers, cluster = workers_and_cluster(workers, backend, address)
-    options = SessionOptions(workers, seed, wall_limit=wall_limit, replay=WrittenFor.FAILED, cluster=cluster)
+    options = SessionOptions(workers, seed, wall_limit=wall_limit, replay=OutcomeFilter.FAILED, cluster=cluster)
     request = FalsifyRequest(
         file,
         method,

@@ -110,8 +110,8 @@ def as_table(body: "RobotBody", checked: "RobotCheckResult") -> Iterator[str]:
 
 def _drive_line(trial: "Trial") -> str:
     motions = (trial.command, trial.odometry, trial.truth)
-    driven = " ".join(f"{motion.driven:7.3f}" for motion in motions)
-    angles = (round(math.degrees(motion.turned), 1) + 0.0 for motion in motions)  # + 0.0 turns -0.0 into 0.0
+    driven = " ".join(f"{motion.distance:7.3f}" for motion in motions)
+    angles = (round(math.degrees(motion.angle), 1) + 0.0 for motion in motions)  # + 0.0 turns -0.0 into 0.0
     turned = " ".join(f"{angle:7.1f}" for angle in angles)
     gap = trial.odometry.end.distance(trial.truth.end)
     return f"  {trial.name:9} {driven}  {turned}   {gap:7.3f} m  {math.degrees(trial.tilt):4.1f}"
@@ -147,4 +147,4 @@ def as_data(body: "RobotBody", checked: "RobotCheckResult") -> dict[str, Any]:
 
 
 def _motion_data(motion: "Motion") -> dict[str, Any]:
-    return {"driven": motion.driven, "turned": motion.turned, "end": motion.end._asdict()}
+    return {"driven": motion.distance, "turned": motion.angle, "end": motion.end._asdict()}

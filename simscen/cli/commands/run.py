@@ -32,7 +32,7 @@ from simscen.cli.shared_options import (
     WorldPathOption,
 )
 from simscen.core.errors import UsageError
-from simscen.run.kept_files import KeptLogs, WrittenFor
+from simscen.run.kept_files import LogRetention, OutcomeFilter
 
 
 def command(
@@ -112,8 +112,8 @@ def command(
     ] = None,
     root: RootOption = None,
     world_path: WorldPathOption = None,
-    replay: ReplayOption = WrittenFor.FAILED,
-    keep_logs: KeepLogsOption = KeptLogs.ALL,
+    replay: ReplayOption = OutcomeFilter.FAILED,
+    keep_logs: KeepLogsOption = LogRetention.ALL,
     lenient: LenientOption = False,
 ) -> None:
     """Run scenarios and report what passed.
@@ -126,7 +126,7 @@ def command(
     2: an invalid scenario or an unusable output folder (nothing was run); 3: a run could not be completed; 5: nothing
     selected, or everything skipped; 129, 130, and 143: interrupted.
     """
-    if keep_logs is KeptLogs.FAILED and (check_determinism or check_against is not None):
+    if keep_logs is LogRetention.FAILED and (check_determinism or check_against is not None):
         raise UsageError("--keep-logs failed excludes --check-determinism and --check-against, which compare logs")
     # All further modules are imported, and the scenarios are loaded, while the fork server starts.
     with early_fork_server(is_needed=backend is BackendName.LOCAL and not watch) as fork_server:

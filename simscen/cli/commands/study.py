@@ -31,7 +31,7 @@ from simscen.cli.shared_options import (
     WallLimitOption,
     WorldPathOption,
 )
-from simscen.run.kept_files import KeptLogs, WrittenFor
+from simscen.run.kept_files import LogRetention, OutcomeFilter
 from simscen.run.sessions.run_session import SessionOptions
 
 
@@ -67,8 +67,8 @@ def command(
     open_: OpenOption = False,
     root: RootOption = None,
     world_path: WorldPathOption = None,
-    replay: ReplayOption = WrittenFor.FAILED,
-    keep_logs: KeepLogsOption = KeptLogs.ALL,
+    replay: ReplayOption = OutcomeFilter.FAILED,
+    keep_logs: KeepLogsOption = LogRetention.ALL,
     lenient: LenientOption = False,
 ) -> None:
     """Run one scenario many times: how often does it fail, and what makes it fail?

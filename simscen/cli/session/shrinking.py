@@ -25,7 +25,7 @@ from simscen.loading.reduction import (
 )
 from simscen.loading.scenario import ChangedScenario
 from simscen.loading.yaml.tree import Keys, MappingNode, Node
-from simscen.run.kept_files import WrittenFor
+from simscen.run.kept_files import OutcomeFilter
 from simscen.run.process.jobs import Backend, Job
 from simscen.run.sessions.run_session import SessionOptions, run_session
 
@@ -131,7 +131,7 @@ class CandidateRuns:
         limit = self.options.wall_limit
         with TemporaryDirectory(prefix="simscen-") as folder:
             jobs = [
-                Job(number, one, one.key(self.seed), Path(folder, str(number)), limit, picture=WrittenFor.NONE)
+                Job(number, one, one.key(self.seed), Path(folder, str(number)), limit, picture=OutcomeFilter.NONE)
                 for number, one in enumerate(named)
             ]
             with interrupt_on_signals():

@@ -54,17 +54,17 @@ MAX_QUATERNION_COMPONENT = 1.01
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A decoded answer. A field, except `correction`, is None or empty if the answer does not contain it.
+    """A decoded answer. An attribute, except `map_from_odom`, is None or empty if the answer does not contain it.
 
-    A `plan` without poses means that the stack follows no plan. `correction` is the last pose of the odom frame in the
-    map frame, from this or an earlier answer. `lines` are messages on /rosout.
+    A `plan` without poses means that the stack follows no plan. `map_from_odom` is the last transform that the stack
+    has sent, in this or an earlier answer; None if there is none. `lines` are messages on /rosout.
     """
 
     command: Twist | None = None
     plan: Path | None = None
     local_plan: Path | None = None
     belief: Belief | None = None
-    correction: Pose2 | None = None
+    map_from_odom: Pose2 | None = None
     events: tuple[dict[str, Any], ...] = ()
     lines: tuple[LogLine, ...] = ()
     costmaps: tuple[CostGrid, ...] = ()
@@ -72,7 +72,7 @@ class Answer:
 
 
 def group_by_topic(messages: Messages) -> MessagesByTopic:
-    """Return the messages of an answer by topic. Raises ProtocolViolation for an unknown number of a topic."""
+    """Return the messages of an answer by topic. Raises ProtocolViolation for an unknown topic number."""
     found: MessagesByTopic = {}
     for number, data in messages:
         if not 1 <= number <= len(STACK_TOPICS):
@@ -82,26 +82,26 @@ def group_by_topic(messages: Messages) -> MessagesByTopic:
 
 
 def decode_answer(
-    messages: MessagesByTopic, tick: int, time: Clock, correction: Pose2 | None, dead_reckoned: Pose2 | None
+    messages: MessagesByTopic, tick: int, clock: Clock, map_from_odom: Pose2 | None, odometry_pose: Pose2 | None
 ) -> Answer:
     """Decode the answer at `tick`. Raises ProtocolViolation for an invalid message.
 
-    `correction` is the pose of the odom frame in the map frame from earlier answers (None: none received). While none
-    is received, the correction of the belief is computed from the estimated pose and the odometry pose: the pose of
-    the stack's filtered odometry, or else `dead_reckoned` (the pose of the wheel odometry).
+    `map_from_odom` is the last transform in earlier answers; None if there is none. `odometry_pose` is the last pose of
+    the wheel odometry. If the stack has not sent any transform, `map_from_odom` of the belief is computed from the
+    estimated pose and from the pose of the stack's filtered odometry, or else from `odometry_pose`.
     """
     if len(messages.get(topics.COMMAND.name, ())) > 1:
         raise ProtocolViolation("two commands in one answer")
-    correction = _correction(messages) or correction
-    odometry = tuple(_filtered_odometry(messages, time, tick))
+    map_from_odom = _map_from_odom(messages) or map_from_odom
+    odometry = tuple(_filtered_odometry(messages, clock, tick))
     if odometry:
-        dead_reckoned = odometry[-1].pose
+        odometry_pose = odometry[-1].pose
     return Answer(
         command=_decode_last(messages, topics.COMMAND.name, _decode_command),
-        plan=_path(messages, topics.PLAN.name, tick, time),
-        local_plan=_path(messages, topics.LOCAL_PLAN.name, tick, time),
-        belief=_belief(messages, correction, dead_reckoned),
-        correction=correction,
+        plan=_path(messages, topics.PLAN.name, tick, clock),
+        local_plan=_path(messages, topics.LOCAL_PLAN.name, tick, clock),
+        belief=_belief(messages, map_from_odom, odometry_pose),
+        map_from_odom=map_from_odom,
         events=tuple(_decode_all(messages, topics.EVENTS.name, _decode_event)),
         lines=tuple(_decode_all(messages, topics.ROSOUT.name, lambda data: decode.log_line(MessageReader(data)))),
         costmaps=tuple(_costmaps(messages)),
@@ -109,27 +109,27 @@ def decode_answer(
     )
 
 
-def _belief(messages: MessagesByTopic, correction: Pose2 | None, dead_reckoned: Pose2 | None) -> Belief | None:
-    """Return the pose estimate in an answer, or None; see `decode_answer` for the arguments."""
+def _belief(messages: MessagesByTopic, map_from_odom: Pose2 | None, odometry_pose: Pose2 | None) -> Belief | None:
+    """Return the pose estimate in an answer, or None. `decode_answer` describes the parameters."""
     name = topics.BELIEF.name
     message = _decode_last(messages, name, _decode_belief_pose)
     if message is None:
         return None
     exact = _decode_last(messages, name + EXACT_SUFFIX, _decode_pose2d)
     pose = exact if exact is not None else _to_pose2(message)
-    if correction is None:
-        correction = pose if dead_reckoned is None else pose.compose(dead_reckoned.inverse())
+    if map_from_odom is None:
+        map_from_odom = pose if odometry_pose is None else pose.compose(odometry_pose.inverse())
     covariance = _decode_message(name, _decode_covariance, messages[name][-1])
     particles = _decode_last(messages, topics.PARTICLES.name, _decode_particles)
     exact_particles = _decode_last(messages, topics.PARTICLES.name + EXACT_SUFFIX, lambda data: _decode_table(data, 4))
     cloud = exact_particles if exact_particles is not None else particles
     if cloud is not None and not np.isfinite(cloud).all():
         raise ProtocolViolation(f"a particle on {topics.PARTICLES.name} that is not finite")
-    return Belief(pose, covariance, correction, cloud if cloud is not None else np.empty((0, 4)))
+    return Belief(pose, covariance, map_from_odom, cloud if cloud is not None else np.empty((0, 4)))
 
 
-def _correction(messages: MessagesByTopic) -> Pose2 | None:
-    """Return the last pose of the odom frame in the map frame in an answer, or None."""
+def _map_from_odom(messages: MessagesByTopic) -> Pose2 | None:
+    """Return the last transform of an answer from the odom frame to the map frame, or None."""
     exact = _decode_last(messages, topics.TF.name + EXACT_SUFFIX, _decode_pose2d)
     if exact is not None:
         return exact
@@ -142,7 +142,7 @@ def _correction(messages: MessagesByTopic) -> Pose2 | None:
     return _to_pose2(found[-1]) if found else None
 
 
-def _filtered_odometry(messages: MessagesByTopic, time: Clock, now: int) -> Iterator[Odometry]:
+def _filtered_odometry(messages: MessagesByTopic, clock: Clock, now: int) -> Iterator[Odometry]:
     """Yield the readings of the stack's odometry filter. `now` is the current tick."""
     name = topics.FILTERED_ODOMETRY.name
     exact = _decode_last(messages, name + EXACT_SUFFIX, lambda data: _decode_table(data, ODOMETRY_COLUMNS))
@@ -156,7 +156,7 @@ def _filtered_odometry(messages: MessagesByTopic, time: Clock, now: int) -> Iter
             raise ProtocolViolation(f"odometry on {name} in the frame `{wrong_frame}` instead of `{frame_names.ODOM}`")
         rows = [
             (
-                time.tick_at(message.stamp[0] * NS_PER_SECOND + message.stamp[1]),
+                clock.tick_at(message.stamp[0] * NS_PER_SECOND + message.stamp[1]),
                 list(message.pose),
                 [message.vx, message.vy, message.wz],
                 [message.twist_covariance[i] for i in _PLANAR_DIAGONAL],
@@ -174,17 +174,17 @@ def _filtered_odometry(messages: MessagesByTopic, time: Clock, now: int) -> Iter
         yield Odometry("", int(tick), Pose2(*pose), Twist(*twist), (vx, vy, wz), (a, b, c, d, e, f, g, h, i))
 
 
-def _path(messages: MessagesByTopic, name: str, tick: int, time: Clock) -> Path | None:
+def _path(messages: MessagesByTopic, name: str, tick: int, clock: Clock) -> Path | None:
     """Return the last path on the topic `name`, or None.
 
-    The path was planned at its stamp, or at `tick` if the stamp is 0, is in the future, or is missing because the path
-    is only on the exact topic.
+    The tick of the path is the stamp of the message, or `tick` if the stamp is 0, is in the future, or is missing
+    because the path is only on the exact topic.
     """
     message = _decode_last(messages, name, partial(decode_checked, decode.path))
     exact = _decode_last(messages, name + EXACT_SUFFIX, lambda data: _decode_table(data, 3))
     if message is None and exact is None:
         return None
-    stamp_tick = 0 if message is None else time.tick_at(message.stamp)
+    stamp_tick = 0 if message is None else clock.tick_at(message.stamp)
     points = exact if exact is not None else to_planar(message.poses) if message is not None else np.empty((0, 3))
     if not np.isfinite(points).all():
         raise ProtocolViolation(f"a path on {name} that is not finite")

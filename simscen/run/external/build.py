@@ -52,7 +52,7 @@ def build_external_stack(
 
 
 def robot_file(file: Path, robot: str) -> Path:
-    """Return the file name for one of several robots, such as stack.a.log for the robot "a"."""
+    """Return `file` with the name of one of several robots, such as stack.a.log; unchanged if `robot` is ""."""
     return file.with_stem(f"{file.stem}.{robot}") if robot else file
 
 

@@ -16,7 +16,7 @@ from simscen.stack.tasks import Task
 MAX_ERROR_CODE = 65_535
 """Largest error code; Nav2's error codes are uint16."""
 MAX_TEXT_LENGTH = 4096
-"""Largest number of characters of names, messages, and event data."""
+"""Maximum number of characters of a name, of a message, and of the data of an event."""
 _UNRESTRICTED_KINDS = {kind.value for kind in EventKind if kind.value.split(".")[0] in ("plan", "recovery")} | {
     EventKind.ROBOT_HELD.value,
     EventKind.ROBOT_RELEASED.value,
@@ -25,14 +25,15 @@ _UNRESTRICTED_KINDS = {kind.value for kind in EventKind if kind.value.split(".")
 
 
 class GoalTracker:
-    """Goals of a robot, and their states as reported by its stack. Collects the events for the log."""
+    """Goals of a robot, with their states as the stack reports them. Collects the events for the log."""
 
     def __init__(self, stop_on_failure: bool, tick_rate: int, mode: Mode = "navigate_to_pose") -> None:
         """If `stop_on_failure`, a failed goal ends the task. `mode` is the Nav2 action that receives the goals."""
         self._events: list[Event] = []
         self._task = Task(stop_on_failure, clock=Clock(tick_rate), mode=mode)
         self._rate = tick_rate
-        self._dropped: set[str] = set()
+        self._dropped_goals: set[str] = set()
+        """Names of goals that were preempted or timed out. A later cancellation of these goals is ignored."""
 
     def start(self, goals: tuple[Goal, ...]) -> None:
         """Start the task with these goals. No goal is accepted yet."""
@@ -89,7 +90,8 @@ class GoalTracker:
         if goal is None or goal.timeout is None or tick - self._task.since <= goal.timeout * self._rate:
             return False
         self._ignore_cancellation()
-        self._events += self._task.record_failed(tick, ErrorCode.NAVIGATE_TIMEOUT, f"{goal.timeout:g} s are over")
+        message = f"the timeout of {goal.timeout:g} s has passed"
+        self._events += self._task.record_failed(tick, ErrorCode.NAVIGATE_TIMEOUT, message)
         return True
 
     def take_events(self) -> tuple[Event, ...]:
@@ -98,9 +100,9 @@ class GoalTracker:
         return events
 
     def _ignore_cancellation(self) -> None:
-        """Remember the current goal, so that a later `goal.canceled` for it is ignored."""
+        """Ignore a later `goal.canceled` for the current goal."""
         if self._task.goal is not None:
-            self._dropped.add(self._task.goal.name)
+            self._dropped_goals.add(self._task.goal.name)
 
     def _accept_goal(self, tick: int, name: str) -> None:
         """Process the acceptance of a goal. Raises ProtocolViolation if it is not the next goal."""
@@ -125,8 +127,8 @@ class GoalTracker:
     def _cancel_goal(self, tick: int, name: str) -> None:
         """Process the cancellation of a goal. Ignores goals that were dropped before."""
         goal = self._task.goal
-        if name in self._dropped and (goal is None or goal.name != name):
-            self._dropped.discard(name)
+        if name in self._dropped_goals and (goal is None or goal.name != name):
+            self._dropped_goals.discard(name)
             return
         self._require_current("goal.canceled", name)
         self._events += self._task.cancel(tick)

@@ -22,7 +22,7 @@ from typing import Any
 from simscen.run.process.isolation import adopt_orphans, die_with_parent, kill_children_except, set_soft_limit
 
 EXIT_GRACE_S = 0.5
-"""Time in which a stack can exit by itself after the run."""
+"""Time that a stack has to exit by itself after the run."""
 TERM_GRACE_S = 0.5
 """Time between SIGTERM and SIGKILL."""
 MAX_OPEN_FILES = 1024
@@ -72,7 +72,7 @@ def _start_failure(error: Exception) -> str:
 
 
 def _watch(process: "subprocess.Popen[bytes]", pidfd: int, control: int, report: int) -> bool:
-    """Wait for the end of the run. If the stack exits before, report its exit code. `pidfd` refers to its process.
+    """Wait for the end of the run. If the stack exits before that, report its exit code. `pidfd` refers to the stack.
 
     Returns True if the worker requested the end of the stack, and False if the worker has died.
     """

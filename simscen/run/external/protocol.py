@@ -1,7 +1,7 @@
 """Topics of the stack protocol, and kinds of errors that an external stack can cause.
 
 ROS messages lose precision: headings become quaternions, and ranges become float32. Therefore, a topic `NAME/exact` has
-the values of the topic `NAME` in full precision. In one STEP or ANSWER, the n-th messages on both belong together.
+the values of the topic `NAME` in full precision. In one STEP or ANSWER, the n-th messages on the two belong together.
 """
 
 from simscen.record import topics

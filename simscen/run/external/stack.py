@@ -62,8 +62,8 @@ class ExternalStack:
         self._plan: Path | None = None
         self._decision = Decision(STOP)
         self._awaits_first_answer = True
-        self._interrupted, self._canceling = False, False
-        self._correction: Pose2 | None = None
+        self._has_request, self._is_canceling = False, False
+        self._map_from_odom: Pose2 | None = None
         self._odometry: Odometry | None = None
         self._wheel_odometry = next(
             (name for name, kind in parameters.sensors.items() if kind == Odometry.__name__), ""
@@ -108,12 +108,12 @@ class ExternalStack:
     def preempt(self, tick: int, goal: Goal) -> None:
         """Replace the current goal by `goal`. The stack answers at the next call of `decide`."""
         self._goals.preempt(tick, goal)
-        self._interrupt(wire.PREEMPT, {"tick": tick, "goal": goal_data(goal)})
+        self._send_request(wire.PREEMPT, {"tick": tick, "goal": goal_data(goal)})
 
     def cancel(self, tick: int) -> None:
         """Cancel the current goal and all following goals. The stack answers at the next call of `decide`."""
-        self._canceling = True
-        self._interrupt(wire.CANCEL, {"tick": tick, "all": True, "reason": "canceled"})
+        self._is_canceling = True
+        self._send_request(wire.CANCEL, {"tick": tick, "all": True, "reason": "canceled"})
 
     def receives_zones_of(self, costmap_filter: Filter) -> bool:
         """Return whether the stack has subscribed to the zone mask of this costmap filter."""
@@ -133,7 +133,7 @@ class ExternalStack:
     @property
     def goal(self) -> Goal | None:
         """Current goal as reported by the stack; None if there is none, and after `cancel`."""
-        return None if self._canceling else self._goals.goal
+        return None if self._is_canceling else self._goals.goal
 
     @property
     def facts(self) -> dict[str, str]:
@@ -148,18 +148,18 @@ class ExternalStack:
     def decide(self, tick: int, readings: Readings) -> Decision:
         """Send the readings and return the stack's decision.
 
-        If no command is due, returns the last command, and sends the readings later. The stack nevertheless decides
-        after `preempt` and `cancel`, or if it has requested `every_beat`.
+        If no command is due, returns the last command, and sends the readings later; except after `preempt` and
+        `cancel`, and for a stack with `every_beat`, which decides at each beat with messages.
         """
         self._publisher.publish_readings(tick, readings)
         self._odometry = next(
             (r for r in readings if isinstance(r, Odometry) and r.sensor == self._wheel_odometry), self._odometry
         )
         is_command_due = tick % self._parameters.control_period == 0
-        if not (is_command_due or self._interrupted or (self._welcome.every_beat and self._publisher.has_messages)):
+        if not (is_command_due or self._has_request or (self._welcome.every_beat and self._publisher.has_messages)):
             return self._decision
         answer = self._request_answer(tick, is_command_due)
-        self._interrupted = self._canceling = False
+        self._has_request = self._is_canceling = False
         return self._to_decision(tick, answer, is_command_due)
 
     def end(self, reason: str) -> None:
@@ -208,9 +208,9 @@ class ExternalStack:
         answered_tick, messages = wire.from_answer(body)
         if answered_tick != tick:
             raise ProtocolViolation(f"it answers tick {answered_tick} instead of {tick}")
-        dead_reckoned = None if self._odometry is None else self._odometry.pose
-        answer = decode_answer(group_by_topic(messages), tick, self._time, self._correction, dead_reckoned)
-        self._correction = answer.correction
+        odometry_pose = None if self._odometry is None else self._odometry.pose
+        answer = decode_answer(group_by_topic(messages), tick, self._time, self._map_from_odom, odometry_pose)
+        self._map_from_odom = answer.map_from_odom
         if is_command_due and answer.command is None:
             raise ProtocolViolation(f"no message on {topics.COMMAND.name}, though a command is due")
         for event in answer.events:
@@ -228,14 +228,14 @@ class ExternalStack:
             self._plan = answer.plan if len(answer.plan.points) else None
         command = answer.command if answer.command is not None else self._decision.command
         self._decision = Decision(command)
-        followed = answer.plan if answer.plan is not None and len(answer.plan.points) else None
+        new_plan = answer.plan if answer.plan is not None and len(answer.plan.points) else None
         return Decision(
-            command, answer.belief, followed, answer.local_plan, events, answer.lines, answer.costmaps, answer.odometry
+            command, answer.belief, new_plan, answer.local_plan, events, answer.lines, answer.costmaps, answer.odometry
         )
 
-    def _interrupt(self, kind: int, content: dict[str, Any]) -> None:
+    def _send_request(self, kind: int, content: dict[str, Any]) -> None:
         """Send a request, and let the stack decide at the next call of `decide`."""
-        self._interrupted, self._plan = True, None
+        self._has_request, self._plan = True, None
         self._send(kind, content)
 
     def _send(self, kind: int, content: dict[str, Any]) -> None:

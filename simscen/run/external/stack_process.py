@@ -44,7 +44,7 @@ class StackProcess:
         self._name = f"{name} of robot `{robot}`" if robot else name
         self._send_buffer, self._receive_buffer, self._report_buffer = bytearray(), bytearray(), bytearray()
         self._exit_message = ""
-        self._disconnected = False
+        self._is_disconnected = False
         self._end_sent_at = 0.0
         self._log = CappedLog(log_file)
         self._stream, stack_socket = socket.socketpair()
@@ -84,18 +84,18 @@ class StackProcess:
         encoded = json.dumps(order).encode()
         os.write(self._control, struct.pack("<I", len(encoded)) + encoded)
 
-    def exchange(self, frame: bytes, limit_s: float, what: str) -> tuple[int, bytes]:
+    def exchange(self, frame: bytes, limit_s: float, expected: str) -> tuple[int, bytes]:
         """Send a frame, and return the kind and the body of the next received frame.
 
         Raises RunError of a kind in simscen.run.external.protocol, for example if no frame arrives within `limit_s`
-        seconds. `what` describes the expected frame in the error message.
+        seconds. `expected` describes the expected frame in the error message.
         """
         self.send(frame)
-        self._pump(lambda: self._disconnected or self._has_frame(), limit_s)
+        self._pump(lambda: self._is_disconnected or self._has_frame(), limit_s)
         if not self._has_frame():
-            if self._disconnected:
+            if self._is_disconnected:
                 raise self._crash_error()
-            raise self.error(protocol.TIMEOUT, f"no {what} within {limit_s:g} s")
+            raise self.error(protocol.TIMEOUT, f"no {expected} within {limit_s:g} s")
         kind, body = self._pop_frame()
         if kind == wire.ERROR:
             raise self.error(protocol.FAILED, _error_message(body))
@@ -113,7 +113,7 @@ class StackProcess:
 
     def receive_bye(self, grace_s: float) -> bytes:
         """Wait until the stack disconnects, up to `grace_s` after `send_end`; return the body of its BYE, or "{}"."""
-        self._pump(lambda: self._disconnected, max(0.0, self._end_sent_at + grace_s - time.monotonic()))
+        self._pump(lambda: self._is_disconnected, max(0.0, self._end_sent_at + grace_s - time.monotonic()))
         with suppress(RunError):
             if self._has_frame():
                 kind, body = self._pop_frame()
@@ -127,7 +127,7 @@ class StackProcess:
         return RunError(kind, f"stack {self._name}: {message}", output_tail(output), by_stack=True)
 
     def release(self) -> None:
-        """Let the launcher end the stack and its descendants, without waiting for it."""
+        """Let the launcher end the stack and its descendants, without waiting for their end."""
         if self._control >= 0:
             with suppress(BrokenPipeError):
                 os.write(self._control, b"\0")
@@ -152,23 +152,23 @@ class StackProcess:
         reason = "its process has closed its socket, but still runs" if launcher_runs else "its launcher has ended"
         return self.error(protocol.CRASHED, self._exit_message or reason)
 
-    def _pump(self, done: Callable[[], bool], limit_s: float) -> None:
-        """Transfer frames and output until `done` returns True or `limit_s` seconds have passed."""
+    def _pump(self, is_done: Callable[[], bool], limit_s: float) -> None:
+        """Transfer frames and output until `is_done` returns True or `limit_s` seconds have passed."""
         end = time.monotonic() + limit_s
-        while not done():
+        while not is_done():
             remaining = end - time.monotonic()
             for descriptor, events in self._poll.poll(max(0.0, remaining) * 1e3):
                 if events & select.POLLOUT:
                     self._flush()
                 if events & ~select.POLLOUT and not self._readers[descriptor]():
-                    self._poll.unregister(descriptor)  # at its end
+                    self._poll.unregister(descriptor)  # the other side has closed it
                     del self._readers[descriptor]
             if remaining <= 0:
                 return
 
     def _flush(self) -> None:
         try:
-            while self._send_buffer and not self._disconnected:
+            while self._send_buffer and not self._is_disconnected:
                 del self._send_buffer[: self._stream.send(self._send_buffer[:READ_BYTES])]
         except BlockingIOError:
             pass
@@ -183,7 +183,7 @@ class StackProcess:
         except ConnectionResetError:
             data = b""
         self._receive_buffer += data
-        self._disconnected = not data
+        self._is_disconnected = not data
         return bool(data)
 
     def _read_exit_report(self) -> bool:

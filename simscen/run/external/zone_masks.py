@@ -1,4 +1,4 @@
-"""Draw keepout and speed zones (polygons) into masks of Nav2's costmap filters, for stacks without support of polygons.
+"""Draw keepout and speed zones (polygons) into masks of Nav2's costmap filters, for stacks that need masks.
 
 Each filter (keepout, speed) has one mask with the enabled zones and the mask file of the stack.
 """
@@ -37,20 +37,20 @@ def switchable_zones(prepared: PreparedScenario) -> Zones:
     """Return the zones that events can switch during the run, with the speed limits of these events (0: none)."""
     keepout: list[Polygon] = []
     speed: list[tuple[Polygon, float]] = []
-    for one in prepared.loaded.actions:
-        if one.kind in ("keepout", "speed_zone") and one.spec.region is not None:
-            region = prepared.built.world.regions[one.spec.region]
-            if one.kind == "keepout":
+    for action in prepared.loaded.actions:
+        if action.kind in ("keepout", "speed_zone") and action.spec.region is not None:
+            region = prepared.built.world.regions[action.spec.region]
+            if action.kind == "keepout":
                 keepout.append(region)
             else:
-                speed.append((region, one.spec.speed_limit or 0.0))
+                speed.append((region, action.spec.speed_limit or 0.0))
     return Zones(tuple(keepout), tuple(speed))
 
 
 class ZoneMasks:
     """Masks with the enabled zones of one robot.
 
-    A mask covers the map or, without a map, all zones. Without zones, it is the mask file of the stack.
+    A mask covers the map or, without a map, all zones. Without zones, a mask is the mask file of the stack.
     """
 
     def __init__(self, surroundings: Surroundings, switchable: Zones) -> None:
@@ -83,7 +83,7 @@ class ZoneMasks:
 
     @property
     def meanings(self) -> list[dict[str, Any]]:
-        """`topic` and `filter` of each mask; for the speed filter also `percent`, `base`, `multiplier` as in Nav2."""
+        """Data for HELLO: `topic` and `filter` of each mask, and `percent`, `base`, `multiplier` of the speed mask."""
         keepout = {"topic": KEEPOUT_ZONES.name, "filter": "keepout"}
         speed = {"topic": SPEED_ZONES.name, "filter": "speed", **self._speed.scale}
         return [
@@ -130,6 +130,7 @@ class _SpeedMask:
 
 
 def _grid_around(polygons: list[Polygon]) -> OccupancyGrid:
+    """Return a free grid that covers all polygons."""
     corners = np.array([corner for polygon in polygons for corner in polygon] or [(0.0, 0.0)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     columns, rows = np.maximum(1, np.ceil((high - low) / CELL_M)).astype(int)

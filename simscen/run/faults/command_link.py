@@ -13,19 +13,19 @@ class CommandLink:
     def __init__(self, period: int, timeout: int) -> None:
         """`period` and `timeout` are in ticks."""
         self._period, self._timeout = period, max(period, timeout)
-        self._sent: Twist | None = None
-        self._received, self._received_at = STOP, 0
+        self._last_command: Twist | None = None
+        self._received_command, self._received_tick = STOP, 0
 
     def send(self, tick: int, command: Twist) -> bool:
-        """Return whether the stack sends a message with `command` at `tick`. Call it for each command."""
-        sent = tick % self._period == 0 or command != self._sent
-        self._sent = command
-        return sent
+        """Return whether the stack sends a message with `command` at `tick`. Call this once for each command."""
+        is_sent = tick % self._period == 0 or command != self._last_command
+        self._last_command = command
+        return is_sent
 
     def receive(self, tick: int, command: Twist) -> None:
         """Let the base receive a message at `tick`."""
-        self._received, self._received_at = command, tick
+        self._received_command, self._received_tick = command, tick
 
     def active_command(self, tick: int) -> Twist:
         """Return the command that the base executes: the last received command, or STOP after the timeout."""
-        return self._received if tick - self._received_at <= self._timeout else STOP
+        return self._received_command if tick - self._received_tick <= self._timeout else STOP

@@ -31,9 +31,9 @@ class FaultSettingFactory:
         @cache
         def ray_caster_without(names: frozenset[str]) -> RayCaster:
             """Return a ray caster that ignores the static and moving objects with these names."""
-            removed = [number for number, name in enumerate(mesh.names) if name in names]
-            kept = ~np.isin(mesh.owners, removed)
-            static = TriangleMesh(mesh.vertices, mesh.faces[kept], mesh.owners[kept], mesh.names)
+            ignored = [index for index, name in enumerate(mesh.names) if name in names]
+            is_kept = ~np.isin(mesh.owners, ignored)
+            static = TriangleMesh(mesh.vertices, mesh.faces[is_kept], mesh.owners[is_kept], mesh.names)
             return LiveRayCaster(RayScene(static), robot, names)
 
         self._ray_caster_without = ray_caster_without
@@ -70,7 +70,7 @@ class HypotheticalSensor:
         self._mount = mount if isinstance(mount, Mount) else Mount()
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """Return the ranges as SensorSimulator describes them."""
+        """Return the distance of the first hit of each beam; see SensorSimulator."""
         mount = self._mount.pose if error is None else self._mount.pose.compose(error)
         pose = self._robot.base_pose().compose(mount)
         angles = scan.angles()
@@ -81,7 +81,7 @@ class HypotheticalSensor:
         return np.minimum(hits, floor_distances(pose.z, directions[:, 2]))
 
     def image(self, error: Pose3) -> Image:
-        """Return the image that the camera would take now if its mount had an `error` (camera frame)."""
+        """Return the image that the camera would take now with its mount displaced by `error` (in the camera frame)."""
         spec = self._spec
         assert isinstance(spec, Camera)
         mount = self._mount.pose.compose(error)

@@ -27,7 +27,7 @@ from simscen.run.stream_names import stream_names
 from simscen.stack.localizers.ground_truth import TRUTH
 
 MAX_ROUNDING_ERROR = 1e-9
-"""Largest change of a number that does not count as an effect of a fault."""
+"""Largest change of a number that counts as rounding, not as an effect of a fault."""
 
 
 @dataclass
@@ -82,10 +82,11 @@ class FaultInjector:
         self.has_faults = bool(faults)
         """Whether the robot has any fault."""
         self._activations: Counter[int] = Counter()
-        # By index of the fault and count of its activations, because an ended activation can still have an effect.
         self.active: dict[tuple[int, int], _ActiveFault] = {}
+        """Active faults by index and number of the activation, because an ended activation can still have an effect."""
         self._affects_commands = False
         self._last_belief: tuple[int, Belief, Belief] | None = None
+        """Tick, belief, and disturbed belief of the last call of `belief`."""
 
     def begin(self, index: int) -> str:
         """Start the fault with this index; return the kind of its target, such as "Scan"."""
@@ -128,12 +129,12 @@ class FaultInjector:
                 continue
             if active.index in self._map_faults:
                 self._map_faults.remove(active.index)
-                self._count(active)
-            late = self._delayed_readings(active)
+                self._count_change(active)
+            delayed = self._delayed_readings(active)
             disturbed = (
                 self._disturb_reading(active, reading) if active.affects(reading) else reading for reading in readings
             )
-            readings = (*late, *(one for one in disturbed if one is not None))
+            readings = (*delayed, *(reading for reading in disturbed if reading is not None))
         return readings
 
     def command(self, tick: int, command: Twist) -> Twist:
@@ -177,10 +178,10 @@ class FaultInjector:
                 active.index,
                 f"returned {arriving!r} from `arriving_readings`, not a list or tuple of readings",
             )
-        if foreign := [one for one in arriving if getattr(one, "sensor", None) != active.sensor]:
+        if invalid := [reading for reading in arriving if getattr(reading, "sensor", None) != active.sensor]:
             self._raise_invalid(
                 active.index,
-                f"returned {foreign[0]!r} from `arriving_readings`, not a reading of `{active.sensor}`",
+                f"returned {invalid[0]!r} from `arriving_readings`, not a reading of `{active.sensor}`",
             )
         return arriving
 
@@ -190,19 +191,19 @@ class FaultInjector:
         if disturbed is not None and _type_and_sensor(disturbed) != _type_and_sensor(reading):
             problem = f"returned an object of type {type(disturbed).__name__} for a {type(reading).__name__} reading"
             self._raise_invalid(active.index, problem)
-        if disturbed is None or not _equal(disturbed, reading):
-            self._count(active)
+        if disturbed is None or not _is_equal(disturbed, reading):
+            self._count_change(active)
         return disturbed
 
     def _transmit_command(self, tick: int, command: Twist | None) -> None:
         """Send a command (None: no new command) through all faults of cmd_vel to the base."""
         for active in self._in_order():
             if active.kind == COMMAND:
-                late = active.effect.arriving_command()
-                if late is not None:
-                    self._require_finite_command(active, late)
+                delayed = active.effect.arriving_command()
+                if delayed is not None:
+                    self._require_finite_command(active, delayed)
                 disturbed = None if command is None else self._disturb_command(active, command)
-                command = late if disturbed is None else disturbed
+                command = delayed if disturbed is None else disturbed
         if command is not None:
             self._link.receive(tick, command)
 
@@ -210,11 +211,11 @@ class FaultInjector:
         """Return the disturbed command, or None if the fault withholds it. Raises RunError if it is invalid."""
         disturbed = active.effect.command(command)
         if disturbed is None and active.kind == COMMAND:
-            self._count(active)
+            self._count_change(active)
             return None
         disturbed = self._require_finite_command(active, disturbed)
         if not np.allclose(disturbed, command, rtol=0.0, atol=MAX_ROUNDING_ERROR):
-            self._count(active)
+            self._count_change(active)
         return disturbed
 
     def _require_finite_command(self, active: _ActiveFault, command: object) -> Twist:
@@ -231,14 +232,14 @@ class FaultInjector:
         if not np.allclose(
             (*disturbed.pose, *disturbed.map_from_odom), (*belief.pose, *belief.map_from_odom), 0.0, MAX_ROUNDING_ERROR
         ):
-            self._count(active)
+            self._count_change(active)
         return disturbed
 
     def _raise_invalid(self, index: int, problem: str) -> NoReturn:
         entry = self._faults[index]
         raise RunError(BROKEN_COMPONENT, f"fault `{entry.label}` {problem}{entry.plugin_suffix}")
 
-    def _count(self, active: _ActiveFault) -> None:
+    def _count_change(self, active: _ActiveFault) -> None:
         """Count a change by a fault, and emit an event for the first change."""
         if active.has_ended:
             return
@@ -260,11 +261,12 @@ def _type_and_sensor(reading: object) -> tuple[type, object]:
     return type(reading), getattr(reading, "sensor", None)
 
 
-def _equal(one: Reading, other: Reading) -> bool:
-    """Return whether two readings are equal except for rounding; nan equals nan."""
-    if one is other:
+def _is_equal(first: Reading, second: Reading) -> bool:
+    """Return whether two readings of a sensor are equal except for rounding; nan equals nan."""
+    if first is second:
         return True
-    pairs = [(getattr(one, field.name), getattr(other, field.name)) for field in fields(one) if field.name != "sensor"]
+    names = [field.name for field in fields(first) if field.name != "sensor"]
+    pairs = [(getattr(first, name), getattr(second, name)) for name in names]
     return all(
         a is b or (a is not None and b is not None and _is_close(a, b))  # a mount that is not tilted is None
         for a, b in pairs

@@ -16,7 +16,7 @@ from simscen.run.stream_names import stream_names
 
 
 def apply_map_faults(prepared: PreparedScenario, seed: int) -> PreparedScenario:
-    """Return the scenario with the maps of its robots changed by faults. `seed` determines their random numbers.
+    """Return the scenario with the robots' maps changed by faults. `seed` determines the faults' random numbers.
 
     The field `map_faults` of the result has the indices of the faults that changed the map. Raises RunError if a fault
     returns no map.

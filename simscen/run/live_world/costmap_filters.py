@@ -35,7 +35,7 @@ class CostmapFilters:
         }
 
     def rejection_reason(self, order: ZoneSwitch) -> str:
-        """Return why an order to switch a zone would have no effect, or "" if it would have one. Changes nothing."""
+        """Return why an order to switch a zone would have no effect; "" if it would have an effect. Changes nothing."""
         target, state = self._filters[order.filter], "on" if order.enabled else "off"
         if order.region is None:
             if not target.zones and not target.has_mask:
@@ -43,18 +43,19 @@ class CostmapFilters:
             return f"the stack's {order.filter} filter was {state} already" if target.enabled == order.enabled else ""
         if not target.enabled:
             return f"the stack's {order.filter} filter is off as a whole"
-        limit, on = target.zones.get(order.region, (0.0, False))
+        limit, is_on = target.zones.get(order.region, (0.0, False))
         if order.enabled and order.filter == "speed" and not (order.speed_limit or limit):
             return f"`{order.region}` is not a speed zone of the stack and has no speed limit"
-        same = order.speed_limit in (None, limit) or not order.enabled
-        return f"`{order.region}` was {state} already" if on == order.enabled and same else ""
+        is_same_limit = order.speed_limit in (None, limit) or not order.enabled
+        return f"`{order.region}` was {state} already" if is_on == order.enabled and is_same_limit else ""
 
     def switch(self, order: ZoneSwitch) -> tuple[str, ...]:
-        """Execute an order that has an effect, and return the names of the switched regions ("" is the mask)."""
+        """Execute an order that has an effect. Return the names of the switched regions, with "" for the mask."""
         target = self._filters[order.filter]
         if order.region is None:
             target.enabled = order.enabled
-            return (*(region for region, (_, on) in target.zones.items() if on), *([""] if target.has_mask else []))
+            regions = [region for region, (_, is_on) in target.zones.items() if is_on]
+            return (*regions, *([""] if target.has_mask else []))
         limit = target.zones.get(order.region, (0.0, False))[0]
         target.zones[order.region] = (order.speed_limit or limit, order.enabled)
         return (order.region,)

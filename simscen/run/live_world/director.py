@@ -40,11 +40,13 @@ class Director:
             for step, stream in zip(steps, stream_names([step.entry for step in steps]), strict=True)
         ]
         self._situations: dict[int, Situation] = {k: stage for k, step in enumerate(steps) if step.after is None}
+        """Situation that the trigger of a step observes, by step index; missing until the previous step happened."""
         self._starts = [
             TriggerState(entry.when or _IMMEDIATE_TRIGGER, streams.generator(f"fault-start{stream}"))
             for entry, stream in zip(faults, stream_names(faults), strict=True)
         ]
         self._ends: dict[int, int | None] = {}
+        """Tick at which each active fault ends, by index of the fault; None for the end of the run."""
 
     @property
     def has_disturbances(self) -> bool:
@@ -105,17 +107,17 @@ class TriggerState:
         self._remaining = trigger.times
         self._scheduled: list[int] = []
 
-    def count_firings(self, now: Situation) -> int:
-        """Evaluate the trigger in the situation `now`, and return how often it fires. Call it once at each beat."""
+    def count_firings(self, situation: Situation) -> int:
+        """Evaluate the trigger in `situation`, and return how often it fires. Call it once at each beat."""
         trigger = self._trigger
         if (
             self._remaining
-            and self._has_edge(now)
+            and self._has_edge(situation)
             and (trigger.probability >= 1 or self._rng.random() < trigger.probability)
         ):
             self._remaining -= 1
-            self._scheduled.append(now.tick + now.clock.ticks(trigger.delay))
-        due = sum(scheduled <= now.tick for scheduled in self._scheduled)
+            self._scheduled.append(situation.tick + situation.clock.ticks(trigger.delay))
+        due = sum(scheduled <= situation.tick for scheduled in self._scheduled)
         self._scheduled = self._scheduled[due:]
         return due
 
@@ -124,50 +126,52 @@ class TriggerState:
         """Whether the trigger can never fire again."""
         return not self._remaining and not self._scheduled
 
-    def _has_edge(self, now: Situation) -> bool:
+    def _has_edge(self, situation: Situation) -> bool:
         """Return whether the condition has changed in the direction that fires the trigger."""
-        before, self._was_true = self._was_true, self._condition.holds(now)
+        before, self._was_true = self._was_true, self._condition.holds(situation)
         return self._was_true != before and self._was_true == (self._trigger.edge == "rising")
 
 
 class ConditionState:
-    """Tracks how long a condition and its parts have been true, for the key `for`. Call `holds` at each beat."""
+    """Tracks how long a condition and its operands have been true, for the key `for`. Call `holds` at each beat."""
 
-    def __init__(self, test: AnyCondition) -> None:
-        self._test = test
-        has_durations = any(part.for_ is not None for operand in test.operands for part in operand.walk())
-        self._parts = [ConditionState(operand) for operand in test.operands] if has_durations else []
+    def __init__(self, condition: AnyCondition) -> None:
+        self._condition = condition
+        has_durations = any(part.for_ is not None for operand in condition.operands for part in operand.walk())
+        self._operands = [ConditionState(operand) for operand in condition.operands] if has_durations else []
         self._since: int | None = None
 
-    def holds(self, now: Situation) -> bool:
-        """Return whether the condition has been true for the required duration, up to the situation `now`."""
-        if not self._is_true(now):
+    def holds(self, situation: Situation) -> bool:
+        """Return whether the condition has been true for the required duration, up to `situation`."""
+        if not self._is_true(situation):
             self._since = None
             return False
         if self._since is None:
-            self._since = now.tick
-        return self._test.for_ is None or now.tick - self._since >= now.clock.ticks(self._test.for_)
+            self._since = situation.tick
+        duration = self._condition.for_
+        return duration is None or situation.tick - self._since >= situation.clock.ticks(duration)
 
-    def _is_true(self, now: Situation) -> bool:
-        """Return whether the condition is true at this beat. Evaluates all parts, because each tracks its duration."""
-        if not self._parts:
-            return self._test.holds(now)
-        now = self._test.situation_of_robot(now)
-        answers = [part.holds(now) for part in self._parts]
-        if self._test.not_ is not None:
-            return not answers[0]
-        return all(answers) if self._test.all is not None else any(answers)
+    def _is_true(self, situation: Situation) -> bool:
+        """Return whether the condition is true at this beat. Evaluates all operands, because each tracks a duration."""
+        if not self._operands:
+            return self._condition.holds(situation)
+        situation = self._condition.situation_of_robot(situation)
+        are_true = [operand.holds(situation) for operand in self._operands]
+        if self._condition.not_ is not None:
+            return not are_true[0]
+        return all(are_true) if self._condition.all is not None else any(are_true)
 
 
 class RelativeSituation:
     """Situation as seen by a step of a sequence: time, distance, and events count from the previous step."""
 
-    def __init__(self, now: Situation, others: "dict[str, RelativeSituation] | None" = None) -> None:
-        """Start counting at the situation `now`. `others` are the views of all robots by name (None: create them)."""
-        self._now, self._others = now, {} if others is None else others
+    def __init__(self, situation: Situation, others: "dict[str, RelativeSituation] | None" = None) -> None:
+        """Start counting at `situation`. `others` are the views of all robots by name (None: create them)."""
+        self._situation, self._others = situation, {} if others is None else others
         if others is None:
-            self._others |= {name: RelativeSituation(now.of(name), self._others) for name in now.robots}
-        self._start_tick, self._initial_distance, self._initial_event_count = now.tick, now.travelled, len(now.events)
+            self._others |= {name: RelativeSituation(situation.of(name), self._others) for name in situation.robots}
+        self._start_tick, self._initial_distance = situation.tick, situation.travelled
+        self._initial_event_count = len(situation.events)
 
     def of(self, robot: str) -> "RelativeSituation":
         """Return the situation of another robot, relative to the same step."""
@@ -176,26 +180,26 @@ class RelativeSituation:
     @property
     def tick(self) -> int:
         """Ticks since the previous step."""
-        return self._now.tick - self._start_tick
+        return self._situation.tick - self._start_tick
 
     @property
     def travelled(self) -> float:
         """Distance driven in m since the previous step."""
-        return self._now.travelled - self._initial_distance
+        return self._situation.travelled - self._initial_distance
 
     @property
     def events(self) -> Sequence[Event]:
         """Events since the previous step."""
-        return self._now.events[self._initial_event_count :]
+        return self._situation.events[self._initial_event_count :]
 
     def last_scan_tick(self, sensor: str | None) -> int | None:
         """Return the tick at which the stack last received a scan, relative to the previous step.
 
         If there was no scan, the start of the run counts as a scan.
         """
-        last = self._now.last_scan_tick(sensor)
+        last = self._situation.last_scan_tick(sensor)
         return (0 if last is None else last) - self._start_tick
 
     def __getattr__(self, name: str) -> Any:
         """Return any other attribute of the situation, such as the robot's pose."""
-        return getattr(self._now, name)
+        return getattr(self._situation, name)

@@ -23,9 +23,10 @@ from simscen.worlds.geometry.cross_section import CrossSection, cross_section, s
 from simscen.worlds.routes.shortest_paths import ShortestPaths, shortest_paths_in
 
 OBSTACLE_HEIGHTS_M = (0.15, 0.5, 0.95)
-"""Heights at which walls block the way of pedestrians. Walls at the last height also block their view.
+"""Heights of horizontal sections of the static world. Walls in these sections block the way of pedestrians.
 
-Solids that are no prisms, or are at none of these heights, block their way at all heights from the first one on.
+Walls in the last section also block the view of pedestrians. More sections are computed for solids that are not prisms,
+and for solids that are at none of these heights.
 """
 HEIGHT_TOLERANCE_M = 0.001
 """Difference up to which heights of vertices count as equal."""
@@ -48,17 +49,17 @@ class PedestrianMap:
 
     @cached_property
     def _cuts(self) -> list[CrossSection]:
-        """Cross sections of what blocks the way of pedestrians; the last one also blocks their view."""
+        """Cross sections of the static world that block the way of pedestrians; the last one also blocks the view."""
         mesh = self._built.mesh
         cuts = [cross_section(mesh, height) for height in OBSTACLE_HEIGHTS_M]
-        # Most solids are prisms, which are equal in all cuts. Others, such as tables, are cut at more heights.
+        # Most solids are prisms, for which these cuts suffice. Other solids, such as tables, are cut at more heights.
         is_complete = _has_two_heights(mesh) & np.isin(
             np.arange(len(mesh.names)), np.concatenate([cut.owners for cut in cuts])
         )
         faces = ~is_complete[mesh.owners]
-        rest = submesh(mesh.vertices, mesh.faces[faces])
-        others = TriangleMesh(rest.vertices, rest.faces, mesh.owners[faces], mesh.names)
-        return [*sections_between(others, (OBSTACLE_HEIGHTS_M[0], BODY_HEIGHT_RANGE_M[1])), *cuts]
+        part = submesh(mesh.vertices, mesh.faces[faces])
+        other_solids = TriangleMesh(part.vertices, part.faces, mesh.owners[faces], mesh.names)
+        return [*sections_between(other_solids, (OBSTACLE_HEIGHTS_M[0], BODY_HEIGHT_RANGE_M[1])), *cuts]
 
     @cached_property
     def walls(self) -> WallMap:
@@ -90,7 +91,7 @@ class PedestrianMap:
 
 
 def _has_two_heights(mesh: TriangleMesh) -> npt.NDArray[np.bool_]:
-    """Return for each solid (n,) of a mesh whether all of its vertices are at its lowest or its highest point."""
+    """Return for each solid (n,) of a mesh whether all vertices are at its minimum height or at its maximum height."""
     z = mesh.vertices[mesh.faces, 2]
     lowest, highest = np.full(len(mesh.names), np.inf), np.full(len(mesh.names), -np.inf)
     np.minimum.at(lowest, mesh.owners, z.min(axis=1))
@@ -197,13 +198,13 @@ class PedestrianSimulation:
         low, high = BODY_HEIGHT_RANGE_M
         if math.hypot(pose.qx, pose.qy) > MAX_LEVEL_TILT:
             corners = [pose.compose(solid.pose).apply(hull_points(solid.shape)) for solid in body.solids]
-            in_range = [each[:, :2] for each in corners if each[:, 2].min() < high and each[:, 2].max() > low]
-            return tuple(np.array(convex_hull(each)) for each in in_range)
+            in_range = [points[:, :2] for points in corners if points[:, 2].min() < high and points[:, 2].max() > low]
+            return tuple(np.array(convex_hull(points)) for points in in_range)
         # Rounded, because the height of an object that rests on the ground varies by some micrometers.
         z = round(pose.z, 2)
         solids, cached_z, outlines = self._outlines.get(body.name, (None, 0.0, ()))
         if solids is not body.solids or cached_z != z:
-            outlines = tuple(np.array(each) for each in outlines_in_z_range(body.solids, (low - z, high - z)))
+            outlines = tuple(map(np.array, outlines_in_z_range(body.solids, (low - z, high - z))))
             self._outlines[body.name] = body.solids, z, outlines
         return tuple(pose.plane.apply(outline) for outline in outlines)
 

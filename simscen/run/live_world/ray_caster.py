@@ -19,14 +19,16 @@ REFRESH_DISTANCE_M = 4.0
 class LiveRayCaster(RayCaster):
     """Ray caster for the sensors of a robot. Before each cast, it updates the poses of the moving objects in reach."""
 
-    def __init__(self, scene: RayScene, robot: Robot, without: frozenset[str] = frozenset()) -> None:
-        """Cast rays for a robot in the static world `scene`, ignoring moving objects with the names in `without`."""
-        self._scene, self._robot, self._without = scene, robot, without
+    def __init__(self, scene: RayScene, robot: Robot, ignored_names: frozenset[str] = frozenset()) -> None:
+        """Cast rays for a robot in the static world `scene`. Rays pass through moving objects in `ignored_names`."""
+        self._scene, self._robot, self._ignored_names = scene, robot, ignored_names
         self._bodies: Mapping[str, Body] | None = None
         self._meshes: dict[str, TriangleMesh] = {}
         self._extent = 0.0
+        """Largest distance in m of a point of a moving object from the origin of the object."""
         self._reachable: ReachableObjects | None = None
         self._state: tuple[Iterable[str], Mapping[str, Pose3], Mapping[str, Pose3]] | None = None
+        """Names, poses, and rest poses of the objects at the last update of the scene."""
 
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """Return distances (n,) in m along unit `directions` (n, 3) from `origins` (n, 3); inf beyond `reach` m."""
@@ -67,7 +69,7 @@ class LiveRayCaster(RayCaster):
         known = [(_parts(previous[name]), mesh) for name, mesh in self._meshes.items()]
         meshes = dict[str, TriangleMesh]()
         for name, body in bodies.items():
-            if name not in self._without:
+            if name not in self._ignored_names:
                 parts = _parts(body)
                 shared = next((mesh for others, mesh in known if others == parts), None)
                 meshes[name] = merge_solids(body.solids) if shared is None else shared

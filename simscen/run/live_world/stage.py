@@ -28,10 +28,10 @@ from simscen.stack.validation.stack import CheckedStack
 
 
 class LiveStage:
-    """Interface of triggers and actions for one robot, as core.stage.Stage describes it. Keeps the robot's events.
+    """Interface of triggers and actions for one robot; implements core.stage.Stage. Keeps the robot's events.
 
-    An order is what an action tells the robot's stack: a new goal, a cancellation, or a change of zones. Orders are
-    delivered at the beats of the robot.
+    An order is a request of an action to the robot's stack: a new goal, a cancellation, or a change of zones. Orders
+    are delivered at the beats of the robot.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class LiveStage:
         self.new_events: list[Event] = []
         """Events since the last call of `take_events`."""
         self.is_observed = True
-        """Whether a Director observes this stage, so that it must be updated at each beat."""
+        """Whether a Director observes this stage. If so, the stage must be updated at each beat."""
 
     # Updates by the lockstep loop
 
@@ -255,6 +255,6 @@ class LiveStage:
         return stack if isinstance(stack, CheckedStack) and stack.can_switch_zones else None
 
     def record_event(self, event: Event) -> None:
-        stamped = event if event.tick else replace(event, tick=self.tick)
-        self.new_events.append(stamped)
-        self.events.append(stamped)
+        event = event if event.tick else replace(event, tick=self.tick)
+        self.new_events.append(event)
+        self.events.append(event)

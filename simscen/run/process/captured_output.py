@@ -1,4 +1,4 @@
-"""Output and end of a process: its log file of limited size, and the texts that an error message quotes."""
+"""Captured output of a process: a log file of limited size, and the parts of it that error messages quote."""
 
 import os
 import re
@@ -9,9 +9,9 @@ MAX_HEAD_BYTES = 1 << 20
 MAX_TAIL_BYTES = 1 << 18
 """Sizes of the first and the last part of a process's output that CappedLog keeps."""
 READ_BYTES = 1 << 20
-"""Largest number of bytes that are read from a pipe at once."""
+"""Maximum number of bytes that are read from a pipe at once."""
 TAIL_BYTES = 16_384
-"""Largest number of bytes of output in a message about the end of a process."""
+"""Maximum number of bytes of output in a message about the end of a process."""
 
 
 class CappedLog:
@@ -23,7 +23,7 @@ class CappedLog:
     def __init__(self, path: Path | None) -> None:
         self._head_bytes_left, self._omitted_bytes = MAX_HEAD_BYTES, 0
         self._tail = bytearray()  # the last MAX_TAIL_BYTES of the output
-        self._unwritten_bytes = 0  # how many of these are not yet in the file
+        self._unwritten_bytes = 0  # of the tail: bytes that are not yet in the file
         self._file: int | None = None
         if path is None:
             return
@@ -81,6 +81,7 @@ TAIL_LINES = 20
 """Number of lines of output that an error message quotes."""
 _DUMP_HEADER = re.compile(r"^(Current thread|Thread|Stack) .*\(most recent call first\):$", re.MULTILINE)
 _DUMP_FRAME = re.compile(r'^  File "(?P<file>.*)", line (?P<line>\d+) in (?P<name>\S+)$', re.MULTILINE)
+"""Header and frames of a traceback of faulthandler."""
 
 
 def innermost_frame(output: str) -> str:

@@ -31,7 +31,7 @@ from simscen.run.process.worker_handle import WorkerHandle
 _F_SETPIPE_SZ = 1031  # of Linux; missing in some builds of Python
 
 HEARTBEAT_S = 1.0
-"""Longest time between two messages to the supervisor, except while the fork server prepares a scenario."""
+"""Maximum time between two messages to the supervisor, except while the fork server prepares a scenario."""
 
 
 class ForkServer:

@@ -1,4 +1,4 @@
-"""Fork server as seen by the supervisor: start its process, exchange messages with it, and end it."""
+"""Interface of the supervisor to the fork server: start the process, exchange messages, and end the process."""
 
 import os
 import select
@@ -14,7 +14,7 @@ from simscen.run.process.captured_output import TAIL_BYTES, signal_name
 from simscen.run.process.isolation import clean_environment
 
 PIPE_BYTES = 1 << 16
-"""Largest number of bytes that are written to or read from a pipe at once."""
+"""Maximum number of bytes that are written to or read from a pipe at once."""
 
 
 class Unresponsive(Exception):
@@ -86,7 +86,7 @@ class ForkServerProcess:
     def _flush(self) -> None:
         try:
             del self._send_buffer[: os.write(self._send_pipe, self._send_buffer[:PIPE_BYTES])]
-        except BrokenPipeError:  # it has exited; its last messages can still be read
+        except BrokenPipeError:  # the process has exited; its last messages can still be read
             self._send_buffer.clear()
 
     def close(self) -> None:

@@ -40,7 +40,7 @@ def limit_memory() -> None:
 
 
 def set_soft_limit(limit: int, maximum: int) -> None:
-    """Set the soft limit of a resource to `maximum`, or to the hard limit if it is lower."""
+    """Set the soft limit of a resource to `maximum`, or to the hard limit if the hard limit is lower."""
     hard = resource.getrlimit(limit)[1]
     resource.setrlimit(limit, (maximum if hard == resource.RLIM_INFINITY else min(maximum, hard), hard))
 
@@ -114,7 +114,7 @@ def _parent(pid: int) -> int:
 
 
 def plugin_path(plugins: Iterable[RegisteredType]) -> str:
-    """Return the argument with which `apply_plugin_path` lets a fork server find the same plug-ins as this process."""
+    """Return the argument of `apply_plugin_path`, so that a fork server finds the same plug-ins as this process."""
     used = sorted({(entry.distribution, entry.folder) for entry in plugins})
     user_site = site.getusersitepackages() if site.ENABLE_USER_SITE else ""
     return json.dumps(

@@ -8,21 +8,21 @@ from simscen.run.process.jobs import Ended, ForkServerDeath, Job, JobUpdate, Pro
 from simscen.run.process.ray_node import FileChunk, NodeUpdate
 
 MAX_ATTEMPTS = 2
-"""Largest number of attempts at a job if its runner or node is lost."""
+"""Maximum number of attempts at a job if its runner or node is lost."""
 
 
 class JobBatch:
-    """Jobs of one call of `RayBackend.run`, by number: `sent` are in the queue, and `running` are on a node."""
+    """Jobs of one call of `RayBackend.run`, by number: `queued` are in the queue, and `running` are on a node."""
 
     def __init__(self, jobs: Iterable[Job], should_continue: Callable[[], bool]) -> None:
         self._jobs, self._should_continue = iter(jobs), should_continue
         self._retries = deque[Job]()
         self._attempts: dict[int, int] = {}
         self._next_job: Job | None = None
-        self.sent: dict[int, Job] = {}
+        self.queued: dict[int, Job] = {}
         self.running: dict[int, Job] = {}
 
-    def next(self) -> Job | None:
+    def next_job(self) -> Job | None:
         """Return the next job to send, or None if there is none."""
         if not self._should_continue():
             return None
@@ -37,15 +37,15 @@ class JobBatch:
             return True
         if not self._should_continue():
             return False
-        if not self.sent and self._next_job is None:
-            self._next_job = self.next()
-        return bool(self.sent) or self._next_job is not None
+        if not self.queued and self._next_job is None:
+            self._next_job = self.next_job()
+        return bool(self.queued) or self._next_job is not None
 
-    def updates(self, update: NodeUpdate) -> Iterator[JobUpdate]:
+    def process_update(self, update: NodeUpdate) -> Iterator[JobUpdate]:
         """Process an update from a node: write file chunks to the job's folder, and yield all other updates."""
         match update:
             case Started(number):
-                if (job := self.sent.pop(number, None)) is not None:
+                if (job := self.queued.pop(number, None)) is not None:
                     self.running[number] = job
                     shutil.rmtree(job.folder, ignore_errors=True)
                     if number not in self._attempts:
@@ -53,18 +53,18 @@ class JobBatch:
             case Progressed():
                 yield update
             case FileChunk(number, name, data):
-                file = (self.running.get(number) or self.sent[number]).folder / name
+                file = (self.running.get(number) or self.queued[number]).folder / name
                 file.parent.mkdir(parents=True, exist_ok=True)
                 with file.open("ab") as output:
                     output.write(data)
             case Ended(number):
                 if self.running.pop(number, None) is None:
-                    del self.sent[number]
+                    del self.queued[number]
                 yield update
 
     def retry_or_fail(self, number: int, address: str) -> Iterator[JobUpdate]:
         """Queue a job of a lost runner again, or yield its end after MAX_ATTEMPTS."""
-        job = self.running.pop(number, None) or self.sent.pop(number, None)
+        job = self.running.pop(number, None) or self.queued.pop(number, None)
         if job is None:
             return
         self._attempts[number] = self._attempts.get(number, 1) + 1

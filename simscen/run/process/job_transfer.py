@@ -57,28 +57,29 @@ class Unpacker:
     def __init__(self, folder: Path, receive: Callable[[Any], bytes]) -> None:
         """`receive` returns the content of a file for a Ray reference."""
         self._folder, self._receive = folder, receive
-        self._is_here: dict[tuple[str, str], bool] = {}
+        self._is_on_machine: dict[tuple[str, str], bool] = {}
+        """Cache of `_has`, by path and digest."""
 
     def unpack(self, packed: PackedJob, output: Path) -> Job:
         """Return the job with the output folder `output` and with paths that are valid on this machine."""
-        moved: frozenset[str] = frozenset()
+        moved_paths: frozenset[str] = frozenset()
         if not all(self._has(path, file.digest) for path, file in packed.files.items()):
             for path, file in packed.files.items():
                 self._write(self._folder / path.lstrip("/"), file)
-            moved = frozenset(text for path in packed.files for text in (path, *map(str, PurePath(path).parents)))
-        job = _Unpickler(io.BytesIO(packed.data), moved, self._folder).load()
+            moved_paths = frozenset(text for path in packed.files for text in (path, *map(str, PurePath(path).parents)))
+        job = _Unpickler(io.BytesIO(packed.data), moved_paths, self._folder).load()
         assert isinstance(job, Job)
         return replace(job, folder=output)
 
     def _has(self, path: str, digest: str) -> bool:
         """Return whether a file with this content is at the same path on this machine."""
-        if (path, digest) not in self._is_here:
+        if (path, digest) not in self._is_on_machine:
             try:
                 local_digest = digest_of(Path(path).read_bytes())
             except OSError:
                 local_digest = ""
-            self._is_here[path, digest] = local_digest == digest
-        return self._is_here[path, digest]
+            self._is_on_machine[path, digest] = local_digest == digest
+        return self._is_on_machine[path, digest]
 
     def _write(self, target: Path, file: SentFile) -> None:
         if not target.exists():
@@ -111,14 +112,14 @@ class _Pickler(pickle.Pickler):
 
 
 class _Unpickler(pickle.Unpickler):
-    """Unpickler for the output of _Pickler. Replaces the paths in `moved` by paths below `folder`."""
+    """Unpickler for the output of _Pickler. Replaces the paths in `moved_paths` by paths below `folder`."""
 
-    def __init__(self, file: io.BytesIO, moved: frozenset[str], folder: Path) -> None:
+    def __init__(self, file: io.BytesIO, moved_paths: frozenset[str], folder: Path) -> None:
         super().__init__(file)
-        self._moved, self._folder = moved, folder
+        self._moved_paths, self._folder = moved_paths, folder
 
     def persistent_load(self, pid: tuple[str, str]) -> Path:
         origin, text = pid
         if origin == "package":
             return PACKAGE / text
-        return self._folder / text.lstrip("/") if text in self._moved else Path(text)
+        return self._folder / text.lstrip("/") if text in self._moved_paths else Path(text)

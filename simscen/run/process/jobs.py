@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from simscen.core.records.run_result import RunKey
 from simscen.loading.loaded import LoadedScenario
-from simscen.run.kept_files import WrittenFor
+from simscen.run.kept_files import OutcomeFilter
 from simscen.spec.registry import RegisteredType
 
 _LENGTH = struct.Struct("<I")
@@ -36,8 +36,8 @@ class Job:
     key: RunKey
     folder: Path
     wall_limit: float
-    replay: WrittenFor = WrittenFor.NONE
-    picture: WrittenFor = WrittenFor.ALL
+    replay: OutcomeFilter = OutcomeFilter.NONE
+    picture: OutcomeFilter = OutcomeFilter.ALL
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class ForkServerDeath:
         was_preparing: Whether the fork server was preparing this job.
         timed_out: Whether the fork server was killed because it did not respond while it prepared this job.
         output: Last part of the fork server's output.
-        has_started: Whether the fork server had sent a message.
+        has_started: Whether the fork server had started, so that it sent a message.
     """
 
     description: str

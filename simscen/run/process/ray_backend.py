@@ -41,7 +41,8 @@ MAX_UNREAD_UPDATES = 64
 class _Runner:
     """Handle of the Ray actor of the class NodeRunner on one node.
 
-    `call` is its pending remote call: first `software`, then (`is_ready`) `run`. It is None while the queue is empty.
+    `call` is the pending remote call of the actor: `software` at first; `run` if `is_ready`, but None while the queue
+    is empty.
     """
 
     name: str
@@ -66,6 +67,7 @@ class RayBackend:
         self._runners: list[_Runner] = []
         self._files: dict[Path, SentFile] = {}
         self._contents: dict[str, SentFile] = {}
+        """Files in the cluster by the digest of their content."""
         self._queue: Any = None
         self._next_name = 0
         self._last_search = 0.0
@@ -104,13 +106,13 @@ class RayBackend:
                 for call in ready:
                     yield from self._process_reply(calls[call], batch, plugins)
                 for runner in self._runners:
-                    if runner.is_ready and runner.call is None and batch.sent:
+                    if runner.is_ready and runner.call is None and batch.queued:
                         self._start(runner, plugins)
                 self._require_free_cpus(start_time)
         except SystemError as error:  # Ray wraps an exception that a signal handler raised
             raise error.__cause__ or error from None
         finally:
-            if batch.running or batch.sent:
+            if batch.running or batch.queued:
                 self._kill_runners()
             ray.get(self._queue.clear.remote())
         self._finish_calls()
@@ -123,11 +125,11 @@ class RayBackend:
         nodes = [node for node in _nodes() if node["Alive"] and node["Resources"].get("CPU", 0) >= 1]
         if not nodes:
             raise UsageError(f"no node of the Ray cluster at {self._address} has a CPU")
-        used = {runner.node for runner in self._runners}
+        used_nodes = {runner.node for runner in self._runners}
         for node in sorted(nodes, key=lambda node: str(node["NodeID"])):
-            remaining = self._workers - sum(one.workers for one in self._runners)
+            remaining = self._workers - sum(runner.workers for runner in self._runners)
             workers = min(int(node["Resources"]["CPU"]), remaining)
-            if node["NodeID"] not in used and workers > 0:
+            if node["NodeID"] not in used_nodes and workers > 0:
                 self._runners.append(self._new_runner(node["NodeID"], node["NodeManagerAddress"], workers))
 
     def _require_free_cpus(self, start_time: float) -> None:
@@ -153,12 +155,12 @@ class RayBackend:
     def _send(self, batch: JobBatch) -> None:
         """Put jobs into the queue until it has QUEUED_JOBS_PER_WORKER jobs for each worker."""
         limit = QUEUED_JOBS_PER_WORKER * sum(runner.workers for runner in self._runners)
-        while len(batch.sent) < limit and (job := batch.next()) is not None:
-            batch.sent[job.number] = job
+        while len(batch.queued) < limit and (job := batch.next_job()) is not None:
+            batch.queued[job.number] = job
             ray.get(self._queue.add.remote(pack(job, self._sent_file)))
 
     def _sent_file(self, path: Path) -> SentFile:
-        """Put the content of a file into the cluster, unless it is there already."""
+        """Put the content of a file into the cluster, unless the content is there already."""
         if path not in self._files:
             data = path.read_bytes()
             digest = digest_of(data)
@@ -178,7 +180,7 @@ class RayBackend:
                 self._start(runner, plugins)
                 return
             update = ray.get(next(runner.call))
-        except StopIteration:  # it found no job in the queue
+        except StopIteration:  # the runner found no job in the queue
             runner.call = None
         except RayActorError:
             yield from self._remove_lost_runner(runner, batch)
@@ -187,7 +189,7 @@ class RayBackend:
                 raise UsageError(f"node {runner.address}: {error.cause}") from error
             raise
         else:
-            yield from batch.updates(update)
+            yield from batch.process_update(update)
 
     def _require_same_software(self, runner: _Runner, found: tuple[str, str]) -> None:
         if found != (__version__, source_digest()):
@@ -199,7 +201,7 @@ class RayBackend:
     def _remove_lost_runner(self, runner: _Runner, batch: JobBatch) -> Iterator[JobUpdate]:
         """Remove a runner that has died, and queue its jobs again or report them as ended."""
         self._runners.remove(runner)
-        ray.kill(runner.actor)  # it may only be unreachable
+        ray.kill(runner.actor)  # the runner may only be unreachable
         self._last_search = 0.0
         for number in ray.get(self._queue.taken_by.remote(runner.name)):
             yield from batch.retry_or_fail(number, runner.address)

@@ -21,7 +21,7 @@ from simscen.run.process.supervisor import Supervisor
 from simscen.spec.registry import RegisteredType, find_type
 
 CHUNK_BYTES = 8 << 20
-"""Largest part of an output file that is sent at once."""
+"""Maximum size of a part of an output file that is sent at once."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,8 @@ class NodeRunner:
     def run(self, queue: Any, runner: str, plugins: Sequence[RegisteredType]) -> Iterator[NodeUpdate]:
         """Run jobs from the queue until it is empty, and yield their updates and files.
 
-        `runner` is the name of this runner. Raises UsageError if the fork server cannot start, so that it does not
-        take the jobs of other nodes, or if a plug-in is missing or has another version here.
+        `runner` is the name of this runner. Raises UsageError if a plug-in is missing or has another version here, or
+        if the fork server cannot start. Otherwise this node would take jobs from other nodes only to fail them.
         """
         jobs = _JobsOfQueue(lambda: self._take_job(queue, runner))
         for update in self._supervisor.run(jobs, [_installed_plugin(entry) for entry in plugins]):

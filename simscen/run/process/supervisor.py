@@ -39,9 +39,10 @@ class Interrupted(BaseException):
 class Supervisor:
     """Runs jobs in worker processes of a fork server on this machine, `workers` at a time.
 
-    If the fork server dies while it prepares a job, this job fails, and all other running jobs are repeated. If it dies
-    at another time, or is killed from outside (SIGKILL), any running job may be the cause: each of them is repeated
-    alone, and fails if the fork server dies again meanwhile. If the fork server cannot start, all jobs fail.
+    If the fork server dies while it prepares a job, this job fails, and all other running jobs are repeated. If the
+    fork server dies at another time, or is killed from outside (SIGKILL), any running job may be the cause: each of
+    these jobs is repeated alone, and fails if the fork server dies again. If the fork server cannot start, all jobs
+    fail.
     """
 
     def __init__(self, workers: int, entry: Sequence[str], unused_server: ForkServerProcess | None = None) -> None:
@@ -55,6 +56,7 @@ class Supervisor:
         self._jobs: Iterator[Job] = iter(())
         self._should_continue: Callable[[], bool] = lambda: True
         self._retries, self._suspects = deque[Job](), deque[Job]()
+        """Jobs to repeat, and jobs to repeat alone because each of them may have killed the fork server."""
         self._running: dict[int, Job] = {}
         self._preparing: Job | None = None
         self._reported: set[int] = set()

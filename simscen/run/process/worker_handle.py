@@ -1,4 +1,4 @@
-"""Worker process as seen by the fork server: its messages, its output, and its termination."""
+"""Interface of the fork server to a worker process: messages, output, and termination."""
 
 import json
 import os
@@ -36,8 +36,8 @@ class WorkerHandle:
         send_message: Callable[[dict[str, Any]], None],
     ) -> None:
         self.job, self.pid, self.pidfd, self.report, self.output = job, pid, os.pidfd_open(pid), report, output
-        self.started = time.monotonic()
-        self.deadline = self.started + job.wall_limit
+        self._start_time = time.monotonic()
+        self.deadline = self._start_time + job.wall_limit
         self._log, self._send_message = log, send_message
         self._buffer = bytearray()
         self._final_message: dict[str, Any] | None = None
@@ -107,7 +107,7 @@ class WorkerHandle:
             try:
                 while read():
                     pass
-            except BlockingIOError:  # a process it left behind keeps the pipe open
+            except BlockingIOError:  # a descendant of the worker keeps the pipe open
                 pass
         self.close_descriptors()
         self._log.close()
@@ -117,7 +117,7 @@ class WorkerHandle:
             "signal": os.WTERMSIG(status) if os.WIFSIGNALED(status) else None,
             "killed_for": self._killed_for,
             "final_message": self._final_message,
-            "wall": time.monotonic() - self.started,
+            "wall": time.monotonic() - self._start_time,
             "cpu": cpu,
             "peak_bytes": peak_bytes,
             "left_processes": self._left_processes,

@@ -20,7 +20,7 @@ from simscen.run.process.isolation import MAX_MEMORY_BYTES
 from simscen.run.process.jobs import ForkServerDeath, Job, ProcessEnd
 
 MAX_RECOVER_BYTES = 64 << 20
-"""Size of the largest partial log that is recovered during the session."""
+"""Maximum size of a partial log that is recovered during the session."""
 
 
 def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
@@ -44,18 +44,18 @@ def finished_run(job: Job, end: ProcessEnd | ForkServerDeath) -> RunFinished:
 
 
 def unfinished_run(job: Job, failure: RunFailure) -> RunFinished:
-    """Return the error `failure` as the result of a run that was interrupted or never started."""
+    """Return the result of a run that was interrupted or never started: the error `failure`."""
     result = error_result(job.key, job.scenario.path, failure, job.scenario.stack)
-    return _without_log(job, result)
+    return _finished_without_log(job, result)
 
 
 def skipped_run(job: Job, reason: str) -> RunFinished:
     """Return the result of a run that is skipped because its scenario has the key `skip`."""
     result = skipped_result(job.key, job.scenario.path, reason, job.scenario.stack)
-    return _without_log(job, result)
+    return _finished_without_log(job, result)
 
 
-def _without_log(job: Job, result: RunResult) -> RunFinished:
+def _finished_without_log(job: Job, result: RunResult) -> RunFinished:
     again, file = repeat_command(job.scenario, job.key.seed), display_path(job.scenario.file)
     return RunFinished(result, again=again, file=file, tags=tuple(job.scenario.spec.tags))
 

@@ -12,10 +12,10 @@ from simscen.core.records.run_store import RunStore
 from simscen.core.records.session_events import Listener, RunFinished, RunProgress, RunStarted
 from simscen.loading.loaded import LoadedScenario
 from simscen.loading.plugins import plugins_of_all
-from simscen.run.kept_files import KeptLogs, WrittenFor
+from simscen.run.kept_files import LogRetention, OutcomeFilter
 from simscen.run.process.jobs import Backend, Ended, Job, Progressed, Started
 from simscen.run.process.supervisor import Interrupted
-from simscen.run.sessions.log_comparison import compare_twins, compare_with_session
+from simscen.run.sessions.log_comparison import compare_with_repetition, compare_with_session
 from simscen.run.sessions.output_folder import run_folder
 from simscen.run.sessions.results import finished_run, skipped_run, unfinished_run
 
@@ -31,7 +31,9 @@ class SessionOptions:
         fail_fast: Whether the session ends after the first run that does not pass.
         wall_limit: Limit of the wall time of each run in s.
         against: Output folder of an earlier session with which each run is compared (None: no comparison).
+        replay: Outcomes for which a replay page is written.
         only: Runs to execute (None: all).
+        keep_logs: Runs of which all files are kept.
         cluster: Address of the Ray cluster that executes the runs ("": this machine).
     """
 
@@ -42,14 +44,14 @@ class SessionOptions:
     fail_fast: bool = False
     wall_limit: float = 300.0
     against: Path | None = None
-    replay: WrittenFor = WrittenFor.NONE
+    replay: OutcomeFilter = OutcomeFilter.NONE
     only: frozenset[RunKey] | None = None
-    keep_logs: KeptLogs = KeptLogs.ALL
+    keep_logs: LogRetention = LogRetention.ALL
     cluster: str = ""
 
     def job(self, number: int, scenario: LoadedScenario, key: RunKey, out: Path) -> Job:
         """Return the job of a run. `out` is the output folder of the session."""
-        picture = WrittenFor.FAILED if self.keep_logs is KeptLogs.FAILED else WrittenFor.ALL
+        picture = OutcomeFilter.FAILED if self.keep_logs is LogRetention.FAILED else OutcomeFilter.ALL
         return Job(number, scenario, key, run_folder(out, key), self.wall_limit, self.replay, picture)
 
 
@@ -79,7 +81,7 @@ def plan_jobs(scenarios: Sequence[LoadedScenario], options: SessionOptions, out:
                     continue
                 for run_key in (key, key.repetition) if options.twice else (key,):
                     jobs.append(options.job(len(jobs), scenario, run_key, out))
-    # Once each and after all others, because twins are identified by their job numbers.
+    # Skipped scenarios come last, because the numbers of a run and its repetition must differ only in the last bit.
     for scenario in skipped if options.only is None else ():
         key = scenario.key(scenario_seeds(scenario, options)[0])
         jobs.append(options.job(len(jobs), scenario, key, out))
@@ -127,12 +129,13 @@ def run_session(
                 case Progressed(seconds=seconds):
                     listener(RunProgress(job.key, seconds))
                 case Ended(end=end):
-                    has_twin = options.twice and job.number ^ 1 in positions
-                    twin = results[positions[job.number ^ 1]] if has_twin else None
-                    run = compare_twins(finished_run(job, end), twin)
+                    other_number = job.number ^ 1  # of its repetition, or of the run that it repeats; see `plan_jobs`
+                    is_other_finished = options.twice and other_number in positions
+                    other = results[positions[other_number]] if is_other_finished else None
+                    run = compare_with_repetition(finished_run(job, end), other)
                     if options.against is not None:
                         run = compare_with_session(run, options.against)
-                    if options.keep_logs is KeptLogs.FAILED and run.outcome.is_good:
+                    if options.keep_logs is LogRetention.FAILED and run.outcome.is_good:
                         run = delete_all_but_result(run)
                     report(job, run)
     except Interrupted as interrupted:

@@ -128,4 +128,5 @@ class TpeSearch:
 
 
 def _clip(u: float) -> float:
+    """Return the number in the open interval (0, 1) that is closest to `u`."""
     return min(max(u, 2.0**-53), 1 - 2.0**-53)

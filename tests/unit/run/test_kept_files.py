@@ -6,7 +6,7 @@ import pytest
 
 from simscen.core.records.run_result import Outcome
 from simscen.loading.scenario import load_scenario
-from simscen.run.kept_files import KeptLogs, WrittenFor
+from simscen.run.kept_files import LogRetention, OutcomeFilter
 from simscen.run.sessions.run_session import SessionOptions
 
 GOOD = {Outcome.PASSED, Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED}
@@ -14,9 +14,9 @@ GOOD = {Outcome.PASSED, Outcome.FAILED_AS_EXPECTED, Outcome.SKIPPED}
 
 @pytest.mark.parametrize("outcome", Outcome)
 def test_files_for_failures_are_not_written_for_good_outcomes(outcome: Outcome) -> None:
-    assert WrittenFor.ALL.includes(outcome)
-    assert not WrittenFor.NONE.includes(outcome)
-    assert WrittenFor.FAILED.includes(outcome) == (outcome not in GOOD)
+    assert OutcomeFilter.ALL.includes(outcome)
+    assert not OutcomeFilter.NONE.includes(outcome)
+    assert OutcomeFilter.FAILED.includes(outcome) == (outcome not in GOOD)
 
 
 @pytest.mark.parametrize(("keep_logs", "picture"), [("all", "all"), ("failed", "failed")])
@@ -26,5 +26,5 @@ def test_pictures_are_drawn_for_runs_that_keep_them(tmp_path: Path, keep_logs: s
         "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 1, y: 1}}\ngoals: []\npass: [{collisions: {max: 0}}]\n"
     )
     scenario = load_scenario(file, tmp_path)
-    options = SessionOptions(keep_logs=KeptLogs(keep_logs))
-    assert options.job(0, scenario, scenario.key(1), tmp_path).picture is WrittenFor(picture)
+    options = SessionOptions(keep_logs=LogRetention(keep_logs))
+    assert options.job(0, scenario, scenario.key(1), tmp_path).picture is OutcomeFilter(picture)

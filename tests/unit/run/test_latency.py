@@ -52,7 +52,7 @@ def moments(tmp_path: Path, beats: int, stack: str = "", lidar: str = "", latenc
         agent.decide(tick)
         taken.append(agent.moment)
         agent.drive()
-        rig.simulation.step(agent.schedule.until_next(tick))
+        rig.simulation.step(agent.schedule.ticks_until_next(tick))
     return taken
 
 

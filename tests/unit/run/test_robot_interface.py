@@ -8,7 +8,7 @@ from simscen.run.robot_interface import TickSchedule
 def test_exactly_the_multiples_of_all_periods_are_visited(periods):
     table, tick, visited = TickSchedule(periods), 0, []
     while tick < 500:
-        tick += table.until_next(tick)
+        tick += table.ticks_until_next(tick)
         visited.append(tick)
     due = [t for t in range(1, visited[-1] + 1) if any(t % period == 0 for period in periods)]
     assert visited == due
@@ -18,7 +18,7 @@ def test_exactly_the_multiples_of_all_periods_are_visited(periods):
 def test_phase_shifted_events_are_visited_at_their_tick(later):
     table, tick, visited = TickSchedule([24], later), 0, []
     while tick < 300:
-        tick += table.until_next(tick)
+        tick += table.ticks_until_next(tick)
         visited.append(tick)
     beats = [(24, 0), *later]
     assert visited == [

@@ -15,7 +15,7 @@ from simscen.faults.base import FaultSetting
 from simscen.faults.message_loss import Off
 from simscen.model.disturbances import FaultEntry
 from simscen.run.faults.command_link import CommandLink
-from simscen.run.faults.injector import FaultInjector, _equal
+from simscen.run.faults.injector import FaultInjector, _is_equal
 
 TILTED = Pose3(0.1, 0.0, 0.3, 0.0, np.sin(0.1), 0.0, np.cos(0.1))
 SCAN = Scan("lidar", 24, np.array([1.0, np.inf, np.nan]), -1.0, 0.5, 0.1, 8.0)
@@ -32,7 +32,7 @@ KINDS = [f"{type(reading).__name__}{number}" for number, reading in enumerate(RE
 
 @pytest.mark.parametrize("reading", READINGS, ids=KINDS)
 def test_a_copy_is_unchanged(reading: Reading) -> None:
-    assert _equal(reading, deepcopy(reading))
+    assert _is_equal(reading, deepcopy(reading))
 
 
 @pytest.mark.parametrize("reading", READINGS, ids=KINDS)
@@ -54,7 +54,7 @@ def test_a_change_of_any_field_is_a_change(reading: Reading) -> None:
             other = replace(value, x=value.x + 1.0)
         else:
             other = value + 1
-        assert not _equal(reading, replace(reading, **{field.name: other})), field.name
+        assert not _is_equal(reading, replace(reading, **{field.name: other})), field.name
 
 
 def test_a_fault_that_measures_again_must_not_withhold_the_measurement(monkeypatch: pytest.MonkeyPatch) -> None:
