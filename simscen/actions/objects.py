@@ -66,7 +66,7 @@ class Spawn(ShapedObject, Action):
             pose = pose_on_plan(plan, stage.robot, self.on_plan or 0.0).compose(Pose2(0.0, 0.0, self.yaw))
         else:
             pose = stage.robot.compose(Pose2(self.on_plan or 0.0, 0.0, self.yaw))
-            remark = ", because the robot had no plan"
+            remark = ", straight ahead because the robot had no plan"
         stage.spawn(Body(self.name, (self.solid(self.name),), Pose3.planar(pose), self.mass))
         return Effect(not remark, f"spawned {self.name} at ({pose.x:.2f}, {pose.y:.2f}){remark}")
 

@@ -21,15 +21,15 @@ class EventKind(str, Enum):
     PLAN_FAILED = "plan.failed"  # ""; error_code, error_name, message
     RECOVERY_STARTED = "recovery.started"  # behavior: clear_costmap, spin, wait, …; error_code, error_name, message
     RECOVERY_ENDED = "recovery.ended"  # behavior; outcome: succeeded, failed, or canceled
-    ROBOT_HELD = "robot.held"  # what it waits for: collision_monitor, planner, controller; message: why
-    ROBOT_RELEASED = "robot.released"  # what it waited for
-    COLLISION_STARTED = "collision.started"  # what was hit; x, y, impulse (N s), speed (m/s), robot_caused, …
-    COLLISION_ENDED = "collision.ended"  # what was hit; impulse (N s), ticks (duration)
+    ROBOT_HELD = "robot.held"  # component that the robot waits for: collision_monitor, planner, …; message
+    ROBOT_RELEASED = "robot.released"  # component that the robot waited for
+    COLLISION_STARTED = "collision.started"  # object that was hit; x, y, impulse (N s), speed (m/s), robot_caused, …
+    COLLISION_ENDED = "collision.ended"  # object that was hit; impulse (N s), ticks (duration)
     FAULT_STARTED = "fault.started"  # label, e.g. "lidar.off"; entry (number of the fault, from 0), sensor, fault, …
-    FAULT_TOOK_EFFECT = "fault.took_effect"  # label, at the first message or command it changed; entry
-    FAULT_ENDED = "fault.ended"  # label; entry, touched (how many messages and commands it changed)
-    EVENT_STARTED = "event.started"  # the scenario's event; entry (number of the event, from 0), actions
-    EVENT_ENDED = "event.ended"  # the scenario's event; entry, effects (of each action: happened, what)
+    FAULT_TOOK_EFFECT = "fault.took_effect"  # label, at the first changed message or command; entry
+    FAULT_ENDED = "fault.ended"  # label; entry, touched (number of changed messages and commands)
+    EVENT_STARTED = "event.started"  # event of the scenario; entry (number of the event, from 0), actions
+    EVENT_ENDED = "event.ended"  # event of the scenario; entry, effects (of each action: happened, what)
     OBJECT_SPAWNED = "object.spawned"  # object; its pose, mass, shape, parts (outlines in its own frame), person, …
     OBJECT_REMOVED = "object.removed"  # object
     OBJECT_MOVED = "object.moved"  # object; waypoints (x, y, yaw), times, repeat, ease, start, phase
@@ -43,7 +43,7 @@ class EventKind(str, Enum):
     ZONE_SWITCHED = "zone.switched"  # region, or "" for a mask; filter (keepout, speed), enabled, speed_limit (m/s)
     FLOOR_CHANGED = "floor.changed"  # region or patch; outline, friction, until (s; absent if permanent)
     MARK = "mark"  # the mark; note
-    RUN_ENDED = "run.ended"  # why: navigation ended, time limit, or (log of another recorder) the recording ends
+    RUN_ENDED = "run.ended"  # reason: navigation ended, time limit, or (log of another recorder) the recording ends
 
     def __str__(self) -> str:
         """Return the value, as it is written in logs."""
