@@ -53,7 +53,7 @@ def paths_from_working_folder(root: Path) -> Iterator[None]:
 
 
 def as_text(problems: Sequence[Problem]) -> str:
-    """Return the problems as text. Each has lines with place and message, source line, carets, and hint.
+    """Return the problems as text: for each problem, its place and message, the source line, carets, and the hint.
 
     The problems of one file must be adjacent. Only the first MAX_PROBLEMS_PER_FILE of a file are included.
     """
@@ -78,12 +78,12 @@ def as_github(problems: Iterable[Problem]) -> str:
     lines = []
     for problem in problems:
         level = "error" if problem.severity == "error" else "warning"
-        where = f"file={_escape_property(relative_to_checkout(problem.path))}"
+        place = f"file={_escape_property(relative_to_checkout(problem.path))}"
         if problem.line:
-            where += f",line={problem.line},col={problem.col}"
+            place += f",line={problem.line},col={problem.col}"
         title = _escape_property(f"simscen {problem.code}")
         message = problem.message + (f"\n{problem.hint}" if problem.hint else "")
-        lines.append(f"::{level} {where},title={title}::{_escape_message(message)}")
+        lines.append(f"::{level} {place},title={title}::{_escape_message(message)}")
     return "\n".join(lines)
 
 
@@ -140,6 +140,9 @@ def _escape_property(text: str) -> str:
 
 
 def _relative_path(path: str, root: Path) -> str:
-    """Return the shorter one of the relative and the absolute path; the path itself if the file does not exist."""
+    """Return `path` relative to the working directory, or absolute if that is shorter; unchanged for a missing file.
+
+    `path` is relative to `root`.
+    """
     absolute = str(root.absolute() / path)
     return min(os.path.relpath(absolute), absolute, key=len) if os.path.lexists(absolute) else path

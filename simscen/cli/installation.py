@@ -17,14 +17,15 @@ from simscen.run.platform_fingerprint import PACKAGES, cpu_flags
 from simscen.run.process.isolation import MAX_FILE_BYTES, MAX_MEMORY_BYTES, MAX_OPEN_FILES
 
 SUPPORTED_PYTHONS = ((3, 10), (3, 11), (3, 12), (3, 13))
+"""Supported versions of Python (major, minor)."""
 MIN_DISK_BYTES = 500 << 20
 """Minimum free disk space: about a hundred logs of one minute."""
 MIN_MEMORY_BYTES = 1 << 30
-"""Minimum memory limit of a run."""
+"""Minimum for the memory limit of a run."""
 MIN_SHARED_MEMORY_BYTES = 16 << 20
 """Minimum free space in /dev/shm, which OpenMP and the renderer use."""
 MIN_OPEN_FILES = 64
-"""Minimum limit of open files of a run."""
+"""Minimum for the limit of open files of a run."""
 
 
 class CheckFailed(Exception):
@@ -107,7 +108,7 @@ def check_disk_space(folder: Path) -> str:
 
 
 def check_resource_limits() -> str:
-    """Check that the limits of shell, container, and system for memory, open files, and file sizes allow a run."""
+    """Check that the limits of memory, open files, and file sizes (of shell, container, and system) allow a run."""
     memory = min(_soft_limit(resource.RLIMIT_AS), _cgroup_memory(), MAX_MEMORY_BYTES)
     files, length = _soft_limit(resource.RLIMIT_NOFILE), _soft_limit(resource.RLIMIT_FSIZE)
     if memory < MIN_MEMORY_BYTES:

@@ -28,7 +28,8 @@ class _LazyModule(ModuleType):
     """Placeholder for a module that is imported when one of its attributes is first accessed."""
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("__") and name != "__path__":  # requested by the import system; __path__ for submodules
+        # The import system reads such names. Only __path__ needs the module, to import submodules.
+        if name.startswith("__") and name != "__path__":
             raise AttributeError(name)
         if sys.modules.get(self.__name__) is self:
             del sys.modules[self.__name__]
@@ -41,13 +42,13 @@ class _LazyModule(ModuleType):
 def import_lazily(name: str, *functions: str) -> None:
     """Put a placeholder into `sys.modules`, which imports the module when one of its attributes is first accessed.
 
-    The module's functions named in `functions` are an exception: they import the module when they are called.
+    The functions named in `functions` can be accessed without an import: they import the module when they are called.
     """
     if name in sys.modules:
         return
     module = _LazyModule(name)
     module.__spec__ = importlib.util.find_spec(name)
-    if functions:  # `from name import` needs a path
+    if functions:  # `from NAME import FUNCTION` reads __path__, which would import the module
         module.__path__ = (module.__spec__ and module.__spec__.submodule_search_locations) or []
     for function in functions:
         setattr(module, function, _lazy_function(name, function))

@@ -45,6 +45,7 @@ def _check_requirements(all_packages: bool) -> None:
 
 
 def _exit_unusable(problems: list[str]) -> NoReturn:
+    """Print why the installation cannot be used, and exit with INCOMPLETE."""
     print(f"simscen: this installation does not work: {'; '.join(problems)}", file=sys.stderr)
     sys.exit(INCOMPLETE)
 

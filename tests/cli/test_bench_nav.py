@@ -34,7 +34,4 @@ def test_missing_data_is_reported_as_skipped_and_unknown_experiment_is_an_error(
     done = bench(*only, "--barn", str(tmp_path / "none"), "--out", str(tmp_path / "out"))
     assert done.returncode == 5
     assert f"BARN: skipped, there is no folder {tmp_path / 'none'}" in done.stderr
-    assert (
-        "tb3_sandbox: skipped, give the folder with Nav2's TurtleBot 3 simulation with --nav2; download: "
-        in done.stderr
-    )
+    assert "tb3_sandbox: skipped, pass the folder of Nav2's TurtleBot 3 simulation as --nav2; download: " in done.stderr

@@ -71,9 +71,9 @@ def command(
             trials[name] += new
             _print_failures(name, new)
         print_progress(f"{done} of {buildings} buildings" if done < buildings else "")
-    rows = [summarize(name, own) for name, own in trials.items()]
+    rows = [summarize(name, set_trials) for name, set_trials in trials.items()]
     if format_ is TextOrJson.JSON:
-        logs = {name: [asdict(trial) for trial in own] for name, own in trials.items()}
+        logs = {name: [asdict(trial) for trial in set_trials] for name, set_trials in trials.items()}
         print(json.dumps({"rows": [asdict(row) for row in rows], "logs": logs}, indent=2))
     else:
         print_text(as_text(rows, detect_style(sys.stdout, os.environ).columns))
@@ -111,11 +111,11 @@ COLUMN_NAMES = {
     "tracked": "tracked", "unknown": "start unknown", "outdated": "half rebuilt", "half": "half a map",
     "kidnapped": "kidnapped",
 }  # fmt: skip
-"""Circumstances with a column in the table, with its heading. Other circumstances only count for the consistency."""
+"""Column headings of the table by circumstance. Other circumstances only count for the consistency."""
 
 
 def as_text(rows: "Sequence[ParameterSetResults]", columns: int | None = None) -> str:
-    """Return a table with a line for each parameter set, and then the consistency (ANEES) of each parameter set.
+    """Return a table with a line for each parameter set, followed by the consistency (ANEES) of each parameter set.
 
     Lines are wrapped at `columns` characters; None stands for unlimited width.
     """
@@ -146,7 +146,8 @@ def _interval_text(interval: tuple[float, float]) -> str:
 def _consistency_lines(row: "ParameterSetResults") -> list[str]:
     """Return the name of the parameter set, and two lines for each circumstance.
 
-    The lines have the ANEES of all samples and at fixed times, each with the 95 % interval of a consistent localizer.
+    The first line has the ANEES of all samples, and the second the ANEES at fixed times. Each line has the 95 %
+    interval of a consistent localizer.
     """
     from simscen.bench.localization.campaign import CHECK_TIMES_S
 

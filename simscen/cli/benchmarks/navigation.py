@@ -101,8 +101,8 @@ def command(
     experiments: list[Experiment] = []
     sizes = Sizes(first, seeds, fields, dynamic, goals, lost)
     for group in experiment_groups(barn, nav2, project, generated, sizes):
-        is_whole = _is_selected(group.name, only)
-        if not is_whole and not any(_is_selected(name, only) for name in group.other_names):
+        is_group_selected = _is_selected(group.name, only)
+        if not is_group_selected and not any(_is_selected(name, only) for name in group.other_names):
             continue
         if group.missing_message:
             print(f"{group.name}: skipped, {group.missing_message}", file=sys.stderr)
@@ -110,21 +110,21 @@ def command(
         experiments += [
             experiment
             for experiment in group.write_experiments()
-            if experiment.drives and (is_whole or _is_selected(experiment.name, only))
+            if experiment.drives and (is_group_selected or _is_selected(experiment.name, only))
         ]
     if not experiments:
         raise NothingSelected(
-            "no experiment matches --only, its data is missing, or its number of fields or drives is 0"
+            "nothing to run: no experiment matches --only, or those that match have no data, fields, or drives"
         )
-    others = [] if stack is None else with_stack(stack, experiments, generated, project)
-    all_experiments = [*experiments, *others]
+    with_stack = [] if stack is None else experiments_with_stack(stack, experiments, generated, project)
+    all_experiments = [*experiments, *with_stack]
     trials, stopped = execute_experiments(all_experiments, journal, workers or len(os.sched_getaffinity(0)))
     rows = [
-        summarize_experiment(experiment, done)
+        summarize_experiment(experiment, finished)
         for experiment, runs in zip(all_experiments, trials, strict=True)
-        if (done := finished_trials(runs))
+        if (finished := finished_trials(runs))
     ]
-    compared = zip(experiments if others else [], trials, trials[len(experiments) :], strict=False)
+    compared = zip(experiments if with_stack else [], trials, trials[len(experiments) :], strict=False)
     pairs = [
         compare_experiment(experiment.name, before, after)
         for experiment, before, after in compared
@@ -140,10 +140,12 @@ def command(
         sys.exit(Exit.INCOMPLETE)
 
 
-def with_stack(file: Path, experiments: list["Experiment"], generated: Path, project: Path) -> list["Experiment"]:
+def experiments_with_stack(
+    file: Path, experiments: list["Experiment"], generated: Path, project: Path
+) -> list["Experiment"]:
     """Return copies of the experiments that use the parameters of a stack file. Raises InvalidInput.
 
-    Their scenarios are written to the folder `generated`. `project` is the root folder of the stack file.
+    The scenarios of the copies are written to the folder `generated`. `project` is the root folder of the stack file.
     """
     from simscen.bench.navigation.experiments import with_stack_parameters
     from simscen.loading.stacks.stack_files import load_stack_file

@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 SHIPPED_WORLDS = ("house", "office", "warehouse")
 """Names of the shipped worlds in which robots drive to random goals."""
-BARN_HINT = "give the folder with the BARN worlds with --barn; download: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"
+BARN_HINT = "pass the folder of the BARN worlds as --barn; download: https://www.cs.utexas.edu/~xiao/BARN/BARN.html"
 NAV2_HINT = (
-    "give the folder with Nav2's TurtleBot 3 simulation with --nav2; "
+    "pass the folder of Nav2's TurtleBot 3 simulation as --nav2; "
     "download: https://github.com/ros-navigation/nav2_minimal_turtlebot_simulation"
 )
-"""Messages if the option with the folder of the data is missing."""
+"""Messages if the option --barn or --nav2 is missing."""
 LIDAR_HEIGHT_M = 0.2
 """Height of the lidar for the maps of the worlds."""
 
@@ -69,7 +69,7 @@ class ExperimentGroup:
     name:               name of the group
     data_folder:        folder with the data; None if the option for the folder was not given
     write_experiments:  function that writes the scenario files, and returns the experiments
-    other_names:        names of the experiments that do not have the name of the group
+    other_names:        names of the experiments of the group that differ from `name`
     missing_hint:       message if `data_folder` is None
     """
 

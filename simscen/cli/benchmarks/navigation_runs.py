@@ -65,17 +65,17 @@ def execute_experiments(
 ) -> tuple[list[list[Trial]], Exit | None]:
     """Execute all runs that have no reusable result in the journal, and print progress and failures to stderr.
 
-    Return the trials (runs with their results) of each experiment, and the exit code of the signal that interrupted the
-    runs; None without a signal. Raises InvalidInput.
+    Return the trials (runs with their results) of each experiment. Also return the exit code of the signal that
+    interrupted the runs; None without a signal. Raises InvalidInput.
     """
     jobs, drives = _plan_jobs(experiments, journal.folder)
     pending = plan_session(journal, jobs, workers)
-    progress = _Progress(len(jobs), len(pending.reused))
+    progress = _Progress(len(jobs), len(pending.reused_results))
     options = SessionOptions(workers=workers, wall_limit=WALL_LIMIT_S)
     with interrupt_on_signals(), backend_of(options) as backend:
         finished_runs, stopped = run_session(pending.jobs, options, backend, broadcast(journal, progress))
     print_progress("")
-    results = {finished.key: finished for finished in (*pending.reused, *finished_runs)}
+    results = {finished.key: finished for finished in (*pending.reused_results, *finished_runs)}
     trials: list[list[Trial]] = [[] for _ in experiments]
     for job in jobs:
         number, drive = drives[job.key]
@@ -123,18 +123,19 @@ def _top_speed(scenario: LoadedScenario) -> float | None:
 class _Progress:
     """Listener that prints the number of finished runs, and all runs that did not pass, to stderr."""
 
-    def __init__(self, total: int, done: int) -> None:
-        self._total, self._done = total, done
+    def __init__(self, total: int, finished_count: int) -> None:
+        self._total, self._finished_count = total, finished_count
 
     def __call__(self, event: SessionEvent) -> None:
         """Handle an event of the session."""
         if not isinstance(event, RunFinished) or event.result.is_unfinished:
             return
-        self._done += 1
+        self._finished_count += 1
         if event.outcome is not Outcome.PASSED:
             print_progress("")
             print_text("\n".join(map(plain_text, run_lines(event, RunNaming(has_seeds=True)))), sys.stderr)
-        print_progress(f"{self._done} of {self._total} runs" if self._done < self._total else "")
+        is_running = self._finished_count < self._total
+        print_progress(f"{self._finished_count} of {self._total} runs" if is_running else "")
 
 
 def summarize_experiment(experiment: Experiment, trials: list[Trial]) -> ExperimentResult:

@@ -9,7 +9,7 @@ from simscen.bench.navigation.summary import Difference, ExperimentComparison, E
 from simscen.cli.benchmarks.navigation_runs import ExperimentResult, LocalizationAccuracy
 from simscen.cli.benchmarks.tables import align_columns, fits, label_cells, two_line_rows, wrap_lines
 
-PUBLISHED_DWA_LINE = "BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: " + ", ".join(
+PUBLISHED_DWA_LINE = "published results of BARN for DWA at 0.5 m/s, in another simulator and 50 worlds: " + ", ".join(
     f"{name} {value:.3f}" for name, value in PUBLISHED_DWA_RESULTS.items()
 )
 COMPARISON_HEAD = ("with minus without --stack", "pairs", "better", "worse", "success", "seconds", "SCT", "score")

@@ -58,18 +58,19 @@ def read_result(file: Path) -> Result:
             f"{file} is a result of another version of simscen bench ({versions}): measure again with this one"
         )
     try:
-        figures = {str(name): _figure(entry) for name, entry in data["figures"].items()}
+        figures = {str(name): _parse_figure(entry) for name, entry in data["figures"].items()}
         return Result(figures, str(data["machine"]), str(data["simscen"]))
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise UsageError(f"{file} is a damaged result of simscen bench: {type(error).__name__} at {error}") from None
 
 
-def _figure(entry: dict[str, Any]) -> Measurement:
+def _parse_figure(entry: dict[str, Any]) -> Measurement:
     rounds = tuple(float(value) for value in entry["rounds"])
     return Measurement(float(entry["value"]), str(entry["unit"]), rounds, bool(entry["more_is_better"]))
 
 
 COMPARISON_HEAD = ("", "before", "after", "ratio", "rounds before", "rounds after", "")
+"""Column headings of the comparison. The first column has the name of the figure, and the last its judgment."""
 MIN_ROUNDS = 2
 """Minimum number of rounds of a figure to distinguish changes from noise."""
 
@@ -117,11 +118,11 @@ def judgment(before: Measurement, after: Measurement) -> str:
 
 def _comparison_row(name: str, before: Measurement, after: Measurement) -> tuple[str, ...]:
     ratio = f"{after.value / before.value:.2f}" if before.value else "-"
-    values = (_value(before.value, before.unit), _value(after.value, after.unit))
+    values = (_value_text(before.value, before.unit), _value_text(after.value, after.unit))
     return name, *values, ratio, _spread(before), _spread(after), judgment(before, after)
 
 
-def _value(value: float, unit: str) -> str:
+def _value_text(value: float, unit: str) -> str:
     return f"{value:.4g} {unit}".rstrip()
 
 
@@ -150,9 +151,10 @@ def print_progress(text: str) -> None:
 def print_result(
     figures: Measurements, text: str, sections: dict[str, Any], format_: TextOrJson, before: Result | None
 ) -> None:
-    """Print figures of this machine: in the format JSON with the further keys `sections`, in the format TEXT as `text`.
+    """Print figures that this machine has measured.
 
-    The text is followed by the comparison with the earlier result `before`, if there is one.
+    The format TEXT prints `text`, followed by the comparison with the earlier result `before`, if there is one. The
+    format JSON prints the figures, with the further keys `sections`.
     """
     result = Result(figures, describe_processor(), version("simscen"))
     print_progress("")

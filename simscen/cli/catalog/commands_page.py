@@ -75,7 +75,7 @@ class Parameter:
     """Argument or option of a command.
 
     spelling:  names, such as "-j, --jobs"
-    value:     kind of its value, such as "integer, 1 to 256"; "" for a flag
+    value:     kind of the value, such as "integer, 1 to 256"; "" for a flag
     default:   default value; "" if there is none
     help:      description
     """
@@ -93,7 +93,7 @@ def commands_page() -> str:
         f"| [`simscen {name}`](#simscen-{functions[name][0][0].replace(' ', '-')}) | {text} |"
         for name, text in COMMANDS.items()
     )
-    sections = [command_section(*one) for name in COMMANDS for one in functions[name]]
+    sections = [command_section(*named) for name in COMMANDS for named in functions[name]]
     table = f"| command | what it does |\n|---|---|\n{rows}\n"
     return "\n".join([f"# Commands\n\n{_COMMANDS_INTRO}\n{table}", *sections, exit_code_section()])
 
@@ -146,12 +146,12 @@ def exit_code_section() -> str:
 
 
 def _parameter(parameter: inspect.Parameter, kind: Any, info: ArgumentInfo | OptionInfo) -> Parameter:
-    repeated, kind = _item_type(kind)
-    required = parameter.default is inspect.Parameter.empty
-    default = "" if required or parameter.default is None or parameter.default is False else parameter.default
+    is_list, kind = _item_type(kind)
+    is_required = parameter.default is inspect.Parameter.empty
+    default = "" if is_required or parameter.default is None or parameter.default is False else parameter.default
     if isinstance(info, ArgumentInfo):
         name = (info.metavar or parameter.name).upper()
-        spelling = f"{name}…" if repeated else name if required else f"[{name}]"
+        spelling = f"{name}…" if is_list else name if is_required else f"[{name}]"
     else:
         # Within Annotated, typer stores the first name as the default.
         names = [name for name in (info.default, *(info.param_decls or ())) if isinstance(name, str)]
@@ -164,8 +164,8 @@ def _item_type(kind: Any) -> tuple[bool, Any]:
     """Return whether a type is a list, and the type of a single value. The alternative None is ignored."""
     if get_origin(kind) in (Union, types.UnionType):
         kind = next(member for member in get_args(kind) if member is not type(None))
-    repeated = get_origin(kind) is list
-    return repeated, get_args(kind)[0] if repeated else kind
+    is_list = get_origin(kind) is list
+    return is_list, get_args(kind)[0] if is_list else kind
 
 
 def _value_text(kind: Any, info: ArgumentInfo | OptionInfo) -> str:

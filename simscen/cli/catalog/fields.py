@@ -37,7 +37,7 @@ _DEFAULT_TYPES = frozenset(
     for mark in get_args(union)[1:]
     if isinstance(mark, ExtensibleUnion)
 )
-"""Types that components have without the key `type`. All other types require this key."""
+"""Types of components for which the key `type` is optional, because they are the default."""
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
 
@@ -60,7 +60,7 @@ class Field:
 def fields_of(model: type[BaseModel]) -> list[Field]:
     """Return the keys of a model in order.
 
-    For a Choice (a mapping with exactly one of several keys), return only the keys that go with any of them.
+    For a Choice (a mapping with exactly one main key and optional modifiers), return only the modifiers.
     """
     docs = field_docs(model)
     names = model.modifiers if issubclass(model, Choice) else model.model_fields.keys()
@@ -123,7 +123,7 @@ def _plural(kind: str) -> str:
 
 
 def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
-    """Return the description of a type without alternatives and items, with its bounds."""
+    """Return the description of a type that is neither a union nor a list, with the bounds of its values."""
     # The constraints of pydantic's Field are in its own metadata.
     marks = [one for mark in metadata for one in (mark.metadata if isinstance(mark, FieldInfo) else [mark])]
     quantity = next((mark for mark in marks if isinstance(mark, Quantity)), None)

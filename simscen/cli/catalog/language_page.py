@@ -57,8 +57,8 @@ key for a task, see [All keys by task](../guides/words.md). In a terminal, `sims
 
 - A default of – means that the key is optional and has no fixed default.
 - A *place* is a named pose of the world.
-- A *mapping* contains further keys. They are in the section with the name of the key, or in the chapter about its
-  types: those of `drive` are in [Drives](#drives).
+- A *mapping* contains further keys. They are in the section with the name of the key, or in the chapter about the
+  types of the value: for example, [Drives](#drives) has the keys of `drive`.
 """
 _SIGNAL_NAMES = " | ".join(f"`{name}`" for name in SIGNALS)
 

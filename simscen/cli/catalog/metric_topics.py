@@ -26,12 +26,12 @@ several `--stack`, `suites` contains them for each stack:
 
 - `runs`: number of runs, without the second runs of `--check-determinism`, and without runs that were skipped,
   interrupted, or not started.
-- `success_rate`: share of successful runs in the `judged_runs`, with its 95 % Wilson interval. These are the runs with
-  an error, which did not succeed, and the runs with a known `success`.
+- `success_rate`: share of successful runs in the `judged_runs`, with its 95 % Wilson interval. The `judged_runs` are
+  the runs with a known `success`, and the runs with an error, which count as unsuccessful.
 - `spl`, `soft_spl`: means over all robots that have these metrics. `spl_runs` is the number of values of `spl`.
 - `collisions_per_km`, `collisions_per_hour`: collisions per driven kilometer and per simulated hour, over the robots
-  whose `collisions` are known. `measured_runs` is the number of runs with such robots; `kilometres` and `hours` are
-  their sums.
+  whose `collisions` are known. `measured_runs` is the number of runs with such robots; `kilometres` and `hours` are the
+  distance driven and the simulated time of these robots.
 
 In a run with several robots, each robot has its own distance, collisions, and SPL. The run succeeds if all robots do.
 

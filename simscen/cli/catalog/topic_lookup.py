@@ -31,7 +31,8 @@ def known_names(keys: bool = False) -> list[str]:
 def key_topics(path: str, known: Sequence[Topic]) -> list[Topic]:
     """Return a topic for each key with a path such as `goals.pose` or `stack.localizer.alpha1`.
 
-    A path starts at one of the topics `known`, or at the top of a file. A path of one key is searched in all of them.
+    A path starts at one of the topics `known`, or at the top of a file. If `path` is a single key, it is searched in
+    all topics.
     """
     parts = path.split(".")
     if len(parts) == 1:
@@ -44,8 +45,8 @@ def key_topics(path: str, known: Sequence[Topic]) -> list[Topic]:
     else:
         found = [topic for model, keys in _path_starts(parts, known) for topic in _keys_below(model, keys, path)]
         name, _, key = path.rpartition(".")
-        listed = [row for topic in known if topic.name == name for row in topic.rows if row.key == key]
-        found += [_key_topic(path, row, ()) for row in listed]
+        rows = [row for topic in known if topic.name == name for row in topic.rows if row.key == key]
+        found += [_key_topic(path, row, ()) for row in rows]
     return list({(topic.name, topic.text): topic for topic in found}.values())
 
 
@@ -82,8 +83,8 @@ def _with_indices(model: type[BaseModel], keys: list[str]) -> list[str | int]:
 
 
 def _key_topic(path: str, field: Field, rows: tuple[Field, ...]) -> Topic:
-    needed = (
+    default = (
         "required" if not field.default else "optional" if field.default == OPTIONAL else f"default {field.default}"
     )
-    text = f"{field.text}\n\n{field.kind} ({needed})" if field.text else f"{field.kind} ({needed})"
+    text = f"{field.text}\n\n{field.kind} ({default})" if field.text else f"{field.kind} ({default})"
     return Topic("key", path, None, text, rows=rows)

@@ -121,7 +121,7 @@ def topics(with_plugins: bool = False) -> list[Topic]:
     ]
 
 
-# Models of the topics of each group that is not a Choice, by name of the topic.
+# Models by name of the topic, for each group of topics that is not a Choice.
 _SCENARIO: dict[str, type[BaseModel]] = {
     "scenario": scenario.ScenarioSpec,
     "robot entry": scenario.RobotEntry,
@@ -219,7 +219,7 @@ def _choices(choice: type[Choice], with_plugins: bool) -> Iterator[Topic]:
 
 
 def entry_point_topics(group: str, with_plugins: bool) -> Iterator[Topic]:
-    """Yield the topics of the types with an entry point; only those of simscen without `with_plugins`."""
+    """Yield the topics of the types that simscen registers as entry points, or any package if `with_plugins`."""
     origins = {entry.name: entry.origin for entry in registry.plugin_types(group)}
     for name, model in registry.installed_specs(group, with_plugins=with_plugins).items():
         yield replace(_topic(group, name, model), origin=origins.get(name, ""))

@@ -19,6 +19,7 @@ from simscen.report.journal import require_unlocked
 from simscen.report.journal_reader import JournaledSession, read_journal
 
 BASELINE, CANDIDATE = "baseline", "candidate"
+"""Names of the two sessions in the comparison."""
 
 
 class Gate(str, Enum):

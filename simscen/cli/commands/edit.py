@@ -66,8 +66,8 @@ def command(
     from simscen.run.sessions.run_session import SessionOptions
 
     stacks = parse_stacks([] if stack is None else [stack], edited.root, edited.world_path)
-    chosen = next(iter(stacks.chosen), None)
-    session = EditorSession(edited, lambda: backend_of(SessionOptions()), text, lenient, chosen, stacks.with_command)
+    choice = next(iter(stacks.choices), None)
+    session = EditorSession(edited, lambda: backend_of(SessionOptions()), text, lenient, choice, stacks.with_command)
     try:
         server = EditorServer(session, port)
     except OSError as error:
@@ -109,8 +109,8 @@ def _edited_file(
     if file is None:
         raise UsageError("name the file to edit, or start a new one with --new --map office.yaml")
     if not file.is_file():
-        what = "it is not a regular file" if file.exists() else "no such file"
-        raise InvalidInput([Problem(str(file), 0, 0, "SC001", what, "start a new one with --new --map office.yaml")])
+        reason = "it is not a regular file" if file.exists() else "no such file"
+        raise InvalidInput([Problem(str(file), 0, 0, "SC001", reason, "start a new one with --new --map office.yaml")])
     from simscen.loading.checks.files import file_kind
     from simscen.loading.files.assets import SDF_SUFFIXES
 
@@ -120,7 +120,7 @@ def _edited_file(
         hint = "edit takes a scenario or a *.world.yaml; for other maps use: simscen edit --new --map FILE"
         message = f"is a {'Gazebo world' if kind == 'world' else f'{kind} file'}"
         raise InvalidInput([Problem(str(file), 0, 0, "SC001", message, hint)])
-    return _edited(file, kind, root_folder, world_path), ""
+    return _with_absolute_paths(file, kind, root_folder, world_path), ""
 
 
 def _new_file(
@@ -140,20 +140,20 @@ def _new_file(
     root_folder = root or default_root([target, map_])
     with paths_from_working_folder(root_folder):
         text = new_scenario_text(target, map_, root_folder, world_path, lenient)
-    return _edited(target, "scenario", root_folder, world_path), text
+    return _with_absolute_paths(target, "scenario", root_folder, world_path), text
 
 
-def _edited(file: Path, kind: str, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
-    """Return a file with absolute paths. Raises InvalidInput if it is outside of the root and world path.
+def _with_absolute_paths(file: Path, kind: str, root: Path, world_path: tuple[Path, ...]) -> "EditedFile":
+    """Return the file to edit with absolute paths. Raises InvalidInput if it is outside of the root and world path.
 
-    Symbolic links of folders are resolved, but not of the file itself.
+    Symbolic links to folders are resolved, but a symbolic link to the file itself is not.
     """
     from simscen.editor.document import EditedFile
     from simscen.loading.files.paths import PathSandbox
 
     path = Path(os.path.realpath(file.parent)) / file.name
     edited = EditedFile(path, kind, Path(os.path.realpath(root)), world_path)
-    entered = PathSandbox.around(edited.root, edited.world_path).resolve_argument(file)
-    if isinstance(entered, Problem):
-        raise InvalidInput([entered])
+    resolved = PathSandbox.around(edited.root, edited.world_path).resolve_argument(file)
+    if isinstance(resolved, Problem):
+        raise InvalidInput([resolved])
     return edited

@@ -17,7 +17,7 @@ from simscen.loading.schema.messages import quoted, suggestion
 from simscen.spec.registry import GROUPS, BrokenPlugin, plugin_types
 
 _ITEM_STARTS = ("- ", *HEADINGS)
-"""Beginnings of lines with which a list item or a paragraph with a heading begins."""
+"""Beginnings of the first line of a list item, or of a paragraph with a heading."""
 
 
 def command(
@@ -54,9 +54,9 @@ def explanation(name: str, width: int = 100) -> str:
 
 
 def _topics_named(name: str) -> list[Topic]:
-    """Return the topics with this name, or, if there are none, a topic for each key with this path.
+    """Return the topics with this name, ignoring case. If there are none, return a topic for each key with this path.
 
-    Upper and lower case of the name are the same. Raises UsageError if nothing is found.
+    Raises UsageError if nothing is found.
     """
     known = all_topics()
     lowered = name.lower()
@@ -108,8 +108,8 @@ def _topic_text(topic: Topic, width: int) -> str:
 
 
 def _field(field: Field, width: int) -> str:
-    needed = "required" if not field.default else "" if field.default == OPTIONAL else f"default {field.default}"
-    head = f"  {field.key}: {field.kind}" + (f" ({needed})" if needed else "")
+    default = "required" if not field.default else "" if field.default == OPTIONAL else f"default {field.default}"
+    head = f"  {field.key}: {field.kind}" + (f" ({default})" if default else "")
     return "\n".join([head, _wrapped(field.text, width, "      ")]) if field.text else head
 
 

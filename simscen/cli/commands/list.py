@@ -33,12 +33,13 @@ def command(
     to fail. Exit code 0: listed; 2: a scenario is invalid; 5: nothing is selected.
     """
     root_folder = root or default_root(paths)
-    tried = [try_variations(file, root_folder, world_path or ()) for file in discover(paths, root_folder)]
-    if problems := [problem for found in tried if isinstance(found, list) for problem in found]:
+    results = [try_variations(file, root_folder, world_path or ()) for file in discover(paths, root_folder)]
+    if problems := [problem for result in results if isinstance(result, list) for problem in result]:
         raise InvalidInput(relative_to_working_folder(problems, root_folder))
-    chosen = select([one for found in tried if isinstance(found, tuple) for one in found], keyword, tag or ())
-    width = max(len(scenario.title) for scenario in chosen)
-    for scenario in chosen:
+    scenarios = [scenario for result in results if isinstance(result, tuple) for scenario in result]
+    selected = select(scenarios, keyword, tag or ())
+    width = max(len(scenario.title) for scenario in selected)
+    for scenario in selected:
         tags = f"[{', '.join(scenario.spec.tags)}]" if scenario.spec.tags else ""
         details = f"{scenario.spec.name or ''} {tags} {_stack(scenario)} {_expectation(scenario)}"
         print_text(f"{escaped(scenario.title):{width}}  {escaped(details)}".rstrip())

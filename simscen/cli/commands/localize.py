@@ -115,7 +115,7 @@ def _load_inputs(
     with paths_from_working_folder(root_folder):
         world = load_world_file(map_, root_folder)
     if world.map is None:
-        hint = "see `simscen world --help` for how to make one"
+        hint = "write one with `simscen world export`"
         raise InvalidInput([Problem(str(map_), 0, 0, "SC320", "not a ROS map", hint)])
     root_folder = root or default_root([Path(robot)])
     with paths_from_working_folder(root_folder):
@@ -141,8 +141,8 @@ def _estimate(start: str | None, log_data: LocalizationLog) -> Estimate:
     return Estimate(Pose2(x, y, yaw))
 
 
-def _lines(localized: LocalizationResult, errors: PoseErrors | None, lost: float) -> list[str]:
-    """Return the printed lines. `lost` is the error in m above which the robot counts as lost."""
+def _lines(localized: LocalizationResult, errors: PoseErrors | None, lost_distance: float) -> list[str]:
+    """Return the printed lines. `lost_distance` is the error in m above which the robot counts as lost."""
     x, y, yaw = localized.poses[-1].tolist()
     seconds = localized.times[-1] - localized.times[0]
     lines = [f"{localized.scan_count} scans in {seconds:.1f} s; final belief ({x:.2f}, {y:.2f}, {yaw:.3f})"]
@@ -155,9 +155,9 @@ def _lines(localized: LocalizationResult, errors: PoseErrors | None, lost: float
         lines.append(f"compared with the reference: {errors.compared_fraction:.1%} of the beliefs")
     for interval in errors.lost:
         end = "to the end" if interval.until is None else f"to {interval.until:.1f} s"
-        lines.append(f"lost (more than {lost:g} m off) from {interval.since:.1f} s {end}")
+        lines.append(f"lost (more than {lost_distance:g} m off) from {interval.since:.1f} s {end}")
     restriction = "" if errors.compared_fraction >= MIN_COMPARED_FRACTION else ", as far as compared"
-    return lines if errors.lost else [*lines, f"never lost (more than {lost:g} m off){restriction}"]
+    return lines if errors.lost else [*lines, f"never lost (more than {lost_distance:g} m off){restriction}"]
 
 
 def _document(localized: LocalizationResult, errors: PoseErrors | None, seed: int) -> dict[str, object]:

@@ -98,8 +98,8 @@ def command(
         target, files = _target(name, out, from_log), GivenFiles(world, map_, robot)
         write_scenario_from_log(from_log, target, files, truth, topic or [], root, verify)
         return
-    of_log = {"out": out, "map": map_, "world": world, "robot": robot, "truth": truth, "topic": topic, "root": root}
-    for option, value in {**of_log, "verify": verify}.items():
+    options = {"out": out, "map": map_, "world": world, "robot": robot, "truth": truth, "topic": topic, "root": root}
+    for option, value in {**options, "verify": verify}.items():
         if value:
             raise UsageError(f"--{option} needs --from-log")
     if not name:
@@ -128,28 +128,31 @@ def _target(name: str, out: Path | None, log: Path) -> Path:
     """Return the file to write with --from-log: NAME, --out, or a file named after the log. Raises UsageError."""
     if name and out is not None:
         raise UsageError("give either NAME or --out")
-    written = str(out) if out is not None else name or log.resolve().name.partition(".")[0]
-    if is_unusable_name(written.rpartition("/")[2].partition(".")[0]):
-        raise UsageError(f"{written!r} is not a valid scenario name")
-    return Path(written if written.endswith((".yaml", ".yml")) else f"{written}{SCENARIO_SUFFIXES[0]}")
+    path = str(out) if out is not None else name or log.resolve().name.partition(".")[0]
+    if is_unusable_name(path.rpartition("/")[2].partition(".")[0]):
+        raise UsageError(f"{path!r} is not a valid scenario name")
+    return Path(path if path.endswith((".yaml", ".yml")) else f"{path}{SCENARIO_SUFFIXES[0]}")
 
 
 def _write_starter(file: Path, kind: str) -> None:
-    """Write the commented scenario or base file that simscen ships. Its first line refers to a schema of the project.
+    """Write a commented file of this kind, "scenario" or "base", that simscen ships.
 
-    The schema is searched in the folders `schemas` above the file, up to its root.
+    If the project has a schema for it in a folder `schemas` beside or above the file, the first line refers to it.
     """
     text = (PACKAGE / "data" / f"starter.{kind}.yaml").read_text(encoding="utf-8")
     folder, root = file.absolute().parent, default_root([file])
-    ancestors = [one for one in (folder, *folder.parents) if one.is_relative_to(root)]
-    schemas = [one / "schemas" / f"{kind}.schema.json" for one in ancestors]
-    if schema := next((one for one in schemas if one.is_file()), None):
+    ancestors = [ancestor for ancestor in (folder, *folder.parents) if ancestor.is_relative_to(root)]
+    schemas = [ancestor / "schemas" / f"{kind}.schema.json" for ancestor in ancestors]
+    if schema := next((candidate for candidate in schemas if candidate.is_file()), None):
         text = f"# yaml-language-server: $schema={os.path.relpath(schema, folder)}\n{text}"
     file.write_text(text, encoding="utf-8")
 
 
 def _copy(like: str, file: Path) -> list[Path]:
-    """Copy a scenario to `file`, and the files that it needs. Return these. Raises InvalidInput and UsageError."""
+    """Copy a scenario to `file`, and the files that it needs. Return the copies of these files.
+
+    Raises InvalidInput and UsageError.
+    """
     from simscen.loading.files.copying import copy_scenario
 
     source = _source(like)

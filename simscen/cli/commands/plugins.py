@@ -30,8 +30,8 @@ def command(format_: Annotated[TextOrJson, typer.Option("--format", help="Output
     """List the types that installed packages add.
 
     Lists the types by package, each with its kind, its name in files, its class, and the first paragraph of the
-    docstring, or why it cannot be used. The command imports each type. Exit code 0: all types are usable; 3: at least
-    one is not.
+    docstring, or the reason why the type cannot be used. The command imports each type. Exit code 0: all types are
+    usable; 3: a type cannot be used.
     """
     found = [entry for kind in GROUPS for entry in plugin_types(kind)]
     by_package = sorted([*found, *types_without_group()], key=lambda one: (one.distribution.lower(), one.distribution))
@@ -44,7 +44,7 @@ def command(format_: Annotated[TextOrJson, typer.Option("--format", help="Output
 
 
 def _row(entry: RegisteredType) -> dict[str, Any]:
-    """Return the JSON data of one type. Its key `broken` is the reason why the type cannot be used; "" if it can."""
+    """Return the JSON data of one type. The key `broken` has the reason why the type cannot be used; "" if it can."""
     text, broken, hint = "", "", ""
     try:
         first_paragraph = inspect.cleandoc(entry.load().__doc__ or "").partition("\n\n")[0]

@@ -73,10 +73,10 @@ def command(
     for file in files:
         prefix = "" if file.name in (COMPLETE_LOG, PARTIAL_LOG) else f"{log_name(file)}."
         page = out or file.with_name(f"{prefix}replay.html")
-        shown = [judging.judge_for_replay(one) for one in (file, *others)]
+        recorded_runs = [judging.judge_for_replay(log) for log in (file, *others)]
         try:
-            save(page, partial(write_replay, runs=shown), [file, *others])
-        except ValueError as error:  # the sensor data and the scenery are not read before
+            save(page, partial(write_replay, runs=recorded_runs), [file, *others])
+        except ValueError as error:  # from the sensor data and the scenery, which are read only here
             raise invalid_log(file, "SC802", f"the log is damaged: {error}") from error
         print_text(escaped(str(page)))
         if open_:

@@ -40,41 +40,41 @@ def command(
     run was not completed.
     """
     require_unlocked(folder)
-    past = read_journal(folder)
+    session = read_journal(folder)
     require_writable_junit(junit, folder)
     if parquet is not None:
         try:
-            files = write_parquet(parquet, past.runs, {run.key: run.varied for run in past.planned})
+            files = write_parquet(parquet, session.runs, {run.key: run.varied for run in session.planned})
         except OSError as error:
             raise UsageError(f"cannot write to {parquet}: {error.strerror or error}") from error
         for file in files:
             print_text(f"wrote {escaped(str(file))}", sys.stderr)  # stdout may be JSON
-    write_reports(past, folder, junit, junit_family, format_, only_junit=junit is not None)
+    write_reports(session, folder, junit, junit_family, format_, only_junit=junit is not None)
 
 
 def write_reports(
-    past: JournaledSession,
+    session: JournaledSession,
     folder: Path,
     junit: Path | None,
     junit_family: JunitFamily,
     format_: Format,
     only_junit: bool,
 ) -> NoReturn:
-    """Write the reports of an output folder from its session `past`, print the session, and exit with its code."""
+    """Write the reports of a session to its output folder, print the session, and exit with its exit code."""
     reports = Reports(folder, junit, junit_family.value, junit_only=only_junit)
-    finished_runs = past.runs
-    with open_screen(format_) as output:
-        output(past.start_event(folder))
+    finished_runs = session.runs
+    with open_screen(format_) as screen:
+        screen(session.start_event(folder))
         for finished in finished_runs:
-            output(finished)
-        comparison = compare_stacks((finished.result for finished in finished_runs), past.stacks)
+            screen(finished)
+        comparison = compare_stacks((finished.result for finished in finished_runs), session.stacks)
         results = (finished.result for finished in finished_runs)
-        study = None if past.study is None else evaluate_study(past.study, results)
+        study = None if session.study is None else evaluate_study(session.study, results)
         written = reports.write(finished_runs, comparison, study)
-        output(reports.finished_event(finished_runs, past.wall, past.interrupted, comparison, study))
+        screen(reports.finished_event(finished_runs, session.wall, session.interrupted, comparison, study))
     if format_ is Format.TEXT:
         for stack, summary in summaries_by_stack(finished_runs).items():
             line = session_summary_line(summary)
             print_text(f"{stack}: {line}" if stack else line)
     code = exit_code(finished_runs, study) if written else Exit.INCOMPLETE
-    sys.exit(output.exit_code(code))
+    sys.exit(screen.exit_code(code))

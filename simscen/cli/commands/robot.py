@@ -93,7 +93,7 @@ def as_table(body: "RobotBody", checked: "RobotCheckResult") -> Iterator[str]:
     yield f"  {drive}, {body.mass:.4g} kg, {len(body.wheels)} wheels"
     slope, step = checked.climb
     if slope:
-        yield f"  climbs {math.degrees(slope):.1f}° and a step of {1000 * step:.0f} mm, on dry concrete (closed forms)"
+        yield f"  climbs {math.degrees(slope):.1f}° and a step of {1000 * step:.0f} mm, on dry concrete (calculated)"
     yield ""
     yield f"  {'':9}{'driven in m':^24}{'turned in degrees':^25}  odometry   most"
     yield f"  {'':9}{'command odometry   truth'}  {'command odometry  truth'}  off at end  tilt"

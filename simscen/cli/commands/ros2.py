@@ -24,6 +24,7 @@ SOCKET_VARIABLE = "SIMSCEN_STACK_FD"
 _ADAPTER_START = Path(__file__).parents[2] / "ros2" / "start.py"
 """Program of the adapter, which runs with the Python interpreter of ROS."""
 _BASE_FRAME = "base_link"
+"""Default of --base-frame."""
 
 
 class GraphKind(str, Enum):
@@ -51,7 +52,7 @@ class Goals(str, Enum):
 
 
 def command(
-    what: Annotated[
+    kind: Annotated[
         GraphKind, typer.Argument(help="`nav2` also checks for the nodes that Nav2 needs.")
     ] = GraphKind.ANY,
     launch: Annotated[
@@ -137,7 +138,7 @@ def command(
         raise InvalidInput(relative_to_working_folder(parameters, Path.cwd()))
     if SOCKET_VARIABLE not in os.environ:
         names = PublishedNames([topics("/scan")], topics("/odom"), base_frames, topics.namespace)
-        _check_parameters(what, parameters, names)
+        _check_parameters(kind, parameters, names)
         return
     options = {
         "launch": launch,
@@ -157,7 +158,7 @@ def command(
         "settle": settle,
         "answer": answer,
         "wall_time": wall_time,
-        "nav2": what is GraphKind.NAV2,
+        "nav2": kind is GraphKind.NAV2,
         "parameters": parameters.nodes if parameters is not None else None,
         "parameter_file": str(params) if params is not None else "",
     }

@@ -132,7 +132,7 @@ def command(
     with early_fork_server(is_needed=backend is BackendName.LOCAL and not watch) as fork_server:
         from simscen.cli.session.backends import workers_and_cluster
         from simscen.cli.session.scenario_session import SessionRequest, execute_session
-        from simscen.cli.session.selection import Selection, scenario_times, shard_of
+        from simscen.cli.session.selection import Selection, parse_shard, scenario_times
         from simscen.cli.session.watch import watch_session
         from simscen.report.journal_reader import JOURNAL_FILE
         from simscen.run.sessions.run_session import SessionOptions
@@ -146,7 +146,9 @@ def command(
         workers, cluster = workers_and_cluster(workers, backend, address)
         request = SessionRequest(
             paths,
-            Selection(keyword, tag or [], shard_of(shard, os.environ), variation or [], scenario_times(shard_by or [])),
+            Selection(
+                keyword, tag or [], parse_shard(shard, os.environ), variation or [], scenario_times(shard_by or [])
+            ),
             SessionOptions(
                 workers,
                 seed,

@@ -88,7 +88,7 @@ def command(
     chosen = _chosen_run(run, seed, variation, stack)
     root_folder = root or default_root([chosen.file])
     stacks = parse_stacks([] if chosen.stack is None else [chosen.stack], root_folder, world_path or ())
-    choice = next(iter(stacks.chosen), None)
+    choice = next(iter(stacks.choices), None)
     with paths_from_working_folder(root_folder):
         scenario = ChangedScenario(chosen.file, root_folder, world_path or (), choice, chosen.variation)
     target = out or sibling(chosen.file, "minimal")
@@ -98,8 +98,8 @@ def command(
     workers, cluster = workers_and_cluster(workers, backend, address)
     options = SessionOptions(workers, wall_limit=wall_limit, cluster=cluster)
     checker = FileChecker(root_folder, world_path or (), lenient, stacks=stacks)
-    own_seed = child(scenario.tree, "seed")
-    first_seed = chosen.seed or (own_seed.plain if own_seed is not None and isinstance(own_seed.plain, int) else 1)
+    node = child(scenario.tree, "seed")
+    first_seed = chosen.seed or (node.plain if node is not None and isinstance(node.plain, int) else 1)
     try:
         with backend_of(options) as processes:
             candidates = CandidateRuns(scenario, checker, options, processes, first_seed, runs)
@@ -120,9 +120,12 @@ def command(
 
 @dataclass(frozen=True)
 class ChosenRun:
-    """Failed run to start from: scenario file, seed, variation, and value of --stack.
+    """Failed run to start from.
 
-    A `seed` or `stack` of None is the one in the scenario. The `variation` is "" for none.
+    file:       scenario file
+    seed:       seed of the run; None for the seed in the scenario
+    variation:  name of the variation; "" without a variation
+    stack:      value of --stack; None for the stack in the scenario
     """
 
     file: Path
@@ -170,8 +173,11 @@ def _shrink(candidates: CandidateRuns, criterion: str, keep: float, keep_world: 
             tree = inline
     shrinker = Shrinker(candidates, failure, tree)
     if sys.stderr.isatty():
-        candidates.report = lambda: print(
-            f"\r{candidates.runs} runs, {_size(shrinker.tree)} values left \x1b[K", end="", file=sys.stderr, flush=True
+        candidates.report_progress = lambda: print(
+            f"\r{candidates.run_count} runs, {_size(shrinker.tree)} values left \x1b[K",
+            end="",
+            file=sys.stderr,
+            flush=True,
         )
     if candidates.first_accepted([tree], failure.occurs_in) is None:
         raise UsageError("the run no longer fails if only this criterion is kept; this is a bug in simscen")
@@ -192,7 +198,7 @@ def _failure_text(result: RunResult, failure: Failure) -> str:
     """Return a failure in words, with the value and its limit."""
     if result.error is not None:
         return result.error.message
-    verdict = next(one for one in result.verdicts if one.id == failure.verdict_id)
+    verdict = next(verdict for verdict in result.verdicts if verdict.id == failure.verdict_id)
     finding = verdict.tightest
     return verdict.id if finding is None else f"{verdict.id}: {finding.measured} (limit {finding.limit})"
 
@@ -205,6 +211,6 @@ def _print_summary(shrinker: Shrinker, before: MappingNode, target: Path, stack:
         if texts:
             print_text("\n".join([title, *(f"  {escaped(text)}" for text in texts)]))
     incomplete = "" if shrinker.is_complete else ", which were not enough to try everything; increase --runs"
-    print_text(f"{_size(shrinker.tree)} values left after {shrinker.candidates.runs} runs{incomplete}")
+    print_text(f"{_size(shrinker.tree)} values left after {shrinker.candidates.run_count} runs{incomplete}")
     command = shlex.join(["simscen", "run", display_path(target), *([] if stack is None else ["--stack", stack])])
     print_text(f"wrote {escaped(str(target))}; try: {escaped(command)}")

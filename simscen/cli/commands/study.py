@@ -49,7 +49,7 @@ def command(
         ),
     ] = None,
     repeat: Annotated[
-        int, typer.Option(min=1, max=100_000, help="Seeds for each variation, if the values are not random.")
+        int, typer.Option(min=1, max=100_000, help="Number of seeds for each variation, if values are not random.")
     ] = 1,
     seed: Annotated[
         int | None, typer.Option(min=1, max=2**32 - 1, help="First seed, instead of the scenario's own.")

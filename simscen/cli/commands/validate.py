@@ -61,10 +61,10 @@ def command(
         sys.exit(Exit.USAGE)
     for file in files:
         kind = file_kind(file, root_folder)
-        of_file = relative_to_working_folder(_problems(kind, file, checker), root_folder)
+        file_problems = relative_to_working_folder(_problems(kind, file, checker), root_folder)
         kinds[kind] += 1
-        invalid_files += any(problem.severity == "error" for problem in of_file)
-        found.update(dict.fromkeys(of_file))
+        invalid_files += any(problem.severity == "error" for problem in file_problems)
+        found.update(dict.fromkeys(file_problems))
     problems = list(found)
     _print_problems(problems, format_, kinds.total(), is_valid=not invalid_files)
     if format_ is not Format.JSON:

@@ -126,8 +126,8 @@ def convert(
     source = _load(path, root_folder, world_path)
     spec, changes = _convert(source, root_folder, world_path, lenient, height)
     if source.map is not None:
-        path_of_map = os.path.relpath(source.map.path.resolve(), out.resolve().parent)
-        spec = spec.model_copy(update={"map": Path(path_of_map).as_posix()})
+        map_path = os.path.relpath(source.map.path.resolve(), out.resolve().parent)
+        spec = spec.model_copy(update={"map": Path(map_path).as_posix()})
     content = world_text(spec).encode()
     save(out, lambda file: write_atomically(file, content), _input_files(source))
     for change in changes:
@@ -179,9 +179,9 @@ def _build(source: LoadedWorld, root_folder: Path, world_path: list[Path] | None
 
 
 def _with_map(world: World, path: Path, height: float, resolution: float, alternative: str) -> BuiltWorld:
-    """Return a world with its map. Raises InvalidInput for the file `path` if the map would be too large.
+    """Build a world and its map. Raises InvalidInput for the file `path` if the map would be too large.
 
-    `alternative` is what users can do instead of changing the world.
+    `alternative` is a further hint: what the user can do instead of changing the world.
     """
     from simscen.worlds.built_world import build_world_and_map
 
@@ -215,28 +215,28 @@ def summary_lines(summary: "WorldSummary", height: float, everything: bool) -> I
     yield f"  map       {columns} x {rows} cells of {summary.map_resolution:g} m, cut at {height:g} m: " + (
         f"{occupied} occupied, {free} free, {unknown} unknown"
     )
-    yield from _items("solids", summary.solids, len(summary.solids) if everything else MAX_SOLIDS)
-    yield from _items("objects", summary.bodies, len(summary.bodies))
+    yield from _item_lines("solids", summary.solids, len(summary.solids) if everything else MAX_SOLIDS)
+    yield from _item_lines("objects", summary.bodies, len(summary.bodies))
     for title, names in (("places", summary.places), ("regions", summary.regions)):
         if names:
             yield f"  {title:9} {escaped(', '.join(names))}"
 
 
-def _items(title: str, items: "Sequence[WorldItem]", max_count: int) -> Iterator[str]:
+def _item_lines(title: str, items: "Sequence[WorldItem]", max_count: int) -> Iterator[str]:
     """Yield a title, and a line for each of the first `max_count` items."""
     if items:
         yield f"  {title}"
     width = max((min(len(escaped(item.name)), MAX_NAME_LENGTH) for item in items[:max_count]), default=0)
-    yield from (f"    {_item(item, width)}" for item in items[:max_count])
+    yield from (f"    {_item_line(item, width)}" for item in items[:max_count])
     if len(items) > max_count:
         yield f"    … and {len(items) - max_count} more (--all lists them)"
 
 
-def _item(item: "WorldItem", width: int) -> str:
-    """Return the line of an item: name, padded to `width`, shape, triangles, extent, and mass."""
+def _item_line(item: "WorldItem", width: int) -> str:
+    """Return the line of an item: name (padded to `width`), shape, triangles, extent, and mass."""
     x0, y0, z0, x1, y1, z1 = item.extent
     name = escaped(item.name)
     short_name = name if len(name) <= MAX_NAME_LENGTH else f"…{name[1 - MAX_NAME_LENGTH :]}"
-    where = f"x {x0:.2f} … {x1:.2f}  y {y0:.2f} … {y1:.2f}  z {z0:.2f} … {z1:.2f}"
+    extent = f"x {x0:.2f} … {x1:.2f}  y {y0:.2f} … {y1:.2f}  z {z0:.2f} … {z1:.2f}"
     mass = "" if item.mass is None else f"  {item.mass:g} kg" if item.mass else "  cannot be pushed"
-    return f"{short_name:{width}}  {item.shape:9} {item.triangles:7} triangles  {where}{mass}"
+    return f"{short_name:{width}}  {item.shape:9} {item.triangles:7} triangles  {extent}{mass}"

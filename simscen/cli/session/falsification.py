@@ -87,9 +87,10 @@ class FoundFailure:
 
 
 Signature = tuple[tuple[str, ...], frozenset[str], tuple[int, int] | None]
-"""Failed criteria, names of the triggered disturbances, and index (x, y) of the grid square of the failure.
+"""IDs of the failed criteria, names of the triggered disturbances, and index (x, y) of the grid square of the failure.
 
-Failures with equal signatures count as the same failure. The square is None for a failure without a position.
+Failures with equal signatures count as the same failure. A failure without a failed criterion has the kind of its error
+instead of the IDs. The square is None for a failure without a position.
 """
 
 
@@ -113,7 +114,7 @@ class Falsification:
         self._request = request
         root = request.root or default_root([request.file])
         stacks = parse_stacks([] if request.stack is None else [request.stack], root, request.world_path)
-        choice = next(iter(stacks.chosen), None)
+        choice = next(iter(stacks.choices), None)
         with paths_from_working_folder(root):
             self._scenario = ChangedScenario(request.file, root, request.world_path, choice, None)
             space = search_space(self._scenario.merged_tree)
@@ -126,10 +127,10 @@ class Falsification:
         self._variations: dict[str, Variation] = {}
         self._planned: list[PlannedRun] = []
         self._signatures: set[Signature] = set()
-        self._proposed = 0
+        self._proposal_count = 0
         self._problems: list[Problem] = []  # of the last values with which the scenario is invalid
         self.finished_runs: list[RunFinished] = []
-        self.found: list[FoundFailure] = []
+        self.failures: list[FoundFailure] = []
 
     def execute(self, backend: Backend, journal: Journal, reports: Reports, screen: Screen) -> Exit:
         """Search until a limit of the request is reached, or no valid values are found. Return the exit code.
@@ -166,7 +167,7 @@ class Falsification:
                 if finished is not None and stopped is None:
                     self._save_failure(finished)
         if not self.finished_runs and stopped is None:
-            message = f"none of {self._proposed} proposed values meets the conditions in `require`"
+            message = f"none of {self._proposal_count} proposed values meets the conditions in `require`"
             problems = relative_to_working_folder(self._problems, self._root)
             raise error or InvalidInput(problems or [Problem(str(self._request.file), 0, 0, "SC016", message)])
         study = evaluate_study(self._study_plan(), (finished.result for finished in self.finished_runs))
@@ -178,7 +179,7 @@ class Falsification:
             return stopped or Exit.INCOMPLETE
         if study.errors:
             return Exit.INCOMPLETE
-        if self.found:
+        if self.failures:
             return Exit.FAILED
         return Exit.PASSED if self.is_probability_shown else Exit.UNDECIDED
 
@@ -204,7 +205,7 @@ class Falsification:
     def _is_done(self) -> bool:
         """Return whether one of the limits in the request is reached: failures, runs, or probability."""
         request = self._request
-        if len(self.found) >= request.failures or len(self.finished_runs) >= request.runs:
+        if len(self.failures) >= request.failures or len(self.finished_runs) >= request.runs:
             return True
         return request.probability is not None and self.is_probability_shown
 
@@ -213,8 +214,8 @@ class Falsification:
         jobs: list[Job | None] = []
         options = self._request.options
         for point in points:
-            self._proposed += 1
-            scenario = self._load(f"{PROPOSAL_PREFIX}{self._proposed}", point)
+            self._proposal_count += 1
+            scenario = self._load(f"{PROPOSAL_PREFIX}{self._proposal_count}", point)
             if scenario is None:
                 jobs.append(None)
                 continue
@@ -260,7 +261,7 @@ class Falsification:
     def _save_failure(self, finished: RunFinished) -> None:
         """Write a scenario that reproduces the run, if it failed with a new signature and more failures are wanted."""
         result = finished.result
-        if result.outcome.is_good or not is_counted(result) or len(self.found) >= self._request.failures:
+        if result.outcome.is_good or not is_counted(result) or len(self.failures) >= self._request.failures:
             return
         if (new := signature(result)) in self._signatures:
             return
@@ -271,7 +272,7 @@ class Falsification:
         file = _new_failure_file(self._request.file)
         text = self._scenario.text_in(file.parent, tree, comment)
         write_atomically(file, text.encode())
-        self.found.append(FoundFailure(file, finished, variation.values))
+        self.failures.append(FoundFailure(file, finished, variation.values))
 
 
 def _require_unmarked(scenario: MappingNode, file: Path) -> None:
@@ -284,7 +285,7 @@ def _require_unmarked(scenario: MappingNode, file: Path) -> None:
 
 
 def _new_failure_file(scenario: Path) -> Path:
-    """Return the first path beside the scenario that neither this nor an earlier search has used for a failure."""
+    """Return the first path NAME.failure-N.scenario.yaml beside the scenario that does not exist."""
     return next(file for k in count(1) if not (file := sibling(scenario, f"failure-{k}")).exists())
 
 
@@ -294,21 +295,21 @@ def signature(result: RunResult) -> Signature:
     finding = failed[0].tightest if failed else None
     place = None if finding is None else finding.place
     square = None if place is None else (math.floor(place[0] / SQUARE_SIZE_M), math.floor(place[1] / SQUARE_SIZE_M))
-    kinds = tuple(sorted({verdict.id for verdict in failed})) or ((result.error.kind,) if result.error else ())
-    happened = frozenset(disturbance.disturbance.name for disturbance in result.disturbances if disturbance.fired)
-    return kinds, happened, square
+    ids = tuple(sorted({verdict.id for verdict in failed})) or ((result.error.kind,) if result.error else ())
+    triggered = frozenset(disturbance.disturbance.name for disturbance in result.disturbances if disturbance.fired)
+    return ids, triggered, square
 
 
 def summary_lines(falsification: Falsification) -> list[str]:
     """Return the last lines of the output: the failures, or a statement that there was no failure."""
     runs = number_with_noun(sum(is_counted(finished.result) for finished in falsification.finished_runs), "run")
     lines = []
-    for failure in falsification.found:
+    for failure in falsification.failures:
         values = ", ".join(f"{path} = {value_text(value)}" for path, value in failure.values.items())
         lines += [f"failure: {display_path(failure.file)}", f"with {values}"]
         lines += [f"replay: {failure.run.artifacts.replay}"] if failure.run.artifacts.replay else []
         lines += [f"smaller: simscen shrink {shlex.quote(display_path(failure.file))}", ""]
-    number = len(falsification.found)
+    number = len(falsification.failures)
     if number:
         lines.append(f"found {number} {'failure' if number == 1 else 'different failures'} in {runs}")
         return lines

@@ -43,7 +43,7 @@ class FileChecker:
     @property
     def choices(self) -> Sequence[StackChoice | None]:
         """Stacks with which each scenario is checked; None stands for the stack in the scenario."""
-        return self.stacks.chosen or (None,)
+        return self.stacks.choices or (None,)
 
     def check_scenario(
         self, file: Path, choice: StackChoice | None = None, variation_numbers: Sequence[int] | None = None
@@ -55,14 +55,14 @@ class FileChecker:
         loaded = try_variations(file, self.root, self.world_path, choice, variation_numbers)
         if isinstance(loaded, list):
             return (), loaded
-        checked = [self.check_variation(one) for one in loaded]
+        checked = [self.check_variation(variation) for variation in loaded]
         problems = merge_problems(
             [
-                VariationProblems(one.variation, one.varied_paths, found)
-                for one, (_, found) in zip(loaded, checked, strict=True)
+                VariationProblems(variation.variation, variation.varied_paths, found)
+                for variation, (_, found) in zip(loaded, checked, strict=True)
             ]
         )
-        usable = [one for one, _ in checked if one is not None]
+        usable = [variation for variation, _ in checked if variation is not None]
         return (usable if len(usable) == len(checked) else ()), problems
 
     def check_variation(self, loaded: LoadedScenario) -> tuple[LoadedScenario | None, list[Problem]]:
@@ -81,9 +81,9 @@ class FileChecker:
         return (loaded if usable else None), list(dict.fromkeys(problems))
 
     def check_world(self, file: Path) -> list[Problem]:
-        """Return the problems of a world file that appear when it is loaded and, unless `fast`, built.
+        """Return the problems of a world file that are found by loading and, unless `fast`, building the world.
 
-        `check_file` finds all others.
+        `check_file` finds the problems of its text.
         """
         try:
             source = load_world_file(file, self.root, self.world_path)
@@ -93,7 +93,7 @@ class FileChecker:
             return error.problems
 
     def check_robot(self, file: Path) -> list[Problem]:
-        """Return the problems of a robot file that appear when its geometry is checked; [] if `fast`."""
+        """Return the problems of a robot file that are found by building the robot; [] if `fast`."""
         if self.fast:
             return []
         try:

@@ -103,8 +103,8 @@ def _components(value: object) -> Iterator[Component]:
             inner = value.values()
         case list() | tuple():
             inner = value
-    for one in inner:
-        yield from _components(one)
+    for item in inner:
+        yield from _components(item)
 
 
 _SCENARIO_CACHE = ScenarioCache(CachedWorldBuilder(DiskCache(cache_folder(os.environ))))

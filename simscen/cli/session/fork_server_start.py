@@ -11,9 +11,9 @@ FORK_SERVER = ("-m", "simscen.cli.session.fork_server_main")
 
 @contextmanager
 def early_fork_server(is_needed: bool) -> Iterator[ForkServerProcess | None]:
-    """Start a fork server if one is needed. It is closed at the end of the context.
+    """Start a fork server if `is_needed`, and close it at the end of the context. Otherwise, provide None.
 
-    It imports its modules while this process imports those of the session, and loads the scenarios.
+    The fork server imports its modules while this process imports the modules of the session and loads the scenarios.
     """
     if not is_needed:
         yield None

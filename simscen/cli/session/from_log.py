@@ -41,16 +41,16 @@ def write_scenario_from_log(
         raise InvalidInput([Problem(str(log), 0, 0, "SC001", "no such file or directory")])
     options = ReconstructionOptions(truth, parse_topics(topics, TOPIC_ROLES), files, root)
     with create_file(out, str(out)), paths_from_working_folder(default_root([out])):
-        made = scenario_from_log(log, out, options)
-    for file in made.files[1:]:
+        reconstruction = scenario_from_log(log, out, options)
+    for file in reconstruction.files[1:]:
         print_text(f"wrote {escaped(str(file))}")
-    for line in made.summary():
+    for line in reconstruction.summary():
         print_text(escaped(line))
     print_text(f"wrote {escaped(str(out))}; try: simscen run {escaped(shlex.quote(str(out)))}")
-    for unknown in made.contents.unknowns:
+    for unknown in reconstruction.contents.unknowns:
         print_text(f"note: the log does not show: {escaped(unknown)}", sys.stderr)
     if verify:
-        _verify(made)
+        _verify(reconstruction)
 
 
 def _verify(reconstruction: Reconstruction) -> None:

@@ -69,13 +69,13 @@ class LogJudge:
     def judge(self, log: Path, is_only_log: bool) -> RunFinished:
         """Evaluate a log and return its result.
 
-        If the evaluation fails, the result is an error; for the only log, the exception is raised instead. Raises
-        UnusableScenario if the criteria file is invalid.
+        If the evaluation fails, the result is an error. If `is_only_log` is true, the exception is raised instead.
+        Raises InvalidCriteriaFile if the criteria file is invalid.
         """
         try:
-            return self._judge_simscen_log(log) if _is_own_log(log) else self._judge_foreign(log)
+            return self._judge_simscen_log(log) if _is_written_by_simscen(log) else self._judge_foreign(log)
         except InvalidInput as error:
-            if is_only_log or isinstance(error, UnusableScenario):
+            if is_only_log or isinstance(error, InvalidCriteriaFile):
                 raise
             reason = "; ".join(": ".join(filter(None, (problem.message, problem.hint))) for problem in error.problems)
             return _not_judged(log, RunFailure("invalid", reason))
@@ -87,7 +87,7 @@ class LogJudge:
 
     def judge_for_replay(self, log: Path) -> tuple[Log, RunResult]:
         """Return a log with its sensor data, and its result. Raises InvalidInput if the log is unusable."""
-        if _is_own_log(log):
+        if _is_written_by_simscen(log):
             read = read_run(log, with_sensors=True)
             return read, recorded_result(read, log) if self._criteria is None else self._judge_simscen_log(log).result
         self.foreign_count += 1
@@ -112,20 +112,20 @@ class LogJudge:
             return RunFinished(result, artifacts=Artifacts(mcap=str(log)), file=str(log))
         if not read.robots:
             return self._judge_robot(log, read, self._criteria, "")
-        runs = {name: self._judge_robot(log, one, self._criteria, name) for name, one in read.robots.items()}
+        runs = {name: self._judge_robot(log, part, self._criteria, name) for name, part in read.robots.items()}
         traces = {name: robot_log.trace for name, robot_log in read.robots.items()}
         expected = expected_failure(self._criteria.spec)
         result = combine_robots({name: run.result for name, run in runs.items()}, traces, expected)
         return replace(next(iter(runs.values())), result=result)
 
-    def _judge_robot(self, log: Path, read: Log, written: LoadedCriteria, robot: str) -> RunFinished:
-        """Evaluate the part of a log about one robot with criteria of the criteria file.
+    def _judge_robot(self, log: Path, read: Log, criteria_file: LoadedCriteria, robot: str) -> RunFinished:
+        """Evaluate `read`, the part of a log about one robot, with the criteria file.
 
-        `robot` is its name; "" for the only robot.
+        `robot` is the name of the robot; "" for the only robot.
         """
         header, case = read.header, read.header.case
-        with _scenario_errors(written):
-            criteria = written.for_robot(robot)
+        with _as_invalid_criteria_file(criteria_file):
+            criteria = criteria_file.for_robot(robot)
         # The disturbances are in the scenario of the log, at lines that the criteria file does not have.
         case = replace(case, disturbances=tuple(replace(disturbance, line=0) for disturbance in case.disturbances))
         labels, objects = _names_in_log(read)
@@ -148,7 +148,7 @@ class LogJudge:
     def _judge_foreign_log(self, log: Path, with_sensors: bool = False) -> tuple[ForeignLog, RunResult]:
         """Return a foreign log, and its result according to the criteria file."""
         assert self._criteria is not None
-        with _scenario_errors(self._criteria):
+        with _as_invalid_criteria_file(self._criteria):
             criteria = self._criteria.for_robot("")
         case = self._foreign_case
         goals = tuple(goal.name for goal in case.goals if not goal.via)
@@ -166,7 +166,7 @@ class LogJudge:
             return self._file_masks
         from simscen.loading.builders import load_criterion_masks
 
-        with _scenario_errors(criteria):
+        with _as_invalid_criteria_file(criteria):
             masks = load_criterion_masks(criteria.masks, criteria.tree, criteria.library.texts)
         self._file_masks = masks if criteria is self._criteria else self._file_masks
         return masks
@@ -176,7 +176,7 @@ class LogJudge:
         if self._file_objects is None:
             from simscen.run.criteria_case import world_of_criteria
 
-            with _scenario_errors(criteria):
+            with _as_invalid_criteria_file(criteria):
                 world = world_of_criteria(criteria)
             self._file_objects = frozenset(
                 [*(body.name for body in world.bodies), *(solid.name for solid in world.solids)]
@@ -189,7 +189,7 @@ class LogJudge:
         from simscen.run.criteria_case import case_from_criteria
 
         assert self._criteria is not None
-        with _scenario_errors(self._criteria):
+        with _as_invalid_criteria_file(self._criteria):
             return case_from_criteria(self._criteria)
 
     def _judge_by_file(
@@ -209,9 +209,9 @@ class LogJudge:
 
 
 def _names_in_log(log: Log) -> tuple[frozenset[str], frozenset[str]]:
-    """Return the names of all events, faults, and marks in a log and its scenario, and of its objects.
+    """Return the names of all events, faults, and marks in a log and its scenario, and the names of all objects.
 
-    Objects of world files are missing.
+    The objects of world files are not included.
     """
     tree, _ = parse_yaml(log.header.scenario, "scenario.yaml")
     scenario = tree.plain if isinstance(tree, MappingNode) else {}
@@ -225,13 +225,16 @@ def _names_in_log(log: Log) -> tuple[frozenset[str], frozenset[str]]:
 
 
 def _names(plain: object, keys: Set[str] | None = None, key: str = "") -> set[str]:
-    """Return the values of `name` in YAML data. With `keys`, return only those in values of these keys."""
+    """Return the values of all keys `name` in YAML data. `key` is the key of these data in their parent mapping.
+
+    With `keys`, return only the names of mappings that are values of these keys.
+    """
     if isinstance(plain, list):
         return {name for part in plain for name in _names(part, keys, key)}
     if not isinstance(plain, Mapping):
         return set()
-    own = {str(plain["name"])} if "name" in plain and (keys is None or key in keys) else set()
-    return own.union(*(_names(part, keys, below) for below, part in plain.items()))
+    names = {str(plain["name"])} if "name" in plain and (keys is None or key in keys) else set()
+    return names.union(*(_names(part, keys, child_key) for child_key, part in plain.items()))
 
 
 def _not_judged(log: Path, failure: RunFailure) -> RunFinished:
@@ -241,26 +244,26 @@ def _not_judged(log: Path, failure: RunFailure) -> RunFinished:
     )
 
 
-def _is_own_log(log: Path) -> bool:
-    """Return whether simscen wrote a log. It writes no folders, and no files of the rosbag formats."""
+def _is_written_by_simscen(log: Path) -> bool:
+    """Return whether simscen wrote a log. The logs of simscen are never folders or files of the rosbag formats."""
     return not log.is_dir() and log.suffix not in (".db3", ".bag") and is_simscen_log(log)
 
 
-class UnusableScenario(InvalidInput):
+class InvalidCriteriaFile(InvalidInput):
     """The criteria file is invalid, so that no log can be evaluated."""
 
 
 @contextmanager
-def _scenario_errors(criteria: LoadedCriteria) -> Iterator[None]:
-    """Convert InvalidInput to UnusableScenario within the context."""
+def _as_invalid_criteria_file(criteria: LoadedCriteria) -> Iterator[None]:
+    """Convert InvalidInput to InvalidCriteriaFile within the context."""
     try:
         yield
     except InvalidInput as error:
-        raise UnusableScenario(relative_to_working_folder(error.problems, criteria.library.sandbox.root)) from error
+        raise InvalidCriteriaFile(relative_to_working_folder(error.problems, criteria.library.sandbox.root)) from error
 
 
 def runs_without_log(paths: Sequence[Path]) -> list[tuple[str, RunFinished]]:
-    """Return the folder and the result of each run without a log, for the sessions at and below the paths.
+    """Return the folder and the result of each run without a log, in the sessions at and below the paths.
 
     The result is an error, except for skipped runs.
     """
@@ -277,5 +280,6 @@ def _as_error(run: RunFinished) -> RunFinished:
     if run.outcome is Outcome.SKIPPED:
         return run
     error = run.result.error
-    failure = RunFailure(error.kind if error else "crashed", "it left no log" + (f": {error.message}" if error else ""))
+    reason = f": {error.message}" if error else ""
+    failure = RunFailure(error.kind if error else "crashed", f"the run left no log{reason}")
     return RunFinished(error_result(run.key, run.result.path, failure), file=run.file)

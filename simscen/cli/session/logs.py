@@ -1,4 +1,4 @@
-"""Search for the logs in files and folders, and reading of the result that is recorded in a log."""
+"""Search for logs in files and folders, and the result of a log: the recorded one, or a new evaluation."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -110,7 +110,7 @@ def log_file(run: Path) -> Path:
 
 
 def recorded_result(log: Log, file: Path) -> RunResult:
-    """Return the result in a log. If the log has none because it is incomplete, evaluate its criteria instead.
+    """Return the result that is recorded in a log. An incomplete log has none; then evaluate its criteria.
 
     Raises InvalidInput for an invalid result.
     """
@@ -125,21 +125,21 @@ def recorded_result(log: Log, file: Path) -> RunResult:
 def evaluate_recorded_criteria(log: Log, file: Path, path: str) -> RunResult:
     """Return the result of a log according to the criteria of the scenario in the log.
 
-    `file` is the path of the log in messages. `path` becomes `path` of the result: the ID of the scenario, or the path
-    of the log.
+    `file` is the path of the log in messages. `path` is the attribute `path` of the result: the ID of the scenario, or
+    the path of the log.
     """
     header = log.header
 
     def criteria(robot: str) -> CriteriaSpec:
         return criteria_of_text(header.scenario, str(file), header.facts, robot)
 
-    def judge(one: Log, spec: CriteriaSpec, expected: ExpectedFailure | None) -> RunResult:
-        case, coverage = one.header.case, one.coverage
-        return judge_run(header.key, path, spec.pass_, one.trace, case, (), coverage, spec.metrics, expected)
+    def judge(part: Log, spec: CriteriaSpec, expected: ExpectedFailure | None) -> RunResult:
+        case, coverage = part.header.case, part.coverage
+        return judge_run(header.key, path, spec.pass_, part.trace, case, (), coverage, spec.metrics, expected)
 
     spec = criteria("")
     expected = expected_failure(spec)
     if not log.robots:
         return judge(log, spec, expected)
-    results = {name: judge(one, criteria(name), None) for name, one in log.robots.items()}
-    return combine_robots(results, {name: one.trace for name, one in log.robots.items()}, expected)
+    results = {name: judge(part, criteria(name), None) for name, part in log.robots.items()}
+    return combine_robots(results, {name: part.trace for name, part in log.robots.items()}, expected)

@@ -35,6 +35,7 @@ class Reports:
     """Writes the reports of a session to its output folder.
 
     folder:        output folder
+    page:          path of the HTML report in the output folder
     junit:         further file for the JUnit report; None for no further file
     family:        dialect of JUnit XML
     junit_only:    whether to write only the file `junit`
@@ -55,7 +56,7 @@ class Reports:
         self._junit, self._junit_only = junit or folder / "junit.xml", junit_only
         self._family: Family = family
         self._extra_entries, self._is_resumable = extra_entries or {}, is_resumable
-        self._missing = frozenset({self.page, self._junit})
+        self._missing_reports = frozenset({self.page, self._junit})
 
     def begin(self) -> None:
         """Write run.json before the first run. Raises UsageError if the folder is not writable."""
@@ -71,22 +72,22 @@ class Reports:
         folder, documents = str(self.folder), dict[Path, bytes | Iterable[bytes]]()
         if not self._junit_only:
             names = ("results.json", "junit.xml", "run.json")
-            page = SessionReport(finished_runs, self._past, comparison, folder, names, study=study)
+            page = SessionReport(finished_runs, self._past_sessions, comparison, folder, names, study=study)
             results = json_parts(finished_runs, folder, comparison, study)
             documents[self.folder / "results.json"] = map(str.encode, results)
             documents[self.page] = to_html(page).encode()
             documents[self.folder / "junit.xml"] = xml_parts(finished_runs, self._family, study=study)
         documents[self._junit] = xml_parts(finished_runs, self._family, study=study)
-        self._missing = frozenset(path for path, data in documents.items() if not _write(path, data))
-        return not self._missing
+        self._missing_reports = frozenset(path for path, data in documents.items() if not _write(path, data))
+        return not self._missing_reports
 
     def write_live(self, finished_runs: Sequence[RunFinished], progress: RunningSession) -> bool:
-        """Write the HTML report of a session that is still running, and return whether it was written."""
-        page = to_html(SessionReport(finished_runs, self._past, folder=str(self.folder), progress=progress))
+        """Write the HTML report of a running session, and return whether it was written."""
+        page = to_html(SessionReport(finished_runs, self._past_sessions, folder=str(self.folder), progress=progress))
         return _write(self.page, page.encode())
 
     @cached_property
-    def _past(self) -> Sequence[PastSession]:
+    def _past_sessions(self) -> Sequence[PastSession]:
         return past_sessions(self.folder)
 
     def write_duration(self, wall: float) -> bool:
@@ -97,11 +98,11 @@ class Reports:
         self,
         finished_runs: Sequence[RunFinished],
         wall: float,
-        interrupted: bool,
+        is_interrupted: bool,
         comparison: Comparison | None = None,
         study: Study | None = None,
     ) -> SessionFinished:
-        """Return the last event of a session. `wall` is its wall-clock duration in s.
+        """Return the last event of a session. `wall` is the wall-clock duration of the session in s.
 
         The path of a report is empty if the report was not written.
         """
@@ -115,13 +116,13 @@ class Reports:
             count[Outcome.ERROR],
             simulated=simulated,
             wall=wall,
-            interrupted=interrupted,
-            junit="" if self._junit in self._missing else str(self._junit),
+            interrupted=is_interrupted,
+            junit="" if self._junit in self._missing_reports else str(self._junit),
             folder=str(self.folder),
             comparison=comparison,
             expected=count[Outcome.FAILED_AS_EXPECTED],
             skipped=count[Outcome.SKIPPED],
-            page="" if self._junit_only or self.page in self._missing else str(self.page),
+            page="" if self._junit_only or self.page in self._missing_reports else str(self.page),
             study=study,
             is_resumable=self._is_resumable,
         )

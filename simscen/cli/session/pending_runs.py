@@ -32,30 +32,31 @@ SHARED_RESULT_KEYS = ("scenario", "seed", "variation", "stack_name", "simulated_
 class PendingRuns:
     """Planned runs of a session: runs to execute, and runs with reused results.
 
-    journal:  journal of the session, a file that lists planned and finished runs
-    jobs:     runs to execute
-    reused:   results of the other runs, from an earlier session in the same folder
-    workers:  number of parallel runs
-    stacks:   values NAME=VALUE of --stack
+    journal:         journal of the session, a file that lists planned and finished runs
+    jobs:            runs to execute
+    reused_results:  results of the other runs, from an earlier session in the same folder
+    workers:         number of parallel runs
+    stacks:          values NAME=VALUE of --stack
     """
 
     journal: Journal
     jobs: Sequence[Job]
-    reused: Sequence[RunFinished]
+    reused_results: Sequence[RunFinished]
     workers: int
     stacks: tuple[str, ...] = ()
 
-    def started(self, folder: Path) -> SessionStarted:
-        """Return the first event of the session."""
-        keys = [*(job.key for job in self.jobs), *(run.key for run in self.reused)]
+    def start_event(self, folder: Path) -> SessionStarted:
+        """Return the first event of the session. `folder` is the output folder."""
+        keys = [*(job.key for job in self.jobs), *(run.key for run in self.reused_results)]
         return session_started(__version__, keys, self.workers, folder, self.stacks)
 
 
 def plan_session(journal: Journal, jobs: Sequence[Job], workers: int, shard: tuple[int, int] = (1, 1)) -> PendingRuns:
-    """Write the planned runs to the journal, and return the pending runs. Raises UsageError if that fails.
+    """Write the planned runs to the journal, and return the pending runs.
 
     A result of an earlier session in the folder is reused if it is not an error and its scenario has not changed.
-    `shard` is the number of this shard (from 1) and the count of shards.
+    `shard` is the number of this shard (from 1) and the count of shards. Raises UsageError if the journal cannot be
+    written.
     """
     planned = plan_runs(jobs)
     past = previous_session(journal)
@@ -86,14 +87,14 @@ def plan_runs(jobs: Sequence[Job]) -> list[PlannedRun]:
 
 
 def divide_runs(
-    jobs: Sequence[Job], planned: Sequence[PlannedRun], earlier: Mapping[PlannedRun, RunFinished]
+    jobs: Sequence[Job], planned: Sequence[PlannedRun], earlier_results: Mapping[PlannedRun, RunFinished]
 ) -> tuple[list[Job], list[RunFinished]]:
-    """Return the jobs to execute, and the `earlier` results of all other jobs.
+    """Return the jobs to execute, and the earlier results of all other jobs.
 
     `planned` are the runs of the jobs in the same order. The two runs that --check-determinism compares are either both
     executed or both reused.
     """
-    results = [earlier.get(run) for run in planned]
+    results = [earlier_results.get(run) for run in planned]
     reused: list[RunFinished] = []
     remaining: list[Job] = []
     for number, (job, result) in enumerate(zip(jobs, results, strict=True)):
@@ -105,7 +106,7 @@ def divide_runs(
 
 
 def write_reused(journal: Journal, reused: Sequence[RunFinished]) -> None:
-    """Write reused results to the journal. Raises UsageError if that fails."""
+    """Write reused results to the journal. Raises UsageError if the journal cannot be written."""
     for finished in reused:
         journal(finished)
     if journal.error:
@@ -167,7 +168,7 @@ def _compared_index(jobs: Sequence[Job], number: int) -> int:
 
 
 RUN_ALL = "all selected scenarios run"
-"""Last words of a message of --last-failed if all selected scenarios run."""
+"""End of a message of --last-failed that selects no runs, so that all selected scenarios run."""
 
 
 def failed_runs(
@@ -175,8 +176,9 @@ def failed_runs(
 ) -> tuple[frozenset[RunKey] | None, str]:
     """Return the runs of these scenarios that failed when they last ran, and a message for the user.
 
-    The runs are None if there is no earlier session, or no such run. Sessions are searched in the parent folder of
-    `out`, the output folder, or in simscen-out if `out` is None. If the options set seeds, other seeds do not count.
+    The runs are None if there is no earlier session, or no such run; all scenarios run then. Sessions are searched in
+    the parent folder of `out`, the output folder, or in simscen-out if `out` is None. If the options set seeds, runs
+    with other seeds are ignored.
     """
     sessions_folder = DEFAULT_FOLDER if out is None else out.absolute().parent
     failed = last_failed(sessions_folder)

@@ -57,8 +57,8 @@ def execute_session(
     """Run a session, write its reports, and return the exit code.
 
     `on_loaded` is called with the selected scenarios before the first run. `listeners` receive all events.
-    `unused_server` is a fork server that was started before.
-    Raises InvalidInput, UsageError, and NothingSelected before the first run.
+    `unused_server` is a fork server that was started before, and has not been used yet. Raises InvalidInput,
+    UsageError, and NothingSelected before the first run.
     """
     options, output = request.options, request.output
     scenarios, warnings = load_selection(
@@ -100,12 +100,12 @@ def _run(
     `listener` receives all events, including the events of reused results.
     """
     start, journal_and_listener = time.monotonic(), broadcast(pending.journal, listener)
-    listener(pending.started(reports.folder))
-    for finished in pending.reused:
+    listener(pending.start_event(reports.folder))
+    for finished in pending.reused_results:
         listener(finished)
     with interrupt_on_signals(), backend_of(options, unused_server) as backend:
         done, stopped = run_session(pending.jobs, options, backend, journal_and_listener)
-    finished_runs = RunStore(pending.reused)
+    finished_runs = RunStore(pending.reused_results)
     finished_runs.extend(done)
     pending.journal.complete(finished_runs)
     comparison = compare_stacks((finished.result for finished in finished_runs), pending.stacks)
@@ -126,7 +126,7 @@ def start_session(
 ) -> tuple[Reports, Journal]:
     """Create the output folder with its journal and run.json. `extra_entries` are added to run.json.
 
-    The file of --junit must not be one of the `inputs`. `is_resumable`: whether the command has the option --resume.
+    The file of --junit must not be one of the `inputs`. `is_resumable` is true if the command has the option --resume.
     Raises InvalidInput and UsageError.
     """
     require_writable_junit(output.junit, output.out or output.resume, inputs)

@@ -47,7 +47,7 @@ PARALLEL_JOBS = (
 """Variables of GitLab, CircleCI, Buildkite, Slurm, and Kubernetes, in the order in which they are searched."""
 
 
-def shard_of(text: str, environ: Mapping[str, str]) -> tuple[int, int]:
+def parse_shard(text: str, environ: Mapping[str, str]) -> tuple[int, int]:
     """Return the number of this shard and the count of shards from the value of --shard, such as "2/4".
 
     The value "auto" stands for the variables of the CI system in `environ`. Raises UsageError.
@@ -75,7 +75,7 @@ def _parallel_job(environ: Mapping[str, str]) -> str:
 def scenarios_of_shard(
     scenarios: list[LoadedScenario], number: int, count: int, times: Mapping[str, float]
 ) -> list[LoadedScenario]:
-    """Return the scenarios of shard `number` of `count`, in their order. Raises NothingSelected if it is empty.
+    """Return the scenarios of shard `number` of `count`, in their order. Raises NothingSelected for an empty shard.
 
     `times` are durations of scenarios in s by title. The scenarios are assigned from the longest to the shortest, each
     to the shard with the least total time so far. A missing duration counts as the median. If `times` is empty, a shard
@@ -88,12 +88,12 @@ def scenarios_of_shard(
         for index in sorted(range(len(scenarios)), key=lambda index: -seconds[index]):
             shards[index] = min(range(count), key=work.__getitem__)
             work[shards[index]] += seconds[index]
-        share = [scenario for index, scenario in enumerate(scenarios) if shards[index] == number - 1]
+        selected = [scenario for index, scenario in enumerate(scenarios) if shards[index] == number - 1]
     else:
-        share = scenarios[number - 1 :: count]
-    if not share:
+        selected = scenarios[number - 1 :: count]
+    if not selected:
         raise NothingSelected(f"shard {number}/{count} of {len(scenarios)} scenarios is empty")
-    return share
+    return selected
 
 
 def scenario_times(folders: Sequence[Path]) -> dict[str, float]:
@@ -154,22 +154,22 @@ def load_selection(
     loaded: dict[str, list[LoadedScenario]] = {}
     problems: dict[Problem, None] = {}
     warnings: dict[str, list[Problem]] = {}
-    named = {absolute_path(path) for path in paths if not is_folder(path)}
+    named_files = {absolute_path(path) for path in paths if not is_folder(path)}
     for file, choice in product(discover(paths, root_folder), choices):
         variations, found = checker.check_scenario(file, choice, selection.variation_numbers)
-        if choice is not None and file not in named and (reason := _stack_limitation(choice, found)):
+        if choice is not None and file not in named_files and (reason := _stack_limitation(choice, found)):
             variations, found = checker.check_scenario(file, None, selection.variation_numbers)
-            variations = [one.as_skipped(choice, reason) for one in variations]
+            variations = [variation.as_skipped(choice, reason) for variation in variations]
         for scenario in variations:
             loaded.setdefault(scenario.title, []).append(scenario.with_changes(several_stacks=len(choices) > 1))
             warnings.setdefault(scenario.id, []).extend(found)
         problems.update(dict.fromkeys(found))
     if any(problem.severity == "error" for problem in problems):
         raise InvalidInput(relative_to_working_folder(problems, root_folder))
-    unique = _select_variations([with_stacks[0] for with_stacks in loaded.values()], selection.variations)
+    unique = _select_variations([by_stack[0] for by_stack in loaded.values()], selection.variations)
     selected = scenarios_of_shard(select(unique, selection.keyword, selection.tags), *selection.shard, selection.times)
-    relevant = dict.fromkeys(warning for one in selected for warning in warnings[one.id])
-    scenarios = [scenario for one in selected for scenario in loaded[one.title]]
+    relevant = dict.fromkeys(warning for scenario in selected for warning in warnings[scenario.id])
+    scenarios = [with_stack for scenario in selected for with_stack in loaded[scenario.title]]
     return scenarios, relative_to_working_folder(relevant, root_folder)
 
 
@@ -184,10 +184,10 @@ def _stack_limitation(choice: StackChoice, problems: Sequence[Problem]) -> str:
 
 def _select_variations(scenarios: list[LoadedScenario], names: Sequence[str]) -> list[LoadedScenario]:
     """Return the variations with one of these names; all for no names. Raises NothingSelected for an unknown name."""
-    known = dict.fromkeys(one.variation for one in scenarios if one.variation)
+    known = dict.fromkeys(scenario.variation for scenario in scenarios if scenario.variation)
     if missing := [name for name in names if name not in known]:
         if number_of(missing[0]) is not None:
             raise NothingSelected(f"no scenario has a {missing[0]} that meets the conditions in `require`")
         hint = suggestion(missing[0], known) or "no scenario has variations"
         raise NothingSelected(f"no variation is called {quoted(missing[0], 120)}; {hint}")
-    return [one for one in scenarios if not names or one.variation in names]
+    return [scenario for scenario in scenarios if not names or scenario.variation in names]

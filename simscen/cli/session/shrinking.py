@@ -38,8 +38,8 @@ FirstFailing = Callable[[Sequence[Sequence[Part]]], int | None]
 def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[Part]:
     """Return a minimal list of parts that fails, by delta debugging (Zeller and Hildebrandt 2002).
 
-    All parts together must fail. The result is minimal: if any one of its parts is removed, it passes. All tested
-    lists keep the order of the parts.
+    The list of all parts must fail. The result is minimal: without any single part, it passes. All tested lists keep
+    the order of the parts.
     """
     remaining = list(parts)
     if not remaining or first_failing([[]]) is not None:
@@ -60,7 +60,7 @@ def minimize(parts: Sequence[Part], first_failing: FirstFailing[Part]) -> list[P
 
 
 BATCH_SIZE = 8
-"""Number of candidates that run together. It is independent of the number of workers, and so is the result."""
+"""Number of candidates that run together. A fixed number, so that the result does not depend on the workers."""
 
 
 class Stopped(Exception):
@@ -79,8 +79,8 @@ class BudgetSpent(Exception):
 class CandidateRuns:
     """Runs of candidates, which are changed versions of a scenario in the form of YAML trees.
 
-    All candidates run with the same seed, and equal candidates run only once. `report` is called after each batch.
-    `runs` is the number of runs so far, and `max_runs` is its maximum.
+    All candidates run with the same seed, and equal candidates run only once. `report_progress` is called after each
+    batch. `run_count` is the number of runs so far, and `max_runs` the maximum number.
     """
 
     scenario: ChangedScenario
@@ -89,8 +89,8 @@ class CandidateRuns:
     backend: Backend
     seed: int
     max_runs: int
-    report: Callable[[], None] = lambda: None
-    runs: int = 0
+    report_progress: Callable[[], None] = lambda: None
+    run_count: int = 0
     _results: dict[str, RunResult | None] = field(default_factory=dict)
 
     def first_accepted(self, trees: Sequence[MappingNode], accepts: Callable[[RunResult], bool]) -> int | None:
@@ -111,13 +111,13 @@ class CandidateRuns:
         new = {key: tree for key, tree in zip(keys, trees, strict=True) if key not in self._results}
         loaded = {key: self.load(tree) for key, tree in new.items()}
         valid = {key: scenario for key, scenario in loaded.items() if scenario is not None}
-        if self.runs + len(valid) > self.max_runs:
+        if self.run_count + len(valid) > self.max_runs:
             raise BudgetSpent
         self._results |= {key: None for key in loaded if key not in valid}
         if valid:
             self._results |= dict(zip(valid, self._run(list(valid.values())), strict=True))
-            self.runs += len(valid)
-            self.report()
+            self.run_count += len(valid)
+            self.report_progress()
         return [self._results[key] for key in keys]
 
     def load(self, tree: MappingNode) -> LoadedScenario | None:
@@ -131,8 +131,8 @@ class CandidateRuns:
         limit = self.options.wall_limit
         with TemporaryDirectory(prefix="simscen-") as folder:
             jobs = [
-                Job(number, one, one.key(self.seed), Path(folder, str(number)), limit, picture=OutcomeFilter.NONE)
-                for number, one in enumerate(named)
+                Job(number, each, each.key(self.seed), Path(folder, str(number)), limit, picture=OutcomeFilter.NONE)
+                for number, each in enumerate(named)
             ]
             with interrupt_on_signals():
                 finished_runs, stopped = run_session(jobs, self.options, self.backend, lambda _: None)
@@ -152,7 +152,7 @@ class Failure:
 
     criterion:   kind of the failed criterion, such as "collisions"; "" for an error of the stack
     verdict_id:  id of the criterion's verdict
-    max_margin:  margin (distance to the limit, below 0) that must not be exceeded; None for any margin
+    max_margin:  maximum margin (distance to the limit; negative for a violation); None for any margin
     """
 
     criterion: str
@@ -174,7 +174,7 @@ class Failure:
 
 @dataclass
 class Shrinker:
-    """Reduces a scenario as long as its runs reproduce a failure.
+    """Makes a scenario smaller as long as its runs reproduce a failure.
 
     `tree` is the smallest scenario so far. `is_complete` is false if the maximum number of runs ended the search.
     """

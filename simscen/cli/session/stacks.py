@@ -27,12 +27,12 @@ _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}")
 
 @dataclass
 class Stacks:
-    """Stacks `chosen` with --stack, in order, and the commands of external stacks.
+    """Stacks of the options --stack in order (`choices`), and the commands of external stacks.
 
     Commands come from --stack or the user's configuration, and never from a scenario or another file of a project.
     """
 
-    chosen: Sequence[StackChoice] = ()
+    choices: Sequence[StackChoice] = ()
     _commands: dict[str, ExternalCommand | None] = field(default_factory=dict)
 
     @cached_property
@@ -47,9 +47,9 @@ class Stacks:
         """
         if loaded.robots:
             checked = {name: self.with_command(view) for name, view in loaded.robots.items()}
-            names = [choice.name for choice in self.chosen if choice.external_command]
+            names = [choice.name for choice in self.choices if choice.external_command]
             problems = [
-                *(one for _, found in checked.values() for one in found),
+                *(problem for _, found in checked.values() for problem in found),
                 *conflicting_stacks(loaded, names, config_file()),
             ]
             complete = replace(loaded, robots={name: view for name, (view, _) in checked.items()})
@@ -59,18 +59,18 @@ class Stacks:
             return loaded, []
         if (command := self.command(stack.external)) is not None:
             return replace(loaded, external_command=command), []
-        names = [*(choice.name for choice in self.chosen if choice.external_command), *self.config.spec.stacks]
+        names = [*(choice.name for choice in self.choices if choice.external_command), *self.config.spec.stacks]
         problem = undefined_stack(loaded, names, self.config.file)
         return loaded, [problem] if problem is not None else []
 
     def command(self, name: str) -> ExternalCommand | None:
         """Return the command of the external stack `name` from --stack or the configuration; None without a command."""
         if name not in self._commands:
-            given = next(
-                (choice.external_command for choice in self.chosen if choice.name == name and choice.external_command),
+            from_option = next(
+                (choice.external_command for choice in self.choices if choice.name == name and choice.external_command),
                 None,
             )
-            self._commands[name] = given or self.config.command(name, caller_environment(), Path.cwd())
+            self._commands[name] = from_option or self.config.command(name, caller_environment(), Path.cwd())
         return self._commands[name]
 
 
@@ -80,10 +80,12 @@ def external_commands(scenarios: Iterable[LoadedScenario]) -> dict[str, dict[str
     Environment variables are not included, because they can contain secrets.
     """
     stacks = ((view.spec.stack, view.external_command) for loaded in scenarios for view in loaded.robot_views.values())
-    found = {stack.external: runs for stack, runs in stacks if isinstance(stack, ExternalStackSpec) and runs}
+    commands = {
+        stack.external: command for stack, command in stacks if isinstance(stack, ExternalStackSpec) and command
+    }
     return {
-        name: {"command": list(runs.argv), "cwd": runs.cwd, "digest": runs.digest}
-        for name, runs in sorted(found.items())
+        name: {"command": list(command.argv), "cwd": command.cwd, "digest": command.digest}
+        for name, command in sorted(commands.items())
     }
 
 
@@ -97,7 +99,7 @@ def load_with_stack(
     """
     root_folder = root or default_root([file])
     stacks = parse_stacks([] if stack is None else [stack], root_folder, world_path)
-    chosen = next(iter(stacks.chosen), None)
+    chosen = next(iter(stacks.choices), None)
     with paths_from_working_folder(root_folder):
         loaded, problems = stacks.with_command(load_scenario(file, root_folder, world_path, chosen, variation))
         if problems:
@@ -141,9 +143,10 @@ def _parse_choice(text: str, root: Path, world_path: Sequence[Path], stacks: Sta
 
 
 def _command(text: str, value: str, may_be_command: bool, stacks: Stacks) -> ExternalCommand:
-    """Return the command that the configuration defines as `value`, or parse `value` as a command.
+    """Return the command that the configuration defines as `value`; otherwise, if allowed, parse `value` as a command.
 
-    `text` is the value of --stack for messages. Raises UsageError.
+    `may_be_command` is false if --stack has only a name. `text` is the value of --stack for messages. Raises
+    UsageError.
     """
     if _NAME.fullmatch(value) and (known := stacks.command(value)) is not None:
         return known

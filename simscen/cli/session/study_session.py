@@ -76,12 +76,12 @@ class StudyRun(NamedTuple):
 
     number:      number of the variation; None for a scenario without variations
     seed_index:  seed of the run minus the first seed of the study
-    drawn:       number of random variations drawn up to this run, including rejected ones; 0 without conditions
+    draw_count:  number of random variations drawn up to this run, including rejected ones; 0 without conditions
     """
 
     number: int | None
     seed_index: int
-    drawn: int
+    draw_count: int
 
 
 def execute_study(request: StudyRequest) -> Exit:
@@ -108,12 +108,12 @@ class _StudySession:
         self._space = space if space is not None and space.blocks else None
         self._is_random = self._space is None or self._space.is_random
         self._loaded: dict[int | None, LoadedScenario] = {}
-        self._text = ""
+        self._scenario_text = ""
         self._claim: PassRate | None = None
         self._runs: Iterator[StudyRun] = iter(())
         self._batch: list[StudyRun] = []
         self._planned: list[PlannedRun] = []
-        self._drawn = 0
+        self._draw_count = 0
         self.total = 0
         self.inputs: set[Path] = set()
 
@@ -237,12 +237,12 @@ class _StudySession:
                 Selection(variations=names),
                 [] if request.stack is None else [request.stack],
             )
-            if warnings and not self._text:
+            if warnings and not self._scenario_text:
                 print_text(as_text(warnings), sys.stderr)
-            if self._text not in ("", found[0].text):
+            if self._scenario_text not in ("", found[0].text):
                 raise UsageError(f"{request.file} has changed since the study began")
-            self._text = found[0].text
-            self._loaded = {number_of(one.variation) if one.variation else None: one for one in found}
+            self._scenario_text = found[0].text
+            self._loaded = {number_of(each.variation) if each.variation else None: each for each in found}
             self.inputs |= {file for each in found for file in (*each.files.values(), *each.read_files)}
         return [self._loaded[number] for number in numbers]
 
@@ -262,15 +262,15 @@ class _StudySession:
         planned = plan_runs(jobs)
         remaining, reused = divide_runs(jobs, planned, earlier)
         self._planned += planned
-        self._drawn = self._batch[-1].drawn
+        self._draw_count = self._batch[-1].draw_count
         journal.add(planned, __version__, self._request.options.workers, self._study_plan())
         return remaining, reused
 
     def _study_plan(self) -> StudyPlan:
         values = {run.key: run.varied for run in self._planned if run.varied}
         scenario = next(iter(self._loaded.values())).id
-        in_pairs = not self._is_random and self._space is not None
-        return StudyPlan(scenario, self._is_random, self._claim, values, in_pairs, self._drawn)
+        is_designed = not self._is_random and self._space is not None
+        return StudyPlan(scenario, self._is_random, self._claim, values, is_designed, self._draw_count)
 
     def _is_decided(self, finished_runs: Sequence[RunFinished]) -> bool:
         """Return whether these runs decide a sequential claim."""

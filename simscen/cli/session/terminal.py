@@ -24,9 +24,9 @@ PICTURES_URL = "SIMSCEN_PICTURES_URL"
 
 
 class Screen:
-    """Prints the events of a session until an error of stdout.
+    """Prints the events of a session until stdout fails.
 
-    `stdout_error` is the first error of writing to stdout, and `summary_error` is the error of writing the job summary;
+    `stdout_error` is the first error of writing to stdout, and `summary_error` the error of writing the job summary;
     None without an error.
     """
 
@@ -74,11 +74,11 @@ class Screen:
 
 
 @contextmanager
-def open_screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
+def open_screen(format_: Format, slowest_count: int | None = None) -> Iterator[Screen]:
     """Provide a Screen within the context. Afterwards, restore the terminal and write the job summary.
 
-    `slow` is the number of slowest runs to list at the end: 0 lists all, None lists none. Only the format GITHUB has a
-    job summary. Raises UsageError if the file of the summary is not writable.
+    `slowest_count` is the number of slowest runs to list at the end: 0 lists all, None lists none. Only the format
+    GITHUB has a job summary. Raises UsageError if the file of the summary is not writable.
     """
     summary = None
     if format_ is Format.GITHUB and (path := os.environ.get(STEP_SUMMARY)):
@@ -90,11 +90,11 @@ def open_screen(format_: Format, slow: int | None = None) -> Iterator[Screen]:
     printer: Reporter
     match format_:
         case Format.TEXT:
-            printer = text_reporter(sys.stdout, slow=slow)
+            printer = text_reporter(sys.stdout, slow=slowest_count)
         case Format.JSON:
             printer = JsonReporter(sys.stdout)
         case Format.GITHUB:
-            printer = GitHubReporter(sys.stdout, summary, slow, os.environ.get(PICTURES_URL, ""))
+            printer = GitHubReporter(sys.stdout, summary, slowest_count, os.environ.get(PICTURES_URL, ""))
     output = Screen(printer)
     printer.__enter__()
     try:

@@ -55,13 +55,13 @@ def searched_folders(path: Path) -> Iterator[Path]:
 
 
 class WatchReporter:
-    """Observer in the child process that writes the files and the outcomes of scenarios to a pipe, as JSON lines."""
+    """Listener in the child process that writes the files and the outcomes of scenarios to a pipe, as JSON lines."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
         self._files: dict[str, str] = {}
 
-    def loaded(self, scenarios: Sequence[LoadedScenario]) -> None:
+    def write_files(self, scenarios: Sequence[LoadedScenario]) -> None:
         """Write the files of each scenario."""
         files_of: dict[str, set[Path]] = {}
         for scenario in scenarios:
@@ -70,8 +70,8 @@ class WatchReporter:
         for file, others in files_of.items():
             self._write({"scenario": file, "files": sorted(map(str, others))})
 
-    def invalid_files(self, problems: Iterable[Problem]) -> None:
-        """Write the files with these problems, which prevented the session."""
+    def write_invalid_files(self, problems: Iterable[Problem]) -> None:
+        """Write the files that have these problems. The problems prevented the session."""
         self._write({"invalid": sorted({str(Path(problem.path).absolute()) for problem in problems})})
 
     def __call__(self, event: SessionEvent) -> None:
@@ -135,7 +135,10 @@ class WatchState:
         self._unfinished = self._requested if code == Exit.USAGE else ()
 
     def scenarios_to_run(self, changed: set[Path]) -> Sequence[Path]:
-        """Return the scenarios to run after these files changed: affected, new, and all of a session to repeat."""
+        """Return the scenarios to run after these files changed: affected scenarios and new scenarios.
+
+        If an invalid file prevented the last session, also return all scenarios of that session.
+        """
         unfinished = {file for path in self._unfinished for file in self._below(path)}
         known = set(self._files)
         existing = set(self._discover()) if changed & self._folders else known
@@ -177,16 +180,16 @@ def watch_session(request: SessionRequest) -> int:
         raise UsageError("--watch and --shard exclude each other")
     root_folder = request.root or default_root(request.paths)
     state = WatchState(lambda: discover(request.paths, root_folder), request.paths)
-    code, seen = _run_in_child(replace(request, root=root_folder), state)
+    code, stamps = _run_in_child(replace(request, root=root_folder), state)
     while code not in INTERRUPTED_CODES:
         keys = f"a = run all, f = run those that did not pass ({len(state.failed)}), q = quit"
         print_text(f"watching {number_with_noun(len(state.scenarios), 'scenario')}: {keys}")
         sys.stdout.flush()
-        files = _wait_for_changes(state, seen)
+        files = _wait_for_changes(state, stamps)
         if files is None:
             break
         next_request = replace(request, paths=files, root=root_folder, last_failed=False)
-        code, seen = _run_in_child(next_request, state)
+        code, stamps = _run_in_child(next_request, state)
     return code
 
 
@@ -202,11 +205,11 @@ def _run_in_child(request: SessionRequest, state: WatchState) -> tuple[int, File
         die_with_parent(watching_process)
         os.close(reading)
         with os.fdopen(writing, "w", encoding="utf-8") as pipe:
-            report = WatchReporter(pipe)
+            reporter = WatchReporter(pipe)
             try:
-                sys.exit(execute_session(request, report.loaded, [report]))
+                sys.exit(execute_session(request, reporter.write_files, [reporter]))
             except InvalidInput as error:
-                report.invalid_files(error.problems)
+                reporter.write_invalid_files(error.problems)
                 raise
     os.close(writing)
     # A terminal sends SIGINT and SIGHUP also to the child process, which handles them.
@@ -227,10 +230,10 @@ def _run_in_child(request: SessionRequest, state: WatchState) -> tuple[int, File
     return code, {**now, **{file: stamp for file, stamp in stamps_before.items() if file in now}}
 
 
-def _wait_for_changes(state: WatchState, seen: FileStamps) -> Sequence[Path] | None:
+def _wait_for_changes(state: WatchState, previous: FileStamps) -> Sequence[Path] | None:
     """Wait for a key or a change of a file, and return the scenarios to run; None to quit.
 
-    `seen` are the stamps of the files before the last session.
+    `previous` are the stamps of the files before the last session.
     """
     with _keys() as keys:
         while True:
@@ -242,15 +245,15 @@ def _wait_for_changes(state: WatchState, seen: FileStamps) -> Sequence[Path] | N
             if key == "f" and state.failed:
                 return state.failed
             now = file_stamps(state.files)
-            if now == seen:
+            if now == previous:
                 continue
             settled: FileStamps = {}
             while settled != now:  # wait until no more files are written
                 settled = now
                 select.select([], [], [], POLL_INTERVAL_S)
                 now = file_stamps(state.files)
-            changed = {file for file in {*now, *seen} if now.get(file) != seen.get(file)}
-            seen = now
+            changed = {file for file in {*now, *previous} if now.get(file) != previous.get(file)}
+            previous = now
             if affected := state.scenarios_to_run(changed):
                 return affected
 

@@ -8,7 +8,7 @@ from simscen.bench.navigation.experiments import Experiment, corner_cases, write
 from simscen.bench.navigation.localization_drives import write_localization_experiments
 from simscen.bench.navigation.moving_cylinders import write_dynamic_fields
 from simscen.bench.navigation.obstacle_fields import write_generated_fields
-from simscen.cli.benchmarks.navigation import with_stack
+from simscen.cli.benchmarks.navigation import experiments_with_stack
 from simscen.loading.scenario import load_scenario
 
 PROJECT = Path(__file__).parents[3]
@@ -76,7 +76,7 @@ def test_every_experiment_accepts_a_nav2_parameter_file(tmp_path: Path) -> None:
         *corner_cases(PROJECT / "scenarios", range(1, 2)),
         *write_localization_experiments(tmp_path / "made", PROJECT / "worlds", range(1, 2), range(1, 2)),
     ]
-    for other in with_stack(tmp_path / "ours.stack.yaml", experiments, tmp_path / "made", PROJECT):
+    for other in experiments_with_stack(tmp_path / "ours.stack.yaml", experiments, tmp_path / "made", PROJECT):
         for drive in other.drives:
             stack = load_scenario(drive.file, other.root, other.world_path).spec.stack
             assert (stack.controller.type, stack.controller.vx_max, stack.planner.type) == ("mppi", 0.4, "navfn")

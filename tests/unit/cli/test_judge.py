@@ -184,7 +184,7 @@ def test_run_without_log_is_reported(simscen, out: Path, folder: str) -> None:
     _log(out, "bad").unlink()
     ended = simscen("judge", folder)
     assert ended.code == 3
-    assert "it left no log" in ended.out
+    assert "the run left no log" in ended.out
 
 
 def test_session_that_planned_no_runs_has_no_missing_logs(simscen, out: Path) -> None:

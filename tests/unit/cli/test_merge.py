@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simscen.cli.main import app
-from simscen.cli.session.selection import PARALLEL_JOBS, scenarios_of_shard, shard_of
+from simscen.cli.session.selection import PARALLEL_JOBS, parse_shard, scenarios_of_shard
 from simscen.core.errors import InvalidInput, NothingSelected, UsageError
 
 SCENARIO = """\
@@ -139,10 +139,10 @@ def test_without_times_each_shard_has_every_nth_scenario() -> None:
     ],
 )
 def test_shard_auto_reads_the_number_of_the_parallel_job(environ: dict[str, str], expected: tuple[int, int]) -> None:
-    assert shard_of("auto", environ) == expected
+    assert parse_shard("auto", environ) == expected
 
 
 @pytest.mark.parametrize("environ", [{}, {"CI_NODE_INDEX": "2"}, {"CI_NODE_INDEX": "x", "CI_NODE_TOTAL": "3"}])
 def test_shard_auto_outside_of_a_parallel_job_is_an_error(environ: dict[str, str]) -> None:
     with pytest.raises(UsageError, match=PARALLEL_JOBS[0].index_variable):
-        shard_of("auto", environ)
+        parse_shard("auto", environ)

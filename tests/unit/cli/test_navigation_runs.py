@@ -11,7 +11,7 @@ from simscen.bench.navigation import generated_worlds
 from simscen.bench.navigation.experiments import Experiment
 from simscen.bench.navigation.summary import Trial
 from simscen.cli.benchmarks import navigation_runs
-from simscen.cli.benchmarks.navigation import with_stack
+from simscen.cli.benchmarks.navigation import experiments_with_stack
 from simscen.cli.benchmarks.navigation_runs import _plan_jobs, summarize_experiment
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
 from simscen.core.records.session_events import Artifacts, RunFinished
@@ -26,7 +26,7 @@ def test_runs_with_another_stack_have_different_keys(tmp_path: Path) -> None:
     stack = tmp_path / "slow.stack.yaml"
     stack.write_text("simscen: 1\nstack: {controller: {desired_linear_vel: 0.3}}\n", encoding="utf-8")
     experiments = [hall(tmp_path / "made/wide"), hall(tmp_path / "made/narrow")]
-    changed = with_stack(stack, experiments, tmp_path / "made", tmp_path)
+    changed = experiments_with_stack(stack, experiments, tmp_path / "made", tmp_path)
     jobs, owners = _plan_jobs(changed, tmp_path / "out")
     assert [owners[job.key][0] for job in jobs] == [0, 0, 1, 1]
     assert len({job.folder for job in jobs}) == 4
@@ -63,7 +63,7 @@ def test_nav2_parameter_file_is_a_valid_stack_and_ignored_parameters_are_reporte
 ) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(NAV2, encoding="utf-8")
-    (other,) = with_stack(file, [hall(tmp_path / "made")], tmp_path / "made", tmp_path)
+    (other,) = experiments_with_stack(file, [hall(tmp_path / "made")], tmp_path / "made", tmp_path)
     jobs, _ = _plan_jobs([other], tmp_path / "out")
     stack = jobs[0].scenario.spec.stack
     assert stack.controller.type == "regulated_pure_pursuit"
@@ -75,7 +75,7 @@ def test_nav2_parameter_file_is_a_valid_stack_and_ignored_parameters_are_reporte
 def test_experiments_without_fields_select_nothing(simscen: Any) -> None:
     ended = simscen("bench", "nav", "--only", "generated fields", "--fields", "0")
     assert ended.code == 5
-    assert "its number of fields or drives is 0" in ended.err
+    assert "those that match have no data, fields, or drives" in ended.err
 
 
 def test_experiments_with_duplicate_runs_are_rejected(tmp_path: Path) -> None:

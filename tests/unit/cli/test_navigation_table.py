@@ -24,7 +24,7 @@ localization, tour: 0.030 m RMSE, worst run 0.040 m
 with minus without --stack  pairs  better  worse                   success  seconds     SCT                     score
 BARN                           30       0      3  -0.100 (-0.200 … +0.000)     +1.5  -0.050  -0.020 (-0.030 … -0.010)
 
-BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: success 0.850, collisions 0.056, \
+published results of BARN for DWA at 0.5 m/s, in another simulator and 50 worlds: success 0.850, collisions 0.056, \
 timeouts 0.094, score 0.159"""
 SLOWER = ExperimentComparison(
     "BARN",
@@ -63,8 +63,8 @@ BARN
   pairs 30  better 0  worse 3  success -0.100 (-0.200 … +0.000)  seconds +1.5
     SCT -0.050  score -0.020 (-0.030 … -0.010)
 
-BARN's own figures for DWA at 0.5 m/s, in another simulator and all 50 worlds: success
-  0.850, collisions 0.056, timeouts 0.094, score 0.159"""
+published results of BARN for DWA at 0.5 m/s, in another simulator and 50 worlds:
+  success 0.850, collisions 0.056, timeouts 0.094, score 0.159"""
 LONG = "BARN, regulated pure pursuit at 0.5 m/s, with nav2_params"
 
 

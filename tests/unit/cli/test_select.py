@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from simscen.cli.session.exit_codes import exit_code
-from simscen.cli.session.selection import Selection, load_selection, shard_of
+from simscen.cli.session.selection import Selection, load_selection, parse_shard
 from simscen.core.errors import Exit, InvalidInput, UsageError
 
 TEXT = """\
@@ -37,7 +37,7 @@ def test_every_scenario_is_in_exactly_one_shard(folder: Path, count: int) -> Non
 @pytest.mark.parametrize("text", ["", "1", "0/2", "3/2", "1/0", "-1/2", "a/b", "1/2/3", "１/２x"])
 def test_invalid_shards_are_rejected(text: str) -> None:
     with pytest.raises(UsageError, match="expected i/n"):
-        shard_of(text, {})
+        parse_shard(text, {})
 
 
 def test_invalid_file_stops_the_session_even_if_not_selected(folder: Path) -> None:

@@ -211,7 +211,7 @@ def test_interrupted_runs_do_not_count_as_searched() -> None:
             RunFinished(RunResult(RunKey("a", 1), "a", outcome, error=failure))
             for outcome, failure in zip(outcomes, failures, strict=True)
         ],
-        found=[],
+        failures=[],
         max_failure_rate=lambda: None,
         is_probability_shown=True,
     )
@@ -224,7 +224,7 @@ def test_passed_runs_show_a_failure_rate_above_their_confidence_bound(limit: flo
     search._request = SimpleNamespace(probability=limit, method=SearchMethod.RANDOM)  # type: ignore[assignment]
     # 1 - 0.05 ** (1 / 14) = 0.1926
     search.finished_runs = [RunFinished(RunResult(RunKey("a", 1), "a", Outcome.PASSED)) for _ in range(14)]
-    search.found = []
+    search.failures = []
     assert search.is_probability_shown == is_shown
     assert ("undecided: too few runs for --probability; increase --runs" in summary_lines(search)) != is_shown
 

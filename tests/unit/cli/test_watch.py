@@ -61,7 +61,7 @@ def test_failed_scenarios_are_known_until_they_run_again(watching: WatchState, f
 def test_session_with_an_invalid_file_is_repeated_after_a_change(watching: WatchState, files: Path) -> None:
     watching.begin([files / "b.scenario.yaml"])
     report = io.StringIO()
-    WatchReporter(report).invalid_files([Problem(str(files / "world.yaml"), 1, 1, "SC012", "unknown key")])
+    WatchReporter(report).write_invalid_files([Problem(str(files / "world.yaml"), 1, 1, "SC012", "unknown key")])
     watching.update(report.getvalue())
     watching.end(Exit.USAGE)
     assert files / "world.yaml" in watching.files

@@ -240,7 +240,7 @@ def test_a_run_uses_the_stack_of_the_option_instead_of_that_of_the_text(
     program = ExternalCommand(("drive",), {}, str(tmp_path))
     stacks = Stacks((StackChoice("mine", "drive", external_command=program),))
     file = EditedFile(tmp_path / "a.scenario.yaml", "scenario", tmp_path)
-    session = EditorSession(file, _no_backend, stack=stacks.chosen[0], resolve_commands=stacks.with_command)
+    session = EditorSession(file, _no_backend, stack=stacks.choices[0], resolve_commands=stacks.with_command)
     started: list[LoadedScenario] = []
 
     def start(loaded: LoadedScenario) -> TrialRun:
