@@ -42,7 +42,7 @@ def command(
         ),
     ] = None,
     fields: Annotated[
-        int, typer.Option(min=0, max=10_000, help="Number of generated obstacle fields; narrow fields: half of it.")
+        int, typer.Option(min=0, max=10_000, help="Number of generated obstacle fields; half as many narrow fields.")
     ] = 50,
     dynamic: Annotated[
         int, typer.Option(min=0, max=10_000, help="Number of fields of moving cylinders at each speed.")
@@ -53,7 +53,7 @@ def command(
             min=1,
             max=10_000,
             help="Number of random goals in each shipped world, and number of generated buildings, ramps, and "
-            "corridors; degraded sensing: a quarter of it.",
+            "corridors; degraded sensing: a quarter of this number.",
         ),
     ] = 20,
     lost: Annotated[
@@ -87,7 +87,8 @@ def command(
     Experiments without data are skipped with a message. Failed runs are printed on standard error, each with a command
     to repeat the run. An interrupted session prints its results so far; use --resume with the same options to continue.
 
-    Exit code 0: all runs were completed; 3: a run could not be completed; 5: no experiment matches --only and has runs.
+    Exit code 0: all runs were completed; 3: a run could not be completed; 5: no experiment that matches --only has
+    runs.
     """
     from simscen.bench.navigation.summary import compare_experiment
     from simscen.cli.benchmarks.navigation_experiments import Sizes, experiment_groups
@@ -125,13 +126,13 @@ def command(
         if (finished := finished_trials(runs))
     ]
     compared = zip(experiments if with_stack else [], trials, trials[len(experiments) :], strict=False)
-    pairs = [
+    comparisons = [
         compare_experiment(experiment.name, before, after)
         for experiment, before, after in compared
         if finished_trials(before) and finished_trials(after)
     ]
     columns = detect_style(sys.stdout, os.environ).columns
-    print_text(as_json(rows, pairs) if format_ is TextOrJson.JSON else as_text(rows, pairs, columns))
+    print_text(as_json(rows, comparisons) if format_ is TextOrJson.JSON else as_text(rows, comparisons, columns))
     if stopped:
         count = f"{sum(len(finished_trials(runs)) for runs in trials)} of {sum(map(len, trials))} runs"
         print_text(f"simscen: interrupted: {count}; continue with --resume {escaped(str(folder))}", sys.stderr)

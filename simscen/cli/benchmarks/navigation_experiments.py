@@ -128,7 +128,7 @@ def experiment_groups(
         ExperimentGroup(
             "degraded sensing",
             worlds,
-            lambda: _degraded(generated, worlds, sizes),
+            lambda: _degraded_sensing(generated, worlds, sizes),
             [f"degraded sensing, {strength}" for strength in random_goals.STRENGTHS],
         ),
         ExperimentGroup("ramps", generated, lambda: [generated_worlds.write_ramps(generated / "ramps", goals)]),
@@ -180,7 +180,7 @@ def _random_goals(generated: Path, worlds: Path, sizes: Sizes) -> Iterator[Exper
     yield random_goals.write_random_goals("random goals, ROS maps", maps, buildings, range(1, 4))
 
 
-def _degraded(generated: Path, worlds: Path, sizes: Sizes) -> list[Experiment]:
+def _degraded_sensing(generated: Path, worlds: Path, sizes: Sizes) -> list[Experiment]:
     """Write the experiments with sensor faults in `sizes.goals` / 4 worlds, at least one."""
     folder, maps = generated / "degraded", generated / "degraded_buildings"
     count = max(1, sizes.goals // 4)

@@ -40,7 +40,7 @@ class LocalizationAccuracy:
     rmse:        mean over the runs of the root mean square position error in m; None without values
     worst_rmse:  maximum over the runs of the root mean square position error in m; None without values
     anees:       average NEES at each of ANEES_TIMES_S, by time in s, over the runs that have not ended by then
-    bounds:      95 % interval of the ANEES of a consistent localizer over as many runs, by the same times
+    bounds:      95 % interval of each value of `anees` for a consistent localizer, by time in s
     """
 
     rmse: float | None

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
+from typing import Any
 
 from simscen.bench.navigation.barn import PUBLISHED_DWA_RESULTS
 from simscen.bench.navigation.summary import Difference, ExperimentComparison, ExperimentSummary
@@ -31,11 +32,11 @@ TABLE_HEAD = (
 
 
 def as_text(
-    rows: Sequence[ExperimentResult], pairs: Sequence[ExperimentComparison] = (), columns: int | None = None
+    rows: Sequence[ExperimentResult], comparisons: Sequence[ExperimentComparison] = (), columns: int | None = None
 ) -> str:
     """Return the table of results, the localization accuracy, the comparisons, and the published figures of BARN.
 
-    `pairs` are the comparisons of the experiments without and with --stack. `columns` is the width of the terminal in
+    `comparisons` are those of the experiments without and with --stack. `columns` is the width of the terminal in
     characters; None stands for unlimited width.
     """
     table = [TABLE_HEAD, *(_cells(result.tally) for result in rows)]
@@ -45,33 +46,42 @@ def as_text(
     for result in rows:
         if result.localized is not None:
             lines += ["", *_localization_lines(result.tally.case, result.localized)]
-    if pairs:
-        lines += ["", *_comparison_lines(pairs, columns)]
+    if comparisons:
+        lines += ["", *_comparison_lines(comparisons, columns)]
     if any(result.tally.case.startswith("BARN") for result in rows):
         lines += ["", PUBLISHED_DWA_LINE]
     return "\n".join(wrap_lines(lines, columns))
 
 
-def as_json(rows: Sequence[ExperimentResult], pairs: Sequence[ExperimentComparison] = ()) -> str:
+def as_json(rows: Sequence[ExperimentResult], comparisons: Sequence[ExperimentComparison] = ()) -> str:
     """Return results, comparisons, and the published figures of BARN as JSON."""
-    data = {"experiments": [asdict(row) for row in rows], "dwa_published": PUBLISHED_DWA_RESULTS}
-    return json.dumps({**data, "versus": [asdict(pair) for pair in pairs]} if pairs else data, indent=2)
+    data: dict[str, Any] = {
+        "experiments": [asdict(row) for row in rows],
+        "dwa_published": PUBLISHED_DWA_RESULTS,
+    }
+    if comparisons:
+        data["versus"] = [asdict(comparison) for comparison in comparisons]
+    return json.dumps(data, indent=2)
 
 
-def _comparison_lines(pairs: Sequence[ExperimentComparison], columns: int | None) -> list[str]:
+def _comparison_lines(comparisons: Sequence[ExperimentComparison], columns: int | None) -> list[str]:
     """Return a table with one line per comparison; if it is too wide, lines of cells with their headings instead."""
-    changes = [_comparison_cells(pair) for pair in pairs]
-    lines = align_columns([COMPARISON_HEAD, *changes])
+    table = [_comparison_cells(comparison) for comparison in comparisons]
+    lines = align_columns([COMPARISON_HEAD, *table])
     if columns is None or fits(lines, columns):
         return lines
-    return [COMPARISON_HEAD[0], *(line for row in changes for line in label_cells(COMPARISON_HEAD, row, columns))]
+    return [COMPARISON_HEAD[0], *(line for row in table for line in label_cells(COMPARISON_HEAD, row, columns))]
 
 
-def _comparison_cells(pair: ExperimentComparison) -> tuple[str, ...]:
+def _comparison_cells(comparison: ExperimentComparison) -> tuple[str, ...]:
     """Return the cells of one comparison in the columns of COMPARISON_HEAD."""
-    forms = ((pair.success, ".3f"), (pair.seconds, ".1f"), (pair.sct, ".3f"), (pair.score, ".3f"))
-    changes = (_difference_text(difference, form) for difference, form in forms)
-    return (pair.case, f"{pair.pairs}", f"{pair.better}", f"{pair.worse}", *changes)
+    differences = (
+        _difference_text(comparison.success, ".3f"),
+        _difference_text(comparison.seconds, ".1f"),
+        _difference_text(comparison.sct, ".3f"),
+        _difference_text(comparison.score, ".3f"),
+    )
+    return comparison.case, f"{comparison.pairs}", f"{comparison.better}", f"{comparison.worse}", *differences
 
 
 def _difference_text(difference: Difference | None, number_format: str) -> str:

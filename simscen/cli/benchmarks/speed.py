@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
 def growth_command(
     format_: FormatOption = TextOrJson.TEXT,
-    rounds: Annotated[int, typer.Option(min=1, max=100, help="Number of runs of each; the median is used.")] = 3,
+    rounds: Annotated[int, typer.Option(min=1, max=100, help="Number of runs of each size; the median is used.")] = 3,
     compare: CompareOption = None,
 ) -> None:
     """Measure how the cost of a simulated second grows with the size of the scenario.
 
-    Repeats a patrol of 15 s and increases one quantity at a time: static obstacles, pushable objects, scripted objects,
+    Repeats a patrol of 15 s and increases one quantity at a time: static obstacles, pushable objects, moving objects,
     lidar beams, AMCL particles, or robots. Prints CPU times of one core. Takes a minute and a half.
     """
     before = None if compare is None else read_result(compare)
@@ -110,7 +110,7 @@ def suite_command(
     baseline: the time of PyBullet alone on one core for the same steps and scans, measured before and after the
     session.
 
-    Exit code 0: all runs were completed; 3: a run was aborted. If all were aborted, nothing is measured.
+    Exit code 0: all runs were completed; 3: a run was aborted. If all runs were aborted, nothing is measured.
     """
     from simscen.cli.session.fork_server_start import FORK_SERVER
     from simscen.cli.session.selection import Selection, load_selection

@@ -34,7 +34,7 @@ from simscen.run.sessions.run_session import SessionOptions, plan_jobs, run_sess
 
 @dataclass(frozen=True)
 class SessionRequest:
-    """Arguments of `simscen run`. `selection`, `options`, and `output` each contain several arguments."""
+    """Arguments of `simscen run` by name. `selection`, `options`, and `output` each contain several arguments."""
 
     paths: Sequence[Path]
     selection: Selection

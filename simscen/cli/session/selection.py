@@ -129,7 +129,7 @@ class Selection:
 
     @property
     def variation_numbers(self) -> list[int] | None:
-        """Numbers of the selected variations if all have names such as "variation-7"; None otherwise, and for ()."""
+        """Numbers of the selected variations if all have names such as "variation-7"; None otherwise."""
         numbers = [number for name in self.variations if (number := number_of(name)) is not None]
         return numbers if numbers and len(numbers) == len(self.variations) else None
 
@@ -174,7 +174,7 @@ def load_selection(
 
 
 def _stack_limitation(choice: StackChoice, problems: Sequence[Problem]) -> str:
-    """Return why a stack cannot run a scenario with these problems; "" without such an error, or with other errors."""
+    """Return why a stack cannot run a scenario with these problems; "" unless all errors are limits of the stack."""
     errors = [problem for problem in problems if problem.severity == "error"]
     if not errors or any(problem.code != UNSUPPORTED_BY_STACK for problem in errors):
         return ""
@@ -183,7 +183,10 @@ def _stack_limitation(choice: StackChoice, problems: Sequence[Problem]) -> str:
 
 
 def _select_variations(scenarios: list[LoadedScenario], names: Sequence[str]) -> list[LoadedScenario]:
-    """Return the variations with one of these names; all for no names. Raises NothingSelected for an unknown name."""
+    """Return the variations with one of these names, or all if `names` is empty.
+
+    Raises NothingSelected for an unknown name.
+    """
     known = dict.fromkeys(scenario.variation for scenario in scenarios if scenario.variation)
     if missing := [name for name in names if name not in known]:
         if number_of(missing[0]) is not None:

@@ -211,7 +211,7 @@ class _StudySession:
         raise UsageError("the number of runs is missing; set it with --runs, or with `acceptance` in the scenario")
 
     def _all_runs(self) -> Iterator[StudyRun]:
-        """Yield the runs in order. Random runs have different seeds; listed values are all run with the same seeds."""
+        """Yield the runs in order. Random runs have different seeds; other variations all have the same seeds."""
         space = self._space
         if space is None:
             yield from (StudyRun(None, index, 0) for index in range(self.total))
@@ -246,21 +246,21 @@ class _StudySession:
             self.inputs |= {file for each in found for file in (*each.files.values(), *each.read_files)}
         return [self._loaded[number] for number in numbers]
 
-    def _jobs(self, first: int, folder: Path) -> list[Job]:
-        """Return the jobs of the current batch. `first` is the number of the first job."""
+    def _jobs(self, first_number: int, folder: Path) -> list[Job]:
+        """Return the jobs of the current batch. `first_number` is the number of the first job."""
         options, jobs = self._request.options, []
         for index, run in enumerate(self._batch):
             scenario = self._loaded[run.number]
             key = scenario.key(self._base_seed + run.seed_index)
-            jobs.append(options.job(first + index, scenario, key, folder))
+            jobs.append(options.job(first_number + index, scenario, key, folder))
         return jobs
 
     def _plan(
-        self, journal: Journal, jobs: Sequence[Job], earlier: Mapping[PlannedRun, RunFinished]
+        self, journal: Journal, jobs: Sequence[Job], earlier_results: Mapping[PlannedRun, RunFinished]
     ) -> tuple[list[Job], list[RunFinished]]:
         """Write the runs of a batch to the journal, and return the jobs to execute, and the reused results."""
         planned = plan_runs(jobs)
-        remaining, reused = divide_runs(jobs, planned, earlier)
+        remaining, reused = divide_runs(jobs, planned, earlier_results)
         self._planned += planned
         self._draw_count = self._batch[-1].draw_count
         journal.add(planned, __version__, self._request.options.workers, self._study_plan())
