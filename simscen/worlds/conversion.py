@@ -35,9 +35,9 @@ class Conversion:
     _names: set[str] = field(default_factory=set, init=False)
 
     def add(self, kind: type[ObjectT], items: list[ObjectT], fields: dict[str, object]) -> None:
-        """Add an obstacle or object with these `fields` to `items`, or a sentence to `changes` if they are not valid.
+        """Build an obstacle or object (`kind`) from `fields`, and add it to `items`.
 
-        If its name is taken, it gets a number: `shelf-2`.
+        If the fields are not valid, add a sentence to `changes` instead. A repeated name gets a number: `shelf-2`.
         """
         name = self._unique_name(str(fields["name"])[:MAX_NAME_LENGTH] or "obstacle")
         try:
@@ -50,10 +50,10 @@ class Conversion:
     def _unique_name(self, name: str) -> str:
         suffixes = chain([""], (f"-{number}" for number in count(2)))
         names = (f"{name[: MAX_NAME_LENGTH - len(suffix)]}{suffix}" for suffix in suffixes)
-        return next(one for one in names if one not in self._names)
+        return next(candidate for candidate in names if candidate not in self._names)
 
     def merged_into(self, spec: WorldSpec) -> WorldSpec:
-        """Return a copy of `spec` with these obstacles and objects in front of its own, and without `sdf`.
+        """Return a copy of `spec` without `sdf`, with these obstacles and objects before the ones of `spec`.
 
         Raises pydantic.ValidationError if there are more obstacles or objects than a world file may have.
         """
@@ -84,7 +84,7 @@ def convert_world(world: World, height: float) -> Conversion:
 
 
 def _add_body(body: Body, height: float, conversion: Conversion) -> None:
-    """Add the body as an object, or as obstacles if it has several shapes, because an object can have only one."""
+    """Add the body as an object; or as obstacles if it has several shapes, because an object has only one shape."""
     solids = placed_solids((), [body])
     shapes = [shape for solid in solids for shape in prism_shapes(solid, height, conversion.changes)]
     if not shapes:

@@ -56,7 +56,7 @@ def oversize_hint(world: World) -> str:
         return "move the start and the goals closer together"
 
     def area_without(name: str) -> float:
-        left, bottom, right, top = union(rest for other, rest in extents.items() if other != name)
+        left, bottom, right, top = union(extent for other, extent in extents.items() if other != name)
         return (right - left) * (top - bottom)
 
     # Only a model at an edge of the world can make the world larger.

@@ -103,18 +103,18 @@ def first_reason(error: ValidationError) -> str:
 def _exact_shape(solid: Solid) -> PrismShape | None:
     """Return the shape that equals a solid; None if the solid is not upright or world files have no such shape."""
     rotation, pose = solid.pose.rotation(), solid.pose
-    up = int(np.argmax(np.abs(rotation[2])))
+    up = int(np.argmax(np.abs(rotation[2])))  # index of the axis of the shape that is vertical
     if abs(rotation[2, up]) < MIN_UPRIGHT_COSINE:
         return None
     along, across = ((1, 2), (0, 2), (0, 1))[up]
-    place = Pose2(pose.x, pose.y, math.atan2(rotation[1, along], rotation[0, along]))
+    planar_pose = Pose2(pose.x, pose.y, math.atan2(rotation[1, along], rotation[0, along]))
     match solid.shape:
         case Box(size):
-            return PrismShape(place, pose.z - size[up] / 2, size[up], box=(size[along], size[across]))
+            return PrismShape(planar_pose, pose.z - size[up] / 2, size[up], box=(size[along], size[across]))
         case Cylinder(radius, length) if up == 2:
             return PrismShape(Pose2(pose.x, pose.y), pose.z - length / 2, length, radius=radius)
         case Extrusion(polygon, extrusion_height) if up == 2 and rotation[2, 2] > 0 and len(polygon) <= MAX_CORNERS:
-            return PrismShape(place, pose.z, extrusion_height, polygon=polygon)
+            return PrismShape(planar_pose, pose.z, extrusion_height, polygon=polygon)
         case _:
             return None
 
@@ -145,12 +145,12 @@ def _cross_section_prisms(solid: Solid, height: float, changes: list[str]) -> It
 
 
 def _equals_prisms(mesh: TriangleMesh, volume: float) -> bool:
-    """Return whether prisms of this volume (m³) equal a mesh: same volume, and all its faces are level or upright."""
+    """Return whether prisms of this volume (m³) equal a mesh: same volume, and no face of the mesh is tilted."""
     a, b, c = mesh.vertices[mesh.faces].swapaxes(0, 1)
     normals = np.cross(b - a, c - a)
-    level, upright = np.linalg.norm(normals[:, :2], axis=1), np.abs(normals[:, 2])
-    tilted = np.minimum(level, upright) > 1e-6 * np.linalg.norm(normals, axis=1) + 1e-12
-    return not tilted.any() and math.isclose(enclosed_volume(mesh), volume, rel_tol=1e-6)
+    horizontal, vertical = np.linalg.norm(normals[:, :2], axis=1), np.abs(normals[:, 2])
+    is_tilted = np.minimum(horizontal, vertical) > 1e-6 * np.linalg.norm(normals, axis=1) + 1e-12
+    return not is_tilted.any() and math.isclose(enclosed_volume(mesh), volume, rel_tol=1e-6)
 
 
 def _rounded(values: Sequence[float]) -> list[float]:

@@ -69,7 +69,7 @@ def world_from_spec(
 
 
 def _solids_from_spec(spec: WorldSpec, grid: OccupancyGrid | None) -> list[Solid]:
-    """Return the static solids that `spec` specifies, without those of an imported world; `grid` is its map."""
+    """Return the static solids that `spec` specifies, including the walls of its map `grid`, but no imported solids."""
     solids: list[Solid] = []
     if grid is not None:
         from simscen.worlds.maps.occupancy_map import walls_from_map
@@ -101,15 +101,17 @@ def _panel_poses(door: Door) -> tuple[Pose2, Pose2]:
     return closed, closed.compose(Pose2(-(door.travel or math.hypot(px - hx, py - hy)), 0.0))
 
 
-def _object_body(thing: Movable) -> Body:
-    pose, path = thing.pose.pose, None
-    if thing.move is not None:
-        path = thing.move.path(pose, thing.move.start)
-        pose = pose if thing.move.keyframes is None else pose_at(path, 0.0)
-    return Body(thing.name, (thing.solid(thing.name),), Pose3.planar(pose), thing.mass, path)
+def _object_body(movable: Movable) -> Body:
+    """Return the body of an object. With keyframes, the body starts at the first keyframe."""
+    pose, path = movable.pose.pose, None
+    if movable.move is not None:
+        path = movable.move.path(pose, movable.move.start)
+        pose = pose if movable.move.keyframes is None else pose_at(path, 0.0)
+    return Body(movable.name, (movable.solid(movable.name),), Pose3.planar(pose), movable.mass, path)
 
 
 def _door_body(door: Door) -> Body:
+    """Return the panel of a door as a body, with its origin at the hinge."""
     (hinge_x, hinge_y), (post_x, post_y) = door.points
     closed, opened = _panel_poses(door)
     width = math.hypot(post_x - hinge_x, post_y - hinge_y)
@@ -136,13 +138,14 @@ def wall_solids(points: list[Point], thickness: float, height: float, name: str)
         start = _miter_end(a, direction, previous, thickness / 2, -1.0)
         end = _miter_end(b, direction, following, thickness / 2, 1.0)
         (ux, uy), sides = direction, zip(start, end, strict=True)
-        if any((bx - ax) * ux + (by - ay) * uy <= 0 for (ax, ay), (bx, by) in sides):  # its miters cross
+        if any((bx - ax) * ux + (by - ay) * uy <= 0 for (ax, ay), (bx, by) in sides):  # the miters cross
             start, end = _square_end(a, direction, thickness / 2, -1.0), _square_end(b, direction, thickness / 2, 1.0)
         solids.append(Solid(Extrusion((start[1], end[1], end[0], start[0]), height), name=name))
     return solids
 
 
 def _direction(a: Point, b: Point) -> Point:
+    """Return the unit vector from `a` to `b`."""
     length = math.hypot(b[0] - a[0], b[1] - a[1])
     return (b[0] - a[0]) / length, (b[1] - a[1]) / length
 

@@ -33,6 +33,7 @@ def cross_section(mesh: TriangleMesh, height: float) -> CrossSection:
     above = mesh.vertices[:, 2] >= height
     count_above = above[mesh.faces].sum(axis=1)
     is_cut = (count_above == 1) | (count_above == 2)
+    # The tip of a triangle is the corner that is alone on its side of `height`.
     faces, is_tip_above = mesh.faces[is_cut], count_above[is_cut] == 1
     tip_corner = np.argmax(above[faces] == is_tip_above[:, None], axis=1)
     tip_first = faces[np.arange(len(faces))[:, None], (tip_corner[:, None] + np.arange(3)) % 3]
@@ -57,7 +58,8 @@ def _edge_crossing(tip: Array, base: Array, height: float, is_tip_above: npt.NDA
 def sections_between(mesh: TriangleMesh, z_range: tuple[float, float]) -> list[CrossSection]:
     """Return at most MAX_SECTIONS cross sections of a mesh between two heights.
 
-    There is one between any two neighboring heights of vertices, or evenly spaced ones if these would be too many.
+    There is one cross section between any two neighboring heights of vertices. If these would be more than
+    MAX_SECTIONS, the cross sections are evenly spaced.
     """
     low, high = z_range
     z = np.unique(np.round(mesh.vertices[:, 2], 3))

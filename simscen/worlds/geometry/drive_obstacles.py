@@ -1,7 +1,7 @@
 """Find the static solids that block a robot that can drive on ramps and over steps.
 
-Solids that the robot can drive on are called ground. They do not block it, but their edges and steep slopes do. An edge
-is an upright face of the ground, which is a line when seen from above.
+A solid that the robot can drive on is called ground. Only the edges and the steep slopes of the ground block the robot.
+An edge is an upright face of the ground, which is a line when seen from above.
 """
 
 import math
@@ -60,8 +60,8 @@ def drive_obstacles(
 
 def _is_convex_or_height_field(mesh: TriangleMesh, normals: Array, owner: int) -> bool:
     """Return whether the solid with the index `owner` is convex or a height field, which has no overhangs."""
-    is_own = mesh.owners == owner
-    return is_convex(submesh(mesh.vertices, mesh.faces[is_own])) or bool((normals[is_own, 2] >= 0).all())
+    is_of_solid = mesh.owners == owner
+    return is_convex(submesh(mesh.vertices, mesh.faces[is_of_solid])) or bool((normals[is_of_solid, 2] >= 0).all())
 
 
 def _steep_faces(mesh: TriangleMesh, normals: Array, is_ground: FaceMask, max_slope: float) -> Iterator[Solid]:

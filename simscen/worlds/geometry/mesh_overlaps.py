@@ -16,11 +16,11 @@ Point = tuple[float, float]
 
 
 def horizontal_distance(
-    mesh: TriangleMesh, point: Point, z_range: tuple[float, float], within: float = math.inf
+    mesh: TriangleMesh, point: Point, z_range: tuple[float, float], max_distance: float = math.inf
 ) -> float:
     """Return the horizontal distance in m from a point to the part of the mesh between two heights; 0 inside.
 
-    Returns inf if the mesh has no part between the heights `z_range`. Distances above `within` m may be inf as well.
+    Returns inf if the mesh has no part between the heights `z_range`. Distances above `max_distance` may be inf, too.
     """
     low, high = z_range
     bottom, top = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
@@ -31,7 +31,7 @@ def horizontal_distance(
         return 0.0
     triangles = mesh.vertices[mesh.faces]
     offsets = triangles[:, :, :2] - point
-    is_near = np.all((offsets.min(axis=1) <= within) & (offsets.max(axis=1) >= -within), axis=1)
+    is_near = np.all((offsets.min(axis=1) <= max_distance) & (offsets.max(axis=1) >= -max_distance), axis=1)
     corners, valid = _clip_to_heights(triangles[is_near], low, high)
     corners, valid = corners[valid.any(axis=1)] - point, valid[valid.any(axis=1)]
     if not len(corners):
@@ -86,9 +86,10 @@ def _distance_from_origin(corners: Array, valid: npt.NDArray[np.bool_]) -> float
 def footprint_overlaps_solid(solid: Solid, corners: Polygon, z_range: tuple[float, float]) -> bool:
     """Return whether a footprint overlaps the part of a solid between two heights.
 
-    `corners` are the corners of the footprint. They and the pose of the solid are in the same frame.
+    `corners` are the corners of the footprint, in the same frame as the pose of the solid.
     """
-    return any(_overlaps_outline(cut.segments, corners) for cut in sections_between(merge_solids([solid]), z_range))
+    sections = sections_between(merge_solids([solid]), z_range)
+    return any(_overlaps_outline(section.segments, corners) for section in sections)
 
 
 def _overlaps_outline(segments: Array, corners: Polygon) -> bool:

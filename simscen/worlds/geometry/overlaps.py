@@ -32,10 +32,10 @@ def first_solid_in_disc(
     return None
 
 
-def _horizontal_distance(solid: Solid, point: tuple[float, float], z_range: ZRange, within: float) -> float:
-    """Return the horizontal distance in m to the part of a solid between two heights; 0 inside.
+def _horizontal_distance(solid: Solid, point: tuple[float, float], z_range: ZRange, max_distance: float) -> float:
+    """Return the horizontal distance in m from a point to the part of a solid between two heights; 0 inside.
 
-    Returns inf without such a part. Distances above `within` m may be inf as well.
+    Returns inf if the solid has no such part. Distances above `max_distance` m may be inf, too.
     """
     prism = upright_prism(solid)
     if prism is not None:
@@ -43,7 +43,7 @@ def _horizontal_distance(solid: Solid, point: tuple[float, float], z_range: ZRan
     from simscen.worlds.geometry.mesh_overlaps import horizontal_distance
     from simscen.worlds.geometry.triangulation import merge_solids
 
-    return horizontal_distance(merge_solids([solid]), point, z_range, within)
+    return horizontal_distance(merge_solids([solid]), point, z_range, max_distance)
 
 
 def is_near(solid: Solid, point: tuple[float, float], radius: float) -> bool:
@@ -78,7 +78,7 @@ def _bounding_radius(shape: Shape) -> float:
 def first_solid_in_footprint(solids: Iterable[Solid], outline: Polygon, pose: Pose2, z_range: ZRange) -> str | None:
     """Return the name of the first solid that a footprint at `pose` overlaps between two heights, or None.
 
-    `outline` are the corners of the footprint in its own frame.
+    `outline` are the corners of the footprint, in the frame at `pose`.
     """
     radius = max(math.hypot(x, y) for x, y in outline)
     corners = transform_polygon(pose, tuple((x * (1 - SHRINK_FRACTION), y * (1 - SHRINK_FRACTION)) for x, y in outline))

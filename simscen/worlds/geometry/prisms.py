@@ -44,7 +44,7 @@ class UprightPrism(NamedTuple):
 
 
 def upright_prism(solid: Solid, frame: Pose3 | None = None) -> UprightPrism | None:
-    """Return a solid as a prism; None if it is tilted, not a prism, or has a base that is not convex.
+    """Return a solid as a prism; None if the solid is tilted, not a prism, or has a base that is not convex.
 
     `frame` is the pose of the frame that the solid's pose refers to, for example of a body; default: the world.
     """

@@ -60,9 +60,10 @@ def simple_polygons(rings: list[Ring]) -> list[Ring]:
     for ring in rings:
         # The middle of an edge is tested, because a corner of a hole may touch the ring around it.
         middle = ((ring[0][0] + ring[1][0]) / 2, (ring[0][1] + ring[1][1]) / 2)
-        around = [n for n, other in enumerate(outer_rings) if signed_area(ring) < 0 and polygon_contains(other, middle)]
-        if around:
-            holes[min(around, key=lambda n: signed_area(outer_rings[n]))].append(ring)
+        is_hole = signed_area(ring) < 0
+        enclosing = [n for n, outer in enumerate(outer_rings) if is_hole and polygon_contains(outer, middle)]
+        if enclosing:
+            holes[min(enclosing, key=lambda n: signed_area(outer_rings[n]))].append(ring)
     polygons: list[Ring] = []
     for number, ring in enumerate(outer_rings):
         is_simple = not holes[number] and len(ring) <= MAX_CORNERS

@@ -143,6 +143,7 @@ def _revolve(profile: Profile, count: int) -> Mesh:
     circle = np.column_stack((np.cos(angles), np.sin(angles), np.ones(count)))
     rings = [circle[: count if r > 0 else 1] * (r, r, z) for r, z in profile]
     ring_starts = np.cumsum([0, *(len(ring) for ring in rings)])
+    # `tip` stands for both ends of a facet in a ring of only one point, which is on the axis.
     this, following, tip = np.arange(count), (np.arange(count) + 1) % count, np.zeros(count, dtype=np.int64)
     faces: list[npt.NDArray[np.int64]] = []
     for (low, high), (r_low, r_high) in zip(pairwise(ring_starts), pairwise(r for r, _ in profile), strict=False):

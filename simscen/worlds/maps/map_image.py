@@ -24,6 +24,7 @@ Grays16 = npt.NDArray[np.uint16]
 """Gray values of pixels (rows, columns), 0 (black) to 65535."""
 
 MAX_PIXELS, MAX_BYTES = 16 * 2**20, 64 * 2**20
+"""Maximum number of pixels of an image, and maximum size of its file."""
 PROBLEM_CODE = "SC320"
 
 # Header of a PGM: P2 or P5, width, height, and maxval, separated by white space or comments.
@@ -58,6 +59,7 @@ def read_image(path: Path) -> MapImage:
 
 
 def _read_bytes(path: Path) -> bytes:
+    """Return the content of a file. Raises UnreadableImage if it is not a regular file, too large, or unreadable."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
@@ -138,6 +140,7 @@ def _decode_png_or_bmp(data: bytes) -> MapImage:
 
 
 def _bmp_size(data: bytes) -> tuple[int, int]:
+    """Return width and height of a BMP from its header. The height is negative in the file if rows begin at the top."""
     (header,) = struct.unpack("<I", data[14:18])
     width, height = struct.unpack("<HH" if header == 12 else "<ii", data[18 : 22 if header == 12 else 26])
     return width, abs(height)

@@ -149,16 +149,16 @@ def _top_and_bottom_rectangles(occupied: CellMask) -> Array:
     row, start, stop = _intervals(occupied).T
     order = np.lexsort((row, stop, start))
     row, start, stop = row[order], start[order], stop[order]
-    new = np.ones(len(row), dtype=np.bool_)
-    new[1:] = (start[1:] != start[:-1]) | (stop[1:] != stop[:-1]) | (row[1:] != row[:-1] + 1)
-    first = np.flatnonzero(new)
+    begins_rectangle = np.ones(len(row), dtype=np.bool_)
+    begins_rectangle[1:] = (start[1:] != start[:-1]) | (stop[1:] != stop[:-1]) | (row[1:] != row[:-1] + 1)
+    first = np.flatnonzero(begins_rectangle)
     last = np.append(first[1:], len(row)) - 1
     low, high, left, right = row[first], row[last] + 1, start[first], stop[first]
     zero = np.zeros(len(first), dtype=np.int64)
     ring = [(left, low), (right, low), (right, high), (left, high)]
     top = np.stack([np.column_stack((x, y, zero + 1)) for x, y in ring], axis=1)
-    under = np.stack([np.column_stack((x, y, zero)) for x, y in reversed(ring)], axis=1)
-    return np.concatenate((top, under)).astype(np.float64)
+    bottom = np.stack([np.column_stack((x, y, zero)) for x, y in reversed(ring)], axis=1)
+    return np.concatenate((top, bottom)).astype(np.float64)
 
 
 def _intervals(lines: CellMask) -> npt.NDArray[np.int64]:

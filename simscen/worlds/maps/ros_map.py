@@ -57,10 +57,10 @@ def cell_values(spec: RosMapSpec) -> npt.NDArray[np.int8]:
     values = np.where(occupancy >= occupied, OCCUPIED, UNKNOWN)
     values = np.where(occupancy <= free, FREE, values)
     if spec.mode == "scale":
-        between = (occupancy > free) & (occupancy < occupied)
+        is_between = (occupancy > free) & (occupancy < occupied)
         span = np.float32(spec.occupied_thresh - spec.free_thresh)
-        scaled = (occupancy[between] - free) / span * np.float32(100)
-        values[between] = np.floor(scaled + np.float32(0.5))  # round half away from zero, as C++ does
+        scaled = (occupancy[is_between] - free) / span * np.float32(100)
+        values[is_between] = np.floor(scaled + np.float32(0.5))  # round half away from zero, as C++ does
     return values.astype(np.int8)
 
 
@@ -99,6 +99,7 @@ def save_map(grid: OccupancyGrid, yaml_path: Path) -> None:
 
 
 def _grays(cells: npt.NDArray[np.int8], is_trinary: bool) -> Grays8:
+    """Return the gray values of cells; without `is_trinary`, the cell values themselves, and 255 for unknown cells."""
     if not is_trinary:
         return np.where(cells < 0, np.uint8(255), cells.astype(np.uint8))
     return np.select((cells == FREE, cells == OCCUPIED), (FREE_GRAY, OCCUPIED_GRAY), UNKNOWN_GRAY).astype(np.uint8)

@@ -3,7 +3,7 @@
 The embreex package contains the library, but its own Python functions are slow.
 
 A fan contains the rays of a planar lidar (see `RayFan`). To sweep a fan means to cast its rays: each ray is shortened
-to end at the first triangle that it hits. Several scenes can be swept one after another.
+to end at the first triangle that it hits. Several scenes can shorten the rays of one fan, one after another.
 """
 
 import ctypes
@@ -131,13 +131,13 @@ class MeshScene:
         self.extent = math.hypot(*self.center) + self.radius
         self._scene = EmbreeScene(corners, mesh)
 
-    def distances(self, origins: Array, directions: Array, ends: float | Float32Array) -> Float32Array:
-        """Return the distances (n,) in m to the first hits of single rays; `ends` for rays without a hit.
+    def distances(self, origins: Array, directions: Array, lengths: float | Float32Array) -> Float32Array:
+        """Return the distances (n,) in m to the first hits of single rays; `lengths` for rays without a hit.
 
-        The rays start at `origins` (n, 3), have the unit vectors `directions` (n, 3), and are `ends` (n,) m long.
+        The rays start at `origins` (n, 3), have the unit vectors `directions` (n, 3), and are `lengths` (n,) m long.
         """
         rays = RayPackets(len(origins))
-        rays.set_rays(origins - self.center, directions, ends)
+        rays.set_rays(origins - self.center, directions, lengths)
         self._scene.shorten(rays)
         return rays.distances()
 
@@ -180,10 +180,10 @@ class MovingMesh:
         """Return a lower bound of the distance in m between the mesh and a position in the world frame."""
         return math.dist(self.pose[:3], position) - self.scene.extent
 
-    def distances(self, origins: Array, directions: Array, ends: Float32Array) -> Float32Array:
+    def distances(self, origins: Array, directions: Array, lengths: Float32Array) -> Float32Array:
         """Return the distances as `MeshScene.distances` does, but for rays in the world frame."""
         rotation = self._world_rotation
-        return self.scene.distances((origins - self.pose[:3]) @ rotation, directions @ rotation, ends)
+        return self.scene.distances((origins - self.pose[:3]) @ rotation, directions @ rotation, lengths)
 
     def sweep(self, fan: RayFan, pose: Pose3, axes: tuple[Vector, Vector]) -> None:
         """Shorten the rays of a fan at `pose` in the world, in the packets that may hit the mesh.
@@ -205,21 +205,21 @@ def packets_towards_sphere(fan: RayFan, pose: Pose3, center: Vector, radius: flo
     ahead, left, _ = rotate_vector((-i, -j, -k, w), offset)
     tangent_length = math.sqrt(distance * distance - radius * radius) if distance > radius else -math.inf
     cone = fan.rays_towards(ahead, left, tangent_length)
-    ends = fan.rays.lengths
+    lengths = fan.rays.lengths
     found = [slice(rays.start // PACKET_SIZE, -(-rays.stop // PACKET_SIZE)) for rays in cone]
     # `max` would take ten times as long as `item(argmax())`.
-    return [packets for packets in found if (some := ends[packets]).item(some.argmax()) >= distance - radius]
+    return [packets for packets in found if (part := lengths[packets]).item(part.argmax()) >= distance - radius]
 
 
 def rays_hitting_sphere(
-    center: Vector, radius: float, origins: Array, directions: Array, ends: Float32Array
+    center: Vector, radius: float, origins: Array, directions: Array, lengths: Float32Array
 ) -> npt.NDArray[np.int64]:
     """Return the indices of single rays that may hit a sphere. Rays are given as in `MeshScene.distances`."""
     offsets = center - origins
     ahead = (offsets * directions).sum(axis=1)
     lateral_squared = (offsets * offsets).sum(axis=1) - ahead**2
     hit: npt.NDArray[np.int64] = (
-        (ahead >= -radius) & (ahead - radius <= ends) & (lateral_squared <= radius * radius)
+        (ahead >= -radius) & (ahead - radius <= lengths) & (lateral_squared <= radius * radius)
     ).nonzero()[0]
     return hit
 

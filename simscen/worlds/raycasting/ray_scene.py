@@ -77,13 +77,13 @@ class RestingBodies:
             if group.min_distance(pose[:3]) <= reach:
                 group.sweep(fan, pose, heights)
 
-    def cast(self, origins: Array, directions: Array, heights: HeightRange, ends: Float32Array) -> None:
-        """Shorten single rays in place: reduce their lengths `ends` (n,) in m to the first hits.
+    def cast(self, origins: Array, directions: Array, heights: HeightRange, lengths: Float32Array) -> None:
+        """Shorten single rays in place: reduce their `lengths` (n,) in m to the first hits.
 
         The rays start at `origins` (n, 3), have the unit vectors `directions` (n, 3), and are between the `heights`.
         """
         for group in self._groups:
-            group.cast(origins, directions, heights, ends)
+            group.cast(origins, directions, heights, lengths)
 
 
 class RestingGroup:
@@ -147,11 +147,11 @@ class RestingGroup:
         for packets in packets_towards_sphere(fan, pose, self._center, self._radius):
             self._scene_between(heights).sweep(fan, pose[:3], packets)
 
-    def cast(self, origins: Array, directions: Array, heights: HeightRange, ends: Float32Array) -> None:
+    def cast(self, origins: Array, directions: Array, heights: HeightRange, lengths: Float32Array) -> None:
         """Shorten single rays; see `RestingBodies.cast`."""
-        rays = rays_hitting_sphere(self._center, self._radius, origins, directions, ends)
+        rays = rays_hitting_sphere(self._center, self._radius, origins, directions, lengths)
         if len(rays):
-            ends[rays] = self._scene_between(heights).distances(origins[rays], directions[rays], ends[rays])
+            lengths[rays] = self._scene_between(heights).distances(origins[rays], directions[rays], lengths[rays])
 
 
 class RayScene(RayCaster):
@@ -212,22 +212,22 @@ class RayScene(RayCaster):
                 mover.sweep(fan, pose, (ahead, left))
         return fan.rays.distances()
 
-    def _first_hits(self, origins: Array, directions: Array, reach: float, end: float) -> Float32Array:
-        """Return the distances (n,) in m to the first hits of single rays, or `end` without a hit within `reach` m."""
+    def _first_hits(self, origins: Array, directions: Array, reach: float, length: float) -> Float32Array:
+        """Return the distances (n,) in m to the first hits of single rays; `length` without a hit within `reach` m."""
         x, y, z = origins[0].tolist()
         reach += float(np.linalg.norm(origins - (x, y, z), axis=1).max())
-        ends = self._static.distances(origins, directions, end)
+        lengths = self._static.distances(origins, directions, length)
         if self._resting:
             low, high = origins[:, 2].min(), origins[:, 2].max()
             down, up = directions[:, 2].min(), directions[:, 2].max()
             heights = self._height_range(low - _max_rise(-down, reach), high + _max_rise(up, reach))
-            self._resting.cast(origins, directions, heights, ends)
+            self._resting.cast(origins, directions, heights, lengths)
         for mover in self._movers.values():
             if mover.min_distance((x, y, z)) <= reach:
-                rays = rays_hitting_sphere(mover.center, mover.scene.radius, origins, directions, ends)
+                rays = rays_hitting_sphere(mover.center, mover.scene.radius, origins, directions, lengths)
                 if len(rays):
-                    ends[rays] = mover.distances(origins[rays], directions[rays], ends[rays])
-        return ends
+                    lengths[rays] = mover.distances(origins[rays], directions[rays], lengths[rays])
+        return lengths
 
     def _height_range(self, low: float, high: float) -> HeightRange:
         """Return a height range that contains all heights from `low` to `high` in m.

@@ -25,6 +25,7 @@ MAX_CELLS = 1_000_000
 OUTLINE_SPACING_M = 0.02
 """Distance between the points of an outline. The error of a clearance of 0.2 m is then at most 0.25 mm."""
 CLEARANCE_WITHOUT_SOLIDS_M = 1e6
+"""Clearance in a world without solids."""
 HALF_DIAGONAL_CELLS = 0.7072
 """Half of a cell's diagonal, in cells: the maximum distance of a point from the center of its cell."""
 
@@ -56,24 +57,24 @@ class ClearanceField:
     def has_clearance(self, points: Array, distance: float) -> npt.NDArray[np.bool_]:
         """Return for each of the points (n, 2) whether it is at least `distance` m away from all solids."""
         approximate = self.cell_clearance[self._cells(points)]
-        # Twice, because both the point and the outline may be that far from the centers of their cells.
+        # Twice, because the point and the outline may each be half a diagonal away from the center of their cells.
         has_clearance: npt.NDArray[np.bool_] = approximate >= distance + 2 * HALF_DIAGONAL_CELLS * self.grid.resolution
-        undecided = ~has_clearance
-        has_clearance[undecided] = self.clearance_at(points[undecided]) >= distance
+        is_undecided = ~has_clearance
+        has_clearance[is_undecided] = self.clearance_at(points[is_undecided]) >= distance
         return has_clearance
 
     def free_cells(self, distance: float) -> CellMask:
         """Return the mask of the cells whose center is at least `distance` m away from all solids."""
         slack = HALF_DIAGONAL_CELLS * self.grid.resolution
-        free: CellMask = (self.cell_clearance >= distance + slack) & ~self.is_inside
-        undecided = (np.abs(self.cell_clearance - distance) < slack) & ~self.is_inside
-        free[undecided] = self.clearance_at(self.grid.center_of(np.argwhere(undecided))) >= distance
-        return free
+        is_free: CellMask = (self.cell_clearance >= distance + slack) & ~self.is_inside
+        is_undecided = (np.abs(self.cell_clearance - distance) < slack) & ~self.is_inside
+        is_free[is_undecided] = self.clearance_at(self.grid.center_of(np.argwhere(is_undecided))) >= distance
+        return is_free
 
     def push_away(self, points: Array, distance: float) -> Array:
-        """Return translations (n, 2) that move points (n, 2) away from their nearest solid, to `distance` m.
+        """Return translations (n, 2) in m that move points (n, 2) to `distance` m from their nearest solid.
 
-        Points that are farther away are not moved.
+        The translations of points that are farther away are zero.
         """
         moves = np.zeros_like(points)
         slack = 2 * HALF_DIAGONAL_CELLS * self.grid.resolution
@@ -113,32 +114,33 @@ def clearance_field(mesh: TriangleMesh, grid: OccupancyGrid, z_range: tuple[floa
     """Return the clearance from the part of a mesh between two heights, on the cells of `grid`, which has no yaw."""
     from scipy import ndimage, spatial
 
-    cuts = sections_between(mesh, z_range)
-    blocked, inside = np.zeros(grid.shape, np.bool_), np.zeros(grid.shape, np.bool_)
-    for cut in cuts:
-        local = CrossSection((cut.segments - (grid.origin.x, grid.origin.y)) / grid.resolution, cut.owners)
-        blocked |= touched_cells(local, grid.shape)
-        inside |= filled_cells(local, grid.shape)
-    segments, segment_owners = np.concatenate([c.segments for c in cuts]), np.concatenate([c.owners for c in cuts])
-    samples, owners = _sample_segments(segments, segment_owners)
-    if not blocked.any():
-        return ClearanceField(grid, np.full(grid.shape, CLEARANCE_WITHOUT_SOLIDS_M), inside, None, owners)
-    cell_clearance = ndimage.distance_transform_edt(~blocked) * grid.resolution
-    return ClearanceField(grid, cell_clearance, inside, spatial.cKDTree(samples), owners, mesh.names)
+    sections = sections_between(mesh, z_range)
+    is_touched, is_inside = np.zeros(grid.shape, np.bool_), np.zeros(grid.shape, np.bool_)
+    for section in sections:
+        points_in_cells = (section.segments - (grid.origin.x, grid.origin.y)) / grid.resolution
+        section_in_cells = CrossSection(points_in_cells, section.owners)
+        is_touched |= touched_cells(section_in_cells, grid.shape)
+        is_inside |= filled_cells(section_in_cells, grid.shape)
+    segments = np.concatenate([section.segments for section in sections])
+    samples, owners = _sample_segments(segments, np.concatenate([section.owners for section in sections]))
+    if not is_touched.any():
+        return ClearanceField(grid, np.full(grid.shape, CLEARANCE_WITHOUT_SOLIDS_M), is_inside, None, owners)
+    cell_clearance = ndimage.distance_transform_edt(~is_touched) * grid.resolution
+    return ClearanceField(grid, cell_clearance, is_inside, spatial.cKDTree(samples), owners, mesh.names)
 
 
 def _sample_segments(segments: Array, owners: npt.NDArray[np.int32]) -> tuple[Array, npt.NDArray[np.int32]]:
     """Return points (n, 2) along segments (m, 2, 2), at most OUTLINE_SPACING_M apart, without duplicates.
 
-    Also returns the owner (n,) of each point, from the owners (m,) of the segments.
+    Also returns the owner (n,) of each point. `owners` (m,) are the owners of the segments.
     """
     step = segments[:, 1] - segments[:, 0]
     piece_counts = np.maximum(np.ceil(np.linalg.norm(step, axis=1) / OUTLINE_SPACING_M), 1).astype(np.int64)
-    which, number = expand_ranges(np.zeros_like(piece_counts), piece_counts + 1)
-    points = segments[which, 0] + (number / piece_counts[which])[:, None] * step[which]
+    segment, number = expand_ranges(np.zeros_like(piece_counts), piece_counts + 1)
+    points = segments[segment, 0] + (number / piece_counts[segment])[:, None] * step[segment]
     keys: npt.NDArray[np.int64] = np.round(points / (OUTLINE_SPACING_M / 20)).astype(np.int64)
     order = np.lexsort(keys.T)
-    new = np.ones(len(order), dtype=np.bool_)
-    new[1:] = np.any(np.diff(keys[order], axis=0) != 0, axis=1)
-    distinct: Array = points[order[new]]
-    return distinct, owners[which][order[new]]
+    is_new = np.ones(len(order), dtype=np.bool_)
+    is_new[1:] = np.any(np.diff(keys[order], axis=0) != 0, axis=1)
+    distinct: Array = points[order[is_new]]
+    return distinct, owners[segment][order[is_new]]

@@ -15,7 +15,7 @@ from simscen.worlds.routes.clearance import ClearanceField
 MIN_CLEARANCE_CELLS = 0.71
 """Clearance below which a gap cannot be distinguished from a thin wall: half of the diagonal of a cell."""
 SAME_THICKNESS_CELLS = 0.3
-"""Difference below which walls count as equally thin. The one nearest to the midpoint of the two ends is then used."""
+"""Difference below which walls count as equally thin. Of these, the wall nearest to the midpoint of the ends counts."""
 OPPOSITE_COSINE = -0.5
 """Cosine of the minimum angle (120°), seen from the gap, between the nearest point and points on the other side."""
 
@@ -42,8 +42,8 @@ def narrowest_gap(field: ClearanceField, ends: tuple[Pose2, Pose2], radius: floa
     """
     grid = field.grid
     clearance: Array = np.minimum(field.cell_clearance, 2 * radius)
-    near = field.cell_clearance < 2 * radius
-    clearance[near] = np.minimum(field.clearance_at(grid.center_of(np.argwhere(near))), 2 * radius)
+    is_near = field.cell_clearance < 2 * radius
+    clearance[is_near] = np.minimum(field.clearance_at(grid.center_of(np.argwhere(is_near))), 2 * radius)
     cell = _bottleneck(clearance, grid.cell_of(np.array([ends[0][:2], ends[1][:2]])))
     position: Array = grid.center_of(cell[None])[0]
     min_clearance = clearance[tuple(cell)]
@@ -66,8 +66,8 @@ def _bottleneck(clearance: Array, ends: npt.NDArray[np.int64]) -> npt.NDArray[np
     while high - low > 1:
         middle = (low + high) // 2
         labels, _ = ndimage.label(clearance >= levels[middle], structure=np.ones((3, 3)))
-        connected = labels[first] == labels[last] > 0
-        low, high = (middle, high) if connected else (low, middle)
+        is_connected = labels[first] == labels[last] > 0
+        low, high = (middle, high) if is_connected else (low, middle)
     return _connecting_cell(clearance, levels[low], first, last)
 
 

@@ -15,10 +15,11 @@ from simscen.core.records.case import Passage, Point
 from simscen.worlds.routes.clearance import ClearanceField
 
 MAX_WIDTH_M = 4.0
+"""Maximum width of a passage. Wider gaps are not reported."""
 PROBE_SPACING_M, MAX_PROBES = 0.25, 80
 """Minimum distance between the points of the path at which passages are searched, and maximum number of points."""
 NARROW_WIDTH_M = 2.0
-"""Width up to which a passage is measured at its narrowest point. A wider one is measured where the path crosses it."""
+"""Maximum width of a passage that is measured at its narrowest point. Wider ones are measured on the path."""
 RAY_ROTATIONS = np.array(
     [[[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]] for a in np.radians(np.arange(-60, 61, 10))]
 )
@@ -48,16 +49,17 @@ def find_passages(path: Array, goal: str, field: ClearanceField) -> tuple[Passag
 def passage_between(sides: tuple[Point, ...], goal: str, field: ClearanceField) -> Passage:
     """Return the passage between the two points `sides`, which are moved to the nearest points of the outline."""
     assert field.outline is not None
-    one, other = (int(field.outline.query(np.array(side))[1]) for side in sides)
-    return _passage(goal, (one, other), field)
+    first, second = (int(field.outline.query(np.array(side))[1]) for side in sides)
+    return _passage(goal, (first, second), field)
 
 
 def _passage(goal: str, pair: tuple[int, int], field: ClearanceField) -> Passage:
     """Return the passage between two points of the outline, given by their indices. Points are rounded to 1 mm."""
     assert field.outline is not None
     (ax, ay), (bx, by) = field.outline.data[list(pair)].tolist()
-    one, other = (field.names[owner] for owner in field.owners[list(pair)])
-    return Passage(goal, ((round(ax, 3), round(ay, 3)), (round(bx, 3), round(by, 3))), (one, other))
+    first_name, second_name = (field.names[owner] for owner in field.owners[list(pair)])
+    ends = (round(ax, 3), round(ay, 3)), (round(bx, 3), round(by, 3))
+    return Passage(goal, ends, (first_name, second_name))
 
 
 def _candidate_pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int, int]]:
@@ -66,20 +68,19 @@ def _candidate_pairs(point: Array, field: ClearanceField) -> Iterator[tuple[int,
     Preferred pairs come first.
     """
     assert field.outline is not None
-    distance, index = field.outline.query(point)
-    one, apart = int(index), float(distance)
-    if not 0 < apart < MAX_WIDTH_M:
+    distance, first = field.outline.query(point)
+    if not 0 < distance < MAX_WIDTH_M:
         return
-    hits = _ray_hits(point, field.outline.data[one], apart, field)
-    reached = np.flatnonzero(np.isfinite(hits[:, 0]))
-    if not len(reached):
+    hits = _ray_hits(point, field.outline.data[first], float(distance), field)
+    rays = np.flatnonzero(np.isfinite(hits[:, 0]))
+    if not len(rays):
         return
-    nearest = int(reached[np.argmin(np.linalg.norm(hits[reached] - point, axis=1))])
-    straightest = int(reached[np.argmin(np.abs(reached - len(RAY_ROTATIONS) // 2))])
-    for hit in dict.fromkeys((nearest, straightest)):
-        other = int(field.outline.query(hits[hit])[1])
-        yield _narrowest_pair(one, other, field)
-        yield one, other
+    shortest = int(rays[np.argmin(np.linalg.norm(hits[rays] - point, axis=1))])
+    straightest = int(rays[np.argmin(np.abs(rays - len(RAY_ROTATIONS) // 2))])
+    for ray in dict.fromkeys((shortest, straightest)):
+        second = int(field.outline.query(hits[ray])[1])
+        yield _narrowest_pair(int(first), second, field)
+        yield int(first), second
 
 
 def _ray_hits(point: Array, side: Array, distance: float, field: ClearanceField) -> Array:
@@ -91,10 +92,10 @@ def _ray_hits(point: Array, side: Array, distance: float, field: ClearanceField)
     rays = point + steps[None, :, None] * (RAY_ROTATIONS @ ((point - side) / distance))[:, None]
     cells = field.grid.cell_of(rays.reshape(-1, 2))
     inside = field.grid.inside(cells)
-    solid = inside & (field.cell_clearance[tuple(np.where(inside[:, None], cells, 0).T)] <= 0)
-    solid = solid.reshape(len(RAY_ROTATIONS), -1)
-    numbers, first = np.arange(len(RAY_ROTATIONS)), solid.argmax(axis=1)
-    hits: Array = np.where(solid[numbers, first][:, None], rays[numbers, first], np.nan)
+    is_solid = inside & (field.cell_clearance[tuple(np.where(inside[:, None], cells, 0).T)] <= 0)
+    is_solid = is_solid.reshape(len(RAY_ROTATIONS), -1)
+    numbers, first = np.arange(len(RAY_ROTATIONS)), is_solid.argmax(axis=1)
+    hits: Array = np.where(is_solid[numbers, first][:, None], rays[numbers, first], np.nan)
     return hits
 
 
@@ -104,10 +105,11 @@ def _crossing_index(ends: Array, path: Array) -> float | None:
     The result is an index of the path: 2.5 means halfway between the points 2 and 3.
     """
     (ax, ay), (bx, by) = ends.tolist()
+    # A cross product is positive for points on the left of a line, and negative on its right.
     across = (bx - ax) * (path[:, 1] - ay) - (by - ay) * (path[:, 0] - ax)
     step = np.diff(path, axis=0)
-    one, other = (step[:, 0] * (y - path[:-1, 1]) - step[:, 1] * (x - path[:-1, 0]) for x, y in ((ax, ay), (bx, by)))
-    pieces = np.flatnonzero((across[:-1] * across[1:] <= 0) & (one * other <= 0))
+    a, b = (step[:, 0] * (y - path[:-1, 1]) - step[:, 1] * (x - path[:-1, 0]) for x, y in ((ax, ay), (bx, by)))
+    pieces = np.flatnonzero((across[:-1] * across[1:] <= 0) & (a * b <= 0))
     if not len(pieces):
         return None
     first = int(pieces[0])
@@ -115,23 +117,23 @@ def _crossing_index(ends: Array, path: Array) -> float | None:
     return first + (before / (before + after) if before + after else 0.0)
 
 
-def _narrowest_pair(one: int, other: int, field: ClearanceField) -> tuple[int, int]:
-    """Return the sides of a passage at its narrowest point near the sides `one` and `other`.
+def _narrowest_pair(first: int, second: int, field: ClearanceField) -> tuple[int, int]:
+    """Return the two sides of a passage at its narrowest point near the sides `first` and `second`.
 
-    Sides are indices of outline points. If they are more than NARROW_WIDTH_M apart, they are returned unchanged.
+    Sides are indices of outline points. Sides that are more than NARROW_WIDTH_M apart are returned unchanged.
     """
     assert field.outline is not None
     data = field.outline.data
-    width = float(np.linalg.norm(data[one] - data[other]))
+    width = float(np.linalg.norm(data[first] - data[second]))
     if width > NARROW_WIDTH_M:
-        return one, other
-    middle = (data[one] + data[other]) / 2
+        return first, second
+    middle = (data[first] + data[second]) / 2
     around: npt.NDArray[np.int64] = np.array(field.outline.query_ball_point(middle, 0.75 * width, return_sorted=True))
-    apart = data[around] - middle
-    cosines = apart @ (data[one] - middle) / np.maximum(np.linalg.norm(apart, axis=1) * width / 2, 1e-9)
-    near, far = _subsample(around[cosines > 0.5], one), _subsample(around[cosines < -0.5], other)
-    between = np.linalg.norm(data[near][:, None] - data[far][None], axis=2)
-    j, k = np.unravel_index(int(np.argmin(between)), between.shape)
+    offsets = data[around] - middle
+    cosines = offsets @ (data[first] - middle) / np.maximum(np.linalg.norm(offsets, axis=1) * width / 2, 1e-9)
+    near, far = _subsample(around[cosines > 0.5], first), _subsample(around[cosines < -0.5], second)
+    distances = np.linalg.norm(data[near][:, None] - data[far][None], axis=2)
+    j, k = np.unravel_index(int(np.argmin(distances)), distances.shape)
     return int(near[j]), int(far[k])
 
 

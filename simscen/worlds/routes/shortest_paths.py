@@ -52,7 +52,7 @@ class ShortestPaths:
     """Finds the shortest paths of a disc of one radius in one world.
 
     Lengths are exact to about 1 %. If the paths around both sides of an obstacle differ by less than 3 %, the longer
-    one may be chosen. A radius smaller than 0.71 grid cells counts as 0.71 cells.
+    path may be chosen. A radius smaller than 0.71 grid cells counts as 0.71 cells.
     """
 
     def __init__(
@@ -88,8 +88,8 @@ class ShortestPaths:
     def leg(self, start: Pose2, goal: Pose2, name: str) -> Leg:
         """Return the shortest path to the goal `name`, with its passages.
 
-        If there is no path, the length is inf, and the only passage is the gap that is too narrow. There is none if
-        the start or the goal is blocked, or if no such gap was found.
+        If there is no path, the length is inf, and the only passage is the gap that is too narrow. There is no passage
+        if the start or the goal is blocked, or if no such gap was found.
         """
         path = self.path(start, goal)
         if path is not None:
@@ -152,7 +152,7 @@ class ShortestPaths:
         return tighten_path(np.concatenate((ends[:1], inner, ends[1:])), self._field, self._radius)
 
     def _free_cell(self, graph: GridGraph, point: Array) -> tuple[int, int] | None:
-        """Return the free cell (row, column) nearest to a point (2,); None if none within two cells is free."""
+        """Return the free cell (row, column) nearest to a point (2,); None if no cell within two cells is free."""
         grid = self._field.grid
         around = np.stack(np.meshgrid(np.arange(-2, 3), np.arange(-2, 3), indexing="ij"), axis=-1).reshape(-1, 2)
         cells: CellIndices = grid.cell_of(point[None]) + around

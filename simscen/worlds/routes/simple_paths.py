@@ -1,6 +1,6 @@
 """Fast search for a path of a disc-shaped robot between upright solids, without NumPy and SciPy.
 
-If no path is found here, there may still be one, and `shortest_paths` must be used.
+This search may miss a path. If it finds none, use `shortest_paths`.
 """
 
 import heapq
@@ -17,7 +17,7 @@ Point = tuple[float, float]
 Cell = tuple[int, int]
 """Point of the search grid: steps along x and y from the start."""
 Bucket = tuple[int, int]
-"""Square of 1 x 1 m, for which the prisms nearby are listed: lower left corner in m."""
+"""Lower left corner in m of a square of 1 x 1 m, for which the prisms nearby are listed."""
 
 STEP_M = 0.2
 """Distance between neighboring points of the search grid, along x and y."""
@@ -37,14 +37,14 @@ class SimplePaths:
     def __init__(self, prisms: Iterable[UprightPrism], radius: float) -> None:
         self._radius = radius
         self._lengths: dict[tuple[Point, Point], float] = {}
-        self._near: dict[Bucket, list[UprightPrism]] = {}
+        self._prisms_near: dict[Bucket, list[UprightPrism]] = {}
         search_radius = radius + HALF_DIAGONAL_STEP_M + SAMPLING_MARGIN_M
         for prism in prisms:
             left, bottom, right, top = prism.rectangle
             columns = range(math.floor(left - search_radius), math.floor(right + search_radius) + 1)
             rows = range(math.floor(bottom - search_radius), math.floor(top + search_radius) + 1)
             for bucket in product(columns, rows):
-                self._near.setdefault(bucket, []).append(prism)
+                self._prisms_near.setdefault(bucket, []).append(prism)
 
     def length(self, start: Point, goal: Point) -> float:
         """Return the length in m of a path, not necessarily the shortest one, to the goal; inf if none was found."""
@@ -71,19 +71,19 @@ class SimplePaths:
     def _search(self, start: Point, goal: Point, last_leg: Callable[[Point], float]) -> float:
         """Return the length in m of a path by A* over a grid around the start; inf if none was found.
 
-        `last_leg` returns the length of the rest of the path from a grid point; inf if the search must continue.
+        `last_leg` returns the length in m of the path from a grid point to the end; inf if the search must continue.
         """
         lengths: dict[Cell, float] = {(0, 0): 0.0}
         queue = [(math.dist(start, goal), (0, 0))]
-        done: set[Cell] = set()
+        visited: set[Cell] = set()
         while queue and len(lengths) < MAX_GRID_POINTS:
             _, cell = heapq.heappop(queue)
-            if cell in done:
+            if cell in visited:
                 continue
-            done.add(cell)
+            visited.add(cell)
             here = _point(start, cell)
-            if (rest := last_leg(here)) < math.inf:
-                return lengths[cell] + rest
+            if (remaining := last_leg(here)) < math.inf:
+                return lengths[cell] + remaining
             for move in MOVES:
                 neighbor = cell[0] + move[0], cell[1] + move[1]
                 there, length = _point(start, neighbor), lengths[cell] + STEP_M * math.hypot(*move)
@@ -105,12 +105,12 @@ class SimplePaths:
 
     def _has_clearance(self, point: Point, margin: float) -> bool:
         """Return whether all prisms are at least the radius plus `margin` m away."""
-        near = self._near.get((math.floor(point[0]), math.floor(point[1])), ())
+        near = self._prisms_near.get((math.floor(point[0]), math.floor(point[1])), ())
         return all(prism.distance(point, (prism.bottom, prism.top)) >= self._radius + margin for prism in near)
 
 
 def simple_paths_between(solids: Iterable[Solid], radius: float, z_range: ZRange) -> SimplePaths | None:
-    """Prepare the search for paths of a disc of `radius` m around solids. Only their parts between two heights count.
+    """Prepare the search for paths of a disc of `radius` m around the parts of solids between two heights.
 
     Returns None if one of the solids is not an upright prism with a convex base.
     """

@@ -23,7 +23,7 @@ _WORLD = -1
 
 
 class LinkGroups:
-    """Disjoint sets (union-find) of links, which are numbered from 0. The links in the set of _WORLD are static."""
+    """Disjoint sets (union-find) of links, given by numbers from 0. The links in the set of _WORLD are static."""
 
     def __init__(self) -> None:
         self._parents: dict[int, int] = {_WORLD: _WORLD}
@@ -48,7 +48,7 @@ def split_model(
     """Return the static solids and the movable bodies of a top-level model at `pose`, in document order.
 
     `contents` are all links of the model and of nested models. A single movable body has the name and the frame of the
-    model. If there are several, each has the name and the frame of its first link.
+    model. If there are several movable bodies, each has the name and the frame of its first link.
     """
     groups = _link_groups(model, [content.link for content in contents], report)
     members: dict[int, list[LinkContent]] = {}

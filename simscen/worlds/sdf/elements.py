@@ -13,6 +13,7 @@ from simscen.worlds.sdf.report import OutOfReach, SourceLocation, UnusableElemen
 MAX_NAME_LENGTH = 120
 """Maximum number of characters of the name of a model, link or frame. In messages, longer tags and names are cut."""
 STAGE_HINT = "an SDF world is XML; a world of Stage is not, so use its floor plan as a ROS map instead"
+"""Hint for a file without XML tags."""
 MAX_COORDINATE_M = 1e4
 """Maximum absolute value of coordinates and sizes."""
 
@@ -29,8 +30,8 @@ class Element(markup.Element):
     @property
     def path(self) -> str:
         """Path without the root element, for example world[default]/model[shelf]/link[link]."""
-        own = f"{_printable(self.tag)}[{_printable(self.name)}]" if self.name else _printable(self.tag)
-        return f"{self.parent.path}/{own}" if self.parent and self.parent.parent else own
+        segment = f"{_printable(self.tag)}[{_printable(self.name)}]" if self.name else _printable(self.tag)
+        return f"{self.parent.path}/{segment}" if self.parent and self.parent.parent else segment
 
     @property
     def location(self) -> SourceLocation:
@@ -68,7 +69,7 @@ def _printable(name: str) -> str:
 
 
 def read_numbers(element: Element, *counts: int) -> tuple[float, ...]:
-    """Return the finite numbers in the text of an element. There must be as many as one of `counts`."""
+    """Return the finite numbers in the text of an element. `counts` are the allowed numbers of numbers."""
     words = element.text.split()
     if len(words) not in counts:
         raise element.unusable(f"expected {' or '.join(map(str, counts))} numbers, got {len(words)}")
@@ -95,9 +96,9 @@ def read_sizes(
     tag: str,
     count: int,
     default: Sequence[float] | None = None,
-    largest: float = MAX_COORDINATE_M,
+    max_size: float = MAX_COORDINATE_M,
 ) -> tuple[float, ...]:
-    """Return `count` positive lengths in m, each at most `largest`, from the child `tag`.
+    """Return `count` positive lengths in m, each at most `max_size`, from the child `tag`.
 
     Without such a child, returns `default`, or raises UnusableElement if there is no default.
     """
@@ -109,8 +110,8 @@ def read_sizes(
     sizes = read_numbers(element, count)
     if any(size <= 0 for size in sizes):
         raise element.unusable(f"must be positive, got {element.text}")
-    if any(size > largest for size in sizes):
-        raise element.unusable(f"larger than {largest:g} m")
+    if any(size > max_size for size in sizes):
+        raise element.unusable(f"larger than {max_size:g} m")
     return sizes
 
 
@@ -121,7 +122,7 @@ def read_size(parent: Element, tag: str) -> float:
 
 def read_positive(parent: Element, tag: str) -> float:
     """Return one positive number of any unit from the required child `tag`."""
-    return read_sizes(parent, tag, 1, largest=math.inf)[0]
+    return read_sizes(parent, tag, 1, max_size=math.inf)[0]
 
 
 def read_bool(element: Element | None, default: bool = False) -> bool:
@@ -150,14 +151,16 @@ def checked_name(element: Element, name: str | None = None) -> str:
 
 
 def reference_frame(pose: Element | None) -> str:
-    """Return the attribute `relative_to` (before SDF 1.7: `frame`) of a `<pose>`; "" without one."""
+    """Return the attribute `relative_to` (before SDF 1.7: `frame`) of a `<pose>`; "" if it is missing."""
     if pose is None:
         return ""
     return pose.attributes.get("relative_to", pose.attributes.get("frame", ""))
 
 
 def read_pose(element: Element | None) -> Pose3:
-    """Return the pose in a `<pose>`: x y z and either roll pitch yaw or a quaternion x y z w; identity without one.
+    """Return the pose in a `<pose>`: x y z and roll pitch yaw, or x y z and a quaternion x y z w.
+
+    Returns the identity if there is no `<pose>`, or if it is empty.
 
     As in Gazebo Classic, the yaw may be missing if roll and pitch are 0; published worlds contain such poses. Source:
     SDF specification, "Specifying pose in SDFormat". Raises OutOfReach if a coordinate exceeds MAX_COORDINATE_M.
@@ -176,8 +179,8 @@ def read_pose(element: Element | None) -> Pose3:
         pose = Pose3(x, y, z, *(part / norm for part in quaternion))
     elif rotation_format == "euler_rpy":
         words = element.text.split()
-        lacks_yaw = len(words) == 5 and not any(word.strip("-.0") for word in words[3:])
-        x, y, z, *angles = (*read_numbers(element, 5), 0.0) if lacks_yaw else read_numbers(element, 6)
+        is_yaw_missing = len(words) == 5 and not any(word.strip("-.0") for word in words[3:])
+        x, y, z, *angles = (*read_numbers(element, 5), 0.0) if is_yaw_missing else read_numbers(element, 6)
         roll, pitch, yaw = (math.radians(angle) if in_degrees else angle for angle in angles)
         pose = Pose3.from_rpy(x, y, z, roll, pitch, yaw)
     else:

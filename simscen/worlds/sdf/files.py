@@ -11,7 +11,7 @@ from simscen.worlds.sdf.elements import Element, parse
 from simscen.worlds.sdf.report import ImportReport, MissingAsset, SourceLocation, UnusableElement
 
 MODEL_FILES = ("model.config", "model.sdf")
-"""Names of the files of which the folder of a model has at least one."""
+"""Names of files. The folder of a model contains at least one of these files."""
 MAX_WORLD_BYTES = 20 * 2**20
 MAX_MESH_BYTES = 64 * 2**20
 MAX_SHOWN_URI_LENGTH = 1000
@@ -30,12 +30,12 @@ BUILT_IN_MODELS = {
 
 
 class WorldFiles(AllowedFolders):
-    """Allowed folders of an SDF world, with methods that raise UnusableElement with the position of the element."""
+    """Folders that the files of an SDF world must be in. Errors name the element that refers to the file."""
 
     def locate(self, element: Element, is_preferred: Callable[[Path], bool] = lambda _: True) -> Path:
         """Return the real path of the file or folder that a `<uri>` refers to; for `is_preferred`, see `find`.
 
-        Raises MissingAsset if it does not exist, or UnusableElement.
+        Raises MissingAsset if the file does not exist, and UnusableElement if it must not be used.
         """
         uri = element.text
         try:
@@ -62,7 +62,7 @@ class WorldFiles(AllowedFolders):
 
 
 class IncludedFiles:
-    """Parses the world file and, once each, the files that `<include>` refers to. Rejects include cycles."""
+    """Parses the world file and the files that `<include>` refers to, each only once. Rejects include cycles."""
 
     def __init__(self, files: WorldFiles, report: ImportReport) -> None:
         self._files, self._report = files, report
@@ -78,7 +78,7 @@ class IncludedFiles:
         return root
 
     @contextmanager
-    def opened(self, include: Element) -> Iterator[Element]:
+    def open_include(self, include: Element) -> Iterator[Element]:
         """Yield the root element of the file that an `<include>` refers to. Raises UnusableElement.
 
         The file counts as open during the `with` block, in which it must not be included again.

@@ -38,10 +38,10 @@ FaceIndices = npt.NDArray[np.int64]
 """Indices (n,) of faces of a mesh."""
 
 
-def floor_height(placed: Sequence[Solid], static_count: int, bounds: Bounds, has_ground: bool) -> float:
+def floor_height(solids: Sequence[Solid], static_count: int, bounds: Bounds, has_ground: bool) -> float:
     """Return the height in m of the floor on which everything in `bounds` stands; 0 if it is at z = 0.
 
-    placed:        solids in the world frame: first `static_count` static solids, then the solids of movable bodies
+    solids:        solids in the world frame: first `static_count` static solids, then the solids of movable bodies
     static_count:  number of static solids
     bounds:        bounds of the world
     has_ground:    whether the world has a ground plane at z = 0
@@ -49,7 +49,7 @@ def floor_height(placed: Sequence[Solid], static_count: int, bounds: Bounds, has
     A static level slab is the floor if it covers nearly all of `bounds`, and is either thin and wide, or carries other
     geometry in a world without a ground plane.
     """
-    mesh = merge_solids(placed)
+    mesh = merge_solids(solids)
     top = mesh.vertices[mesh.faces, 2].max(axis=1)
     is_low = (top > MIN_FLOOR_HEIGHT_M) & (top <= MAX_FLOOR_HEIGHT_M) & (mesh.owners < static_count)
     low = np.flatnonzero(is_low)

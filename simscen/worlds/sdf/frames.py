@@ -17,10 +17,10 @@ MODEL_FRAME, WORLD_FRAME = "__model__", "world"
 class Frame:
     """A named frame: of a link, a nested model, a joint, or a `<frame>` element.
 
-    element:          the XML element; several frames can have the same one if a file is included several times
+    element:          the XML element; several frames have the same element if a file is included several times
     pose:             the `<pose>` element; None for identity
-    attached_to:      name of the link or frame with which a joint or a `<frame>` moves, and to which its `pose` refers
-                      if it has no `relative_to`; "" for the scope's own frame
+    attached_to:      name of the link or frame with which a joint or a `<frame>` moves; also the reference of `pose` if
+                      the `<pose>` has no `relative_to`; "" for the scope's own frame
     model_scope:      the frames in a nested model; None if this is not the frame of a model
     placement_frame:  name of a frame in the nested model that `pose` places; "" if `pose` places the model itself
     """
@@ -85,16 +85,16 @@ class FrameScope:
             return Pose3()
         if name in self.frames:
             return self.pose_of(self.frames[name])
-        model, rest = self._model_with_frame(name)
+        model, inner_name = self._model_with_frame(name)
         if model is None or model.model_scope is None:
             raise referrer.unusable(f"unknown frame {name[:80]!r}")
-        return self.pose_of(model).compose(model.model_scope.pose_of_name(rest, referrer))
+        return self.pose_of(model).compose(model.model_scope.pose_of_name(inner_name, referrer))
 
     def link_of_frame(self, name: str, referrer: Element, visited: tuple[Frame, ...] = ()) -> Frame | None:
         """Return the frame of the link with which the frame `name` moves; None for the world or a model without links.
 
         `visited` are the frames that lead to this one, to detect cycles. Raises UnusableElement at the element
-        `referrer` if there is no such frame, or if it is attached to itself.
+        `referrer` if there is no such frame, or if the frame is attached to itself.
         """
         if name == WORLD_FRAME:
             return None
@@ -102,10 +102,10 @@ class FrameScope:
             return self.link_of_frame(self.canonical_link, referrer, visited) if self.canonical_link else None
         frame = self.frames.get(name)
         if frame is None:
-            model, rest = self._model_with_frame(name)
+            model, inner_name = self._model_with_frame(name)
             if model is None or model.model_scope is None:
                 raise referrer.unusable(f"unknown link or frame {name[:80]!r}")
-            return model.model_scope.link_of_frame(rest, referrer)
+            return model.model_scope.link_of_frame(inner_name, referrer)
         if frame in visited:
             raise referrer.unusable(f"frame {name!r} is attached to itself")
         if frame.model_scope is not None:
@@ -115,14 +115,15 @@ class FrameScope:
         return self.link_of_frame(frame.attached_to, referrer, (*visited, frame))
 
     def _model_with_frame(self, name: str) -> tuple[Frame | None, str]:
-        """Return the frame of the nested or merged model that contains the frame `name`, and the frame's name there.
+        """Return the frame of the nested or merged model that contains the frame `name`, and its name there.
 
         Returns None instead of the frame if there is no such model.
         """
-        head, _, rest = name.partition("::")
-        nested = self.frames.get(head)
-        if rest and nested is not None and nested.model_scope is not None and nested.model_scope.has_frame(rest):
-            return nested, rest
+        model_name, _, inner_name = name.partition("::")
+        nested = self.frames.get(model_name)
+        scope = nested.model_scope if nested is not None else None
+        if inner_name and scope is not None and scope.has_frame(inner_name):
+            return nested, inner_name
         for model in self.merged_models:
             if model.model_scope is not None and model.model_scope.has_frame(name):
                 return model, name

@@ -62,12 +62,17 @@ _XACRO_CONDITIONALS = ("xacro:if", "xacro:unless")
 
 
 def report_unknown(element: Element, parent: str, report: ImportReport) -> None:
-    """Report an element that the importer does not read. Harmless elements (see HARMLESS_CHILDREN) are ignored.
+    """Report an element that the importer does not read. `parent` is the key of its parent in GEOMETRIC_CHILDREN.
 
-    Raises UnusableElement if the element could change the geometry: if it contains solids, if its parent is a shape, if
-    its name is a misspelling of an element in GEOMETRIC_CHILDREN, or if it is a xacro element or `experimental:params`
-    that must be expanded first. Ignores all other elements with a namespace prefix, and adds a note for any other
-    element. `parent` is the key of the parent in GEOMETRIC_CHILDREN.
+    Harmless elements (see HARMLESS_CHILDREN) are ignored. Raises UnusableElement if the element could change the
+    geometry, because
+
+    - it contains solids,
+    - its parent is a shape,
+    - its name is a misspelling of an element in GEOMETRIC_CHILDREN, or
+    - it is a xacro element or `experimental:params` that must be expanded first.
+
+    Other elements with a namespace prefix are ignored. For any other element, a note is added to the report.
     """
     tag = element.tag
     harmless = HARMLESS_CHILDREN.get(parent, set()) | (set() if parent in SHAPES else _HARMLESS_ANYWHERE)

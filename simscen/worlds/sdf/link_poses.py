@@ -22,9 +22,9 @@ class ModelState:
     """Saved state of a model.
 
     pose:    pose of the model in the world; None if not saved
-    links:   poses of its links in the world, by name
-    models:  states of its nested models, by name
-    scale:   factors for the shapes of its links, not for their poses
+    links:   poses of the model's links in the world, by name
+    models:  states of the nested models, by name
+    scale:   factors for the shapes of the model's links; the poses are not scaled
     """
 
     pose: Pose3 | None = None
@@ -37,14 +37,14 @@ class ModelState:
 class WorldState:
     """Saved state of a world.
 
-    models:    states of models, by name
-    deleted:   names of models that were deleted from the world
-    inserted:  `<model>` elements that were inserted into the world
+    models:           states of models, by name
+    deleted_names:    names of models that were deleted from the world
+    inserted_models:  `<model>` elements that were inserted into the world
     """
 
     models: dict[str, ModelState] = field(default_factory=dict)
-    deleted: frozenset[str] = frozenset()
-    inserted: tuple[Element, ...] = ()
+    deleted_names: frozenset[str] = frozenset()
+    inserted_models: tuple[Element, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class PlacedLink:
 
 
 def read_state(world: Element, report: ImportReport) -> WorldState:
-    """Return the first `<state>` of a `<world>`; an empty one if the world has none."""
+    """Return the first `<state>` of a `<world>`; an empty WorldState if the world has no `<state>`."""
     states = list(world.all("state"))
     if not states:
         return WorldState()
@@ -135,7 +135,7 @@ def place_links(
 def _state_of_included_model(state: ModelState, model: ModelNode) -> ModelState:
     """Return the state of a nested model from the `state` of the outer model.
 
-    Older versions of Classic saved the links of an included model as `model::link` of the outer model.
+    Older versions of Gazebo Classic saved the links of an included model as `model::link` of the outer model.
     """
     prefix = f"{model.name}::"
     links = {name.removeprefix(prefix): pose for name, pose in state.links.items() if name.startswith(prefix)}

@@ -68,7 +68,7 @@ def _collision_solids(
     name = f"{link.name}::{collision.name}" if collision.name else link.name
     friction = _friction(collision, report)
     for solid in reader.solids(geometry, pose):
-        yield Solid(_scaled(solid.shape, link.scale), pose.compose(solid.pose), name, friction)
+        yield Solid(_scale_shape(solid.shape, link.scale), pose.compose(solid.pose), name, friction)
 
 
 def _friction(collision: Element, report: ImportReport) -> float:
@@ -98,6 +98,7 @@ def _pose_in_link(pose: Element | None, link: PlacedLink) -> Pose3:
 
 
 def _note_disabled_contacts(collision: Element, report: ImportReport) -> None:
+    """Add a note for each element that disables contacts in Gazebo, which has no effect in simscen."""
     for element in collision.descendants():
         text = element.text.lower()
         has_no_bits = element.tag == "collide_bitmask" and text.removeprefix("0x").strip("0") == ""
@@ -105,8 +106,8 @@ def _note_disabled_contacts(collision: Element, report: ImportReport) -> None:
             report.note(element.location, "not supported: the robot still collides with it")
 
 
-def _scaled(shape: Shape, scale: Scale) -> Shape:
-    """Return a shape with sizes multiplied by `scale`, and a single radius by its x component, as in Gazebo Classic."""
+def _scale_shape(shape: Shape, scale: Scale) -> Shape:
+    """Return a shape with sizes multiplied by `scale`. A single radius is multiplied by x, as in Gazebo Classic."""
     if scale == (1.0, 1.0, 1.0):
         return shape
     x, y, z = scale
@@ -135,8 +136,8 @@ def _link_mass(inertial: Element | None, collisions: Sequence[tuple[Element, Seq
         # For a mesh that is not closed, the volume depends on the origin, as in sdformat.
         mass = 0.0
         for collision, solids in collisions:
-            owner = next((owner for owner in (collision, inertial) if owner.child("density")), None)
-            density = read_positive(owner, "density") if owner else DEFAULT_DENSITY_KG_M3
+            parent = next((element for element in (collision, inertial) if element.child("density")), None)
+            density = read_positive(parent, "density") if parent else DEFAULT_DENSITY_KG_M3
             for solid in solids:
                 mass += density * abs(enclosed_volume(triangulate(solid.shape)))
         if mass > 0:

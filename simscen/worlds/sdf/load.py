@@ -27,7 +27,7 @@ from simscen.worlds.sdf.shapes import ShapeReader
 MAX_OUTLIER_FRACTION = 0.05
 """Maximum fraction of the models that `outliers` may leave out, in addition to one model."""
 
-Placed = TypeVar("Placed", Solid, Body)
+SolidOrBody = TypeVar("SolidOrBody", Solid, Body)
 
 
 def load_sdf(path: Path, *, search: Sequence[Path] = (), root: Path, lenient: bool = False) -> World:
@@ -84,11 +84,11 @@ class _WorldImporter:
 
     def build(self, state: WorldState, tree: TreeReader) -> World:
         """Return the world after applying the saved `state`; `tree` reads the models that the state inserts."""
-        for element in state.inserted:
+        for element in state.inserted_models:
             with self._report.skip_unusable():
                 tree.add_model(self._root, tree.read_model(element, is_parent_static=False))
         for model in self._root.parts:
-            if isinstance(model, ModelNode) and model.name not in state.deleted:
+            if isinstance(model, ModelNode) and model.name not in state.deleted_names:
                 with self._report.skip_unusable():
                     self._add_model(model, state)
         for actor in self._root.actors:
@@ -101,9 +101,9 @@ class _WorldImporter:
 
     def _add_model(self, model: ModelNode, state: WorldState) -> None:
         """Collect the solids and bodies of a top-level model."""
-        saved = state.models.get(model.name, ModelState())
-        pose = saved.pose or self._root.scope.pose_of(model.frame)
-        links = place_links(model, pose, self._report, saved)
+        model_state = state.models.get(model.name, ModelState())
+        pose = model_state.pose or self._root.scope.pose_of(model.frame)
+        links = place_links(model, pose, self._report, model_state)
         contents = [read_link(link, self._shapes, self._report) for link in links]
         solids, bodies = split_model(model, pose, contents, self._report)
         self._solids += solids
@@ -169,17 +169,18 @@ class _WorldImporter:
         self._report.add_error(element.unusable(message, "load it with --lenient if the world should be empty"))
 
 
-def _lower(placed: Sequence[Placed], height: float) -> tuple[Placed, ...]:
+def _lower(items: Sequence[SolidOrBody], height: float) -> tuple[SolidOrBody, ...]:
     """Return solids or bodies moved down by `height` m."""
-    return tuple(replace(each, pose=each.pose._replace(z=each.pose.z - height)) for each in placed)
+    return tuple(replace(item, pose=item.pose._replace(z=item.pose.z - height)) for item in items)
 
 
 def outliers(extents: Mapping[str, Bounds]) -> dict[str, float]:
     """Return the models to leave out so that the others fit on a map, with their distances in m.
 
     Distances are from the median of the centers of all models. `extents` are the bounding rectangles of the models by
-    name. The result is empty if all models fit, if more than MAX_OUTLIER_FRACTION of them plus one are outliers, or if
-    an outlier overlaps the area of the other models, because it is then large and not far away.
+    name. The result is empty if all models fit, or if more than MAX_OUTLIER_FRACTION of the models (plus one) would
+    have to be left out. It is also empty if an outlier overlaps the area of the other models, because such a model is
+    large, but not far away.
     """
     names, corners = list(extents), np.array(list(extents.values())).reshape(-1, 2, 2)
     if not names:

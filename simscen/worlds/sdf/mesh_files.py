@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import collada
 
 MAX_FACES = 1_000_000
+"""Maximum number of triangles of a file."""
 MAX_NODES = 10_000
 """Maximum number of nodes of a COLLADA scene, including repeated instances of a node."""
 STL_HEADER_BYTES, STL_TRIANGLE_BYTES = 84, 50
@@ -62,8 +63,8 @@ def read_parts(data: bytes, suffix: str) -> tuple[MeshPart, ...]:
     _check_parts(parts)
     without_unused_vertices = []
     for part in parts:
-        used, faces = np.unique(part.faces, return_inverse=True)
-        without_unused_vertices.append(MeshPart(part.names, part.vertices[used], faces.reshape(-1, 3)))
+        vertex_indices, faces = np.unique(part.faces, return_inverse=True)
+        without_unused_vertices.append(MeshPart(part.names, part.vertices[vertex_indices], faces.reshape(-1, 3)))
     return tuple(without_unused_vertices)
 
 
@@ -99,8 +100,8 @@ def _check_stl_header(data: bytes) -> None:
     if len(data) < STL_HEADER_BYTES:
         raise UnusableMesh("too short for an STL file")
     stated = int.from_bytes(data[80:84], "little")
-    count, rest = divmod(len(data) - STL_HEADER_BYTES, STL_TRIANGLE_BYTES)
-    if stated != count or rest:
+    count, excess_bytes = divmod(len(data) - STL_HEADER_BYTES, STL_TRIANGLE_BYTES)
+    if stated != count or excess_bytes:
         raise UnusableMesh(f"STL header says {stated} triangles, file holds {count}")
     _check_face_count(stated)
 
@@ -165,15 +166,15 @@ def _geometry_only(data: bytes) -> bytes:
     pycollada would drop geometry with missing materials or images. Lights and cameras often have invalid matrices.
     """
     root = ET.fromstring(data)
-    with_geometry: set[ET.Element] = set()
+    elements_with_geometry: set[ET.Element] = set()
     for parent in reversed(list(root.iter())):  # children come before their parents
         is_in_scene = _local_name(parent) in ("visual_scene", "node")
         for child in list(parent):
-            is_empty_node = is_in_scene and _local_name(child) == "node" and child not in with_geometry
+            is_empty_node = is_in_scene and _local_name(child) == "node" and child not in elements_with_geometry
             if _local_name(child) in MATERIAL_ELEMENTS or is_empty_node:
                 parent.remove(child)
-        if _local_name(parent) in INSTANCE_ELEMENTS or any(child in with_geometry for child in parent):
-            with_geometry.add(parent)
+        if _local_name(parent) in INSTANCE_ELEMENTS or any(child in elements_with_geometry for child in parent):
+            elements_with_geometry.add(parent)
     return ET.tostring(root)
 
 
@@ -213,7 +214,7 @@ def _parts_of_nodes(nodes: list[object]) -> Iterator[MeshPart]:
                 _check_face_count(face_count)
                 yield part
         elif isinstance(node, Node):
-            element = getattr(node, "node", node).xmlnode  # that of the node itself, also for <instance_node>
+            element = getattr(node, "node", node).xmlnode  # <node>, also if `node` is an <instance_node>
             name = element.get("name") or node_name
             matrix = parent_matrix @ np.asarray(node.matrix, float)
             pending.extend((child, matrix, name) for child in reversed(node.children or []))

@@ -58,6 +58,7 @@ def _size_in_bytes(parts: tuple[MeshPart, ...]) -> int:
 
 
 MESH_CACHE = MeshCache()
+"""Cache that all worlds and robots of this process share."""
 
 
 @dataclass(frozen=True)

@@ -95,6 +95,7 @@ class TreeReader:
                 self._read_child(owner, kind, child)
 
     def _read_child(self, owner: ModelNode, kind: str, child: Element) -> None:
+        """Add a child element to the node `owner`; see `_read_children`. Raises UnusableElement."""
         pose, scope = child.child("pose"), owner.scope
         match kind, child.tag:
             case _, "frame":
@@ -133,7 +134,7 @@ class TreeReader:
     def _read_include(self, owner: ModelNode, include: Element) -> None:
         """Add the first model or actor of another file to the owner. A light is ignored. Raises UnusableElement."""
         report_unknown_children(include, "include", self._report)
-        with self._included_files.opened(include) as root:
+        with self._included_files.open_include(include) as root:
             entities = list(root.all("model", "actor", "light", "world"))
             if not entities or entities[0].tag == "world":
                 hint = "it contains a world" if entities else ""

@@ -49,7 +49,7 @@ class MissingAsset(UnusableElement):
 class ImportReport:
     """Collects problems and notes in the order in which they are found, without repetitions; missing files come last.
 
-    An unusable element is a problem. If `lenient`, it is only a note, and counted in `skipped_count`.
+    An unusable element is a problem. If `lenient`, the element is only noted, and counted in `skipped_count`.
     """
 
     def __init__(self, *, lenient: bool = False) -> None:

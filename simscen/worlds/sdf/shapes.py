@@ -91,7 +91,7 @@ def _read_primitive(element: Element) -> Shape | None:
 def _read_plane(plane: Element, world_from_plane: Pose3, report: ImportReport) -> Solid | None:
     """Return a thin slab whose upper face is the plane, or None for the ground plane."""
     normal = _read_normal(plane)
-    x, y = read_sizes(plane, "size", 2, default=(1.0, 1.0), largest=math.inf)
+    x, y = read_sizes(plane, "size", 2, default=(1.0, 1.0), max_size=math.inf)
     x, y = min(x, MAX_COORDINATE_M), min(y, MAX_COORDINATE_M)
     world_normal = world_from_plane.rotation() @ normal
     if world_normal[2] >= MIN_LEVEL_NORMAL_Z:
