@@ -49,7 +49,7 @@ class Adapter:
         options: Options,
         topics: Sequence[Topic],
         goals: Goals,
-        launched: Optional[LaunchedCommand],
+        launch_command: Optional[LaunchedCommand],
         period_s: float,
         answer_limit_s: float,
         filter_info: FilterInfo,
@@ -60,7 +60,7 @@ class Adapter:
         Args:
             topics: Topics of the robot that simscen can publish.
             goals: Queue of goals.
-            launched: The user's launch command; None if the user starts the nodes.
+            launch_command: The user's running launch command; None if the user starts the nodes.
             period_s: Control period.
             answer_limit_s: Maximum wall time for the answer to a step after the nodes are ready.
             filter_info: Messages that describe the zone masks among `topics`.
@@ -68,8 +68,9 @@ class Adapter:
         """
         if not rclpy.ok():
             rclpy.init(args=[])
-        self._options, self._goals, self._launched, self._answer_limit_s = options, goals, launched, answer_limit_s
-        self._graph = Graph(TopicNames(options.namespace, options.remap), self._check_launched)
+        self._options, self._goals, self._answer_limit_s = options, goals, answer_limit_s
+        self._launch_command = launch_command
+        self._graph = Graph(TopicNames(options.namespace, options.remap), self._check_launch_command)
         self._frames = FrameNames(options.frame, options.base_frame)
         self._estimate = PoseEstimate()
         self._senders = GoalSenders(self._graph, options.goals)
@@ -105,7 +106,7 @@ class Adapter:
 
     @property
     def needed_topics(self) -> Set[str]:
-        """Topics that the adapter needs from simscen: all that it publishes, and `_replaced_topics`."""
+        """Topics that the adapter needs from simscen: the topics that it publishes, and `_replaced_topics`."""
         return {*self._graph.publishers, *self._replaced_topics}
 
     @property
@@ -118,9 +119,12 @@ class Adapter:
         """/tf_static if the user's nodes publish it instead of simscen; otherwise empty."""
         return {TF_STATIC} & set(self._options.without)
 
-    def _check_launched(self) -> None:
-        if self._launched is not None and self._launched.end_reason is not None:
-            raise AdapterError(f"the launched command {self._launched.end_reason}: {self._launched.command}")
+    def _check_launch_command(self) -> None:
+        """Raise AdapterError if the launch command has ended."""
+        if self._launch_command is not None and self._launch_command.end_reason is not None:
+            raise AdapterError(
+                f"the launched command {self._launch_command.end_reason}: {self._launch_command.command}"
+            )
 
     def run_facts(self) -> Dict[str, Any]:
         """Return facts about the nodes and the synchronization for the run's log."""
@@ -141,7 +145,7 @@ class Adapter:
             [f"the launched command was started again, because {self.restart_reason}"] if self.restart_reason else []
         )
         warnings += [
-            f"{node} does not answer, so lockstep does not wait for it" for node in sorted(self._barrier.left_out)
+            f"{node} does not answer, so lockstep does not wait for it" for node in sorted(self._barrier.silent_nodes)
         ]
         if self.is_ready and (warnings or self._unused_masks):
             facts["warnings"] = [*warnings, *self._unused_masks]
@@ -154,7 +158,7 @@ class Adapter:
         return facts
 
     def prepare(self) -> None:
-        """Wait until all nodes are ready or probably need sensor data to become ready.
+        """Wait until all nodes are ready, or until they probably need sensor data to become ready.
 
         Raises AdapterError if the launch command ends, or a node needs a topic that cannot be published.
         """
@@ -184,7 +188,7 @@ class Adapter:
             is_command_due: Whether the robot needs a velocity command now.
             limit_s: Maximum wall time for the answer.
         """
-        self._check_launched()
+        self._check_launch_command()
         limit_s = min(limit_s, self._answer_limit_s) if self.is_ready else limit_s
         messages, self._pending_infos = [*messages, *self._pending_infos], []
         for topic, data in messages:
@@ -197,25 +201,25 @@ class Adapter:
             for topic, data in messages
         ]
         messages = self._bring_up.hold_initial_pose(messages)
-        warming_up = now < self._options.warm_up * NS_PER_S
+        is_warming_up = now < self._options.warm_up * NS_PER_S
         if not self.is_ready:
-            warming_up = warming_up or self._bring_up.lacks_scan(now, messages)
+            is_warming_up = is_warming_up or self._bring_up.lacks_scan(now, messages)
             self._bring_up.remember_latest(messages)
-            if not warming_up:
+            if not is_warming_up:
                 self._bring_up.wait(now, MAX_WAIT_FRACTION * limit_s)
                 # `wait` has published the messages on latched topics.
                 messages = [message for message in messages if message[0] not in LATCHED_TOPICS]
                 self._begin()
         messages = [*messages, *self._bring_up.due_initial_pose()]
         self._barrier.step_time.begin(MAX_WAIT_FRACTION * limit_s)
-        synchronization: Any = self._lockstep if self._options.sync == "lockstep" and not warming_up else self._paced
-        if not warming_up and self._goals.current is None:
+        synchronization: Any = self._lockstep if self._options.sync == "lockstep" and not is_warming_up else self._paced
+        if not is_warming_up and self._goals.current is None:
             self._send(now)
         received = synchronization.step(now, messages, is_command_due, self._goals.current is not None)
-        commanded = any(message.topic == COMMAND for message in received)
+        has_command = any(message.topic == COMMAND for message in received)
         # The order of messages on different topics is random.
         answers = sorted((each for message in received for each in self._process(message)), key=lambda each: each[0])
-        if is_command_due or commanded:
+        if is_command_due or has_command:
             answers.append((COMMAND, write_twist(self._velocity)))
         if self.is_ready:
             if isinstance(self._sender, ActionSender):
@@ -265,6 +269,7 @@ class Adapter:
         return remaining[: next(stops, len(remaining)) + 1]
 
     def _report_outcomes(self, now: int) -> None:
+        """Report the outcomes of the goals that have ended, and accept the next goal of the batch."""
         assert self._sender is not None
         for outcome in self._sender.outcomes(self._state(now)) if self._goals.current is not None else ():
             if self._goals.current is None:
@@ -280,6 +285,7 @@ class Adapter:
             self._goals.accept()
 
     def _state(self, now: int) -> StackState:
+        """Return the current state of the stack for the goal sender."""
         is_stopped = all(abs(number) < 1e-3 for number in self._velocity)
         return StackState(now, is_stopped, self._estimate.pose)
 
@@ -308,8 +314,8 @@ class Adapter:
         self._graph.close()
         if rclpy.ok():
             rclpy.shutdown()
-        if self._launched is not None:
-            self._launched.end()
+        if self._launch_command is not None:
+            self._launch_command.end()
 
 
 def require_packages(options: Options) -> None:

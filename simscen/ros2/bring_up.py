@@ -1,8 +1,8 @@
-"""Bring-up before a run: waits until all nodes are ready, and meanwhile publishes sensor data if they need it.
+"""Bring-up before a run: waits until all nodes are ready, and publishes the sensor data that nodes need to get ready.
 
 Some nodes become active only if sensor data arrive and time advances. For example, Nav2's costmaps wait for
-odom -> base_link. `BringUp.prepare` first waits without sensor data. Then `BringUp.wait` publishes the latest readings
-repeatedly, if necessary. Meanwhile, ROS time advances, but simulated time does not.
+odom -> base_link. `BringUp.prepare` first waits without sensor data. Then, if nodes are not ready, `BringUp.wait`
+publishes the latest readings repeatedly. During this wait, ROS time advances, but simulated time does not.
 """
 
 import math
@@ -20,16 +20,16 @@ from simscen.ros2.readiness import MAP, Readiness
 from simscen.ros2.synchronization import Message
 
 INITIAL_POSE = "/initialpose"
-PREPARE_S = 10.0
+MAX_PREPARE_S = 10.0
 """Maximum wall time to wait without sensor data."""
 PREPARE_SETTLE_S = 2.0
-"""Additional wall time, after `--settle`, without new nodes, after which the present nodes probably need sensor data.
+"""Wall time in addition to `--settle`. If no node appears or disappears for this sum, nodes probably need sensor data.
 
 Not used with Nav2 or `--warm-up`.
 """
 CHECK_PERIOD_S = 0.25
 """Wall time between two checks of the graph."""
-FIRST_SCAN_S = 2.0
+MAX_FIRST_SCAN_S = 2.0
 """Maximum simulated time until the first scan of each lidar."""
 
 
@@ -55,7 +55,7 @@ class BringUp:
     @property
     def latest_start_s(self) -> float:
         """Simulated time in s at which the nodes must be ready."""
-        return max(self._options.warm_up, FIRST_SCAN_S if self._options.nav2 else 0.0) + self._period
+        return max(self._options.warm_up, MAX_FIRST_SCAN_S if self._options.nav2 else 0.0) + self._period
 
     def prepare(self) -> bool:
         """Wait without sensor data. Return whether all nodes are ready; always False with `--warm-up`.
@@ -65,22 +65,23 @@ class BringUp:
         changed_at = incomplete_at = time.monotonic()
         nodes = self._graph.nodes()
         settle = self._options.settle
-        patience = settle if self._options.nav2 or self._options.warm_up else settle + PREPARE_SETTLE_S
+        # Wall time without changes after which nodes that are not ready probably need sensor data.
+        incomplete_settle = settle if self._options.nav2 or self._options.warm_up else settle + PREPARE_SETTLE_S
         missing: List[str] = []
 
-        def settled() -> bool:
+        def has_settled() -> bool:
             nonlocal changed_at, incomplete_at, nodes
-            missing[:] = self._readiness.no_nodes() if self._options.warm_up else self._readiness.problems()
+            missing[:] = self._readiness.empty_graph() if self._options.warm_up else self._readiness.problems()
             self._check_unavailable()
             now = time.monotonic()
             if nodes != self._graph.nodes():
                 changed_at, nodes = now, self._graph.nodes()
             if missing:
                 incomplete_at = now
-                return bool(nodes) and now - changed_at >= patience
+                return bool(nodes) and now - changed_at >= incomplete_settle
             return now - max(changed_at, incomplete_at) >= settle
 
-        is_settled = self._graph.spin_until(_throttled(settled), min(self._options.ready, PREPARE_S))
+        is_settled = self._graph.spin_until(_throttled(has_settled), min(self._options.ready, MAX_PREPARE_S))
         return is_settled and not missing and not self._options.warm_up
 
     def remember_latest(self, messages: Sequence[Message]) -> None:
@@ -93,19 +94,19 @@ class BringUp:
         return [message for message in messages if message[0] != INITIAL_POSE]
 
     def due_initial_pose(self) -> List[Message]:
-        """Return the initial pose, once, when a node subscribes to it; otherwise an empty list."""
+        """Return the initial pose once a node subscribes to it, and only once; otherwise an empty list."""
         if self._initial_pose is None or not self._graph.subscribers_of(self._graph.names(INITIAL_POSE)):
             return []
         pose, self._initial_pose = self._initial_pose, None
         return [(INITIAL_POSE, pose)]
 
     def lacks_scan(self, now: int, messages: Sequence[Message]) -> bool:
-        """Return whether a lidar has not published its first scan yet. Always False without Nav2 or after FIRST_SCAN_S.
+        """Return whether a lidar has not published its first scan yet. `messages` are the messages of this step.
 
-        `now` is simulated time in ns. `messages` are the messages of this step.
+        `now` is simulated time in ns. Always False without Nav2, and after MAX_FIRST_SCAN_S.
         """
         # Nav2's AMCL needs a scan to publish map -> odom.
-        if not self._options.nav2 or now >= FIRST_SCAN_S * NS_PER_S:
+        if not self._options.nav2 or now >= MAX_FIRST_SCAN_S * NS_PER_S:
             return False
         known = {*self._latest, *(topic for topic, _ in messages)}
         return any(type_name == SCAN_TYPE and topic not in known for topic, type_name in self._graph.types.items())
@@ -114,7 +115,8 @@ class BringUp:
         """Publish the latest readings with advancing ROS time until all nodes are ready.
 
         `now` is simulated time in ns. Raises AdapterError if nodes are not ready after the wall time `--ready` or
-        `step_limit_s`. Raises BringUpAborted if the lifecycle manager of a launched Nav2 has given up.
+        `step_limit_s`, whichever is shorter. Raises BringUpAborted if the lifecycle manager of a launched Nav2 has
+        given up.
         """
         remaining_s = self._options.ready - (0.0 if self._options.warm_up else time.monotonic() - self._started_at)
         self._readiness.has_map = MAP in self._latest
@@ -133,7 +135,7 @@ class BringUp:
         missing: List[str] = []
         changed_at, nodes = time.monotonic(), self._graph.nodes()
 
-        def complete() -> bool:
+        def is_complete() -> bool:
             nonlocal changed_at, nodes
             missing[:] = self._readiness.problems()
             self._check_unavailable()
@@ -146,7 +148,7 @@ class BringUp:
             return not missing and time.monotonic() - changed_at >= self._options.settle
 
         try:
-            if not self._graph.spin_until(_throttled(complete), max(0.5, min(remaining_s, step_limit_s))):
+            if not self._graph.spin_until(_throttled(is_complete), max(0.5, min(remaining_s, step_limit_s))):
                 raise AdapterError(self._reasons(missing))
         finally:
             self._graph.node.destroy_timer(timer)
@@ -168,10 +170,10 @@ class BringUp:
     def _check_unavailable(self) -> None:
         """Raise AdapterError if a node subscribes to a topic whose message type this Python does not have."""
         for topic in self._unavailable:
-            for end in self._graph.subscribers_of(self._graph.names(topic.name)):
+            for subscriber in self._graph.subscribers_of(self._graph.names(topic.name)):
                 package = topic.type.partition("/")[0]
                 raise AdapterError(
-                    f"{end.node} subscribes to {self._graph.names(topic.name)}, which cannot be published: "
+                    f"{subscriber.node} subscribes to {self._graph.names(topic.name)}, which cannot be published: "
                     f"{sys.executable} has no {package}; install it, or do not publish the topic: "
                     f"--without {topic.name}"
                 )

@@ -62,6 +62,7 @@ class GoalPoseSender:
     """
 
     takes_single_goals = True
+    """Whether the nodes take only one goal at a time."""
 
     def __init__(self, graph: Graph) -> None:
         self._graph = graph
@@ -74,7 +75,7 @@ class GoalPoseSender:
         """Name of the topic in the graph."""
         return self._graph.names(GOAL_POSE)
 
-    def missing(self) -> List[str]:
+    def problems(self) -> List[str]:
         """Return a reason why goals cannot be sent (no subscriber), or an empty list."""
         found = self._graph.subscribers_of(self.name)
         return [] if found else [f"no node takes goals: no subscriber of {self.name} ({POSE_TYPE})"]
@@ -91,7 +92,7 @@ class GoalPoseSender:
         """Return GoalReached if the robot has stopped at the goal, or an empty list."""
         if self._goal is None:
             return []
-        if not (state.is_stopped and state.pose is not None and _within_tolerance(self._goal, state.pose)):
+        if not (state.is_stopped and state.pose is not None and _is_within_tolerance(self._goal, state.pose)):
             self._stopped_since = None
             return []
         if self._stopped_since is None:
@@ -129,10 +130,10 @@ class ActionSender:
 
     @property
     def takes_single_goals(self) -> bool:
-        """Whether the action takes only one goal."""
+        """Whether the nodes take only one goal at a time."""
         return self.action == "navigate_to_pose"
 
-    def missing(self) -> List[str]:
+    def problems(self) -> List[str]:
         """Return a reason why goals cannot be sent (no action server), or an empty list."""
         if self._client.server_is_ready():
             return []
@@ -197,26 +198,27 @@ class ActionSender:
         for waypoint in getattr(result, "missed_waypoints", ()):
             index = waypoint.waypoint_index if hasattr(waypoint, "waypoint_index") else waypoint.index
             code, message = getattr(waypoint, "error_code", 0) or UNKNOWN_CODE, getattr(waypoint, "error_msg", "")
-            missed[index] = GoalFailed(code, message or f"{self.name} missed it")
+            missed[index] = GoalFailed(code, message or f"{self.name} missed this waypoint")
         return missed
 
     def _passed_goals(self, state: StackState) -> List[Outcome]:
         """Return the outcomes of the goals passed since the last call, according to the feedback."""
-        # The feedback of FollowWaypoints is the same for reached and missed goals, so that the pose estimate decides.
+        # FollowWaypoints gives the same feedback for reached and missed goals. Therefore, the pose estimate decides.
         found: List[Outcome] = []
         for goal in self._goals[self._reported : self._passed]:
-            arrived = state.pose is not None and _within_tolerance(goal, state.pose)
-            if arrived or self.action == "navigate_through_poses":
+            is_at_goal = state.pose is not None and _is_within_tolerance(goal, state.pose)
+            if is_at_goal or self.action == "navigate_through_poses":
                 found.append(GoalReached())
             else:
-                found.append(GoalFailed(UNKNOWN_CODE, f"{self.name} continued without having been there"))
+                message = f"{self.name} continued, although the robot was not at the goal"
+                found.append(GoalFailed(UNKNOWN_CODE, message))
         self._reported = self._passed
         return found
 
     def cancel(self, state: StackState, barrier: NodeBarrier) -> None:
         """Cancel the goals that were sent. Raises AdapterError if the server does not answer in time."""
         if self._handle is not None:
-            barrier.wait(self._handle.cancel_goal_async(), f"{self.name} has not answered to a cancel")
+            barrier.wait(self._handle.cancel_goal_async(), f"{self.name} has not answered the request to cancel")
             self._handle = None
 
 
@@ -224,7 +226,7 @@ GoalSender = Union[GoalPoseSender, ActionSender]
 
 
 class GoalSenders:
-    """Senders that the option `--goals` (`requested`) allows. `auto` allows NavigateToPose and /goal_pose."""
+    """Senders that the value `requested` of the option `--goals` allows; `auto`: NavigateToPose and /goal_pose."""
 
     def __init__(self, graph: Graph, requested: str) -> None:
         self._senders: List[GoalSender] = []
@@ -237,13 +239,13 @@ class GoalSenders:
     @property
     def usable(self) -> Optional[GoalSender]:
         """The first sender with an action server or a subscriber; None if there is none."""
-        return next((sender for sender in self._senders if not sender.missing()), None)
+        return next((sender for sender in self._senders if not sender.problems()), None)
 
-    def missing(self) -> List[str]:
+    def problems(self) -> List[str]:
         """Return a reason why goals cannot be sent, or an empty list."""
         if self.usable is not None:
             return []
-        reasons = [sender.missing()[0] for sender in self._senders]
+        reasons = [sender.problems()[0] for sender in self._senders]
         return [reasons[0] + "".join(", and " + reason.partition(": ")[2] for reason in reasons[1:])]
 
 
@@ -257,6 +259,6 @@ def pose_stamped(goal: Goal, now: int) -> Any:
     return message
 
 
-def _within_tolerance(goal: Goal, pose: Pose) -> bool:
+def _is_within_tolerance(goal: Goal, pose: Pose) -> bool:
     is_near = math.hypot(pose[0] - goal.x, pose[1] - goal.y) <= goal.xy_tolerance
     return is_near and abs(wrap_angle(pose[2] - goal.yaw)) <= goal.yaw_tolerance

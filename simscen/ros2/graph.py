@@ -1,8 +1,8 @@
 """simscen's own ROS node, which publishes and receives serialized (CDR) messages, and lists the other nodes.
 
-While the run waits for nodes to become ready, ROS time advances, but simulated time does not. `Graph.offset_ns` is the
-difference between both. The graph adds it to the stamps of published messages, and subtracts it from the stamps of
-received messages.
+While the run waits for nodes to become ready, ROS time advances, but simulated time does not. `Graph.offset_ns` is ROS
+time minus simulated time. The graph adds this offset to the stamps of published messages, and subtracts it from the
+stamps of received messages.
 """
 
 import time
@@ -92,6 +92,7 @@ class Graph:
         self.inbox: List[ReceivedMessage] = []
         """Received messages in the order of arrival, until the caller removes them."""
         self.offset_ns = 0
+        """ROS time minus simulated time."""
 
     def advertise(self, topic: str, type_name: str) -> bool:
         """Create a publisher; return False if the type is not installed."""
@@ -104,7 +105,7 @@ class Graph:
         return True
 
     def publish(self, topic: str, data: bytes) -> bool:
-        """Publish a message, and return whether the topic has subscribers. Does nothing if it is not advertised."""
+        """Publish a message, and return whether the topic has subscribers. Ignores topics that are not advertised."""
         publisher = self.publishers.get(topic)
         if publisher is None:
             return False
@@ -132,7 +133,11 @@ class Graph:
         self._subscriptions[topic] = (type_name, subscription)
 
     def subscribe_to_status(self, action: str, callback: Callable[[Any], None]) -> Optional[str]:
-        """Call `callback` with each GoalStatusArray of an action from now on. Return its server's node, or None."""
+        """Call `callback` with each GoalStatusArray of an action from now on.
+
+        Return the full name of the server's node. If the action does not have exactly one server, return None, and do
+        not subscribe.
+        """
         status_type, topic = find_type(STATUS_TYPE), self.names(f"/{action}/_action/status")
         servers = self.publishers_of(topic)
         if status_type is None or len(servers) != 1:
@@ -143,7 +148,11 @@ class Graph:
     def subscription_profile(self, name: str) -> QoSProfile:
         """Return a QoS profile for a subscription that is compatible with all publishers of other nodes."""
         return subscription_qos(
-            [end for end in self.node.get_publishers_info_by_topic(name) if end.node_name != NODE_NAME]
+            [
+                publisher
+                for publisher in self.node.get_publishers_info_by_topic(name)
+                if publisher.node_name != NODE_NAME
+            ]
         )
 
     def spin_once(self, seconds: float = 0.0) -> None:
@@ -221,25 +230,25 @@ def _endpoints(infos: List[Any]) -> List[Endpoint]:
 
 def publisher_qos(topic: str) -> QoSProfile:
     """Return the QoS profile with which simscen publishes a topic."""
-    latched = topic in LATCHED_TOPICS
+    is_latched = topic in LATCHED_TOPICS
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
-        depth=1 if latched else QUEUE_DEPTHS.get(topic, DEFAULT_QUEUE_DEPTH),
+        depth=1 if is_latched else QUEUE_DEPTHS.get(topic, DEFAULT_QUEUE_DEPTH),
         reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if is_latched else DurabilityPolicy.VOLATILE,
     )
 
 
 def subscription_qos(publishers: Sequence[Any]) -> QoSProfile:
     """Return a QoS profile that is compatible with all `publishers`."""
     profiles = [publisher.qos_profile for publisher in publishers]
-    reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in profiles)
-    latched = bool(profiles) and all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in profiles)
+    is_reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in profiles)
+    is_latched = bool(profiles) and all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in profiles)
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=100,
-        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+        reliability=ReliabilityPolicy.RELIABLE if is_reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if is_latched else DurabilityPolicy.VOLATILE,
     )
 
 

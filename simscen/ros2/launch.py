@@ -1,4 +1,4 @@
-"""Launch command of the user: runs it, and ends all processes that it started, even if the adapter is killed.
+"""Runs the user's launch command, and ends all processes that it started, even if the adapter is killed.
 
 LaunchedCommand runs this file as a program, `python launch.py COMMAND`. The program runs the command in a shell. When
 the command ends or the adapter closes standard input, the program sends SIGINT to all descendants, then SIGTERM, then
@@ -60,7 +60,7 @@ def descendants(parent: int) -> List[int]:
                     children.setdefault(int(parent_pid), []).append(int(entry.name))
     found, new = [], [parent]
     while new:
-        new = [child for one in new for child in children.get(one, ())]
+        new = [child for process in new for child in children.get(process, ())]
         found += new
     return found
 

@@ -101,7 +101,7 @@ class ReceivedStep(NamedTuple):
 
 
 class AdapterRun:
-    """One run of the adapter. As a context manager, it ends adapter and launch command, and frees the domain."""
+    """One run of the adapter. Leaving its context ends the adapter and the launch command, and releases the domain."""
 
     def __init__(self, options: Options, connection: Connection) -> None:
         self._connection, self._hello = connection, Hello.receive(connection)
@@ -154,8 +154,8 @@ class AdapterRun:
                 now = header.sec * 10**9 + header.nanosec
                 self.goals.now = now * 1e-9
                 published = [(self._hello.topics[number][0], data) for number, data in content]
-                due = bool(header.flags & wire.COMMAND_DUE)
-                received = self._step(ReceivedStep(now, published, due, header.deadline * 1e-3))
+                is_command_due = bool(header.flags & wire.COMMAND_DUE)
+                received = self._step(ReceivedStep(now, published, is_command_due, header.deadline * 1e-3))
                 stamp = header.sec, header.nanosec
                 received += [(ROSOUT, messages.log(stamp, *line)) for line in self._adapter.take_lines()]
                 self._connection.send(wire.answer_frame(header.tick, self._number_messages(received)))
@@ -166,15 +166,15 @@ class AdapterRun:
                 self._process_frame(kind, wire.from_json(body), now)
 
     def _start_adapter(self, restart_reason: str) -> None:
-        """Run the launch command, and create and prepare the adapter. The reason is empty for the first start."""
+        """Run the launch command, and create and prepare the adapter. `restart_reason` is empty at the first start."""
         from simscen.ros2.adapter import Adapter
         from simscen.ros2.graph import Topic
 
         options, hello = self._options, self._hello
-        launched = LaunchedCommand(options.launch, os.environ) if options.launch else None
+        launch_command = LaunchedCommand(options.launch, os.environ) if options.launch else None
         topics = [Topic(*topic) for topic in hello.topics.values()]
         limits, filter_info = (hello.period_s, hello.answer_limit_s), FilterInfo(hello.zone_masks)
-        self._adapter = Adapter(options, topics, self.goals, launched, *limits, filter_info, restart_reason)
+        self._adapter = Adapter(options, topics, self.goals, launch_command, *limits, filter_info, restart_reason)
         self._adapter.prepare()
 
     def _step(self, step: ReceivedStep) -> List[Tuple[str, bytes]]:
@@ -192,12 +192,12 @@ class AdapterRun:
             if self._adapter.restart_reason:
                 raise
             print(f"simscen ros2: {error}; starting the launched command again", file=sys.stderr)
-            earlier, self._adapter = self._adapter, None
-            earlier.end()
+            aborted, self._adapter = self._adapter, None
+            aborted.end()
             self._start_adapter(f"{error.manager} had given up the bring-up")
-            self._adapter.mode, self._adapter.continue_after_failure = earlier.mode, earlier.continue_after_failure
-            for repeated in self._steps_until_ready:
-                self._adapter.step(*repeated)
+            self._adapter.mode, self._adapter.continue_after_failure = aborted.mode, aborted.continue_after_failure
+            for earlier_step in self._steps_until_ready:
+                self._adapter.step(*earlier_step)
             return list(self._adapter.step(*step._replace(limit_s=end - time.monotonic())))
         finally:
             self._steps_until_ready.append(step)
@@ -216,9 +216,9 @@ class AdapterRun:
     def _number_messages(self, received: Sequence[Tuple[str, bytes]]) -> List[Tuple[int, bytes]]:
         """Return the `received` messages and the events of the goals, with topic numbers instead of topics."""
         stack_topics = self._hello.stack_topics
-        out = [(stack_topics[topic], data) for topic, data in received if topic in stack_topics]
+        numbered = [(stack_topics[topic], data) for topic, data in received if topic in stack_topics]
         events = (json.dumps(event, allow_nan=False) for event in self.goals.take_events())
-        return out + [(stack_topics[EVENTS], messages.string(event)) for event in events]
+        return numbered + [(stack_topics[EVENTS], messages.string(event)) for event in events]
 
     def _set_environment(self) -> None:
         """Claim a ROS domain, and set the environment variables of this process and its nodes.
@@ -250,7 +250,7 @@ def _options_for(options: Options, mode: str) -> Options:
 def _is_robot_topic(topic: Dict[str, Any]) -> bool:
     """Return whether a real robot would have this topic, unlike ground truth and simscen's own topics."""
     name: str = topic["topic"]
-    if name in MASK_TOPICS.values():  # masks without zones; the adapter publishes those with zones under these names
+    if name in MASK_TOPICS.values():  # masks without zones; the adapter uses these names for the masks with zones
         return False
     return not name.startswith(("/simscen", "/ground_truth")) and not name.endswith("/exact") and name != "/clock"
 

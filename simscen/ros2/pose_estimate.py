@@ -46,7 +46,7 @@ class PoseEstimate:
             self._initial = read("geometry_msgs/msg/PoseWithCovarianceStamped", data).pose
 
     def process_received(self, message: ReceivedMessage) -> bool:
-        """Process a message from the nodes. Return False for one that simscen does not need: /tf without map -> odom.
+        """Process a message from the nodes. Return False if simscen does not need it: /tf without map -> odom.
 
         Raises AdapterError for a pose or plan in another frame than `map`.
         """
@@ -61,19 +61,20 @@ class PoseEstimate:
         return True
 
     def _process_transforms(self, message: ReceivedMessage) -> bool:
-        """Store map -> odom of a message on /tf. Return whether the message contains it."""
-        found = False
+        """Store map -> odom of a message on /tf. Return whether the message contains map -> odom."""
+        has_map_from_odom = False
         for link in read(message.type, message.data):
             if link.child.lstrip("/") != ODOM_FRAME:
                 continue
             if link.frame.lstrip("/") != MAP_FRAME:
                 raise AdapterError(f"/tf: the stack publishes {ODOM_FRAME!r} in {link.frame!r}, not in {MAP_FRAME!r}")
             self._map_from_odom = link.pose2d
-            found = True
-        return found
+            has_map_from_odom = True
+        return has_map_from_odom
 
 
 def _require_map_frame(message: ReceivedMessage) -> None:
+    """Raise AdapterError if the message is in another frame than `map`."""
     frame = messages.read_header(message.data)[1]
     if frame.lstrip("/") != MAP_FRAME:
         raise AdapterError(f"{message.topic} is in the frame {frame!r}; simscen's map frame is {MAP_FRAME!r}")

@@ -5,7 +5,7 @@ from typing import Any, Iterable, List, Optional, Sequence, Set, Tuple
 from simscen.ros2.goal_sender import GOAL_POSE, GoalPoseSender, GoalSenders
 from simscen.ros2.graph import Endpoint, Graph, Topic, full_name, incompatible_policies
 from simscen.ros2.messages import ODOMETRY_TYPE, find_type
-from simscen.ros2.nav2.parameter_rules import NODES
+from simscen.ros2.nav2.parameter_rules import REQUIRED_NODES
 from simscen.ros2.nav2.readiness import Nav2Readiness
 from simscen.ros2.node_barrier import POLL_S, NodeBarrier, ServicePoll
 from simscen.ros2.options import Options
@@ -41,26 +41,26 @@ class Readiness:
         self._user_transforms: Optional[UserTransforms] = None
         self.has_map = True
         """Whether simscen has published the map."""
-        barrier.required = self.required_nodes
+        barrier.required_nodes = self.required_nodes
 
     def use_transforms(self, transforms: UserTransforms) -> None:
         """Require that the user's nodes publish `transforms`, and accept the frames in them as base frames."""
         self._user_transforms = self._nav2.user_transforms = transforms
 
-    def no_nodes(self) -> List[str]:
+    def empty_graph(self) -> List[str]:
         """Return a problem if the graph has no node except simscen's."""
         return [] if self._graph.nodes() else ["there is no other node in this ROS domain"]
 
     def problems(self) -> List[str]:
         """Return all problems that prevent the start of the run."""
-        if self.no_nodes():
-            return self.no_nodes()
+        if self.empty_graph():
+            return self.empty_graph()
         busy = self._barrier.poll()
-        found = self._command_problems() + self._senders.missing()
+        found = self._command_problems() + self._senders.problems()
         for topic in self._topics:
             found += self._incompatible_subscribers(topic) + self._other_publishers(topic)
         found += self._unused_sensors()
-        found += self._user_transforms.missing() if self._user_transforms is not None else []
+        found += self._user_transforms.missing_frames() if self._user_transforms is not None else []
         if self._options.nav2:
             found += self._nav2.node_problems()
             found += [] if found else self._nav2.wrong_parameters()
@@ -75,7 +75,7 @@ class Readiness:
         name = self._graph.names(MAP)
         if self.has_map or self._graph.publishers_of(name):
             return []
-        nodes = sorted({end.node for end in self._graph.subscribers_of(name)})
+        nodes = sorted({subscriber.node for subscriber in self._graph.subscribers_of(name)})
         reason = "which no node publishes: the scenario has `map: none`, or simscen was started with --without /map"
         return [f"{', '.join(nodes)}: waiting for {name}, {reason}"] if nodes else []
 
@@ -84,48 +84,53 @@ class Readiness:
 
         These are lifecycle nodes, publishers of commands, subscribers of goals, and nodes that Nav2 needs.
         """
-        names = {end.node for end in self._graph.publishers_of(self._graph.names(COMMAND))}
+        names = {publisher.node for publisher in self._graph.publishers_of(self._graph.names(COMMAND))}
         if isinstance(self._senders.usable, GoalPoseSender):
-            names |= {end.node for end in self._graph.subscribers_of(self._graph.names(GOAL_POSE))}
+            names |= {subscriber.node for subscriber in self._graph.subscribers_of(self._graph.names(GOAL_POSE))}
         if self._options.nav2:
-            names |= {full_name(node) for node in self._graph.nodes() if node[0] in NODES}
+            names |= {full_name(node) for node in self._graph.nodes() if node[0] in REQUIRED_NODES}
         return names | {full_name(node) for node in self._lifecycle_nodes()}
 
     def command_type(self) -> str:
         """Return the type of velocity commands: Twist or TwistStamped."""
-        return next(end.type for end in self._graph.publishers_of(self._graph.names(COMMAND)))
+        return next(publisher.type for publisher in self._graph.publishers_of(self._graph.names(COMMAND)))
 
     def _command_problems(self) -> List[str]:
+        """Return a problem if no node publishes velocity commands, or nodes publish them with wrong or mixed types."""
         name = self._graph.names(COMMAND)
-        ends = self._graph.publishers_of(name)
-        if not ends:
+        publishers = self._graph.publishers_of(name)
+        if not publishers:
             others = self._on_other_topics((TWIST_TYPE, TWIST_STAMPED_TYPE), self._graph.publishers_of)
             hints = [
-                f"; {end.node} publishes {topic} ({end.type}): --remap {COMMAND}:={topic}" for topic, end in others
+                f"; {publisher.node} publishes {topic} ({publisher.type}): --remap {COMMAND}:={topic}"
+                for topic, publisher in others
             ]
             return [f"no node publishes {name} ({TWIST_TYPE} or {TWIST_STAMPED_TYPE}){''.join(hints[:2])}"]
-        wrong = [end for end in ends if end.type not in (TWIST_TYPE, TWIST_STAMPED_TYPE)]
+        wrong = [publisher for publisher in publishers if publisher.type not in (TWIST_TYPE, TWIST_STAMPED_TYPE)]
         if wrong:
             return [
-                f"{end.node} publishes {name} as {end.type}, not {TWIST_TYPE} or {TWIST_STAMPED_TYPE}" for end in wrong
+                f"{publisher.node} publishes {name} as {publisher.type}, not {TWIST_TYPE} or {TWIST_STAMPED_TYPE}"
+                for publisher in wrong
             ]
-        if len({end.type for end in ends}) > 1:
-            listed = ", ".join(f"{end.node} ({end.type})" for end in ends)
+        if len({publisher.type for publisher in publishers}) > 1:
+            listed = ", ".join(f"{publisher.node} ({publisher.type})" for publisher in publishers)
             return [f"{name} is published both as Twist and as TwistStamped: {listed}"]
         return []
 
     def _incompatible_subscribers(self, topic: Topic) -> List[str]:
         """Return a problem for each subscriber with an incompatible type or QoS profile, which receives nothing."""
         name, found = self._graph.names(topic.name), []
-        for end in self._graph.subscribers_of(name):
-            if end.type != topic.type:
-                found.append(f"{end.node} subscribes to {name} as {end.type}; it is {topic.type}")
+        for subscriber in self._graph.subscribers_of(name):
+            if subscriber.type != topic.type:
+                found.append(
+                    f"{subscriber.node} subscribes to {name} as {subscriber.type}; simscen publishes {topic.type}"
+                )
                 continue
             publisher = self._graph.publishers.get(topic.name)
             if publisher is not None:
-                for policy, offered, requested in incompatible_policies(publisher.qos_profile, end.qos):
+                for policy, offered, requested in incompatible_policies(publisher.qos_profile, subscriber.qos):
                     reason = f"it requests {policy} {requested}, simscen offers {offered}"
-                    found.append(f"{end.node} receives nothing on {name}: {reason}")
+                    found.append(f"{subscriber.node} receives nothing on {name}: {reason}")
         return found
 
     def _other_publishers(self, topic: Topic) -> List[str]:
@@ -134,8 +139,8 @@ class Readiness:
             return []
         name = self._graph.names(topic.name)
         return [
-            f"{end.node} publishes {name} as well: do not start that node, or use --without {topic.name}"
-            for end in self._graph.publishers_of(name)
+            f"{publisher.node} publishes {name} as well: do not start that node, or use --without {topic.name}"
+            for publisher in self._graph.publishers_of(name)
         ]
 
     def _unused_sensors(self) -> List[str]:
@@ -149,11 +154,11 @@ class Readiness:
             name = self._graph.names(topic.name)
             if self._graph.subscribers_of(name):
                 continue
-            for other, end in self._on_other_topics((topic.type,), self._graph.subscribers_of):
+            for other, subscriber in self._on_other_topics((topic.type,), self._graph.subscribers_of):
                 if not self._graph.node.get_publishers_info_by_topic(other):
                     found.append(
-                        f"no node subscribes to {name}; {end.node} waits for {other} ({end.type}), which no node "
-                        f"publishes: --remap {topic.name}:={other}"
+                        f"no node subscribes to {name}; {subscriber.node} waits for {other} ({subscriber.type}), "
+                        f"which no node publishes: --remap {topic.name}:={other}"
                     )
         names = [self._graph.names(topic.name) for topic in sensors]
         if names and not found and not any(self._graph.subscribers_of(name) for name in names):
@@ -161,15 +166,16 @@ class Readiness:
         return found
 
     def _on_other_topics(self, types: Iterable[str], endpoints_of: Any) -> List[Tuple[str, Endpoint]]:
-        """Return pairs (topic, endpoint) of all topics that simscen does not use, for endpoints of these types."""
-        own = {self._graph.names(topic.name) for topic in self._topics} | {self._graph.names(COMMAND)}
+        """Return pairs (topic, endpoint) for endpoints of these types on topics that simscen does not use."""
+        used_names = {self._graph.names(topic.name) for topic in self._topics} | {self._graph.names(COMMAND)}
         found = []
         for name, existing in sorted(self._graph.node.get_topic_names_and_types()):
-            if name not in own and set(existing) & set(types):
-                found += [(name, end) for end in endpoints_of(name) if end.type in types]
+            if name not in used_names and set(existing) & set(types):
+                found += [(name, endpoint) for endpoint in endpoints_of(name) if endpoint.type in types]
         return found
 
     def _nodes_on_wall_time(self) -> List[str]:
+        """Return a problem for each node without use_sim_time; none with `--wall-time`."""
         if self._options.wall_time:
             return []
         return [

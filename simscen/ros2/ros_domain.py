@@ -38,7 +38,10 @@ def user_domain(environment: Mapping[str, str]) -> int:
 
 
 def claim_domain(requested: Optional[int], environment: Mapping[str, str]) -> Domain:
-    """Reserve the domain `requested`; None reserves the first free domain. Raises AdapterError if it is in use."""
+    """Reserve the domain `requested`, or the first free domain if it is None.
+
+    Raises AdapterError if the domain is in use, or if no domain is free.
+    """
     folder = _lock_folder(environment)
     for number in DOMAINS if requested is None else (requested,):
         lock = (folder / f"{number}.lock").open("a+")
@@ -52,16 +55,17 @@ def claim_domain(requested: Optional[int], environment: Mapping[str, str]) -> Do
         raise AdapterError(f"all ROS domains from {DOMAINS[0]} to {DOMAINS[-1]} are in use by other runs")
     if environment.get(ROBOT_VARIABLE):
         raise AdapterError(
-            f"another robot or run is using ROS domain {requested}: with several robots, each has "
-            "a ROS graph of its own; with --launch each has nodes and a domain of its own"
+            f"another robot or run is using ROS domain {requested}: with several robots, each robot needs "
+            "its own ROS graph; with --launch each robot gets its own nodes and its own domain"
         )
     raise AdapterError(
         f"another run is using ROS domain {requested}: nodes that you start yourself serve one run at a time "
-        "(simscen run --jobs 1); with --launch each run has nodes and a domain of its own"
+        "(simscen run --jobs 1); with --launch each run gets its own nodes and its own domain"
     )
 
 
 def _lock_folder(environment: Mapping[str, str]) -> Path:
+    """Return the folder of this user's lock files, and create it. Raises AdapterError if it is another user's."""
     runtime = environment.get("XDG_RUNTIME_DIR")
     if not runtime or not os.access(runtime, os.W_OK):
         runtime = str(Path(tempfile.gettempdir(), f"simscen-{os.getuid()}"))

@@ -28,20 +28,20 @@ class StepTime:
         """Wall time in s that is left for the step; inf before the first step."""
         return max(0.0, self._end - time.monotonic())
 
-    def wait_for(self, awaited: Callable[[], Iterable[str]], limit_s: float) -> bool:
-        """Handle events until `awaited` returns no nodes. Return False if that takes longer than `limit_s`.
+    def wait_for(self, late_nodes: Callable[[], Iterable[str]], limit_s: float) -> bool:
+        """Handle events until `late_nodes` returns no nodes. Return False if that takes longer than `limit_s`.
 
-        `awaited` returns the full names of the nodes to wait for. Raises AdapterError with the slowest nodes if the
-        time of the step is over.
+        `late_nodes` returns the full names of the nodes that have not answered. Raises AdapterError with the slowest
+        nodes if the time of the step is over.
         """
         start = time.monotonic()
-        waiting = set(awaited())
+        waiting = set(late_nodes())
 
         def is_done() -> bool:
-            left = set(awaited())
-            self._count(waiting - left, start)
-            waiting.intersection_update(left)
-            return not left
+            late = set(late_nodes())
+            self._count(waiting - late, start)
+            waiting.intersection_update(late)
+            return not late
 
         if self._spin_until(is_done, min(limit_s, self.remaining)):
             return True

@@ -8,8 +8,8 @@
 3. Run two rounds, so that nodes receive the time and run their timers. Run more rounds until a command arrives, at most
    one per node.
 4. Without a command while the robot drives to a goal, wait for a short wall time.
-5. If a Nav2 server moves the robot and its command is due, wait for the command, at most `limit_s` of wall time. The
-   run ends with an error if no command arrives in the next simulated second either.
+5. If a Nav2 server moves the robot and its command is due, wait for the command, at most `limit_s` of wall time. If no
+   command arrives in the next simulated second either, the run ends with an error.
 
 Without a command, the robot keeps its previous command. ROS time is always a multiple of the control period.
 
@@ -76,7 +76,7 @@ class LockstepSynchronization:
                 return []
             return [overdue.node]
 
-        if not self._barrier.step_time.wait_for(awaited=late_server, limit_s=self._actions.wait_s(self._limit)):
+        if not self._barrier.step_time.wait_for(late_server, limit_s=self._actions.wait_s(self._limit)):
             overdue = self._actions.record_missing(now)
             if overdue is not None:
                 raise AdapterError(
@@ -131,5 +131,6 @@ def _last_command(received: Sequence[ReceivedMessage]) -> Optional[ReceivedMessa
 
 
 def _take_inbox(graph: Graph) -> List[ReceivedMessage]:
+    """Return all messages of the inbox, and empty the inbox."""
     received, graph.inbox[:] = list(graph.inbox), []
     return received

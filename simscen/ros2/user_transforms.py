@@ -19,14 +19,14 @@ PROFILES = {
 class UserTransforms:
     """Collects the frames of the user's nodes, and finds frames of simscen's /tf_static that are missing."""
 
-    def __init__(self, graph: Graph, names: FrameNames, replaced: bytes) -> None:
-        """Subscribe to the transforms. `replaced` is simscen's message for /tf_static, which is not published."""
+    def __init__(self, graph: Graph, names: FrameNames, tf_static: bytes) -> None:
+        """Subscribe to the transforms. `tf_static` is simscen's message for /tf_static, which is not published."""
         self._required: List[str] = []
         self._published: Set[str] = set()
         message_type: Any = find_type(TRANSFORMS_TYPE)
         if message_type is None:
             return
-        message = deserialize_message(names.apply(TF_STATIC, message_type, replaced), message_type)
+        message = deserialize_message(names.apply(TF_STATIC, message_type, tf_static), message_type)
         self._required = [link.child_frame_id for link in message.transforms]
         for topic, profile in PROFILES.items():
             graph.node.create_subscription(message_type, graph.names(topic), self._process_transforms, profile)
@@ -42,7 +42,7 @@ class UserTransforms:
         """Frames of the robot that the user's nodes publish, sorted."""
         return sorted(self._published)
 
-    def missing(self) -> List[str]:
+    def missing_frames(self) -> List[str]:
         """Return a text for each frame of simscen's /tf_static that no node publishes."""
         known = ", ".join(self.robot_frames) or "none"
         return [

@@ -71,7 +71,7 @@ def test_a_sensor_without_a_frame_is_named_with_the_option(with_interfaces, run)
         {
             "no command": "no node publishes /cmd_vel (geometry_msgs/msg/Twist or geometry_msgs/msg/TwistStamped)",
             "no goals": "no node takes goals: no ",
-            "scan type": "/flawed subscribes to /scan as nav_msgs/msg/Odometry; it is sensor_msgs/msg/LaserScan",
+            "scan type": "/flawed subscribes to /scan as nav_msgs/msg/Odometry; simscen publishes sensor_msgs/msg/",
         },
         pytest.param(
             {

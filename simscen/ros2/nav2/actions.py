@@ -1,11 +1,11 @@
-"""Observers of the actions of Nav2's servers: one finds overdue velocity commands, the other reports recoveries.
+"""Observers of the actions of Nav2's servers: MotionActions finds overdue commands, RecoveryReporter recoveries.
 
 **Overdue commands.** A server must send commands while it executes an action that moves the robot. The simulation waits
-for them, because the control loops of Nav2 up to Jazzy run on wall time and may be slower than the simulation.
+for commands, because the control loops of Nav2 up to Jazzy run on wall time and may be slower than the simulation.
 
 **Recoveries.** A recovery is a behavior of Nav2's behavior server, or the clearing of a costmap. Behaviors are actions
 with a visible status. Clearings are service calls, which other nodes cannot observe. The feedback of the navigation
-action counts both (`number_of_recoveries`).
+action counts behaviors and clearings (`number_of_recoveries`).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ RATE_PARAMETERS = {
     "drive_on_heading": "cycle_frequency",
 }
 """Actions that move the robot, and the server's parameter that sets the rate of commands in Hz."""
-MISSING_LIMIT_NS = NS_PER_S
+MAX_MISSING_NS = NS_PER_S
 """Simulated time after which the run fails if a due command has not arrived."""
 NEXT_WAIT_S = 0.25
 """Maximum wall time to wait for a due command if the previous one did not arrive."""
@@ -92,10 +92,10 @@ class MotionActions:
         return limit_s if self._missing_since is None else min(limit_s, NEXT_WAIT_S)
 
     def record_missing(self, now: int) -> OverdueCommand | None:
-        """Record that the due command did not arrive. Return it if no command has arrived for MISSING_LIMIT_NS."""
+        """Record that the due command did not arrive. Return this command if none has arrived for MAX_MISSING_NS."""
         overdue = self.overdue_command(now)
         self._missing_since = None if overdue is None else now if self._missing_since is None else self._missing_since
-        is_late = self._missing_since is not None and now - self._missing_since >= MISSING_LIMIT_NS
+        is_late = self._missing_since is not None and now - self._missing_since >= MAX_MISSING_NS
         return overdue if is_late else None
 
     def overdue_command(self, now: int) -> OverdueCommand | None:

@@ -50,8 +50,8 @@ def check(
 ) -> List[ParameterProblem]:
     """Return all problems in the parameters of Nav2's nodes.
 
-    Keys of `nodes` and `subscriptions` are node names without namespace. A wrong topic name is only a problem if the
-    node subscribes to this topic; without `subscriptions`, it always is.
+    Keys of `nodes` and `subscriptions` are node names without namespace. A wrong topic name is a problem only if the
+    node subscribes to this topic, or if `subscriptions` is None.
     """
     problems: List[ParameterProblem] = []
     for name in sorted(nodes):
@@ -124,10 +124,10 @@ class _Node(NamedTuple):
         self.problems.append(ParameterProblem(self.name, key, f"{key} {message}", is_severe))
 
     def check_base(self, key: str) -> None:
-        """Add a problem if the parameter is set, but is no name of the base frame."""
+        """Add a problem if the parameter is set, but not to a name of the base frame."""
         value = self.get(key)
         if value is not None and value not in self.published.base_frames:
-            hint = f"--base-frame {value} also gives it that name"
+            hint = f"with --base-frame {value}, it gets this name as well"
             self.add_problem(key, f"is {value!r}; simscen's base frame is {self.published.base_frames[0]!r}: {hint}")
 
     def check_frame(self, key: str, *frames: str) -> None:
@@ -137,7 +137,10 @@ class _Node(NamedTuple):
             self.add_problem(key, f"is {value!r}; expected {' or '.join(map(repr, frames))}")
 
     def check_topic(self, key: str, topics: Sequence[str], kind: str) -> None:
-        """Add a problem unless the parameter is one of these topics. `kind` is what they contain, e.g. "scans"."""
+        """Add a problem if the parameter is set to a topic that is not in `topics`, and the node subscribes to it.
+
+        `kind` is the content of the topics, e.g. "scans".
+        """
         value = self.get(key)
         if not isinstance(value, str):
             return
@@ -159,5 +162,5 @@ def _check_source(node: _Node, source: str) -> None:
         node.add_problem(key, f"is {kind!r}: simscen publishes scans only", is_severe=False)
 
 
-NODES = ("amcl", "bt_navigator", "controller_server", "planner_server", "behavior_server", *COSTMAPS)
+REQUIRED_NODES = ("amcl", "bt_navigator", "controller_server", "planner_server", "behavior_server", *COSTMAPS)
 """Nodes that a run needs. Another localizer that publishes map -> odom may replace `amcl`."""

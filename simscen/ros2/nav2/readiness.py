@@ -33,7 +33,7 @@ class Nav2Readiness:
         """Return a text for each missing node and each severe problem of the parameter file, except wrong topics."""
         found = self._severe_problems(self._options.parameters or {}, {}, f"{self._options.parameter_file}: ")
         names = {name for name, _ in self._graph.nodes()}
-        for name in parameter_rules.NODES:
+        for name in parameter_rules.REQUIRED_NODES:
             # Another localizer may publish map -> odom.
             is_replaced = name == "amcl" and self._graph.publishers_of(self._graph.names("/tf"))
             if name not in names and not is_replaced:

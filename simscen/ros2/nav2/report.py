@@ -1,4 +1,4 @@
-"""What the run's log contains about Nav2: behavior tree transitions, warnings, and parameters of its nodes."""
+"""Records about Nav2 for the run's log: behavior tree transitions, warnings, and parameters of Nav2's nodes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MAX_LISTED_ERRORS = 3
 """Maximum number of errors that `errors` returns."""
 ABORTED_BRING_UP = "Aborting bringup"
 """Text that Nav2's lifecycle manager logs when it gives up the start of its nodes."""
-NODES = (
+RECORDED_NODES = (
     *("amcl", "map_server", "planner_server", "controller_server", "smoother_server", "behavior_server"),
     *("bt_navigator", "waypoint_follower", "velocity_smoother", "collision_monitor"),
     *("local_costmap", "global_costmap"),
@@ -39,7 +39,7 @@ class LogLine(NamedTuple):
 
 
 class Nav2Report:
-    """Collects log lines of Nav2's nodes during the run, and reads their parameters once at its start."""
+    """Collects log lines of Nav2's nodes during the run, and reads the parameters of these nodes once at the start."""
 
     def __init__(self, graph: Graph, barrier: NodeBarrier) -> None:
         self._graph, self._barrier = graph, barrier
@@ -57,12 +57,12 @@ class Nav2Report:
         self.follow_log()
         self._lines.clear()
         for node in self._barrier.nodes:
-            if node.rpartition("/")[2] in NODES:
+            if node.rpartition("/")[2] in RECORDED_NODES:
                 names = [name for name in self._node_parameters.names(node) if not name.startswith(OMITTED_PREFIXES)]
                 self.parameters[node] = self._node_parameters.values(node, names)
 
     def follow_log(self) -> None:
-        """Subscribe to /rosout if a node publishes it. Call repeatedly until a node does."""
+        """Subscribe to /rosout if a node publishes it. The caller repeats this, because nodes may start later."""
         if not self._follows_log:
             self._follows_log = self._follow(ROSOUT, "rcl_interfaces/msg/Log", self._add_log_line)
 
@@ -76,12 +76,12 @@ class Nav2Report:
         lines, self._lines = self._lines, []
         return sorted(lines, key=lambda line: line.name)
 
-    def _follow(self, topic: str, type_name: str, take: Callable[[Any], None]) -> bool:
-        """Subscribe to a topic; return False if no node publishes it."""
+    def _follow(self, topic: str, type_name: str, callback: Callable[[Any], None]) -> bool:
+        """Subscribe to a topic. Return False if no node publishes the topic, or its type is not installed."""
         message_type = find_type(type_name)
         if message_type is None or not self._graph.publishers_of(topic):
             return False
-        self._graph.node.create_subscription(message_type, topic, take, self._graph.subscription_profile(topic))
+        self._graph.node.create_subscription(message_type, topic, callback, self._graph.subscription_profile(topic))
         return True
 
     def _add_tree_changes(self, message: Any) -> None:
