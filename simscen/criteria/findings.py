@@ -53,7 +53,8 @@ def counted(
 
     A bound of None is not checked. `noun` is the name of one event, e.g. "collision".
     """
-    plural = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
+    has_plural_ies = noun.endswith("y") and noun[-2:-1] not in tuple("aeiou")
+    plural = f"{noun[:-1]}ies" if has_plural_ies else f"{noun}s"
     measured = f"{count} {noun if count == 1 else plural}"
     bounds = [] if low is None else [(count - low, f"≥ {low}")]
     bounds += [] if high is None else [(high - count, f"≤ {high}")]

@@ -46,6 +46,7 @@ def test_counts_are_written_with_a_noun():
     assert (few.measured, few.limit, few.margin, few.value) == ("1 recovery", "≥ 2", -1.0, 1.0)
     assert (many.measured, many.limit, many.margin, many.value) == ("2 recoveries", "≤ 3", 1.0, 2.0)
     assert counted("x", 0, "replan", 0, None)[0].measured == "0 replans"
+    assert counted("x", 2, "delay", 0, None)[0].measured == "2 delays"
 
 
 def test_position_of_a_finding_is_that_at_its_time():
