@@ -68,7 +68,7 @@ class TimeToGoal(Spec, Criterion):
         """Return the finding for the time from the tick `start` until the goal was reached."""
         if outcome.expected_failure:
             return undecided(what, "the robot is expected to fail at this goal")
-        expected = f"to be there within {self.max:.2f} s"
+        expected = f"reached within {self.max:.2f} s"
         detail = [f"goal {outcome.goal.name}: {outcome.summary}"]
         if start is None:
             if outcome.end is None and has_ended(trace):

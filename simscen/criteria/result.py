@@ -189,9 +189,9 @@ def _judge_success(
 
 
 def _end_index(outcome: GoalOutcome, ends: tuple[Event, ...]) -> int | None:
-    """Return the index of the first of the `ends` of navigation after the start of a goal, or at or after its end.
+    """Return the index of the end of navigation to which a goal belongs; None if there is no such end.
 
-    Return None if there is no such end of navigation.
+    This is the first of `ends` after the goal was accepted, or at or after the tick at which the goal ended.
     """
     end_tick = math.inf if outcome.end is None else outcome.end.tick
     return next((k for k, end in enumerate(ends) if outcome_start(outcome) < end.tick or end_tick <= end.tick), None)

@@ -200,7 +200,7 @@ def _dimension_of(value: Any) -> str:
 
 
 def _check_signal(condition: Condition, name: str, signal: Signal) -> None:
-    """Raise ValueError if the keys of a comparison do not suit its signal, or if the result is always the same."""
+    """Raise ValueError if the keys of a comparison do not match the signal, or if the result is always the same."""
     arguments = condition.arguments
     unknown = [key for key in arguments if key not in (*signal.alternative_arguments, *signal.optional_arguments)]
     if unknown:
