@@ -11,7 +11,7 @@ import typer
 from simscen.cli import completions
 from simscen.cli.diagnostics import escaped
 from simscen.core.errors import UsageError
-from simscen.record.foreign.options import TOPICS, Clock, ForeignLogOptions
+from simscen.record.foreign.options import TOPICS, ForeignLogOptions, TimeSource
 from simscen.run.kept_files import LogRetention, OutcomeFilter
 
 
@@ -138,7 +138,7 @@ def foreign_log_options(
     truth: str | None, topics: list[str] | None, time: TimeStamps, tick_rate: int, same_frame: bool
 ) -> ForeignLogOptions:
     """Return the options for reading a log of a real robot. Raises UsageError if --truth or --topic is invalid."""
-    clock: Clock = "log" if time is TimeStamps.LOG else "header"
+    clock: TimeSource = "log" if time is TimeStamps.LOG else "header"
     options = ForeignLogOptions(truth, parse_topics(topics or [], TOPICS), tick_rate, clock, same_frame)
     if truth is not None and not truth.startswith("/") and not (options.frames and all(options.frames)):
         expected = "expected a /topic, or two frames such as map:base_link"

@@ -162,7 +162,7 @@ def collect_messages(path: Path, named: Mapping[str, str], has_truth: bool = Fal
         messages.notes.append(f"scans on {names['scan']}; those on {topic} are used, see --topic scan=/TOPIC")
     robot_topics = {name: kind for name, kind in stream.topics.items() if name.startswith(namespace)}
     messages.topics = {name.removeprefix(prefix): kind for name, kind in robot_topics.items()}
-    messages.is_complete = stream.complete
+    messages.is_complete = stream.is_complete
     for role_messages in messages.by_role.values():
         role_messages.sort(key=lambda message: message.log_time)
     return messages

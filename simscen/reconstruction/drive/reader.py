@@ -210,7 +210,7 @@ class _DriveReader:
     def _poses_of_tf(self, outer: str, inner: str) -> TimedValues | None:
         """Return the poses x, y, yaw of the frame `inner` in `outer`; None if /tf does not contain the transform."""
         try:
-            _, logged, stamped, poses = self._transforms.between(outer, inner)
+            _, logged, stamped, poses = self._transforms.track(outer, inner)
         except UnknownTransform:
             return None
         except UnusableLog as error:

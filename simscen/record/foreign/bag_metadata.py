@@ -8,7 +8,7 @@ import yaml
 
 @dataclass(frozen=True)
 class BagMetadata:
-    """Part of the metadata.yaml.
+    """Entries of metadata.yaml that simscen uses.
 
     storage:        storage plug-in: "mcap" or "sqlite3"
     is_compressed:  whether rosbag2 has compressed the messages or files, in addition to the compression of MCAP
@@ -23,7 +23,7 @@ class BagMetadata:
 
 
 def read_bag_metadata(folder: Path) -> BagMetadata | None:
-    """Return the metadata of a rosbag2 folder; None if the metadata.yaml is missing or cannot be used."""
+    """Return the metadata of a rosbag2 folder; None if metadata.yaml is missing or lacks a required entry."""
     file = folder / "metadata.yaml"
     if not file.is_file():
         return None

@@ -1,4 +1,4 @@
-"""Decoder of the messages of a real robot's log by the role (purpose) of their topics."""
+"""Decoding of the messages of a real robot's log by the role (purpose) of the topic."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from simscen.record.messages.decode import MessageReader
 
 
 def _stamp(reader: MessageReader) -> int:
-    """Decode only the stamp of a message with a header, and skip the rest of the message."""
+    """Decode only the stamp of a message with a header, and skip the other fields."""
     stamp, _ = reader.header()
     reader.blob(reader.remaining)
     return stamp
@@ -40,10 +40,12 @@ DECODERS: dict[str, Decoders] = {
 
 @dataclass
 class DecodedMessages:
-    """Times of logging in ns and decoded messages, by role.
+    """Decoded messages of a log.
 
-    `problems` are the reasons why messages of a role could not be decoded. `invalid_poses` are the numbers of messages
-    by topic that are ignored because of an invalid orientation.
+    Attributes:
+        by_role: Pairs of the time of logging in ns and a decoded message, by role.
+        problems: Reason why messages of a role could not be decoded, by role.
+        invalid_poses: Number of messages that are ignored because of an invalid orientation, by topic.
     """
 
     by_role: dict[str, list[tuple[int, Any]]] = field(default_factory=lambda: defaultdict(list))
@@ -52,7 +54,7 @@ class DecodedMessages:
 
 
 def topic_roles(options: ForeignLogOptions) -> dict[str, list[str]]:
-    """Return the roles of each topic. The topic of the ground truth has the role `truth`, and may have another role."""
+    """Return the roles of each topic. The topic of the ground truth has the role `truth`, and can have another role."""
     roles: dict[str, list[str]] = defaultdict(list)
     for role in TOPICS:
         roles[options.topic(role)].append(role)
@@ -78,8 +80,8 @@ def decode_messages(raw: Iterable[RawMessage], roles: Mapping[str, Sequence[str]
             try:
                 messages.append((message.time, message.decode(DECODERS[role], f"message {len(messages) + 1}")))
             except InvalidPose:
-                decoded.invalid_poses[message.topic] += role == message_roles[0]
+                decoded.invalid_poses[message.topic] += role == message_roles[0]  # count each message once
     for topic in decoded.invalid_poses:
-        without = [role for role in roles[topic] if not decoded.by_role[role]]
-        decoded.problems |= dict.fromkeys(without, f"all messages of {topic} have an invalid orientation")
+        empty_roles = [role for role in roles[topic] if not decoded.by_role[role]]
+        decoded.problems |= dict.fromkeys(empty_roles, f"all messages of {topic} have an invalid orientation")
     return decoded

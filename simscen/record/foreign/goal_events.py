@@ -1,4 +1,4 @@
-"""Events of goals from the states of goals that an action server publishes."""
+"""Conversion of the states of goals that an action server publishes to events of goals."""
 
 from __future__ import annotations
 
@@ -14,44 +14,45 @@ _FINAL_STATES = {
     CANCELED: (EventKind.GOAL_CANCELED, "CANCELED"),
     ABORTED: (EventKind.GOAL_FAILED, "FAILED"),
 }
-"""Event of a goal, and result of a navigation with this goal alone, by the final status of the goal."""
+"""Event of a goal, and result of a navigation with only this goal, by the final status of the goal."""
 
 
 def goal_events(messages: Sequence[tuple[int, list[GoalState]]], names: Sequence[str]) -> list[Event] | str:
-    """Return the events of goals, or the reason why they are unknown.
+    """Return the events of goals, or the reason why the events are unknown.
 
-    `messages` are ticks and states of all goals. `names` are the names of the goals in the order of their acceptance.
-    Goals that ended before the start of the log are ignored.
+    `messages` are pairs of a tick and the states of all goals at this tick. `names` are the names of the goals in the
+    order in which the goals were accepted. Goals that ended before the start of the log are ignored.
     """
-    accepted: dict[bytes, int] = {}
-    ended: dict[bytes, tuple[int, int]] = {}
-    ignored: set[bytes] = set()
-    for number, (tick, states) in enumerate(messages):
+    accept_ticks: dict[bytes, int] = {}
+    ends: dict[bytes, tuple[int, int]] = {}
+    ignored_goals: set[bytes] = set()
+    for message_index, (tick, states) in enumerate(messages):
         for state in states:
-            if number == 0 and state.status in _FINAL_STATES:
-                ignored.add(state.id)
-            if state.id in ignored:
+            if message_index == 0 and state.status in _FINAL_STATES:
+                ignored_goals.add(state.id)
+            if state.id in ignored_goals:
                 continue
-            accepted.setdefault(state.id, tick)
+            accept_ticks.setdefault(state.id, tick)
             if state.status in _FINAL_STATES:
-                ended.setdefault(state.id, (tick, state.status))
-    if len(accepted) != len(names):
-        return f"the log has {_count(len(accepted))}, the scenario {_count(len(names))}"
+                ends.setdefault(state.id, (tick, state.status))
+    if len(accept_ticks) != len(names):
+        return f"the log has {_count_text(len(accept_ticks))}, the scenario {_count_text(len(names))}"
     events = []
-    for name, (goal_id, tick) in zip(names, accepted.items(), strict=True):
+    for name, (goal_id, tick) in zip(names, accept_ticks.items(), strict=True):
         events.append(Event(tick, EventKind.GOAL_ACCEPTED, name))
-        if goal_id in ended:
-            end_tick, status = ended[goal_id]
+        if goal_id in ends:
+            end_tick, status = ends[goal_id]
             events.append(Event(end_tick, _FINAL_STATES[status][0], name))
-    events += _navigation_ends(list(accepted.values()), [ended.get(goal_id) for goal_id in accepted])
+    events += _navigation_ends(list(accept_ticks.values()), [ends.get(goal_id) for goal_id in accept_ticks])
     return sorted(events, key=lambda event: event.tick)
 
 
-def _navigation_ends(starts: Sequence[int], ends: Sequence[tuple[int, int] | None]) -> Iterator[Event]:
-    """Yield the ends of navigation, with the results that simscen's own stack would report.
+def _navigation_ends(accept_ticks: Sequence[int], ends: Sequence[tuple[int, int] | None]) -> Iterator[Event]:
+    """Yield the ends of navigation, with the results that the reference stack would report.
 
-    `starts` and `ends` are the ticks at which the goals were accepted, and their ticks and final statuses. Navigation
-    ends with the last goal, and with a canceled goal before the next one is accepted. It has failed if a goal failed.
+    `accept_ticks` are the ticks at which the goals were accepted. `ends` are the tick and the final status at the end
+    of each goal; None for a goal that has not ended. Navigation ends with the last goal. It also ends with a canceled
+    goal if the next goal is accepted later. Navigation has failed if one of its goals failed.
     """
     has_failed = False
     for index, end in enumerate(ends):
@@ -59,11 +60,11 @@ def _navigation_ends(starts: Sequence[int], ends: Sequence[tuple[int, int] | Non
             return
         tick, status = end
         has_failed = has_failed or status == ABORTED
-        if index == len(ends) - 1 or (status == CANCELED and tick <= starts[index + 1]):
+        if index == len(ends) - 1 or (status == CANCELED and tick <= accept_ticks[index + 1]):
             result = ABORTED if has_failed and status != CANCELED else status
             yield Event(tick, EventKind.NAVIGATION_ENDED, _FINAL_STATES[result][1])
             has_failed = False
 
 
-def _count(number: int) -> str:
-    return f"{number} goal" if number == 1 else f"{number} goals"
+def _count_text(count: int) -> str:
+    return f"{count} goal" if count == 1 else f"{count} goals"

@@ -14,12 +14,12 @@ TOPICS = {
     "tf_static": "/tf_static",
     "status": "/navigate_to_pose/_action/status",
 }
-"""Default topics by role. A role is the purpose of a topic, the NAME in the option `--topic NAME=TOPIC`.
+"""Default topics by role. A role is the purpose of a topic. It is the NAME in the option `--topic NAME=TOPIC`.
 
 The topic with the role `status` contains the states of goals.
 """
 
-Clock = Literal["header", "log"]
+TimeSource = Literal["header", "log"]
 """Source of the times of messages: stamps in headers, or times of logging."""
 
 
@@ -32,19 +32,19 @@ class ForeignLogOptions:
         topics: Topics by role, for roles whose topic is not the default.
         tick_rate: Ticks per second of the trace.
         clock: Source of the times of messages.
-        same_frame: Whether the frame of the ground truth is the map frame, even if its name differs.
-        goals: Names of the goals of the robot, in order.
+        same_frame: Whether the frame of the ground truth is the map frame even if their names differ.
+        goals: Names of the goals of the robot, in the order in which they are accepted.
     """
 
     truth: str | None = None
     topics: Mapping[str, str] = field(default_factory=dict)
     tick_rate: int = 1000
-    clock: Clock = "header"
+    clock: TimeSource = "header"
     same_frame: bool = False
     goals: tuple[str, ...] = ()
 
     def topic(self, role: str) -> str:
-        """Return the topic with a role."""
+        """Return the topic that has a role."""
         return self.topics.get(role, TOPICS[role])
 
     @property
@@ -55,5 +55,5 @@ class ForeignLogOptions:
 
 def parse_frame_pair(name: str) -> tuple[str, str] | None:
     """Return the parent and child frame of a name such as `map:base_link`; None for the name of a topic."""
-    outer, colon, inner = name.partition(":")
-    return (outer, inner) if colon and not name.startswith("/") else None
+    parent, colon, child = name.partition(":")
+    return (parent, child) if colon and not name.startswith("/") else None

@@ -20,7 +20,7 @@ Decoders = Mapping[str, Callable[[MessageReader], Any]]
 
 
 class UnusableLog(ValueError):
-    """The log cannot be used. The message states the reason, and `hint` the solution ("" if unknown)."""
+    """The log cannot be used. The message states the reason. `hint` states the solution; "" if it is unknown."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         self.hint = hint
@@ -28,11 +28,14 @@ class UnusableLog(ValueError):
 
 
 class InvalidPose(UnusableLog):
-    """Message whose orientation is not a rotation, as from a tracking system that has lost the robot. It is ignored."""
+    """The orientation in a message is not a rotation. Readers ignore such messages.
+
+    For example, a tracking system that has lost the robot may publish a quaternion of zeros.
+    """
 
 
 def invalid_pose_notes(counts: Mapping[str, int]) -> list[str]:
-    """Return notes on the ignored messages. `counts` are their numbers by topic."""
+    """Return notes on messages that are ignored because of InvalidPose. `counts` are their numbers by topic."""
     return [f"{topic}: messages with an invalid orientation are ignored ({count})" for topic, count in counts.items()]
 
 
@@ -56,15 +59,15 @@ class RawMessage(NamedTuple):
     data: bytes
 
     def mismatch(self, decoders: Decoders) -> str:
-        """Return why no decoder suits the encoding and type of the message; "" if one does."""
+        """Return why no decoder suits the encoding and type of the message; "" if a decoder does."""
         if self.encoding != "cdr":
             return f"{self.topic} is encoded as {self.encoding or 'something unknown'}, not as CDR"
         return type_mismatch(self.topic, self.type, decoders)
 
     def decode(self, decoders: Decoders, label: str = "a message", frame_prefix: str = "") -> Any:
-        """Return the decoded message. Raises UnusableLog, with the `label` of the message, if this is impossible.
+        """Return the decoded message. Raises InvalidPose for an invalid orientation, and UnusableLog for other errors.
 
-        Raises InvalidPose for an invalid orientation. `frame_prefix` is removed from the names of frames.
+        `label` names the message in the text of the exception. `frame_prefix` is removed from the names of frames.
         """
         if mismatch := self.mismatch(decoders):
             raise UnusableLog(mismatch)
@@ -77,7 +80,7 @@ class RawMessage(NamedTuple):
 
 
 def type_mismatch(topic: str, message_type: str, decoders: Decoders) -> str:
-    """Return why no decoder suits the message type of a topic; "" if one does."""
+    """Return why no decoder suits the message type of a topic; "" if a decoder does."""
     if message_type in decoders:
         return ""
     return f"{topic} is a {message_type or 'type without a name'}, expected {' or '.join(decoders)}"
@@ -86,14 +89,18 @@ def type_mismatch(topic: str, message_type: str, decoders: Decoders) -> str:
 class McapMessages:
     """Iterable of the messages of an MCAP file.
 
-    After the iteration, `complete` is False if the file is truncated, `count` is the number of messages, and `topics`
-    has the message types by absolute topic. The iteration raises UnusableLog for ROS 1, for files that are not MCAP,
-    and for several concatenated files, and mcap exceptions for damaged files.
+    The iteration raises UnusableLog for ROS 1, for files that are not MCAP, and for several concatenated files. It
+    raises exceptions of the mcap library for damaged files. The attributes are valid after the iteration.
+
+    Attributes:
+        is_complete: False if the file is truncated.
+        count: Number of messages.
+        topics: Message types by topic, which always starts with a slash.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self.complete = False
+        self.is_complete = False
         self.count = 0
         self.topics: dict[str, str] = {}
 
@@ -106,7 +113,7 @@ class McapMessages:
             yield from self._messages(reader)
             if stream.read(1):
                 raise UnusableLog("data follows its end", "if it is a file of several logs, split it")
-            self.complete = not reader.is_truncated
+            self.is_complete = not reader.is_truncated
 
     def _messages(self, reader: RecordReader) -> Iterator[RawMessage]:
         types: dict[int, str] = {}
@@ -131,12 +138,15 @@ class McapMessages:
 
 
 def _absolute(topic: str) -> str:
-    """Return a topic with a leading slash: recorders other than `ros2 bag record` may write topics without it."""
+    """Return a topic with one leading slash. Recorders other than `ros2 bag record` may omit the slash."""
     return f"/{topic.lstrip('/')}"
 
 
 def is_simscen_log(path: Path) -> bool:
-    """Return whether simscen recorded this file. Returns True if the file cannot be read."""
+    """Return whether simscen recorded this file.
+
+    Return True if the file cannot be read. The reader of simscen's logs then raises the exception with the reason.
+    """
     try:
         return _run_metadata(path) is not None
     except Exception:
@@ -144,7 +154,7 @@ def is_simscen_log(path: Path) -> bool:
 
 
 def recorded_robots(path: Path) -> tuple[str, ...]:
-    """Return the names of several robots in a log of simscen; () for other logs."""
+    """Return the names of the robots in a log of simscen with several robots; () for other logs."""
     try:
         return tuple(json.loads((_run_metadata(path) or {}).get(ROBOTS_KEY, "[]")))
     except Exception:
@@ -163,7 +173,7 @@ def _run_metadata(path: Path) -> dict[str, str] | None:
 
 
 def _reject_ros1(profile: str) -> None:
-    """Raise UnusableLog if an MCAP profile or message encoding is of ROS 1."""
+    """Raise UnusableLog if `profile`, the profile of a file or the encoding of a channel, is that of ROS 1."""
     if profile == "ros1":
         raise UnusableLog("it is a log of ROS 1", "convert it, e.g. with `rosbags-convert`, whose logs are of ROS 2")
 
@@ -175,14 +185,17 @@ INSTALL_ROSBAGS = "pip install 'rosbags>=0.10,<1'"
 class BagMessages:
     """Iterable of the messages of a rosbag2 folder.
 
-    After the iteration, `complete` is False if messages are missing, and `topics` has the message types by topic.
-    SQLite and compressed bags need the optional package rosbags. Of these bags, only messages on the topics given to
-    the constructor are read.
+    SQLite and compressed bags need the optional package rosbags. From these bags, only messages on `selected_topics`
+    are read. The attributes are valid after the iteration.
+
+    Attributes:
+        is_complete: False if messages are missing.
+        topics: Message types by topic, which always starts with a slash.
     """
 
-    def __init__(self, folder: Path, topics: Container[str]) -> None:
-        self._folder, self._topics = folder, topics
-        self.complete = False
+    def __init__(self, folder: Path, selected_topics: Container[str]) -> None:
+        self._folder, self._selected_topics = folder, selected_topics
+        self.is_complete = False
         self.topics: dict[str, str] = {}
 
     def __iter__(self) -> Iterator[RawMessage]:
@@ -199,14 +212,14 @@ class BagMessages:
         """Yield the messages of MCAP files, which should have at least `expected_count` messages in total."""
         if missing := [file.name for file in files if not file.exists()]:
             raise UnusableLog(f"metadata.yaml lists {missing[0]}, which is missing", "add the file to the folder")
-        complete, count = [], 0
+        are_complete, count = True, 0
         for file in files:
             messages = McapMessages(file)
             yield from messages
             self.topics.update(messages.topics)
-            complete.append(messages.complete)
+            are_complete &= messages.is_complete
             count += messages.count
-        self.complete = all(complete) and count >= expected_count
+        self.is_complete = are_complete and count >= expected_count
 
     def _read_with_rosbags(self) -> Iterator[RawMessage]:
         try:
@@ -218,11 +231,11 @@ class BagMessages:
             with Reader(self._folder) as reader:
                 names = {connection.topic: _absolute(connection.topic) for connection in reader.connections}
                 self.topics = {names[connection.topic]: connection.msgtype for connection in reader.connections}
-                selected = [connection for connection in reader.connections if names[connection.topic] in self._topics]
+                selected = [c for c in reader.connections if names[c.topic] in self._selected_topics]
                 for connection, time, data in reader.messages(selected) if selected else ():
                     count += 1
                     yield RawMessage(names[connection.topic], connection.msgtype, "cdr", time, bytes(data))
-                self.complete = count == sum(connection.msgcount for connection in selected)
+                self.is_complete = count == sum(connection.msgcount for connection in selected)
         except (UnusableLog, OSError):
             raise
         except Exception as error:  # rosbags does not catch exceptions of SQLite, YAML and zstd
@@ -233,7 +246,8 @@ class BagMessages:
 def open_messages(path: Path, topics: Container[str]) -> McapMessages | BagMessages:
     """Return an iterable of the messages of an MCAP file or a rosbag2 folder.
 
-    It contains all messages on `topics`, and possibly on other topics. Raises UnusableLog for .bag and .db3 files.
+    The iterable contains all messages on `topics`, and may contain messages on other topics. Raises UnusableLog for
+    .bag and .db3 files.
     """
     if path.is_dir():
         return BagMessages(path, topics)

@@ -52,8 +52,8 @@ class ForeignLog:
 def read_foreign_log(path: Path, options: ForeignLogOptions, with_sensors: bool = False) -> ForeignLog:
     """Read an MCAP file or a rosbag2 folder of a real robot.
 
-    The trace of a truncated log has no event `run.ended`. With `with_sensors`, also keep scans, particles, local plans,
-    costmaps, and the map. Raises InvalidInput if the log cannot be used.
+    The trace of a truncated log has no event `run.ended`. If `with_sensors` is True, the result also has the scans,
+    particles, local plans, costmaps, and the map. Raises InvalidInput if the log cannot be used.
     """
     with unusable_log_as_invalid_input(path):
         roles = topic_roles(options)
@@ -63,16 +63,17 @@ def read_foreign_log(path: Path, options: ForeignLogOptions, with_sensors: bool 
         with np.errstate(all="ignore"):  # the judge reports numbers that are not finite
             reader = ForeignTraceReader(decoded, messages.topics, options)
         reader.notes += invalid_pose_notes(decoded.invalid_poses)
-        end = reader.time.end
-        if messages.complete:
-            reader.rows.events.append(Event(end, EventKind.RUN_ENDED, "the recording ends"))
+        last_tick = reader.timebase.last_tick
+        if messages.is_complete:
+            reader.rows.events.append(Event(last_tick, EventKind.RUN_ENDED, "the recording ends"))
         else:
             reader.notes.append("the log is truncated, so no criterion can pass")
-        trace = reader.rows.trace(options.tick_rate, end)
+        trace = reader.rows.trace(options.tick_rate, last_tick)
         coverage = LogCoverage(reader.missing, reader.partial, recorded_by_simscen=False)
         if collector is None:
             return ForeignLog(trace, coverage, reader.notes)
-        return ForeignLog(trace, coverage, reader.notes, collector.sensors(reader.time, decoded), collector.map)
+        sensors = collector.sensor_messages(reader.timebase, decoded)
+        return ForeignLog(trace, coverage, reader.notes, sensors, collector.map)
 
 
 SENSOR_TOPICS = (
@@ -88,9 +89,9 @@ _UPSIDE_DOWN = Pose3(qx=1.0, qw=0.0)
 
 
 class SensorMessageCollector:
-    """Collects sensor messages while another reader iterates over the messages of a log.
+    """Collects the sensor messages of a log while another reader iterates over all messages.
 
-    `map` is the last map on /map; None without a map.
+    `map` is the last map on /map; None if the log has no map.
     """
 
     def __init__(self) -> None:
@@ -101,7 +102,7 @@ class SensorMessageCollector:
     def collect(self, messages: Iterable[RawMessage]) -> Iterator[RawMessage]:
         """Yield all messages, and collect the sensor messages. Raises ValueError for an invalid sensor message.
 
-        Plans with an invalid orientation are ignored.
+        Local plans with an invalid orientation are not collected.
         """
         for message in messages:
             if message.encoding == "cdr":
@@ -109,9 +110,9 @@ class SensorMessageCollector:
                     self._add(message)
             yield message
 
-    def sensors(self, time: Timebase, decoded: DecodedMessages) -> SensorMessages:
-        """Return the collected messages with ticks of the timebase, and the mounts of lidars."""
-        ticks = time.ticks_of_logged(np.array([message.time for message in self._messages], dtype=np.int64))
+    def sensor_messages(self, timebase: Timebase, decoded: DecodedMessages) -> SensorMessages:
+        """Return the collected messages with their ticks, and the mounts of lidars from the transforms in `decoded`."""
+        ticks = timebase.ticks_of_logged(np.array([message.time for message in self._messages], dtype=np.int64))
         for tick, message in zip(ticks.tolist(), self._messages, strict=True):
             handler = self._sensors.handler(message.topic, message.type)
             assert handler is not None
@@ -119,19 +120,20 @@ class SensorMessageCollector:
         transforms = transform_tree(decoded)
         for frame in transforms.child_frames:
             if (mount := transforms.sensor_mount(frame, BASE_FRAME)) is not None:
-                level = Pose3.planar(mount.plane)
-                self._sensors.mounts[frame] = level.compose(_UPSIDE_DOWN) if is_upside_down(mount) else level
+                level_mount = Pose3.planar(mount.plane)
+                is_mirrored = is_upside_down(mount)
+                self._sensors.mounts[frame] = level_mount.compose(_UPSIDE_DOWN) if is_mirrored else level_mount
         return self._sensors
 
     def _add(self, message: RawMessage) -> None:
         if (message.topic, message.type) == topics.MAP[:2]:
             self.map = self._sensors.decode_costmap(message.data)[1]
         elif self._sensors.handler(message.topic, message.type) is not None:
-            checks: dict[str, Callable[[bytes], object]] = {
+            decoders: dict[str, Callable[[bytes], object]] = {
                 topics.SCAN_TYPE: self._sensors.decode_scan,
                 topics.PARTICLES.type: self._sensors.decode_particles,
                 topics.LOCAL_PLAN.type: self._sensors.decode_path,
                 topics.MAP.type: self._sensors.decode_costmap,
             }
-            checks[message.type](message.data)  # raises ValueError for an invalid message
+            decoders[message.type](message.data)  # raises ValueError for an invalid message
             self._messages.append(message)

@@ -18,23 +18,23 @@ MIN_CLOCK_STEP_NS = NS_PER_SECOND // 10
 MIN_MESSAGES_AROUND_STEP = 20
 """Minimum number of messages before and after the change of a clock that is reported."""
 MAX_CLOCK_STEP_RATIO = 1.5
-"""When a clock is set, the offset (stamp minus time of logging) changes permanently at one message. If the permanent
-change is more than this ratio times the change at the message, the recorder caught up or lost messages instead."""
+"""Maximum ratio of the permanent change of the offset (stamp minus time of logging) to the change at one message.
+
+When a clock is set, both changes are equal. With a larger ratio, the recorder caught up or lost messages instead."""
 MAX_STAMP_DIFFERENCE_NS = 10 * NS_PER_SECOND
 """Maximum difference between stamps of two topics at the same time. A larger difference means different clocks."""
-
 MIN_MESSAGES_OF_CLOCK = 5
-"""Minimum number of messages of a topic from which it is checked that its clock advances."""
+"""Minimum number of messages of a topic with which it is checked that the stamps advance."""
 MIN_CLOCK_RATE = 0.01
-"""Minimum duration by the stamps of a topic, relative to the duration by the times of logging."""
+"""Minimum time span of the stamps of a topic, relative to the time span of the times of logging."""
 
 
 @dataclass(frozen=True, eq=False)
 class StampedMessages:
-    """Times of logging and stamps of the messages of a topic in ns, in the order of logging.
+    """Times of logging and stamps (n,) of the messages of a topic in ns, in the order of logging.
 
-    The constructor raises UnusableLog if the stamps stand still or jump back, or if their clock was set during the
-    recording.
+    The constructor raises UnusableLog if the stamps stand still or jump back, or if the clock of the stamps was set
+    during the recording.
     """
 
     topic: str
@@ -60,7 +60,7 @@ class StampedMessages:
 
     @property
     def order_problems(self) -> str:
-        """Text on the numbers of late and repeated stamps; "" without problems."""
+        """Text with the numbers of late and repeated stamps; "" if there are none."""
         late = int((np.diff(self.stamps) < 0).sum())
         repeated = len(self.stamps) - len(np.unique(self.stamps))
         texts = [
@@ -71,10 +71,11 @@ class StampedMessages:
 
 
 def find_clock_step(logged: Ticks, stamps: Ticks) -> tuple[int, int] | None:
-    """Return the index of the first message after the clock of the stamps was set, and the change in ns.
+    """Find the message at which the clock of the stamps was set.
 
-    Returns None if the clock was not set. `logged` and `stamps` are the times of the messages of one topic in ns, in
-    the order of logging.
+    Return the index of the first message after the clock was set, and the change of the clock in ns. Return None if the
+    clock was not set. `logged` and `stamps` are the times of logging and the stamps of the messages of one topic in ns,
+    in the order of logging.
     """
     # Delays make offsets smaller, so that the maximum offset of many messages is the difference of the two clocks. Only
     # setting a clock changes this maximum permanently and from one message to the next.
@@ -83,23 +84,24 @@ def find_clock_step(logged: Ticks, stamps: Ticks) -> tuple[int, int] | None:
         return None
     offsets, stamp_gaps, logged_gaps = stamps - logged, np.diff(stamps), np.diff(logged)
     changes = np.diff(offsets)
-    lasting = np.maximum.accumulate(offsets[::-1])[::-1][1:] - np.maximum.accumulate(offsets)[:-1]
-    share = lasting / np.where(changes == 0, 1, changes)
-    is_step = (np.abs(changes) > MIN_CLOCK_STEP_NS) & (share > 0.5) & (share < MAX_CLOCK_STEP_RATIO)
+    permanent_changes = np.maximum.accumulate(offsets[::-1])[::-1][1:] - np.maximum.accumulate(offsets)[:-1]
+    ratios = permanent_changes / np.where(changes == 0, 1, changes)
+    is_step = (np.abs(changes) > MIN_CLOCK_STEP_NS) & (ratios > 0.5) & (ratios < MAX_CLOCK_STEP_RATIO)
     is_step &= np.abs(stamp_gaps - np.median(stamp_gaps)) > np.abs(logged_gaps - np.median(logged_gaps))
-    found = np.flatnonzero(is_step[count - 1 : -count + 1])
-    if not len(found):
+    steps = np.flatnonzero(is_step[count - 1 : -count + 1])
+    if not len(steps):
         return None
-    index = int(found[0]) + count - 1
+    index = int(steps[0]) + count - 1
     return index + 1, int(changes[index])
 
 
 def check_recorder_clock(topic: str, logged: Sequence[int], stamps: Sequence[int]) -> None:
     """Raise UnusableLog if the clock of the recorder was set back.
 
-    `logged` and `stamps` are the times of the messages of one topic in ns, in the order of the file.
+    `logged` and `stamps` are the times of logging and the stamps of the messages of one topic in ns, in the order of
+    the file.
     """
-    # Several steps back, or parts whose times do not overlap, mean that the file is only unsorted.
+    # A file with several backward steps, or with parts whose times do not overlap, is only unsorted.
     times = np.array(logged, dtype=np.int64)
     backward = np.flatnonzero(np.diff(times) < 0)
     if len(backward) != 1:
@@ -118,39 +120,39 @@ def check_recorder_clock(topic: str, logged: Sequence[int], stamps: Sequence[int
 class Timebase:
     """Conversion of the times of messages to ticks.
 
-    start:   time of tick 0 in ns
-    stop:    time of the last tick in ns
-    rate:    ticks per second
-    anchor:  messages that relate times of logging to stamps; None if times of logging are used for all messages
+    start_time:  time of tick 0 in ns, by the clock of the anchor
+    end_time:    time of the last tick in ns, by the clock of the anchor
+    rate:        ticks per second
+    anchor:      messages that relate times of logging to stamps; None if times of logging are used for all messages
     """
 
-    start: int
-    stop: int
+    start_time: int
+    end_time: int
     rate: int
     anchor: StampedMessages | None = None
 
     @classmethod
-    def from_logged(cls, begin: int, end: int, rate: int, anchor: StampedMessages | None) -> Timebase:
-        """Return the timebase between two times of logging in ns."""
-        start, stop = _header_times(np.array([begin, end]), anchor).tolist()
-        return cls(start, stop, rate, anchor)
+    def from_logged(cls, start: int, end: int, rate: int, anchor: StampedMessages | None) -> Timebase:
+        """Return the timebase between the times of logging `start` and `end` in ns."""
+        start_time, end_time = _to_clock_of_anchor(np.array([start, end]), anchor).tolist()
+        return cls(start_time, end_time, rate, anchor)
 
     @property
-    def end(self) -> int:
+    def last_tick(self) -> int:
         """The last tick."""
-        return int(self._ticks(np.array([self.stop]))[0])
+        return int(self._ticks(np.array([self.end_time]))[0])
 
     def ticks_of_logged(self, logged: Ticks) -> Ticks:
-        """Return the ticks of messages without stamps, from their times of logging in ns."""
-        return self._ticks(_header_times(logged, self.anchor))
+        """Return the ticks of messages without stamps, from the times of logging in ns."""
+        return self._ticks(_to_clock_of_anchor(logged, self.anchor))
 
     def ticks_of_stamped(self, messages: StampedMessages) -> Ticks:
         """Return the ticks of messages with stamps. Raises UnusableLog if the anchor has another clock."""
         if self.anchor is None:
             return self._ticks(messages.logged)
-        delays = np.abs(messages.stamps - _header_times(messages.logged, self.anchor))
-        if len(delays) > 2 and np.median(delays) > MAX_STAMP_DIFFERENCE_NS:
-            seconds = float(np.median(delays)) / NS_PER_SECOND
+        differences = np.abs(messages.stamps - _to_clock_of_anchor(messages.logged, self.anchor))
+        if len(differences) > 2 and np.median(differences) > MAX_STAMP_DIFFERENCE_NS:
+            seconds = float(np.median(differences)) / NS_PER_SECOND
             topics = f"{messages.topic} and {self.anchor.topic}"
             text = f"{topics} do not share a clock: their stamps differ by {seconds:.1f} s"
             raise UnusableLog(text, "is use_sim_time the same for all nodes? --time log judges by the time of logging")
@@ -158,28 +160,28 @@ class Timebase:
 
     def _ticks(self, times: Ticks) -> Ticks:
         """Return the ticks nearest to times in ns, limited to the first and the last tick."""
-        since: Ticks = np.clip(times, self.start, self.stop) - self.start
-        return (since * self.rate + NS_PER_SECOND // 2) // NS_PER_SECOND
+        elapsed: Ticks = np.clip(times, self.start_time, self.end_time) - self.start_time
+        return (elapsed * self.rate + NS_PER_SECOND // 2) // NS_PER_SECOND
 
 
-def _header_times(logged: Ticks, anchor: StampedMessages | None) -> Ticks:
-    """Convert times of logging to the clock of the anchor's stamps, by interpolation between the anchor's messages.
-
-    Before and after these messages, the difference of the two clocks is constant.
-    """
+def _to_clock_of_anchor(logged: Ticks, anchor: StampedMessages | None) -> Ticks:
+    """Convert times of logging with `to_clock_of_stamps`. Return the times unchanged if there is no anchor."""
     return logged if anchor is None else to_clock_of_stamps(logged, anchor.logged, anchor.stamps)
 
 
 def to_clock_of_stamps(logged: Ticks, anchor_logged: Ticks, anchor_stamps: Ticks) -> Ticks:
     """Convert times of logging to the clock of stamps, by interpolation between the messages of a topic (the anchor).
 
-    Before and after these messages, the difference of the two clocks is constant. All times are in ns. The messages of
-    the anchor are in the order of logging.
+    `anchor_logged` and `anchor_stamps` are the times of logging and the stamps of the anchor, in the order of logging.
+    Before and after the anchor, the difference of the two clocks is assumed to be constant. All times are in ns.
     """
     stamps = np.maximum.accumulate(anchor_stamps)
-    first, start = int(anchor_logged[0]), int(stamps[0])
-    anchor_times = (anchor_logged - first).astype(np.float64)
-    interpolated = np.interp((logged - first).astype(np.float64), anchor_times, (stamps - start).astype(np.float64))
-    outside = np.minimum(logged - first, 0) + np.maximum(logged - int(anchor_logged[-1]), 0)
-    times: Ticks = start + np.rint(interpolated).astype(np.int64) + outside
+    first_logged, first_stamp = int(anchor_logged[0]), int(stamps[0])
+    interpolated = np.interp(
+        (logged - first_logged).astype(np.float64),
+        (anchor_logged - first_logged).astype(np.float64),
+        (stamps - first_stamp).astype(np.float64),
+    )
+    outside = np.minimum(logged - first_logged, 0) + np.maximum(logged - int(anchor_logged[-1]), 0)
+    times: Ticks = first_stamp + np.rint(interpolated).astype(np.int64) + outside
     return times

@@ -20,7 +20,7 @@ from simscen.record.messages.decode import NO_COVARIANCE, StampedPose
 DIFFERENCE_WINDOW_S = 0.2
 """Time over which velocities are computed from poses."""
 MIN_GAP_PERIODS = 3.0
-"""Minimum time without a sample, in median times between samples, that is a gap."""
+"""Minimum duration of a gap between samples, as a multiple of the median time between samples."""
 MIN_MOTION_M_RAD = 0.1
 """Motion in m or rad above which twists of zero count as missing."""
 
@@ -34,9 +34,9 @@ class Track:
         frame: Frame of the poses.
         logged: Times of logging (n,) in ns.
         stamped: Stamps; None if the times of logging are used instead.
-        poses: x, y, z and a quaternion x, y, z, w (n, 7).
+        poses: x, y, z in m and a quaternion x, y, z, w (n, 7), in `frame`.
         covariances: xx, xy, xyaw, yy, yyaw, yawyaw (n, 6); zeros if unknown.
-        twists: vx, vy, wz (n, 3); None if a message has no twist.
+        twists: vx and vy in m/s, wz in rad/s (n, 3), in the frame of the base; None if a message has no twist.
     """
 
     source: str
@@ -51,7 +51,7 @@ class Track:
 def stamped_messages(
     topic: str, logged: Sequence[int], stamps: Sequence[int], options: ForeignLogOptions
 ) -> StampedMessages | None:
-    """Return the stamps of a topic by time of logging; None if all stamps are zero or `options` ignore stamps."""
+    """Return the stamps of a topic in the order of logging; None if all stamps are zero or `options` ignore stamps."""
     if options.clock == "log" or not any(stamps):
         return None
     times = np.array(logged, dtype=np.int64)
@@ -60,7 +60,7 @@ def stamped_messages(
 
 
 def track_from_topic(topic: str, messages: Sequence[tuple[int, StampedPose]], options: ForeignLogOptions) -> Track:
-    """Return the track of a topic. `messages` are times of logging in ns and poses.
+    """Return the track of a topic. `messages` are pairs of a time of logging in ns and a pose.
 
     Raises UnusableLog if the messages have several frames or if a clock was set during the recording.
     """
@@ -84,8 +84,8 @@ def track_from_topic(topic: str, messages: Sequence[tuple[int, StampedPose]], op
 
 def track_from_tf(outer: str, inner: str, decoded: DecodedMessages, options: ForeignLogOptions) -> Track:
     """Return the track of the frame `inner` in the frame `outer` from tf. Raises UnknownTransform, or UnusableLog."""
-    source, times, stamped, poses = transform_tree(decoded).between(outer, inner, use_log_time=options.clock == "log")
-    return Track(source, outer, times, stamped, poses, np.tile(NO_COVARIANCE, (len(poses), 1)), None)
+    source, logged, stamped, poses = transform_tree(decoded).track(outer, inner, use_log_time=options.clock == "log")
+    return Track(source, outer, logged, stamped, poses, np.tile(NO_COVARIANCE, (len(poses), 1)), None)
 
 
 def transform_tree(decoded: DecodedMessages) -> TransformTree:
@@ -98,34 +98,37 @@ def transform_tree(decoded: DecodedMessages) -> TransformTree:
 
 
 def velocity_from_poses(ticks: Ticks, poses: Array, rate: int) -> Array:
-    """Return vx, vy, wz (n, 3) in the body frame for poses x, y, yaw (n, 3) at increasing `ticks` (n,).
+    """Return velocities vx, vy, wz (n, 3) in the base frame for poses x, y, yaw (n, 3) at increasing `ticks` (n,).
 
-    They are averaged over at least DIFFERENCE_WINDOW_S, and over longer times where samples are sparse. Beside a gap,
-    only samples on the same side are used, unless the robot moved faster in the gap.
+    The velocities are averaged over at least DIFFERENCE_WINDOW_S, and over longer times where samples are sparse.
+    Beside a gap, only samples on the same side are used, except if the mean speed in the gap is higher. `rate` is the
+    number of ticks per second.
     """
     if len(ticks) < 2:
         return np.zeros((len(ticks), 3))
-    half = max(1, round(DIFFERENCE_WINDOW_S / 2 * rate))
-    is_gap, first, last = _parts_between_gaps(ticks, half)
-    before = np.maximum(np.searchsorted(ticks, ticks - half, side="right") - 1, first)
-    after = np.minimum(np.searchsorted(ticks, ticks + half, side="left"), last)
-    moved = np.column_stack((poses[:, :2], np.unwrap(poses[:, 2])))
-    velocities = (moved[after] - moved[before]) * rate / (ticks[after] - ticks[before])[:, None]
+    half_window = max(1, round(DIFFERENCE_WINDOW_S / 2 * rate))
+    is_gap, first, last = _parts_between_gaps(ticks, half_window)
+    before = np.maximum(np.searchsorted(ticks, ticks - half_window, side="right") - 1, first)
+    after = np.minimum(np.searchsorted(ticks, ticks + half_window, side="left"), last)
+    unwrapped = np.column_stack((poses[:, :2], np.unwrap(poses[:, 2])))
+    velocities = (unwrapped[after] - unwrapped[before]) * rate / (ticks[after] - ticks[before])[:, None]
     for index in np.flatnonzero(is_gap).tolist():
-        mean = (moved[index + 1] - moved[index]) * rate / (ticks[index + 1] - ticks[index])
-        for part in (slice(0, 2), slice(2, 3)):
-            beside = velocities[index : index + 2, part]
-            if np.linalg.norm(mean[part]) > np.linalg.norm(beside, axis=1).max():
-                beside[:] = mean[part]
+        mean = (unwrapped[index + 1] - unwrapped[index]) * rate / (ticks[index + 1] - ticks[index])
+        for axes in (slice(0, 2), slice(2, 3)):
+            beside_gap = velocities[index : index + 2, axes]
+            if np.linalg.norm(mean[axes]) > np.linalg.norm(beside_gap, axis=1).max():
+                beside_gap[:] = mean[axes]
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     vx, vy, wz = velocities.T
     return np.column_stack((c * vx + s * vy, c * vy - s * vx, wz))
 
 
 def _parts_between_gaps(ticks: Ticks, min_length: int) -> tuple[npt.NDArray[np.bool_], Ticks, Ticks]:
-    """Return a mask (n - 1,) of gaps, and the first and the last sample (n,) between the gaps beside each sample.
+    """Divide samples at n `ticks` into parts without a gap.
 
-    Parts shorter than `min_length` ticks have too few samples for a velocity. For their samples, all gaps are ignored.
+    Return a mask (n - 1,) of gaps, and for each sample the indices of the first and the last sample of its part (n,).
+    For samples of a part that is shorter than `min_length` ticks, the indices are those of all samples, because the
+    part is too short for a velocity.
     """
     steps = np.diff(ticks)
     is_gap: npt.NDArray[np.bool_] = steps > max(2 * min_length, MIN_GAP_PERIODS * float(np.median(steps)))
@@ -137,7 +140,7 @@ def _parts_between_gaps(ticks: Ticks, min_length: int) -> tuple[npt.NDArray[np.b
 
 
 def is_twist_missing(twists: Array, poses: Array) -> bool:
-    """Return whether all twists are zero although the robot moved."""
-    moved = float(np.ptp(poses[:, 0]) + np.ptp(poses[:, 1])) if len(poses) else 0.0
-    turned = float(np.abs(wrap_array(poses[:, 2] - poses[0, 2])).max()) if len(poses) else 0.0
-    return not twists.any() and (moved > MIN_MOTION_M_RAD or turned > MIN_MOTION_M_RAD)
+    """Return whether all `twists` (n, 3) are zero although the robot moved. `poses` (n, 3) are x, y, yaw."""
+    distance = float(np.ptp(poses[:, 0]) + np.ptp(poses[:, 1])) if len(poses) else 0.0
+    angle = float(np.abs(wrap_array(poses[:, 2] - poses[0, 2])).max()) if len(poses) else 0.0
+    return not twists.any() and (distance > MIN_MOTION_M_RAD or angle > MIN_MOTION_M_RAD)

@@ -17,9 +17,13 @@ from simscen.record.messages.decode import StampedPose
 
 @dataclass
 class _Link:
-    """Poses of a frame in its parent frame, with times of logging and stamps in ns.
+    """Transforms of a frame, one for each message.
 
-    `is_static` is False if any message was on /tf.
+    parent:     name of the parent frame
+    logged:     times of logging in ns
+    stamps:     stamps in ns
+    poses:      poses of the frame in the parent frame: x, y, z and a quaternion x, y, z, w
+    is_static:  False if any message was on /tf
     """
 
     parent: str
@@ -34,9 +38,9 @@ class _Link:
 
 
 class TransformTrack(NamedTuple):
-    """Poses of a frame in another frame, in the order of logging.
+    """Poses of a frame in another frame over time, in the order of logging.
 
-    source:   pair of frames, for messages to the user
+    source:   text with the two frames, for messages to the user
     logged:   times of logging (n,) in ns
     stamped:  stamps; None if the times of logging are used instead
     poses:    x, y, z and a quaternion x, y, z, w (n, 7)
@@ -52,7 +56,7 @@ _BASE_FRAMES = ("base_link", "base_footprint")
 
 
 class UnknownTransform(UnusableLog):
-    """Transform between two frames that tf does not contain. The message states the reason."""
+    """tf does not contain the transform between two frames. The message states the reason."""
 
 
 class TransformTree:
@@ -64,7 +68,7 @@ class TransformTree:
     def add(self, logged: int, links: list[StampedPose], is_static: bool) -> None:
         """Add the transforms of one message on /tf, or on /tf_static if `is_static`.
 
-        `logged` is the time of logging in ns. If the parent of a frame changes, previous transforms are dropped.
+        `logged` is the time of logging in ns. If the parent of a frame changes, its previous transforms are dropped.
         """
         for transform in links:
             link = self._links.get(transform.child)
@@ -80,25 +84,27 @@ class TransformTree:
         """All frames that have a parent frame."""
         return self._links.keys()
 
-    def between(self, outer: str, inner: str, use_log_time: bool = False) -> TransformTrack:
+    def track(self, outer: str, inner: str, use_log_time: bool = False) -> TransformTrack:
         """Return the poses of the frame `inner` in `outer`. Raises UnknownTransform, or UnusableLog.
 
-        Each message of the dynamic transform nearest to `inner` yields one pose. Other transforms are not interpolated:
-        they have the value of their latest message.
+        Each message of the dynamic transform nearest to `inner` yields one pose. For all other transforms, the latest
+        message at this time counts, without interpolation. Times are stamps, or times of logging if `use_log_time` or
+        if all stamps are zero.
         """
         chain = self._chain(outer, inner)
-        moving = next((link for link in chain if not link.is_static), None)
-        if moving is None:
+        dynamic_links = [link for link in chain if not link.is_static]
+        if not dynamic_links:
             raise UnknownTransform(f"tf between {outer} and {inner} never changes")
+        nearest = dynamic_links[0]
         source = f"tf {outer}:{inner}"
-        check_recorder_clock(source, moving.logged, moving.stamps)
-        use_log_time = use_log_time or not any(any(link.stamps) for link in chain if not link.is_static)
-        begin = max(int(link.times(use_log_time).min()) for link in chain if not link.is_static)
-        order = np.argsort(moving.logged, kind="stable")
-        order = order[moving.times(use_log_time)[order] >= begin]
+        check_recorder_clock(source, nearest.logged, nearest.stamps)
+        use_log_time = use_log_time or not any(any(link.stamps) for link in dynamic_links)
+        start = max(int(link.times(use_log_time).min()) for link in dynamic_links)
+        order = np.argsort(nearest.logged, kind="stable")
+        order = order[nearest.times(use_log_time)[order] >= start]
         if not len(order):
             raise UnknownTransform(f"tf never connects {outer} and {inner} at the same time")
-        times, logged = moving.times(use_log_time)[order], moving.times(use_log_time=True)[order]
+        times, logged = nearest.times(use_log_time)[order], nearest.times(use_log_time=True)[order]
         poses = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(order), 1))
         for link in chain:
             poses = _compose(_latest_poses(link, times, use_log_time), poses)
@@ -107,15 +113,15 @@ class TransformTree:
     def sensor_mount(self, frame: str, base: str) -> Pose3 | None:
         """Return the pose of a sensor's frame on the frame `base`, or else on base_link or base_footprint.
 
-        Returns None if no transforms connect the frames. The latest message of a static transform counts, and the first
-        message of a transform on /tf: some robots publish the mounts of their sensors there.
+        Return None if no transforms connect the frames. For a static transform, the latest message counts. For a
+        transform on /tf, where some robots publish the mounts of their sensors, the first message counts.
         """
-        pose, visited, nearest = Pose3(), set(), None
+        pose, visited, pose_on_base_link = Pose3(), set(), None
         while frame != base:
-            if nearest is None and frame.rpartition("/")[2] in _BASE_FRAMES:
-                nearest = pose
+            if pose_on_base_link is None and frame.rpartition("/")[2] in _BASE_FRAMES:
+                pose_on_base_link = pose
             if frame not in self._links or frame in visited:
-                return nearest
+                return pose_on_base_link
             visited.add(frame)
             link = self._links[frame]
             pose, frame = Pose3(*link.poses[-1 if link.is_static else 0]).compose(pose), link.parent
@@ -123,16 +129,16 @@ class TransformTree:
 
     def _chain(self, outer: str, inner: str) -> list[_Link]:
         """Return the transforms from `inner` up to `outer`. Raises UnknownTransform if `inner` is not below `outer`."""
-        chain = self._links_up(inner, outer)
+        chain = self._links_to_ancestor(inner, outer)
         if chain is not None:
             return chain
-        if self._links_up(outer, inner) is not None:
+        if self._links_to_ancestor(outer, inner) is not None:
             raise UnknownTransform(f"in tf, {outer} is below {inner}; write {inner}:{outer}")
-        listed = ", ".join(sorted({*self._links, *(link.parent for link in self._links.values())})) or "none"
-        raise UnknownTransform(f"tf does not connect {outer} with {inner}; frames: {listed}")
+        frames = ", ".join(sorted({*self._links, *(link.parent for link in self._links.values())})) or "none"
+        raise UnknownTransform(f"tf does not connect {outer} with {inner}; frames: {frames}")
 
-    def _links_up(self, frame: str, ancestor: str) -> list[_Link] | None:
-        """Return the transforms from a frame up to another one; None if the other one is not above it."""
+    def _links_to_ancestor(self, frame: str, ancestor: str) -> list[_Link] | None:
+        """Return the transforms from `frame` up to `ancestor`; None if `ancestor` is not above `frame`."""
         links: list[_Link] = []
         while frame != ancestor:
             link = self._links.get(frame)
@@ -144,16 +150,21 @@ class TransformTree:
 
 
 def _latest_poses(link: _Link, times: Ticks, use_log_time: bool) -> Array:
-    """Return the latest poses (n, 7) of a link at `times` (n,), which are times of logging or stamps."""
+    """Return the latest poses (n, 7) of a link at `times` (n,), which are times of logging or stamps.
+
+    Before the first message of the link, the first pose counts. For a static link, the last pose counts at all times.
+    """
     link_times, poses = link.times(use_log_time), np.array(link.poses)
     order = np.argsort(link_times, kind="stable")
-    newest = np.searchsorted(link_times[order], times, side="right") - 1
-    latest: Array = poses[order][len(order) - 1 if link.is_static else np.maximum(newest, 0)]
-    return np.tile(latest, (len(times), 1)) if latest.ndim == 1 else latest
+    if link.is_static:
+        return np.tile(poses[order[-1]], (len(times), 1))
+    indices = np.searchsorted(link_times[order], times, side="right") - 1
+    latest: Array = poses[order][np.maximum(indices, 0)]
+    return latest
 
 
 def _compose(outer: Array, inner: Array) -> Array:
-    """Return the composition of poses (n, 7) row by row. `inner` are poses in the frames `outer`."""
+    """Return the composition of poses (n, 7), row by row. Each row of `inner` is a pose in the frame at `outer`."""
     ax, ay, az, aw = outer[:, 3:].T
     bx, by, bz, bw = inner[:, 3:].T
     rotations = np.column_stack(

@@ -23,15 +23,15 @@ from simscen.record.log_reader import invalid_log
 class LocalizationLog:
     """Recorded input of a localizer, and reference poses.
 
-    Ticks start at the first reading. There are TICK_RATE_HZ ticks per second.
+    Tick 0 is the time of the first reading. There are TICK_RATE_HZ ticks per second.
 
     Attributes:
         readings: Readings in the order of the log.
         ticks: Ticks (n,) of the reference poses.
         truth: Reference poses x, y, yaw (n, 3) in the map frame.
         notes: Remarks for the user.
-        initial_pose: Pose at the start of the odometry, from the reference poses or, without them, from the first
-            initial pose in the log; None if it has neither.
+        initial_pose: Pose at the start of the odometry, from the reference poses. If the log has no reference poses,
+            from its first initial pose. None if the log has neither.
     """
 
     readings: Sequence[Odometry | Scan]
@@ -64,39 +64,43 @@ def read_localization_log(path: Path, odometry: str, scan: str, reference: str |
 
 
 def _to_log(rows: LocalizationRows) -> LocalizationLog:
+    """Convert rows with times to readings and reference poses with ticks."""
     start = min(*(row.time for row in rows.odometry), *(row.time for row in rows.scans))
 
-    def tick(time: float) -> int:
+    def tick_at(time: float) -> int:
         return round((time - start) * TICK_RATE_HZ)
 
+    # If odometry and a scan are in the same row of the log, odometry comes first.
     ordered: list[tuple[int, int, Odometry | Scan]] = [
-        (row.order, 0, Odometry("odom", tick(row.time), row.pose, Twist())) for row in rows.odometry
+        (row.order, 0, Odometry("odom", tick_at(row.time), row.pose, Twist())) for row in rows.odometry
     ]
-    ordered += [(row.order, 1, Scan("lidar", tick(row.time), row.ranges, *row.layout, row.mount)) for row in rows.scans]
+    ordered += [
+        (row.order, 1, Scan("lidar", tick_at(row.time), row.ranges, *row.layout, row.mount)) for row in rows.scans
+    ]
     ordered.sort(key=lambda item: item[:2])
-    truth = {tick(row.time): row.pose for row in rows.truth}
+    truth = {tick_at(row.time): row.pose for row in rows.truth}
     ticks = np.array(sorted(truth), dtype=np.int64)
     poses = np.array([truth[tick] for tick in sorted(truth)], dtype=np.float64).reshape(-1, 3)
     readings = [reading for *_, reading in ordered]
-    initial_pose = _first_reference_pose(rows) or _initial_pose(rows)
+    initial_pose = _start_from_reference(rows) or _start_from_initial_pose(rows)
     return LocalizationLog(readings, ticks, poses, [*rows.notes, *_check_readings(readings)], initial_pose)
 
 
-def _first_reference_pose(rows: LocalizationRows) -> Pose2 | None:
+def _start_from_reference(rows: LocalizationRows) -> Pose2 | None:
     """Return the reference pose at the start of the odometry; None without reference poses.
 
-    If the reference starts later, it is moved back by the motion that odometry measured until then.
+    If the reference poses start later, return the first one, moved back by the motion that odometry measured before it.
     """
     if not rows.truth:
         return None
-    begin, first = rows.odometry[0], min(rows.truth, key=lambda row: row.time)
-    if first.time <= begin.time:
-        return _pose_at(rows.truth, begin.time)
-    return first.pose.compose(_pose_at(rows.odometry, first.time).between(begin.pose))
+    start, first = rows.odometry[0], min(rows.truth, key=lambda row: row.time)
+    if first.time <= start.time:
+        return _pose_at(rows.truth, start.time)
+    return first.pose.compose(_pose_at(rows.odometry, first.time).between(start.pose))
 
 
 def _pose_at(rows: Sequence[PoseRow], time: float) -> Pose2:
-    """Return the pose at a time in s, interpolated; before the first row and after the last one, their poses."""
+    """Return the interpolated pose at a time in s. Before the first row and after the last row, the pose is constant."""
     ordered = sorted(rows, key=lambda row: row.time)
     times = [row.time for row in ordered]
     yaw = np.interp(time, times, np.unwrap([row.pose.yaw for row in ordered]))
@@ -104,15 +108,15 @@ def _pose_at(rows: Sequence[PoseRow], time: float) -> Pose2:
     return Pose2(float(x), float(y), wrap(float(yaw)))
 
 
-def _initial_pose(rows: LocalizationRows) -> Pose2 | None:
-    """Return the pose at the start of the odometry, from the first initial pose and the odometry before it."""
-    if not rows.initial:
+def _start_from_initial_pose(rows: LocalizationRows) -> Pose2 | None:
+    """Return the first initial pose, moved back by the motion that odometry measured before it; None without one."""
+    if not rows.initial_poses:
         return None
     # The stamp of an initial pose is often zero, so the order of logging counts.
-    first = min(rows.initial, key=lambda row: row.order)
-    begin = rows.odometry[0]
-    before = next((row for row in reversed(rows.odometry) if row.order < first.order), begin)
-    return first.pose.compose(before.pose.between(begin.pose))
+    first = min(rows.initial_poses, key=lambda row: row.order)
+    start = rows.odometry[0]
+    previous = next((row for row in reversed(rows.odometry) if row.order < first.order), start)
+    return first.pose.compose(previous.pose.between(start.pose))
 
 
 def _check_readings(readings: Sequence[Odometry | Scan]) -> Iterator[str]:
@@ -122,13 +126,13 @@ def _check_readings(readings: Sequence[Odometry | Scan]) -> Iterator[str]:
         raise UnusableLog("all beams of a scan have the same direction: its angle_increment is 0")
     if empty := sum(not len(scan.points()) for scan in all_scans):
         yield f"{empty} of {len(all_scans)} scans have no range between their range_min and range_max"
-    odometry = np.array([reading.tick for reading in readings if isinstance(reading, Odometry)])
-    scans = np.array([scan.tick for scan in all_scans])
-    if late := int((np.diff(np.maximum.accumulate(odometry)) == 0).sum()):
-        yield f"{late} of {len(odometry)} odometry readings are not newer than an earlier one and are ignored"
-    outside = int(((scans < odometry[0]) | (scans > odometry.max())).sum())
-    if outside == len(scans):
+    odometry_ticks = np.array([reading.tick for reading in readings if isinstance(reading, Odometry)])
+    scan_ticks = np.array([scan.tick for scan in all_scans])
+    if late := int((np.diff(np.maximum.accumulate(odometry_ticks)) == 0).sum()):
+        yield f"{late} of {len(odometry_ticks)} odometry readings are not newer than an earlier one and are ignored"
+    outside = int(((scan_ticks < odometry_ticks[0]) | (scan_ticks > odometry_ticks.max())).sum())
+    if outside == len(scan_ticks):
         hint = "do the topics belong to the same robot and clock?"
         raise UnusableLog("no scan was measured while there was odometry", hint)
     if outside:
-        yield f"{outside} of {len(scans)} scans were measured before the odometry starts or after it ends"
+        yield f"{outside} of {len(scan_ticks)} scans were measured before the odometry starts or after it ends"

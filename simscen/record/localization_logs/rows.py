@@ -1,4 +1,4 @@
-"""Content of localization logs of all formats."""
+"""Content of a localization log, in the same form for all formats of logs."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -7,8 +7,10 @@ from simscen.core.geometry import Array, Pose2
 
 TICK_RATE_HZ = 1000
 """Ticks per second. Times are rounded to ticks."""
-MAX_TIME_S, MAX_COORDINATE_M = 1e11, 1e6
-"""Maximum valid time and coordinate."""
+MAX_TIME_S = 1e11
+"""Maximum absolute value of a valid time."""
+MAX_COORDINATE_M = 1e6
+"""Maximum absolute value of a valid coordinate."""
 
 
 @dataclass(frozen=True)
@@ -40,20 +42,22 @@ class ScanRow:
 class LocalizationRows:
     """Content of a localization log.
 
-    truth:    reference poses
-    initial:  initial poses for the localizer
-    hint:     hint for the user if odometry or scans are missing
-    notes:    remarks for the user
+    odometry:       poses in the odom frame
+    scans:          scans of the lidar
+    truth:          reference poses in the map frame
+    initial_poses:  initial poses for the localizer in the map frame
+    hint:           hint for the user if odometry or scans are missing
+    notes:          remarks for the user
     """
 
     odometry: list[PoseRow] = field(default_factory=list)
     scans: list[ScanRow] = field(default_factory=list)
     truth: list[PoseRow] = field(default_factory=list)
-    initial: list[PoseRow] = field(default_factory=list)
+    initial_poses: list[PoseRow] = field(default_factory=list)
     hint: str = ""
     notes: list[str] = field(default_factory=list)
 
 
 def all_within(values: Iterable[float], limit: float) -> bool:
-    """Return whether all values are numbers within ±`limit`."""
+    """Return whether the absolute values of all numbers are below `limit`. A value of nan is not."""
     return all(-limit < value < limit for value in values)

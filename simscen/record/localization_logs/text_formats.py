@@ -22,17 +22,17 @@ from simscen.record.localization_logs.rows import (
 def read_csv_rows(path: Path) -> LocalizationRows:
     """Read a CSV file. Raises UnusableLog for an invalid row.
 
-    The first cell of a row is its kind. The other cells are:
+    The first cell of a row is the kind of the row. The other cells, in s, m, and rad, are:
 
     odom, truth:  time, x, y, yaw
     scan:         time, first angle, angle increment, minimum range, maximum range, ranges
-    mount:        x, y, yaw of the lidar on the base, for the scans that follow
+    mount:        x, y, yaw of the lidar on the base, for the scans in the rows below
     """
     rows, mount = LocalizationRows(hint="see `simscen localize --help` for its columns"), Pose2(0.0, 0.0)
     with path.open(encoding="utf-8-sig", newline="") as lines:
         reader = csv.reader(lines)
         try:
-            for number, row in enumerate(reader, 1):
+            for row_number, row in enumerate(reader, 1):
                 cells = [cell.strip() for cell in row]
                 while cells and not cells[-1]:  # a spreadsheet pads short rows
                     cells.pop()
@@ -42,16 +42,16 @@ def read_csv_rows(path: Path) -> LocalizationRows:
                     if cells[0] == "mount":
                         mount = _pose(cells[1:])
                     else:
-                        _add_row(rows, cells[0], number, cells[1:], mount)
+                        _add_row(rows, cells[0], row_number, cells[1:], mount)
                 except ValueError as error:
-                    raise UnusableLog(f"line {number}: {error}", rows.hint) from error
+                    raise UnusableLog(f"line {row_number}: {error}", rows.hint) from error
         except csv.Error as error:
             raise UnusableLog(f"line {reader.line_num} is not CSV: {error}", rows.hint) from error
     return rows
 
 
 def _add_row(rows: LocalizationRows, kind: str, order: int, cells: list[str], mount: Pose2) -> None:
-    """Add a row of the CSV file to `rows`. `order` is the number of the row, `mount` the last pose of the lidar."""
+    """Add a row of the CSV file to `rows`. `order` is the number of the row. `mount` is the pose of the lidar."""
     match kind:
         case "odom" | "truth":
             target = rows.odometry if kind == "odom" else rows.truth
@@ -60,15 +60,15 @@ def _add_row(rows: LocalizationRows, kind: str, order: int, cells: list[str], mo
             values = [float(cell) for cell in cells]
             if len(values) < 6 or not all(math.isfinite(value) for value in values[:5]):
                 raise ValueError("a scan needs TIME, ANGLE_MIN, ANGLE_INCREMENT, RANGE_MIN, RANGE_MAX and ranges")
-            first, step, range_min, range_max = values[1:5]
-            layout = first, step, range_min, range_max
+            angle_min, angle_increment, range_min, range_max = values[1:5]
+            layout = angle_min, angle_increment, range_min, range_max
             rows.scans.append(ScanRow(_time(cells[0]), order, np.array(values[5:]), layout, mount))
         case _:
             raise ValueError(f"unknown kind of row {kind!r}; use odom, scan, truth or mount")
 
 
 DEFAULT_MAX_RANGE_M = 81.9
-"""Range of a SICK LMS for a beam without a hit, because FLASER lines do not contain the maximum range."""
+"""Maximum range of scans in FLASER lines, which do not contain it. A SICK LMS returns it for a beam without a hit."""
 
 
 def read_carmen_rows(path: Path) -> LocalizationRows:
@@ -79,13 +79,13 @@ def read_carmen_rows(path: Path) -> LocalizationRows:
     """
     rows = LocalizationRows(hint="its lines must start with ODOM, FLASER or ROBOTLASER1")
     with path.open(encoding="utf-8-sig") as lines:
-        for number, line in enumerate(lines, 1):
+        for line_number, line in enumerate(lines, 1):
             words = line.split()
             if words and words[0] in _LINE_PARSERS:
                 try:
-                    _LINE_PARSERS[words[0]](rows, number, words)
+                    _LINE_PARSERS[words[0]](rows, line_number, words)
                 except (ValueError, IndexError) as error:
-                    raise UnusableLog(f"line {number} is not a {words[0]} line: {error}") from error
+                    raise UnusableLog(f"line {line_number} is not a {words[0]} line: {error}") from error
     return rows
 
 
@@ -100,13 +100,14 @@ def _parse_truepos(rows: LocalizationRows, order: int, words: list[str]) -> None
 def _parse_flaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
     """Parse `FLASER n r… x y theta odom_x odom_y odom_theta time host logger_time`."""
     count = int(words[1])
-    ranges, rest = _ranges(words[2 : 2 + count], count), words[2 + count :]
-    time = _time(rest[6])
-    step = math.pi / max(1, count - 1) if count % 2 else math.pi / count
-    rows.odometry.append(PoseRow(time, order, _pose(rest[3:6])))
-    mount = _relative_pose(_pose(rest[3:6]), _pose(rest[:3]))
-    mount = mount if math.hypot(*mount[:2]) < 1.0 else Pose2(0.0, 0.0)  # some logs have corrected poses here
-    rows.scans.append(ScanRow(time, order, ranges, (-math.pi / 2, step, 0.0, DEFAULT_MAX_RANGE_M), mount))
+    ranges, other_words = _ranges(words[2 : 2 + count], count), words[2 + count :]
+    lidar, robot, time = _pose(other_words[:3]), _pose(other_words[3:6]), _time(other_words[6])
+    angle_increment = math.pi / max(1, count - 1) if count % 2 else math.pi / count
+    rows.odometry.append(PoseRow(time, order, robot))
+    mount = _relative_pose(robot, lidar)
+    if math.hypot(*mount[:2]) >= 1.0:  # some logs have corrected poses of the robot instead of poses of the lidar
+        mount = Pose2(0.0, 0.0)
+    rows.scans.append(ScanRow(time, order, ranges, (-math.pi / 2, angle_increment, 0.0, DEFAULT_MAX_RANGE_M), mount))
 
 
 def _parse_robotlaser(rows: LocalizationRows, order: int, words: list[str]) -> None:
@@ -114,15 +115,16 @@ def _parse_robotlaser(rows: LocalizationRows, order: int, words: list[str]) -> N
 
     `laser` and `robot` are poses x, y, theta.
     """
-    first, _, step, range_max = (float(word) for word in words[2:6])
-    if not all(map(math.isfinite, (first, step, range_max))):
+    angle_min, _, angle_increment, range_max = (float(word) for word in words[2:6])
+    if not all(map(math.isfinite, (angle_min, angle_increment, range_max))):
         raise ValueError("an angle or the maximum range is not finite")
     count = int(words[8])
     ranges = _ranges(words[9 : 9 + count], count)
-    rest = words[10 + count + int(words[9 + count]) :]
-    time, laser, robot = _time(words[-3]), _pose(rest[:3]), _pose(rest[3:6])
+    other_words = words[10 + count + int(words[9 + count]) :]
+    time, laser, robot = _time(words[-3]), _pose(other_words[:3]), _pose(other_words[3:6])
+    layout = angle_min, angle_increment, 0.0, range_max
     rows.odometry.append(PoseRow(time, order, robot))
-    rows.scans.append(ScanRow(time, order, ranges, (first, step, 0.0, range_max), _relative_pose(robot, laser)))
+    rows.scans.append(ScanRow(time, order, ranges, layout, _relative_pose(robot, laser)))
 
 
 def _ranges(words: list[str], count: int) -> Array:
@@ -158,4 +160,6 @@ _LINE_PARSERS: dict[str, Callable[[LocalizationRows, int, list[str]], None]] = {
     "ROBOTLASER1": _parse_robotlaser,
     "TRUEPOS": _parse_truepos,
 }
-"""Functions (rows, line number, words) that add a line of a CARMEN log to the rows, by the first word of the line."""
+"""Functions that add a line of a CARMEN log to rows, by the first word of the line.
+
+Their arguments are the rows, the number of the line, and the words of the line."""

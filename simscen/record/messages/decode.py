@@ -46,12 +46,12 @@ class MessageReader(Reader):
         """Number of bytes that have not been read."""
         return len(self._data) - self.offset
 
-    def array(self, kind: str, shape: tuple[int, ...]) -> npt.NDArray[np.generic]:
-        """Return the next numbers as an array. `kind` is a numpy type without byte order, e.g. "f8".
+    def array(self, type_code: str, shape: tuple[int, ...]) -> npt.NDArray[np.generic]:
+        """Return the next numbers as an array. `type_code` is a numpy type without byte order, e.g. "f8".
 
         Raises ValueError if the message is too short.
         """
-        dtype, size = np.dtype(self.byte_order + kind), math.prod(shape)
+        dtype, size = np.dtype(self.byte_order + type_code), math.prod(shape)
         if size:  # an empty sequence at the end of a message has no padding
             self._align(dtype.itemsize)
         return np.frombuffer(self._data, dtype, size, self._skip(size * dtype.itemsize)).reshape(shape)
@@ -77,15 +77,13 @@ class MessageReader(Reader):
 
 
 class CheckedReader(MessageReader):
-    """Reads a message of another program: normalizes quaternions, and removes leading slashes of frames.
-
-    `frame_prefix` is removed from the names of frames, too.
-    """
+    """Reads a message of another program: normalizes quaternions, and removes leading slashes of frames."""
 
     frame_prefix = ""
+    """Prefix that is removed from the names of frames."""
 
     def frame(self) -> str:
-        """Return the name of the next frame without leading slashes."""
+        """Return the name of the next frame without leading slashes and without `frame_prefix`."""
         return self.string().lstrip("/").removeprefix(self.frame_prefix)
 
     def pose(self) -> Numbers:
@@ -138,15 +136,15 @@ class PathMessage(NamedTuple):
 
 
 class GoalState(NamedTuple):
-    """State of a goal of an action server: its ID, the time of its acceptance in ns, and a value of GoalStatus."""
+    """State of a goal of an action server: ID, time of acceptance in ns, and a value of action_msgs/msg/GoalStatus."""
 
     id: bytes
-    accepted: int
+    accept_time: int
     status: int
 
 
 class ScanMessage(NamedTuple):
-    """Planar scan: angles in rad, and ranges (n,) in m (inf for a beam without a hit)."""
+    """Planar scan with angles in rad, and ranges (n,) in m. The range of a beam without a hit is inf."""
 
     stamp: int
     frame: str
@@ -226,7 +224,7 @@ def particle_cloud(reader: MessageReader) -> Array:
 
 
 def occupancy_grid(reader: MessageReader) -> tuple[str, OccupancyGrid]:
-    """Decode nav_msgs/msg/OccupancyGrid: its frame, and the grid (the resolution has 32-bit precision)."""
+    """Decode nav_msgs/msg/OccupancyGrid. Return its frame, and the grid, whose resolution has 32-bit precision."""
     _, frame = reader.header()
     reader.take("iI")
     (resolution,) = reader.take("f")

@@ -44,12 +44,13 @@ def path(frame: str, stamp: Stamp, points: Array) -> bytes:
     if not len(points):
         return head
     poses = planar_poses(points).astype("<f8")
-    first = Template(prefix=b"", start=len(head) - len(HEADER)).put("iI", *stamp).string(frame).align(8).buffer
-    following = Template(prefix=b"").put("iI", *stamp).string(frame).align(8).buffer
-    rest = np.empty((len(points) - 1, len(following) + 56), dtype=np.uint8)
-    rest[:, : len(following)] = np.frombuffer(following, dtype=np.uint8)
-    rest[:, len(following) :] = poses[1:].view(np.uint8).reshape(-1, 56)
-    return b"".join((head, first, poses[0].tobytes(), rest.tobytes()))
+    # The padding of the first header differs, because `head` can have any length.
+    first_header = Template(prefix=b"", start=len(head) - len(HEADER)).put("iI", *stamp).string(frame).align(8).buffer
+    header = Template(prefix=b"").put("iI", *stamp).string(frame).align(8).buffer
+    other_poses = np.empty((len(points) - 1, len(header) + 56), dtype=np.uint8)
+    other_poses[:, : len(header)] = np.frombuffer(header, dtype=np.uint8)
+    other_poses[:, len(header) :] = poses[1:].view(np.uint8).reshape(-1, 56)
+    return b"".join((head, first_header, poses[0].tobytes(), other_poses.tobytes()))
 
 
 def particle_cloud(frame: str, stamp: Stamp, particles: Array) -> bytes:
@@ -78,7 +79,10 @@ def tf_message(links: Sequence[Link]) -> bytes:
 
 @lru_cache(maxsize=1024)
 def _transform_packer(frame: str, child: str, start: int) -> Callable[[Stamp, Pose3], bytes]:
-    """Return a function (stamp, pose) that packs a transform, which starts `start` bytes after a multiple of eight."""
+    """Return a function (stamp, pose) that packs a transform.
+
+    The transform starts `start` bytes after a multiple of eight bytes in its message.
+    """
     transform = Template(prefix=b"", start=start).slot("iI", "*stamp").string(frame).string(child)
     return transform.slot("7d", "*pose").packer()
 
@@ -138,10 +142,10 @@ Bytes = npt.NDArray[np.uint8]
 
 
 class TransformBatchPacker:
-    """Callable encoder of the transforms of the same links at many times.
+    """Callable that encodes the transforms of the same links at many times.
 
-    It returns the last part of a tf2_msgs/msg/TFMessage for each time. The caller writes the start of the message, with
-    at least one transform, before this part.
+    For each time, the bytes are the last part of a tf2_msgs/msg/TFMessage. The caller writes the start of the message,
+    with at least one transform, before this part.
     """
 
     def __init__(self, links: Sequence[tuple[str, str]]) -> None:
@@ -158,7 +162,10 @@ class TransformBatchPacker:
         """Size in bytes of these transforms in one message."""
 
     def __call__(self, stamps: Sequence[Stamp], poses: Array) -> Bytes:
-        """Return the bytes (n, size) of the transforms at n `stamps`. `poses` (n, links, 7) are of the child frames."""
+        """Return the bytes (n, size) of the transforms at n `stamps`.
+
+        `poses` (n, number of links, 7) are the poses of the child frames.
+        """
         packed = np.tile(self._empty, (len(poses), 1))
         times, numbers = np.array(stamps, "<u4").view(np.uint8), np.ascontiguousarray(poses, "<f8").view(np.uint8)
         for column, (stamp, pose) in enumerate(self._slices):

@@ -1,4 +1,4 @@
-"""Encoder of visualization_msgs/msg/MarkerArray, and points of its shapes."""
+"""Encoder of visualization_msgs/msg/MarkerArray, and functions that compute the points of markers."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -19,11 +19,13 @@ _ADD, _DELETE_ALL = 0, 3
 class Marker(NamedTuple):
     """Fields of visualization_msgs/msg/Marker.
 
+    frame:   name of the frame that the marker moves with
     group:   `ns` of the message
-    kind:    `type` of the message
-    scale:   in m; the meaning depends on `kind`
+    kind:    `type` of the message, such as LINE_LIST
+    scale:   `scale` of the message in m; the meaning depends on `kind`
     pose:    pose in `frame`
     points:  (n, 3) in m, relative to `pose`
+    text:    text of a marker of the kind TEXT
     """
 
     frame: str
@@ -37,23 +39,21 @@ class Marker(NamedTuple):
 
 
 def marker_array(markers: Iterable[Marker]) -> bytes:
-    """Return the bytes of a visualization_msgs/msg/MarkerArray that replaces all previous markers of the topic.
-
-    Each marker moves with its frame.
-    """
+    """Return the bytes of a visualization_msgs/msg/MarkerArray that replaces all previous markers of the topic."""
     markers = list(markers)
     message = Writer().put("I", len(markers) + 1)
-    _put(message, Marker("map", "", ARROW, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 0, _DELETE_ALL)
-    for number, marker in enumerate(markers):
-        _put(message, marker, number, _ADD)
+    _put_marker(message, Marker("map", "", ARROW, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 0, _DELETE_ALL)
+    for marker_id, marker in enumerate(markers):
+        _put_marker(message, marker, marker_id, _ADD)
     return message.done()
 
 
-def _put(message: Writer, marker: Marker, number: int, action: int) -> None:
-    message.put("iI", 0, 0).string(marker.frame).string(marker.group).put("3i", number, marker.kind, action)
+def _put_marker(message: Writer, marker: Marker, marker_id: int, action: int) -> None:
+    """Append a visualization_msgs/msg/Marker to a message."""
+    message.put("iI", 0, 0).string(marker.frame).string(marker.group).put("3i", marker_id, marker.kind, action)
     message.put("7d", *marker.pose).put("3d", *marker.scale).put("4f", *marker.color)
     message.put("iI", 0, 0)  # lifetime: forever
-    message.put("B", True).put("I", len(marker.points))
+    message.put("B", True).put("I", len(marker.points))  # True: the marker moves with its frame
     if len(marker.points):
         message.align(8)
         message.buffer += np.ascontiguousarray(marker.points, dtype="<f8").tobytes()

@@ -1,4 +1,4 @@
-"""Conversion of events to text: JSON for /simscen/events, and sentences for /rosout."""
+"""Conversion of events to text: JSON for /simscen/events, and readable lines for /rosout."""
 
 import json
 from typing import Any
@@ -21,7 +21,7 @@ _LEVELS = {
 
 
 def to_json(event: Event) -> str:
-    """Return an event as one line of JSON. Infinity and nan are written as by Python's json."""
+    """Return an event as one line of JSON. Infinity and nan become `Infinity` and `NaN`, as usual in Python's json."""
     record = {"tick": event.tick, "kind": event.kind, "name": event.name, "data": dict(event.data)}
     return json.dumps(record, separators=(",", ":"))
 
@@ -37,13 +37,13 @@ def level(event: Event) -> int:
     return _LEVELS.get(event.kind, INFO)
 
 
-def sentence(event: Event) -> str:
+def log_text(event: Event) -> str:
     """Return an event as one readable line, for example "goal.failed shelf: error_code=208"."""
     head = f"{event.kind} {event.name}".rstrip()
-    details = ", ".join(f"{key}={_short(value)}" for key, value in event.data.items())
+    details = ", ".join(f"{key}={_short_text(value)}" for key, value in event.data.items())
     return f"{head}: {details}" if details else head
 
 
-def _short(value: object) -> str:
+def _short_text(value: object) -> str:
     """Return a value as text, with four significant digits if it is a float."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

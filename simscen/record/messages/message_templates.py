@@ -1,7 +1,7 @@
 """Templates of ROS 2 messages of fixed size. Encoders of other messages are in encode.py.
 
-`Template.packer()` returns a function that takes the values of the fields of the template, in the order of the
-docstring, and returns the bytes of the message.
+`Template.packer()` returns a function that packs a message. It takes the values of the fields in the order in which the
+docstring of the template names them, and returns the bytes of the message.
 
 The field `stamp` is seconds and nanoseconds, `pose` is x, y, z and a quaternion x, y, z, w, and `twist` is vx, vy, wz.
 Unknown covariances are zeros.
@@ -97,8 +97,8 @@ def transforms(links: Sequence[tuple[str, str, str]], serialized_count: int = 0,
     """Return the template of tf2_msgs/msg/TFMessage, with the fields stamp, one pose for each link, and `serialized`.
 
     A link is (frame, child frame, name of the field for the pose). All transforms have the same stamp. `serialized` are
-    the bytes of `serialized_count` further transforms from a TransformBatchPacker, `serialized_bytes` in total. Without
-    further transforms, the field does not exist.
+    the `serialized_bytes` bytes of `serialized_count` further transforms, from a TransformBatchPacker. The field does
+    not exist if `serialized_count` is 0.
     """
     message = Template().put("I", len(links) + serialized_count)
     for frame, child, pose in links:

@@ -26,7 +26,7 @@ class Template(Writer):
     """Layout of a message of fixed size: constants, and slots for variable fields. `buffer` has zeros in the slots.
 
     prefix:  bytes before the message, such as the CDR header, which do not count for the alignment
-    start:   for the template of a part of a message, number of bytes of the message before this part
+    start:   number of bytes of the message before this template, if the template is a part of a message
     """
 
     def __init__(self, prefix: bytes = HEADER, start: int = 0) -> None:
@@ -36,7 +36,7 @@ class Template(Writer):
         self._slots: list[tuple[int, Slot]] = []
 
     def slot(self, codes: str, field: str) -> "Template":
-        """Append a slot for numbers of equal width. `codes` are codes of `struct`, e.g. "iI" or "7d24x"."""
+        """Append a slot for a field, whose numbers have equal widths. `codes` is a `struct` format such as "7d24x"."""
         self.align(max(struct.calcsize("<" + code) for code in codes if code.isalpha()))
         self._slots.append((len(self.buffer), Slot(codes, field)))
         self.buffer += bytes(struct.calcsize("<" + codes))
@@ -53,7 +53,7 @@ class Template(Writer):
         return [*parts, bytes(self.buffer[end:])]
 
     def packer(self) -> Callable[..., bytes]:
-        """Return a function that packs a message. Its arguments are the values of the `field_names`."""
+        """Return a function that packs a message. Its arguments are the values of `field_names(self.parts)`."""
         return compile_packer(tuple(self.parts))
 
 
@@ -72,12 +72,12 @@ def compile_writer(parts: "tuple[bytes | Slot, ...]") -> Callable[..., None]:
     return _compile(parts, "pack_into", ("buffer", "offset"))
 
 
-def _compile(parts: "tuple[bytes | Slot, ...]", method: str, leading: tuple[str, ...]) -> Callable[..., Any]:
+def _compile(parts: "tuple[bytes | Slot, ...]", method: str, first_parameters: tuple[str, ...]) -> Callable[..., Any]:
     """Generate a function that packs all parts with a single call of the struct function `method`.
 
-    `leading` are the names of its first arguments.
+    `first_parameters` are the names of the parameters of the function before the fields.
     """
-    codes, arguments, constants = "<", [*leading], dict[str, Any]()
+    codes, arguments, constants = "<", [*first_parameters], dict[str, Any]()
     for is_constant, group in groupby(parts, lambda part: isinstance(part, bytes)):
         if is_constant:
             data = b"".join(part for part in group if isinstance(part, bytes))
@@ -89,7 +89,7 @@ def _compile(parts: "tuple[bytes | Slot, ...]", method: str, leading: tuple[str,
             slots = [part for part in group if isinstance(part, Slot)]
             codes += "".join(slot.codes for slot in slots)
             arguments += [slot.field for slot in slots]
-    parameters = *leading, *dict.fromkeys(field_names(parts))
+    parameters = *first_parameters, *field_names(parts)
     source = f"lambda {', '.join(parameters)}: {method}({', '.join(arguments)})"
     function: Callable[..., Any] = eval(source, {**constants, method: getattr(struct.Struct(codes), method)})
     return function

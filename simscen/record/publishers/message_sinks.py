@@ -8,7 +8,7 @@ from simscen.record.messages.template import Slot, Template, compile_writer, fie
 from simscen.record.topics import CLOCK, Topic, load_message_types, qos
 
 Layouts = Sequence[tuple[Topic, Template]]
-"""Topics with the templates of their messages."""
+"""Pairs of a topic and the template of its messages."""
 
 
 class MessageSink(Protocol):
@@ -26,8 +26,8 @@ class MessageSink(Protocol):
 class BatchWriter:
     """Writer of one message on each of several topics. Fields with equal names have the same value in all messages."""
 
-    def __init__(self, out: MessageSink, layouts: Layouts) -> None:
-        self._out = out
+    def __init__(self, sink: MessageSink, layouts: Layouts) -> None:
+        self._sink = sink
         fields = field_names([part for _, message in layouts for part in message.parts])
         self._messages = [
             (topic, message.packer(), [fields.index(name) for name in field_names(message.parts)])
@@ -37,7 +37,7 @@ class BatchWriter:
     def write(self, time: int, *fields: Any) -> None:
         """Write all messages at `time` nanoseconds. `fields` are the values of the `field_names` of all layouts."""
         for topic, pack, indices in self._messages:
-            self._out.publish(topic, time, pack(*[fields[index] for index in indices]))
+            self._sink.publish(topic, time, pack(*[fields[index] for index in indices]))
 
 
 class LogPublisher:
@@ -64,20 +64,21 @@ class LogPublisher:
         channel = self._channels.get(topic.name)
         if channel is None:
             name = topic.name if topic == CLOCK else self._namespace + topic.name
-            kind = load_message_types()[topic.type]
-            metadata = {"offered_qos_profiles": qos(topic.latched), "topic_type_hash": kind.hash}
-            channel = self._channels[topic.name] = self._writer.add_channel(name, kind, metadata)
+            message_type = load_message_types()[topic.type]
+            metadata = {"offered_qos_profiles": qos(topic.latched), "topic_type_hash": message_type.hash}
+            channel = self._channels[topic.name] = self._writer.add_channel(name, message_type, metadata)
         return channel
 
 
 class _ChunkBatchWriter(BatchWriter):
-    """BatchWriter that packs all messages directly into the current chunk with one call, if they fit."""
+    """BatchWriter that packs all messages into the current chunk with one call if the chunk has enough space."""
 
-    def __init__(self, out: LogPublisher, layouts: Layouts) -> None:
-        super().__init__(out, layouts)
-        self._publisher, self._layouts = out, layouts
+    def __init__(self, publisher: LogPublisher, layouts: Layouts) -> None:
+        super().__init__(publisher, layouts)
+        self._publisher, self._layouts = publisher, layouts
         self._size = 0
         self._offsets: list[tuple[Channel, int]] = []
+        """Channel of each message, and offset of the message in the batch in bytes."""
 
     def write(self, time: int, *fields: Any) -> None:
         if not self._offsets:

@@ -25,22 +25,22 @@ from simscen.record.trace_thinning import Thinning, Throttle
 class EventPublisher:
     """Publishes events on /simscen/events (JSON) and /rosout (text), and accepted goals on /goal_pose."""
 
-    def __init__(self, out: MessageSink, time: Clock, case: Case) -> None:
-        self._out, self._time = out, time
+    def __init__(self, out: MessageSink, clock: Clock, case: Case) -> None:
+        self._out, self._clock = out, clock
         self._goals = {goal.name: goal.pose for goal in case.every_goal}
-        self._goal = message_templates.pose_stamped(frame_names.MAP).packer()
+        self._pack_goal = message_templates.pose_stamped(frame_names.MAP).packer()
 
     def write(self, now: int, event: Event) -> None:
         """Publish an event. `now` is simulated time in ns."""
-        stamp = self._time.stamp(event.tick)
-        line = event_text.level(event), event_text.EVENT_LOGGER, event_text.sentence(event)
+        stamp = self._clock.stamp(event.tick)
+        line = event_text.level(event), event_text.EVENT_LOGGER, event_text.log_text(event)
         self._out.publish(topics.EVENTS, now, messages.string(event_text.to_json(event)))
         self._out.publish(topics.ROSOUT, now, messages.log(stamp, *line))
-        pose = self._pose(event) if event.kind == EventKind.GOAL_ACCEPTED else None
+        pose = self._goal_pose(event) if event.kind == EventKind.GOAL_ACCEPTED else None
         if pose is not None:
-            self._out.publish(topics.GOAL, now, self._goal(stamp, Pose3.planar(pose)))
+            self._out.publish(topics.GOAL, now, self._pack_goal(stamp, Pose3.planar(pose)))
 
-    def _pose(self, event: Event) -> Pose2 | None:
+    def _goal_pose(self, event: Event) -> Pose2 | None:
         """Return the pose of an accepted goal from its event, or else from the scenario; None if it is unknown."""
         x, y, yaw = (event.data.get(key) for key in ("x", "y", "yaw"))
         if isinstance(x, float) and isinstance(y, float):
@@ -51,37 +51,37 @@ class EventPublisher:
 class RobotPublisher:
     """Publishes the moments of a robot.
 
-    `header` and `scenery` describe the run. `robot` is the name of the robot; "" for a single robot. If
-    `publishes_clock`, simulated time is published on /clock.
+    `header` is the header of the robot, and `scenery` describes the world. `robot` is the name of the robot; "" for a
+    single robot. If `publishes_clock` is True, simulated time is published on /clock.
     """
 
     def __init__(
         self,
         out: LogPublisher,
-        time: Clock,
+        clock: Clock,
         header: LogHeader,
         scenery: Scenery,
         robot: str,
         publishes_clock: bool,
     ) -> None:
-        self._time, frames = time, RobotFrames(robot)
-        self.thinning = thinning = Thinning(time.rate, header.sensors)
+        self._clock, frames = clock, RobotFrames(robot)
+        self.thinning = thinning = Thinning(clock.rate, header.sensors)
         """Selects the samples to publish. A TraceBuilder of the same robot can use it as well."""
         self.flush_if_due = out.flush_if_due
         if header.map is not None:
             out.publish(topics.MAP, 0, encode.occupancy_grid(frame_names.MAP, (0, 0), header.map))
         if header.robot_description:
             out.publish(topics.ROBOT_DESCRIPTION, 0, messages.string(header.robot_description))
-        self._truth = TruthPublisher(out, time, thinning, frames, publishes_clock)
-        self._sensors = SensorPublisher(out, time, thinning, header.mounts, header.sensors, frames)
-        self._stack = StackPublisher(out, time, thinning, frames)
-        self._events = EventPublisher(out, time, header.case)
+        self._truth = TruthPublisher(out, clock, thinning, frames, publishes_clock)
+        self._sensors = SensorPublisher(out, clock, thinning, header.mounts, header.sensors, frames)
+        self._stack = StackPublisher(out, clock, thinning, frames)
+        self._events = EventPublisher(out, clock, header.case)
         self._scene = ScenePublisher(out, header.case, scenery, frames, robot)
 
     def append(self, moment: Moment) -> None:
         """Publish one moment. Moments must be published in the order of their ticks."""
         tick, decision = moment.tick, moment.decision
-        now, truth = self._time.nanoseconds(tick), moment.truth
+        now, truth = self._clock.nanoseconds(tick), moment.truth
         if truth is not None:
             self._truth.write(now, tick, truth)
         if decision.belief is not None:
@@ -99,8 +99,10 @@ class RobotPublisher:
 
 PARTICLE_RATE_HZ = 2
 """Maximum rate of ParticleCloud messages."""
-POSE_ARRAY_RATE_HZ, MAX_ARRAY_POSES = 1, 200
-"""Maximum rate of the PoseArray of particles, and maximum number of its poses."""
+POSE_ARRAY_RATE_HZ = 1
+"""Maximum rate of PoseArray messages with particles."""
+MAX_ARRAY_POSES = 200
+"""Maximum number of poses in a PoseArray message."""
 LOCAL_PLAN_RATE_HZ = 5
 """Maximum rate of local plans."""
 
@@ -108,35 +110,35 @@ LOCAL_PLAN_RATE_HZ = 5
 class StackPublisher:
     """Publishes the decisions of a stack: beliefs, plans, costmaps, commands, and log lines."""
 
-    def __init__(self, out: MessageSink, time: Clock, thinning: Thinning, frames: RobotFrames) -> None:
-        self._out, self._time, self._thinning, self._frames = out, time, thinning, frames
+    def __init__(self, out: MessageSink, clock: Clock, thinning: Thinning, frames: RobotFrames) -> None:
+        self._out, self._clock, self._thinning, self._frames = out, clock, thinning, frames
         self._command = out.batch_writer([(topics.COMMAND, message_templates.twist())])
         self._belief = out.batch_writer([(topics.BELIEF, message_templates.pose_with_covariance(frame_names.MAP))])
-        self._particle_times = Throttle(time.rate, PARTICLE_RATE_HZ)
-        self._pose_array_times = Throttle(time.rate, POSE_ARRAY_RATE_HZ)
-        self._local_plan_times = Throttle(time.rate, LOCAL_PLAN_RATE_HZ)
+        self._particle_times = Throttle(clock.rate, PARTICLE_RATE_HZ)
+        self._pose_array_times = Throttle(clock.rate, POSE_ARRAY_RATE_HZ)
+        self._local_plan_times = Throttle(clock.rate, LOCAL_PLAN_RATE_HZ)
 
     def write(self, now: int, tick: int, decision: Decision) -> None:
         """Publish the decision of `tick`. `now` is simulated time in ns."""
         if decision.belief is not None:
             self._write_belief(now, tick, decision.belief)
         if decision.plan is not None:
-            stamp = self._time.stamp(decision.plan.tick)
+            stamp = self._clock.stamp(decision.plan.tick)
             self._out.publish(topics.PLAN, now, encode.path(frame_names.MAP, stamp, decision.plan.points))
         if decision.local_plan is not None and self._local_plan_times.passes(tick):
-            path = encode.path(frame_names.MAP, self._time.stamp(tick), decision.local_plan.points)
+            path = encode.path(frame_names.MAP, self._clock.stamp(tick), decision.local_plan.points)
             self._out.publish(topics.LOCAL_PLAN, now, path)
         for costmap in decision.costmaps:
             topic = topics.GLOBAL_COSTMAP if costmap.name == "global" else topics.LOCAL_COSTMAP
-            stamp, frame = self._time.stamp(tick), self._frames.log_frame(costmap.frame)
+            stamp, frame = self._clock.stamp(tick), self._frames.log_frame(costmap.frame)
             self._out.publish(topic, now, encode.occupancy_grid(frame, stamp, costmap.grid))
         if self._thinning.keeps_command(tick, decision.command):
             self._command.write(now, decision.command)
         for line in decision.lines:
-            self._out.publish(topics.ROSOUT, now, messages.log(self._time.stamp(tick), *line))
+            self._out.publish(topics.ROSOUT, now, messages.log(self._clock.stamp(tick), *line))
 
     def _write_belief(self, now: int, tick: int, belief: Belief) -> None:
-        stamp = self._time.stamp(tick)
+        stamp = self._clock.stamp(tick)
         pose = Pose3.planar(belief.pose)
         self._belief.write(now, stamp, pose, belief.covariance.ravel().tolist())
         if len(belief.particles) and self._particle_times.passes(tick):
@@ -150,13 +152,13 @@ class StackPublisher:
 class TruthPublisher:
     """Publishes the ground truth: pose, velocity, and clearance of the robot, and poses of moving objects.
 
-    Poses are also published on /tf. If `publishes_clock`, simulated time is published on /clock.
+    /tf contains the poses. If `publishes_clock` is True, simulated time is published on /clock.
     """
 
     def __init__(
-        self, out: MessageSink, time: Clock, thinning: Thinning, frames: RobotFrames, publishes_clock: bool
+        self, out: MessageSink, clock: Clock, thinning: Thinning, frames: RobotFrames, publishes_clock: bool
     ) -> None:
-        self._out, self._time, self._thinning, self._frame = out, time, thinning, frames.truth
+        self._out, self._clock, self._thinning, self._frame = out, clock, thinning, frames.truth
         truth = (
             (topics.TRUTH, message_templates.odometry(frame_names.MAP, frames.truth)),
             (topics.CLEARANCE, message_templates.float64()),
@@ -165,16 +167,16 @@ class TruthPublisher:
         robot = topics.TF, message_templates.transforms([(frame_names.MAP, self._frame, "pose")])
         self._without_tf = out.batch_writer(self._common_layouts)
         self._without_objects = out.batch_writer((*self._common_layouts, robot))
-        self._precomputed: _PrecomputedBatch | None = None
+        self._object_batch: _ObjectBatch | None = None
 
     def write(self, now: int, tick: int, truth: Truth) -> None:
         """Publish the ground truth of `tick`. `now` is simulated time in ns."""
         poses = self._thinning.objects_to_keep(tick, truth) if truth.objects else {}
-        stamp, fields = self._time.stamp(tick), (truth.pose, truth.twist, truth.clearance)
+        stamp, fields = self._clock.stamp(tick), (truth.pose, truth.twist, truth.clearance)
         if type(poses) is PosesAtTick:
-            batch = self._precomputed
+            batch = self._object_batch
             if batch is None or batch.predicted is not poses.predicted:
-                batch = self._precomputed = self._precompute(poses.predicted)
+                batch = self._object_batch = self._serialize_objects(poses.predicted)
             batch.writer.write(now, stamp, *fields, batch.serialized[poses.row].tobytes())
             return
         if not poses:
@@ -185,23 +187,26 @@ class TruthPublisher:
         robot = frame_names.MAP, self._frame, stamp, truth.pose
         self._out.publish(topics.TF, now, encode.tf_message([robot, *links]))
 
-    def _precompute(self, predicted: PredictedPoses) -> "_PrecomputedBatch":
+    def _serialize_objects(self, predicted: PredictedPoses) -> "_ObjectBatch":
         """Serialize the transforms of all objects for all ticks with predicted poses."""
-        previous, names = self._precomputed, predicted.names
+        previous, names = self._object_batch, predicted.names
         if previous is not None and previous.predicted.names == names:
             packer, writer = previous.packer, previous.writer
         else:
             packer = TransformBatchPacker([(frame_names.MAP, frame_names.object_frame(name)) for name in names])
             tf = message_templates.transforms([(frame_names.MAP, self._frame, "pose")], len(names), packer.size)
             writer = self._out.batch_writer((*self._common_layouts, (topics.TF, tf)))
-        stamps = [self._time.stamp(tick) for tick in predicted.ticks]
-        return _PrecomputedBatch(predicted, packer, writer, packer(stamps, predicted.table))
+        stamps = [self._clock.stamp(tick) for tick in predicted.ticks]
+        return _ObjectBatch(predicted, packer, writer, packer(stamps, predicted.table))
 
 
-class _PrecomputedBatch(NamedTuple):
-    """Serialized transforms of objects with predicted poses: one row of `serialized` for each tick.
+class _ObjectBatch(NamedTuple):
+    """Serialized transforms of objects with predicted poses.
 
-    `packer` has serialized the transforms. `writer` writes a row together with the other messages of its tick.
+    predicted:   poses of the objects at several ticks
+    packer:      serializer of the transforms
+    writer:      writer of the transforms of one tick, together with the other messages of the tick
+    serialized:  bytes of the transforms, one row for each tick
     """
 
     predicted: PredictedPoses

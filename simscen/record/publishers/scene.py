@@ -37,7 +37,7 @@ TRUTH_COLOR: Color = (0.0, 0.44, 0.34, 1.0)
 BELIEF_COLOR: Color = (0.8, 0.2, 0.5, 1.0)
 """Colors of Okabe and Ito, as in reports and pictures."""
 LINE_SCALE, TEXT_SCALE = (0.03, 0.0, 0.0), (0.0, 0.0, 0.25)
-"""`scale` of markers in m: line width in x, and height of letters in z."""
+"""`scale` of markers in m: x is the width of lines, z is the height of letters."""
 MAX_MASK_BLOCKS = 2000
 """Maximum number of rectangles of a filter mask. The largest rectangles are drawn."""
 _MARKER_HEIGHT_M = 0.02  # above the floor, so that the map does not hide markers
@@ -45,19 +45,19 @@ _TEXT_POSE = Pose3(0.0, 0.0, 0.5)
 
 
 class ScenePublisher:
-    """Publishes the markers of the world and of `robot` ("" for a single robot) when they change.
+    """Publishes the markers of the world and of `robot` ("" for a single robot) when the markers change.
 
-    Markers move with their frames on /tf without further messages.
+    A marker moves with its frame on /tf, without a new message.
     """
 
     def __init__(self, out: MessageSink, case: Case, scenery: Scenery, frames: RobotFrames, robot: str) -> None:
         self._out, self._case, self._frames, self._robot, self._scenery = out, case, frames, robot, scenery
         self._doors = {thing.name for thing in scenery.things if thing.closed is not None}
         self._spawned: dict[str, Event] = {}
-        own_zones = (zone for zone in scenery.zones if zone.robot == robot)
-        self._zones: dict[tuple[str, str], FilterZone] = {(zone.filter, zone.region): zone for zone in own_zones}
+        robot_zones = (zone for zone in scenery.zones if zone.robot == robot)
+        self._zones: dict[tuple[str, str], FilterZone] = {(zone.filter, zone.region): zone for zone in robot_zones}
         self.has_published = False
-        """True after the first call of `write`. From then on, `write` is needed only at ticks with events."""
+        """True after the first call of `write`. Further calls of `write` are needed only at ticks with events."""
 
     def write(self, now: int, events: Sequence[Event]) -> None:
         """Update the markers after events, and publish them if they have changed. `now` is simulated time in ns."""
@@ -90,7 +90,7 @@ class ScenePublisher:
         return True
 
     def _find_zone(self, filter_: Filter, region: str) -> FilterZone | None:
-        """Return the zone of a region at the start of the run, or else a new zone; None for an unknown region."""
+        """Return the zone that a region has at the start of the run, or else a new zone; None for an unknown region."""
         for zone in self._scenery.zones:
             if (zone.filter, zone.region, zone.robot) == (filter_, region, self._robot):
                 return zone
@@ -118,8 +118,8 @@ class ScenePublisher:
         for zone in self._zones.values():
             yield from _zone_markers(zone)
         for ground in self._scenery.ground:
-            outline = outline_edges([ground.outline], ground.height + _MARKER_HEIGHT_M)
-            yield Marker(frame_names.MAP, "ramps", LINE_LIST, RAMP_COLOR, LINE_SCALE, points=outline)
+            edges = outline_edges([ground.outline], ground.height + _MARKER_HEIGHT_M)
+            yield Marker(frame_names.MAP, "ramps", LINE_LIST, RAMP_COLOR, LINE_SCALE, points=edges)
         for name, place in self._scenery.places.items():
             yield Marker(frame_names.MAP, "places", ARROW, PLACE_COLOR, (0.4, 0.06, 0.06), Pose3.planar(place))
             above = Pose3(place.x, place.y, 0.3)
@@ -127,9 +127,9 @@ class ScenePublisher:
 
 
 def _zone_markers(zone: FilterZone) -> Iterator[Marker]:
-    keepout = zone.filter == "keepout"
-    group, color = f"{zone.filter} zones", KEEPOUT_COLOR if keepout else SPEED_COLOR
-    text = zone.region if keepout or not zone.speed_limit else f"{zone.region}: {zone.speed_limit:g} m/s"
+    is_keepout = zone.filter == "keepout"
+    group, color = f"{zone.filter} zones", KEEPOUT_COLOR if is_keepout else SPEED_COLOR
+    text = zone.region if is_keepout or not zone.speed_limit else f"{zone.region}: {zone.speed_limit:g} m/s"
     if zone.outline:
         edges = outline_edges([zone.outline], _MARKER_HEIGHT_M)
         yield Marker(frame_names.MAP, group, LINE_LIST, color, LINE_SCALE, points=edges)
@@ -137,7 +137,7 @@ def _zone_markers(zone: FilterZone) -> Iterator[Marker]:
         yield Marker(frame_names.MAP, group, TEXT, color, TEXT_SCALE, Pose3(x, y, 0.3), text=text)
     if zone.cells is not None:
         blocks = sorted(zone.cells.blocks, key=lambda block: -block[2] * block[3])[:MAX_MASK_BLOCKS]
-        corners = np.array([(c, r, c + w, r + h) for c, r, w, h, _ in blocks], dtype=np.float64).reshape(-1, 4)
-        points = rectangle_triangles(corners * zone.cells.resolution, _MARKER_HEIGHT_M)
+        bounds = np.array([(c, r, c + w, r + h) for c, r, w, h, _ in blocks], dtype=np.float64).reshape(-1, 4)
+        points = rectangle_triangles(bounds * zone.cells.resolution, _MARKER_HEIGHT_M)
         pose = Pose3.planar(zone.cells.origin)
         yield Marker(frame_names.MAP, group, TRIANGLE_LIST, (*color[:3], 0.35), (1.0, 1.0, 1.0), pose, points)

@@ -15,7 +15,7 @@ from simscen.record.topics import Topic
 from simscen.record.trace_thinning import Thinning
 
 _START: Stamp = (0, 0)
-_PRESSED, _FREE = encode.boolean(True), encode.boolean(False)
+_PRESSED_MESSAGE, _FREE_MESSAGE = encode.boolean(True), encode.boolean(False)
 _DEFAULT_TOPICS = {
     "Scan": ("scan", topics.SCAN_TYPE),
     "Odometry": ("odom", topics.ODOMETRY_TYPE),
@@ -28,14 +28,14 @@ _DEFAULT_TOPICS = {
 class SensorPublisher:
     """Publishes readings when the stack receives them. Stamps are the times of measurement.
 
-    The first sensor of a type has the default topic, e.g. /scan. Further sensors of this type, and all cameras, have
-    their name in front, e.g. /rear/scan. Characters that ROS names cannot have become `_`, and equal results get
-    numbers.
+    The first sensor of a type has the default topic, e.g. /scan. The topics of further sensors of this type, and of all
+    cameras, start with the name of the sensor, e.g. /rear/scan. In the topic, `_` replaces characters that ROS names
+    cannot contain, and a number distinguishes equal names.
 
     Args:
         mounts: Poses of sensors on the base, by sensor name.
-        sensors: Class names of readings ("Scan", …) by sensor name, in the order of topics. Missing sensors get their
-            topics with their first reading.
+        sensors: Class names of readings ("Scan", …) by sensor name. Topics are assigned in this order. A sensor that
+            is missing here gets its topic with its first reading.
 
     Attributes:
         sensor_topics: Pairs of sensor name and topic for all `sensors`.
@@ -45,13 +45,13 @@ class SensorPublisher:
     def __init__(
         self,
         out: MessageSink,
-        time: Clock,
+        clock: Clock,
         thinning: Thinning,
         mounts: Mapping[str, Pose3],
         sensors: Mapping[str, str],
         frames: frame_names.RobotFrames,
     ) -> None:
-        self._out, self._time, self._thinning = out, time, thinning
+        self._out, self._clock, self._thinning = out, clock, thinning
         self._topics: dict[tuple[str, str], Topic] = {}
         self._imu_writers: dict[str, BatchWriter] = {}
         self._wheel_odometry: _OdometryWriters | None = None
@@ -75,7 +75,7 @@ class SensorPublisher:
     def write_filtered(self, now: int, odometry: Odometry) -> None:
         """Publish the filtered odometry of the stack. `now` is simulated time in ns.
 
-        From now on, the transform from odom to base on /tf comes from the filter instead of the wheel odometry.
+        After the first call, the transform from odom to base on /tf comes from the filter, not from the wheel odometry.
         """
         if self._filtered_odometry is None:
             self._filtered_odometry = self._odometry_writers(topics.FILTERED_ODOMETRY)
@@ -104,7 +104,7 @@ class SensorPublisher:
         self._write_with_transforms(self._wheel_odometry, now, odometry)
 
     def _odometry_fields(self, odometry: Odometry) -> tuple[Any, ...]:
-        stamp, pose = self._time.stamp(odometry.tick), Pose3.planar(odometry.pose)
+        stamp, pose = self._clock.stamp(odometry.tick), Pose3.planar(odometry.pose)
         return stamp, pose, odometry.pose_covariance, odometry.twist, odometry.twist_variance
 
     def _write_with_transforms(self, writers: "_OdometryWriters", now: int, odometry: Odometry) -> None:
@@ -127,7 +127,7 @@ class SensorPublisher:
         if scan.sensor not in self._mounts:
             self._mounts[scan.sensor] = scan.tilted_mount or Pose3.planar(scan.mount)
             self._publish_mounts(now)
-        data = encode.laser_scan(self._frames.sensor_frame(scan.sensor), self._time.stamp(scan.tick), scan)
+        data = encode.laser_scan(self._frames.sensor_frame(scan.sensor), self._clock.stamp(scan.tick), scan)
         self._out.publish(self.topic_of(scan), now, data)
 
     def _write_imu(self, now: int, imu: Imu) -> None:
@@ -137,16 +137,16 @@ class SensorPublisher:
             frame = self._frames.sensor_frame(imu.sensor) if imu.sensor in self._mounts else self._frames.base
             writer = self._imu_writers[imu.sensor] = self._out.batch_writer([(topic, message_templates.imu(frame))])
         writer.write(
-            now, self._time.stamp(imu.tick),
+            now, self._clock.stamp(imu.tick),
             imu.angular_velocity, imu.angular_velocity_variance,
             imu.linear_acceleration, imu.linear_acceleration_variance,
         )  # fmt: skip
 
     def _write_bump(self, now: int, bump: Bump) -> None:
-        self._out.publish(self._topic(bump.sensor, "Bump"), now, _PRESSED if bump.pressed else _FREE)
+        self._out.publish(self._topic(bump.sensor, "Bump"), now, _PRESSED_MESSAGE if bump.pressed else _FREE_MESSAGE)
 
     def _write_image(self, now: int, image: Image) -> None:
-        frame, stamp = self._frames.sensor_frame(image.sensor), self._time.stamp(image.tick)
+        frame, stamp = self._frames.sensor_frame(image.sensor), self._clock.stamp(image.tick)
         for topic, is_depth in self._image_topics(image.sensor):
             pixels = image.depth if is_depth else image.rgb
             if pixels.size:
@@ -169,18 +169,18 @@ class SensorPublisher:
         return topic
 
     def _image_topics(self, sensor: str) -> list[tuple[Topic, bool]]:
-        """Return the topics of a camera, each with whether it contains depths instead of colors."""
-        root = f"/{self._namespace(sensor)}"
+        """Return pairs for a camera: a topic, and whether its images contain depths instead of colors."""
+        namespace = self._namespace(sensor)
         names = ("image_raw", False), ("depth/image_raw", True)
-        return [(Topic(f"{root}/{name}", topics.IMAGE_TYPE), is_depth) for name, is_depth in names]
+        return [(Topic(f"/{namespace}/{name}", topics.IMAGE_TYPE), is_depth) for name, is_depth in names]
 
     def _namespace(self, sensor: str) -> str:
         """Return the namespace of a sensor's topics, with a number if another sensor has the same ROS name."""
         if sensor not in self._namespaces:
             name = _ros_name(sensor)
-            numbered = (f"{name}_{number}" for number in count(2))
-            used = set(self._namespaces.values())
-            self._namespaces[sensor] = next(one for one in chain([name], numbered) if one not in used)
+            numbered_names = (f"{name}_{number}" for number in count(2))
+            other_names = set(self._namespaces.values())
+            self._namespaces[sensor] = next(n for n in chain([name], numbered_names) if n not in other_names)
         return self._namespaces[sensor]
 
 

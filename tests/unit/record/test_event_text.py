@@ -16,8 +16,8 @@ def test_an_event_with_an_infinite_number_is_read_back_equal() -> None:
 
 def test_an_event_reads_as_one_line() -> None:
     event = Event(1, "goal.failed", "shelf", {"error_code": 208, "after": 1.23456789})
-    assert event_text.sentence(event) == "goal.failed shelf: error_code=208, after=1.235"
-    assert event_text.sentence(Event(1, "navigation.ended")) == "navigation.ended"
+    assert event_text.log_text(event) == "goal.failed shelf: error_code=208, after=1.235"
+    assert event_text.log_text(Event(1, "navigation.ended")) == "navigation.ended"
 
 
 def test_failures_have_the_level_error_or_warning() -> None:

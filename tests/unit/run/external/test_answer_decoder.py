@@ -119,7 +119,7 @@ events = st.fixed_dictionaries(
 @given(events)
 def test_any_event_is_accepted_or_refused_and_can_be_logged(answer) -> None:
     from simscen.peer.messages import log, string
-    from simscen.record.messages.event_text import sentence, to_json
+    from simscen.record.messages.event_text import log_text, to_json
 
     goals = GoalTracker(True, 240)
     with suppress(ProtocolViolation):
@@ -127,7 +127,7 @@ def test_any_event_is_accepted_or_refused_and_can_be_logged(answer) -> None:
             goals.process(240, event)
     for event in goals.take_events():
         string(to_json(event))
-        log((1, 0), 20, "simscen", sentence(event))
+        log((1, 0), 20, "simscen", log_text(event))
         assert json.loads(to_json(event), parse_constant=pytest.fail)
 
 
