@@ -25,7 +25,7 @@ W = TypeVar("W", bound="Writer")
 class Writer:
     """Serializes a little-endian message field by field, in the order of its definition.
 
-    Methods append a field to `buffer`, and return the writer.
+    All methods except `done` append to `buffer`, and return the writer.
     """
 
     def __init__(self) -> None:
@@ -33,7 +33,7 @@ class Writer:
         self._alignment_offset = -len(HEADER)
 
     def put(self: W, codes: str, *values: Any) -> W:
-        """Append numbers of the same width. `codes` are their format codes of `struct`, e.g. "iI" or "7d"."""
+        """Append numbers of the same width. `codes` is their format as in `struct`, e.g. "iI" or "7d"."""
         self.align(struct.calcsize("<" + codes[-1]))
         self.buffer += struct.pack("<" + codes, *values)
         return self
@@ -46,7 +46,7 @@ class Writer:
         return self
 
     def numbers(self: W, code: str, values: Sequence[float]) -> W:
-        """Append a sequence of numbers, after its length. `code` is a type code of `array`, e.g. "f"."""
+        """Append the length of a sequence, and its numbers. `code` is a type code of `array`, e.g. "f"."""
         numbers = array(code, values)
         if sys.byteorder == "big":
             numbers.byteswap()
@@ -79,7 +79,7 @@ class Reader:
         self._data, self.byte_order, self.offset = data, _BYTE_ORDERS[data[:2]], len(HEADER)
 
     def take(self, codes: str) -> tuple[Any, ...]:
-        """Return the next numbers, of the same width. `codes` are their format codes of `struct`, e.g. "7d"."""
+        """Return the next numbers, which have the same width. `codes` is their format as in `struct`, e.g. "7d"."""
         layout = struct.Struct(self.byte_order + codes)
         self._align(struct.calcsize("<" + codes[-1]))
         try:

@@ -31,13 +31,13 @@ class Message(NamedTuple):
 
 
 class Step:
-    """One step of the run: the messages for the stack, and its answer.
+    """One step of the run: the messages for the stack, and the stack's answer.
 
     `drive`, `publish`, and `log` add to the answer, which is sent when the loop over the Peer requests the next step.
 
     Attributes:
-        messages: Messages since the last step.
-        canceled: True if simscen has sent CANCEL since the last step, also without a current goal.
+        messages: Messages since the previous step.
+        canceled: True if simscen has sent CANCEL since the previous step, even if there is no current goal.
     """
 
     def __init__(self, peer: Peer, header: wire.StepHeader, received: list[Message], canceled: bool) -> None:
@@ -45,7 +45,7 @@ class Step:
         self.messages = received
         self.canceled = canceled
         self._published: wire.Messages = []
-        self._commanded = False
+        self._has_command = False
 
     @property
     def tick(self) -> int:
@@ -68,14 +68,14 @@ class Step:
         return bool(self._header.flags & wire.COMMAND_DUE)
 
     def get(self, topic: str) -> Any:
-        """Return the content of the newest message on a topic; None if the step has no message on it."""
-        found = [message for message in self.messages if message.topic == topic]
-        return found[-1].content if found else None
+        """Return the content of the newest message on a topic; None if the step has no message on the topic."""
+        on_topic = [message for message in self.messages if message.topic == topic]
+        return on_topic[-1].content if on_topic else None
 
     def drive(self, vx: float, wz: float, vy: float = 0.0) -> None:
         """Command `vx` m/s forward, `wz` rad/s counterclockwise, and `vy` m/s to the left, until the next command."""
         self._peer.command = (float(vx), float(vy), float(wz))
-        self._commanded = True
+        self._has_command = True
 
     def publish(self, topic: str, data: bytes) -> None:
         """Publish a serialized message. Raises KeyError if simscen does not accept the topic."""
@@ -87,7 +87,7 @@ class Step:
 
     def _answer(self) -> bytes:
         """Return the ANSWER frame: command, published messages, and events about goals."""
-        if self.command_due or self._commanded:
+        if self.command_due or self._has_command:
             self.publish(COMMAND, messages.twist(*self._peer.command))
         for event in self._peer.goals.take_events():
             self.publish(EVENTS, messages.string(json.dumps(event, allow_nan=False)))
@@ -106,7 +106,7 @@ class Peer:
 
     Attributes:
         hello: Content of the frame HELLO.
-        task: Content of the frame GOAL; {} before the first step.
+        task: Content of the last frame GOAL; {} before the first GOAL.
         goals: Queue of goals.
         command: Last commanded velocity vx, vy, wz.
         accepted_topics: Numbers of the topics that simscen accepts, by name.
@@ -140,8 +140,8 @@ class Peer:
         with _valid_content(kind):
             if wire.PROTOCOL not in self.hello["protocols"]:
                 self.give_up(f"{name} requires version {wire.PROTOCOL} of the stack protocol")
-            self._topics: dict[int, tuple[str, str]] = {
-                t["number"]: (t["topic"], t["type"]) for t in self.hello["says"]
+            self._received_topics: dict[int, tuple[str, str]] = {
+                topic["number"]: (topic["topic"], topic["type"]) for topic in self.hello["says"]
             }
             self.accepted_topics: dict[str, int] = {topic["topic"]: topic["number"] for topic in self.hello["hears"]}
         self._connection.send_json(
@@ -150,7 +150,7 @@ class Peer:
                 "protocol": wire.PROTOCOL,
                 "name": name,
                 "version": version,
-                "topics": [topic for topic, _ in self._topics.values()] if topics is None else list(topics),
+                "topics": [name for name, _ in self._received_topics.values()] if topics is None else list(topics),
                 "step": "beat" if every_beat else "control",
                 "modes": list(modes),
                 "about": about or {},
@@ -172,7 +172,7 @@ class Peer:
     def __iter__(self) -> Iterator[Step]:
         """Yield steps until the run ends. The answer to a step is sent when the next step is requested.
 
-        Therefore, do not leave the loop before the run ends: simscen would wait for the last answer.
+        Do not leave the loop before the run ends, because simscen would wait for the answer to the last step.
         """
         while True:
             kind, body = self._connection.receive()
@@ -180,8 +180,8 @@ class Peer:
                 header, received = wire.from_step(body)
                 self.goals.now = header.sec + header.nanosec * 1e-9
                 with _valid_content(kind):
-                    named = [Message(*self._topics[number], data) for number, data in received]
-                step = Step(self, header, named, self._canceled)
+                    messages_for_stack = [Message(*self._received_topics[number], data) for number, data in received]
+                step = Step(self, header, messages_for_stack, self._canceled)
                 self._canceled = False
                 yield step
                 self._connection.send(step._answer())
@@ -195,11 +195,11 @@ class Peer:
                     self._process_frame(kind, content)
 
     def add(self, **about: Any) -> None:
-        """Add facts about the stack, as JSON values, to the run's log. They are sent at the end of the run."""
+        """Add facts about the stack, as JSON values, to the run's log. The facts are sent at the end of the run."""
         self._bye_content.update(about)
 
     def give_up(self, message: str) -> None:
-        """End the run with this error message. Raises Refused with the same message."""
+        """End the run with an error message. Always raises Refused with the same message."""
         self._connection.send_json(wire.ERROR, {"message": message})
         self._connection.close()
         raise Refused(message)
@@ -220,7 +220,7 @@ class Peer:
 
 @contextmanager
 def _valid_content(kind: int) -> Iterator[None]:
-    """Convert errors about missing or invalid fields of a frame of this kind to wire.Malformed."""
+    """Context manager that converts errors about missing or invalid fields of a frame to wire.Malformed."""
     try:
         yield
     except (KeyError, TypeError) as error:

@@ -1,4 +1,4 @@
-"""Goal queue of a stack: holds the goals from simscen, and collects events about their progress for simscen."""
+"""Goal queue of a stack: holds the goals from simscen, and collects the events about goals for simscen."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ class Goals:
     """Queue of goals, and the events to send with the next answer.
 
     Attributes:
-        current: Accepted goal, or None.
-        waiting: Goals after the current one.
+        current: Accepted goal that has not ended; None without such a goal.
+        waiting: Goals after the current goal, in order.
+        now: Simulated time in seconds. The caller updates it at every step.
     """
 
     def __init__(self) -> None:
         self.current: Goal | None = None
         self.waiting: list[Goal] = []
         self.now = 0.0
-        """Simulated time in seconds; the caller updates it at every step."""
         self._wait_until = 0.0
         self._events: list[dict[str, Any]] = []
 
@@ -58,9 +58,9 @@ class Goals:
         self.current, self.waiting, self._wait_until = None, list(goals), 0.0
 
     def accept(self) -> Goal | None:
-        """Accept the next goal if no goal is current, and return the current goal.
+        """Return the current goal. If no goal is current, accept the next goal first.
 
-        Returns None if there is no goal, or while the robot waits at the previous goal.
+        Return None if there is no goal, or while the robot waits at the previous goal.
         """
         if self.current is None and self.waiting and self.now >= self._wait_until - ROUNDING_S:
             self.current = self.waiting.pop(0)
@@ -68,7 +68,7 @@ class Goals:
         return self.current
 
     def reached(self) -> None:
-        """Report the current goal as reached (as passed if it has `via`), and start its `wait`.
+        """Report the current goal as reached, or as passed if it has `via`, and start the `wait` at the goal.
 
         Raises ValueError without a current goal.
         """
@@ -79,35 +79,35 @@ class Goals:
 
     @property
     def ahead(self) -> list[Goal]:
-        """Goals that the robot reaches after the current one without a stop in between.
+        """Goals that the robot reaches after the current goal without a stop in between.
 
-        They are the next goals with `via`, and the first goal without `via`, at which the robot stops. There are none
-        if the robot stops at the current goal.
+        If the current goal has `via`, these are the next goals with `via`, and after them the first goal without `via`,
+        at which the robot stops. Otherwise the robot stops at the current goal, and the list is empty.
         """
         if self.current is None or not self.current.via:
             return []
-        stop = next((k for k, goal in enumerate(self.waiting) if not goal.via), len(self.waiting) - 1)
-        return self.waiting[: stop + 1]
+        last = next((k for k, goal in enumerate(self.waiting) if not goal.via), len(self.waiting) - 1)
+        return self.waiting[: last + 1]
 
     def failed(self, error_code: int | str, message: str = "", go_on: bool = False) -> None:
         """Report the current goal as failed, with the number or name of a Nav2 error code.
 
-        The goals `ahead` are dropped, and without `go_on` all other goals, too. Raises ValueError without a current
-        goal.
+        The goals `ahead` are dropped. If `go_on` is False, all other goals are dropped, too. Raises ValueError without
+        a current goal.
         """
         self._drop("goal.failed", error_code=error_code, message=message)
         if not go_on:
             self.waiting = []
 
     def preempt(self, goal: Goal) -> None:
-        """Cancel the current goal and the goals `ahead`, and insert `goal` as the next one."""
+        """Cancel the current goal and the goals `ahead`, and insert `goal` as the next goal."""
         if self.current is not None:
             self._drop("goal.canceled")
         self._wait_until = 0.0
         self.waiting.insert(0, goal)
 
     def cancel(self, everything: bool) -> None:
-        """Cancel the current goal and the goals `ahead`; with `everything`, all goals."""
+        """Cancel the current goal and the goals `ahead`. If `everything` is True, cancel all other goals, too."""
         if self.current is not None:
             self._drop("goal.canceled")
         if everything:
@@ -124,9 +124,9 @@ class Goals:
 
     def _drop(self, kind: str, **data: Any) -> None:
         """End the current goal with an event of this kind, and drop the goals `ahead`."""
-        ahead = len(self.ahead)
+        ahead_count = len(self.ahead)
         self._end(kind, **data)
-        self.waiting = self.waiting[ahead:]
+        self.waiting = self.waiting[ahead_count:]
 
     def _end(self, kind: str, **data: Any) -> None:
         """End the current goal with an event of this kind. Raises ValueError without a current goal."""

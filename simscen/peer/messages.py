@@ -1,8 +1,8 @@
 """Classes for the ROS 2 messages of the stack protocol, and functions that read and serialize them.
 
 `read` deserializes a message that a stack receives. The functions that return bytes serialize messages (CDR) that a
-stack sends. The messages are those of common_interfaces, nav2_msgs, rcl_interfaces, and tf2_msgs of ROS 2 Humble. Only
-the planar part of most poses and velocities is used: x, y, yaw (m, rad) and vx, vy, wz (m/s, rad/s).
+stack sends. The message types are defined in common_interfaces, nav2_msgs, rcl_interfaces, and tf2_msgs of ROS 2
+Humble. Only the planar part of most poses and velocities is used: x, y, yaw (m, rad) and vx, vy, wz (m/s, rad/s).
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ class PoseWithCovariance(NamedTuple):
 
 
 class Transform(NamedTuple):
-    """A transform of tf2_msgs/msg/TFMessage: the pose of `child` in `frame`, x, y, z and a quaternion x, y, z, w."""
+    """A transform of tf2_msgs/msg/TFMessage: the pose x, y, z, qx, qy, qz, qw of the frame `child` in `frame`."""
 
     stamp: Stamp
     frame: str
@@ -132,11 +132,13 @@ def quaternion(yaw: float) -> tuple[float, float, float, float]:
 
 
 def _planar(pose: Sequence[float]) -> Pose2D:
+    """Return the planar part of a pose x, y, z, qx, qy, qz, qw."""
     x, y, _, qx, qy, qz, qw = pose
     return Pose2D(x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz)))
 
 
 def _header(reader: Reader) -> tuple[Stamp, str]:
+    """Return the stamp and the frame of a std_msgs/msg/Header."""
     sec, nanosec = reader.take("iI")
     return (sec, nanosec), reader.string()
 
@@ -217,13 +219,14 @@ READERS: dict[str, Callable[[Reader], Any]] = {
     "geometry_msgs/msg/Pose2D": lambda reader: Pose2D(*reader.take("3d")),
     "tf2_msgs/msg/TFMessage": _transforms,
 }
-"""Functions that read a message, by its type."""
+"""Functions that read a message, by ROS type."""
 
 
 def read(kind: str, data: bytes) -> Any:
-    """Deserialize a message of the ROS type `kind`: an object of a class above, or a plain Python value, e.g. for Bool.
+    """Deserialize a message of the ROS type `kind`.
 
-    Raises ValueError if the data are not a message of this type.
+    Return an object of a class of this module, or a plain Python value, such as a bool for std_msgs/msg/Bool. Raises
+    ValueError if `data` is not a message of this type.
     """
     return READERS[kind](Reader(data))
 
@@ -254,10 +257,10 @@ def pose_with_covariance(stamp: Stamp, pose: Sequence[float], covariance: Sequen
     `pose` is x, y, yaw. `covariance` is 3 x 3 for x, y, yaw, or 6 x 6 as in the message, row by row.
     """
     if len(covariance) == 9:
-        c, full = covariance, [0.0] * 36
+        c, expanded = covariance, [0.0] * 36
         for row, start in enumerate((0, 6, 30)):
-            full[start], full[start + 1], full[start + 5] = c[3 * row], c[3 * row + 1], c[3 * row + 2]
-        covariance = full
+            expanded[start], expanded[start + 1], expanded[start + 5] = c[3 * row], c[3 * row + 1], c[3 * row + 2]
+        covariance = expanded
     x, y, yaw = pose
     return (
         Writer().put("iI", *stamp).string("map").put("7d", x, y, 0.0, *quaternion(yaw)).put("36d", *covariance).done()
@@ -269,7 +272,7 @@ def odometry(
 ) -> bytes:
     """Return a nav_msgs/msg/Odometry of base_link in the odom frame.
 
-    `pose` is x, y, yaw, `twist` is vx, vy, wz, and `variances` are those of the twist.
+    `pose` is x, y, yaw, `twist` is vx, vy, wz, and `variances` are the variances of vx, vy, wz.
     """
     (x, y, yaw), (vx, vy, wz), twist_covariance = pose, twist, [0.0] * 36
     twist_covariance[0], twist_covariance[7], twist_covariance[35] = variances
@@ -291,8 +294,8 @@ def occupancy_grid(
 ) -> bytes:
     """Return a nav_msgs/msg/OccupancyGrid.
 
-    `cells` are rows of `width` cells, the row with the lowest y first; a cell is 0 … 100, or -1 if unknown.
-    `resolution` is the size of a cell in m, `origin` the pose x, y, yaw of the outer corner of the first cell.
+    `cells` are rows of `width` cells, starting with the row of the lowest y. A cell is 0 … 100, or -1 if unknown.
+    `resolution` is the size of a cell in m. `origin` is the pose x, y, yaw of the outer corner of the first cell.
     """
     x, y, yaw = origin
     message = Writer().put("iI", *stamp).string(frame).put("iI", *stamp).put("f", resolution)
@@ -301,7 +304,7 @@ def occupancy_grid(
 
 
 def transforms(links: Sequence[tuple[Stamp, str, str, Sequence[float]]]) -> bytes:
-    """Return a tf2_msgs/msg/TFMessage. A link is the stamp, frame, child frame, and pose x, y, yaw of the child."""
+    """Return a tf2_msgs/msg/TFMessage. A link is (stamp, frame, child frame, pose x, y, yaw of the child frame)."""
     message = Writer().put("I", len(links))
     for stamp, frame, child, (x, y, yaw) in links:
         message.put("iI", *stamp).string(frame).string(child).put("7d", x, y, 0.0, *quaternion(yaw))
@@ -317,7 +320,7 @@ def particle_cloud(stamp: Stamp, particles: Sequence[Sequence[float]]) -> bytes:
 
 
 BEHAVIOR_TREE_LOGGER = "behavior_tree"
-"""Name of the logger for the lines of `tree_change`."""
+"""Name of the logger for lines that `tree_change` returns."""
 
 
 def tree_change(node: str, before: str, after: str) -> str:

@@ -20,17 +20,17 @@ SOCKET_FD_VARIABLE = "SIMSCEN_STACK_FD"
 HELLO, WELCOME, GOAL, STEP, ANSWER, PREEMPT, CANCEL, END, ERROR, BYE = range(1, 11)
 """Kinds of frames, in the first byte after the size."""
 KIND_NAMES = ("", "HELLO", "WELCOME", "GOAL", "STEP", "ANSWER", "PREEMPT", "CANCEL", "END", "ERROR", "BYE")
-"""Names of the kinds of frames, by their number."""
+"""Names of the kinds of frames, by number."""
 
 COMMAND_DUE = 1
 """Flag of a STEP frame: the answer must contain a velocity command."""
 MAX_FRAME_BYTES = 256 << 20
-
+"""Maximum size of the kind and the body of a frame."""
 MAX_JSON_DEPTH = 32
-"""Maximum number of levels of JSON content; the innermost value is a level, too."""
+"""Maximum number of levels of JSON content. The innermost value counts as a level."""
 
 SIZE = struct.Struct("<I")
-"""First field of a frame: size of the rest of the frame in bytes."""
+"""First field of a frame: size of the kind and the body in bytes."""
 _STEP = struct.Struct("<QiIIII")
 """Header of a STEP frame: the fields of StepHeader, and the number of messages."""
 _ANSWER = struct.Struct("<QI")
@@ -43,13 +43,16 @@ if TYPE_CHECKING:
 
 
 class Malformed(ValueError):
-    """A frame that violates the protocol."""
+    """A frame violates the protocol."""
 
 
 class StepHeader(NamedTuple):
-    """Header of a STEP frame: the tick (physics step), and the simulated time `sec` + `nanosec`.
+    """Header of a STEP frame.
 
-    `deadline` is the maximum wall time for the answer in milliseconds. `flags` is 0 or COMMAND_DUE.
+    tick:          number of physics steps since the start of the run
+    sec, nanosec:  simulated time, as in a ROS stamp
+    deadline:      maximum wall-clock time for the answer in milliseconds
+    flags:         0 or COMMAND_DUE
     """
 
     tick: int
@@ -85,7 +88,7 @@ def from_json(body: bytes) -> dict[str, Any]:
 
 
 def _has_more_levels(content: Any, limit: int) -> bool:
-    """Return whether JSON content has more than `limit` levels. A number is one level, and a list of numbers two."""
+    """Return whether JSON content has more than `limit` levels. A number has one level, a list of numbers has two."""
     inner = content.values() if isinstance(content, dict) else content if isinstance(content, list) else ()
     return limit == 0 or any(_has_more_levels(item, limit - 1) for item in inner)
 
@@ -117,7 +120,7 @@ def _pack_messages(messages: Messages) -> bytes:
 
 
 def _unpack_messages(body: bytes, offset: int, count: int) -> Messages:
-    """Return the messages that begin at `offset`. Raises Malformed unless they fill the rest of the body."""
+    """Return the messages that begin at `offset`. Raises Malformed if the last message does not end with the body."""
     messages = []
     for _ in range(count):
         number, size = _unpack_struct(_MESSAGE, body, offset)
@@ -138,11 +141,11 @@ def _unpack_struct(layout: struct.Struct, body: bytes, offset: int) -> tuple[Any
 
 
 class Disconnected(ConnectionError):
-    """End of the connection, closed by the other side."""
+    """The other side has closed the connection."""
 
 
 class Refused(RuntimeError):
-    """End of the run because simscen has sent ERROR or the stack has given up. The message states the reason."""
+    """simscen has sent ERROR, or the stack has given up. The run ends. The message states the reason."""
 
 
 class Connection:

@@ -100,7 +100,7 @@ def _start_from_reference(rows: LocalizationRows) -> Pose2 | None:
 
 
 def _pose_at(rows: Sequence[PoseRow], time: float) -> Pose2:
-    """Return the interpolated pose at a time in s. Before the first row and after the last row, the pose is constant."""
+    """Return the interpolated pose at a time in s. The pose is constant before the first and after the last row."""
     ordered = sorted(rows, key=lambda row: row.time)
     times = [row.time for row in ordered]
     yaw = np.interp(time, times, np.unwrap([row.pose.yaw for row in ordered]))
