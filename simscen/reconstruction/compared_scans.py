@@ -14,29 +14,36 @@ from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive, Scans
 from simscen.reconstruction.static_world import StaticWorld, beam_ends, lidar_poses
 
-TRUE_POSE_TOLERANCE_M, BELIEVED_POSE_TOLERANCE_M = 0.12, 0.25
+TRUE_POSE_TOLERANCE_M, ESTIMATED_POSE_TOLERANCE_M = 0.12, 0.25
 """Tolerated difference between measured and expected range, for drives with true poses and with estimated poses."""
-BELIEVED_POSE_TOLERANCE_PER_M = 0.02
+ESTIMATED_POSE_TOLERANCE_PER_M = 0.02
 """Additional tolerance for estimated poses per meter of range."""
 NOISE_SIGMAS = 4.0
-"""Additional tolerance in standard deviations of the range noise."""
+"""Additional tolerance, as a multiple of the standard deviation of the range noise."""
+MAX_NOISE_M = 0.3
+"""Maximum standard deviation of the range noise that increases the tolerance."""
 MAD_TO_STD = 1.4826
 """Factor from the median absolute deviation to the standard deviation of a normal distribution."""
 MAX_INVALID_HIT_FRACTION, MIN_EXPECTED_HIT_FRACTION = 0.1, 0.3
-"""Maximum fraction of beams with a hit in an invalid scan, and minimum fraction of beams that should hit the world."""
-SMOOTH_STEP_M = 0.1
+"""Limits for a scan that is invalid because it has hardly any hit: maximum fraction of beams with a hit, and minimum
+fraction of beams for which a hit is expected."""
+MAX_SMOOTH_STEP_M = 0.1
 """Maximum difference between the expected ranges of neighbor beams that end at the same smooth surface."""
+MIN_SMOOTH_BEAMS = 10
+"""Minimum number of beams on smooth surfaces for an estimate of the noise of a scan."""
+DEFAULT_NOISE_M = 0.01
+"""Standard deviation of the range noise if it cannot be estimated from any scan."""
 
 
 @dataclass(frozen=True, eq=False)
 class ComparedScans:
-    """Measured scans with the ranges that are expected in the static world.
+    """Measured scans, and the ranges that are expected in the static world.
 
     Attributes:
         scans: Measured scans.
         poses: Poses x, y, yaw (n, 3) of the lidar in the map frame.
         expected: Expected ranges (n, beams) in m; inf beyond the maximum range of the lidar.
-        noise: Standard deviation (n,) of the range noise of each scan in m.
+        noise: Standard deviation (n,) in m of the range noise of each scan.
         tolerance: Tolerated differences (n, beams) in m between measured and expected ranges.
     """
 
@@ -58,9 +65,9 @@ class ComparedScans:
 
     @cached_property
     def is_invalid(self) -> Mask:
-        """Mask (n,) of scans with a wrong number of beams, or with hardly any hit."""
-        hits, expected = self.is_hit.mean(axis=1), np.isfinite(self.expected).mean(axis=1)
-        lacks_hits: Mask = (hits < MAX_INVALID_HIT_FRACTION) & (expected > MIN_EXPECTED_HIT_FRACTION)
+        """Mask (n,) of scans with a wrong number of beams, or with hardly any hit where hits are expected."""
+        hits, expected_hits = self.is_hit.mean(axis=1), np.isfinite(self.expected).mean(axis=1)
+        lacks_hits: Mask = (hits < MAX_INVALID_HIT_FRACTION) & (expected_hits > MIN_EXPECTED_HIT_FRACTION)
         return self.scans.is_malformed | lacks_hits
 
     @cached_property
@@ -74,13 +81,13 @@ class ComparedScans:
 
     @cached_property
     def is_short(self) -> Mask:
-        """Mask (n, beams) of beams that end before the walls of the static world by more than the tolerance."""
+        """Mask (n, beams) of beams that end in front of the static world by more than the tolerance."""
         with np.errstate(invalid="ignore"):
             return self.is_hit & (self.scans.ranges < self._nearest - self.tolerance)
 
     @cached_property
     def passes_through(self) -> Mask:
-        """Mask (n, beams) of beams that end behind a wall, or return nothing although a wall is in range."""
+        """Mask (n, beams) of beams that end behind a wall, or have no return although a wall is in range."""
         with np.errstate(invalid="ignore"):
             behind = self.is_hit & (self.scans.ranges > self._farthest + self.tolerance)
         return behind | (self.is_missing & (self._farthest + self.tolerance < self.scans.range_max))
@@ -108,45 +115,48 @@ class ComparedScans:
         return _reduce_neighbors(self.expected, np.maximum)
 
 
-def _reduce_neighbors(values: Array, choose: np.ufunc) -> Array:
-    """Return the minimum or maximum (`choose`) of each beam and its two neighbors."""
+def _reduce_neighbors(values: Array, reduce: np.ufunc) -> Array:
+    """Return the values (n, beams) after `reduce`, a minimum or maximum, over each beam and its two neighbors."""
     result: Array = values.copy()
-    choose(result[:, 1:], values[:, :-1], out=result[:, 1:])
-    choose(result[:, :-1], values[:, 1:], out=result[:, :-1])
+    reduce(result[:, 1:], values[:, :-1], out=result[:, 1:])
+    reduce(result[:, :-1], values[:, 1:], out=result[:, :-1])
     return result
 
 
 def compare_scans(drive: RecordedDrive, scans: Scans, world: StaticWorld) -> ComparedScans:
-    """Compare scans of a drive with the static world, from the poses of the drive at the times of the scans."""
+    """Compare scans of a drive with the static world. The poses of the drive are used as poses of the robot."""
     poses = lidar_poses(drive, scans)
     expected = world.ranges_from(poses, scans.angles, scans.range_max)
     noise = range_noise(_residuals(scans, expected), expected)
-    fixed = TRUE_POSE_TOLERANCE_M if drive.has_true_poses else BELIEVED_POSE_TOLERANCE_M
-    growth = 0.0 if drive.has_true_poses else BELIEVED_POSE_TOLERANCE_PER_M
-    reach = np.minimum(expected, scans.range_max)
-    tolerance = fixed + NOISE_SIGMAS * np.minimum(noise, 0.3)[:, None] + growth * reach
+    base_tolerance = TRUE_POSE_TOLERANCE_M if drive.has_true_poses else ESTIMATED_POSE_TOLERANCE_M
+    tolerance_per_m = 0.0 if drive.has_true_poses else ESTIMATED_POSE_TOLERANCE_PER_M
+    noise_tolerance = NOISE_SIGMAS * np.minimum(noise, MAX_NOISE_M)[:, None]
+    tolerance = base_tolerance + noise_tolerance + tolerance_per_m * np.minimum(expected, scans.range_max)
     return ComparedScans(scans, poses, expected, noise, tolerance)
 
 
 def _residuals(scans: Scans, expected: Array) -> Array:
+    """Return measured minus expected ranges (n, beams) in m; nan without a measured or an expected range."""
     with np.errstate(invalid="ignore"):
         return np.where(scans.is_hit() & np.isfinite(expected), scans.ranges - expected, np.nan)
 
 
 def range_noise(residuals: Array, expected: Array) -> Array:
-    """Return the standard deviation (n,) of the range noise of each scan in m, from residuals and expected ranges.
+    """Return the standard deviation (n,) in m of the range noise of each scan.
 
-    The noise is estimated from second differences between neighbor beams on smooth surfaces. Scans with too few of
-    these beams get the median of the other scans (0.01 m without other scans).
+    `residuals` and `expected` (n, beams) are as in ComparedScans. The noise is estimated from second differences
+    between neighbor beams on smooth surfaces. A scan with fewer than MIN_SMOOTH_BEAMS of these beams has the median
+    noise of the other scans.
     """
     with np.errstate(invalid="ignore"):
         steps = np.abs(np.diff(expected, axis=1))
-        smooth = (steps[:, 1:] < SMOOTH_STEP_M) & (steps[:, :-1] < SMOOTH_STEP_M)
-        bends = (residuals[:, :-2] - 2 * residuals[:, 1:-1] + residuals[:, 2:]) / np.sqrt(6.0)
-        bends = np.where(smooth & (np.abs(bends) < 1.0), np.abs(bends), np.nan)
-    enough = np.isfinite(bends).sum(axis=1) >= 10
+        is_smooth = (steps[:, 1:] < MAX_SMOOTH_STEP_M) & (steps[:, :-1] < MAX_SMOOTH_STEP_M)
+        # The variance of a second difference is 6 times the variance of the noise.
+        differences = np.abs(residuals[:, :-2] - 2 * residuals[:, 1:-1] + residuals[:, 2:]) / np.sqrt(6.0)
+        differences = np.where(is_smooth & (differences < 1.0), differences, np.nan)
+    has_estimate = np.isfinite(differences).sum(axis=1) >= MIN_SMOOTH_BEAMS
     noise = np.full(len(residuals), np.nan)
-    if enough.any():
-        noise[enough] = MAD_TO_STD * np.nanmedian(bends[enough], axis=1)
-    usual = float(np.nanmedian(noise)) if enough.any() else 0.01
-    return np.where(np.isfinite(noise), noise, usual)
+    if has_estimate.any():
+        noise[has_estimate] = MAD_TO_STD * np.nanmedian(differences[has_estimate], axis=1)
+    median_noise = float(np.nanmedian(noise)) if has_estimate.any() else DEFAULT_NOISE_M
+    return np.where(np.isfinite(noise), noise, median_noise)

@@ -1,4 +1,4 @@
-"""Runs all estimators on a recorded drive: they find faults, objects, pedestrians, kidnappings, and incidents."""
+"""Runs all estimators on a recorded drive. Estimators find faults, objects, pedestrians, kidnappings, and incidents."""
 
 from __future__ import annotations
 
@@ -46,10 +46,11 @@ MAX_SCANS = 3000
 SENSORS = ("lidar", "odom", "imu")
 """Names of sensors in the faults that the estimators return. The names in the robot file can differ."""
 NEVER_ESTIMATED = "doors that open or close, pushes, slippery floor, and changes of the payload; add them by hand"
-"""Disturbances that no estimator looks for, as part of a message to the user."""
+"""Disturbances that no estimator looks for, as the end of the sentence "The log does not show …"."""
 MIN_KIDNAP_M, MAX_KIDNAP_S = 0.5, 0.3
-"""Minimum distance and maximum duration of a jump of the true pose that counts as a kidnapping. The distance that the
-robot drives at its speed before or after the jump does not count."""
+"""Minimum distance and maximum duration of a jump of the true pose that counts as a kidnapping.
+
+The distance that the robot drives in this time, at its speed before or after the jump, is subtracted first."""
 
 
 def run_estimators(
@@ -61,13 +62,17 @@ def run_estimators(
 ) -> EstimatedParts:
     """Return all parts of a scenario that the estimators find in a drive.
 
-    `is_map_built` states that the walls of `world` were built from the scans of this drive. `other_robots` are the
-    other robots in the log, which become objects of the scenario. Their scan hits are not reported as further objects.
+    drive:         recorded drive
+    world:         walls and known obstacles
+    robot:         properties of the robot
+    other_robots:  other robots in the log, which become objects of the scenario. Scan hits on these robots are not
+        reported as additional objects.
+    is_map_built:  whether the walls of `world` were built from the scans of this drive
     """
     unknowns = [NEVER_ESTIMATED, *_unknown_times(drive)]
     is_calibrated = drive.has_true_poses and not is_map_built
     faults, objects = _faults_and_objects_of_scans(drive, world, robot, other_robots, unknowns, is_calibrated)
-    kidnaps, gaps = list(_kidnaps(drive)), recording_gaps(drive)
+    kidnaps, gaps = list(_find_kidnaps(drive)), recording_gaps(drive)
     for target, signal in (("odom", drive.odometry), ("imu", drive.turn_rates)):
         faults += stream_faults(target, signal.times, signal.arrivals, drive.duration, gaps)
     if drive.has_true_poses:
@@ -90,17 +95,17 @@ def _with_sensor_names_of_robot(
 ) -> list[FoundFault]:
     """Return the faults with the sensor names of the robot file.
 
-    For a fault of a missing sensor, append a phrase to `unknowns` instead.
+    Omit the fault of a sensor that the robot file does not have, and append a phrase about the fault to `unknowns`.
     """
     if not robot.sensors:
         return faults
-    found = []
+    renamed_faults = []
     for fault in faults:
         if fault.target in SENSORS and fault.target not in robot.sensors:
             unknowns.append(f"where to put {fault.target}.{fault.kind}, because the robot file has no such sensor")
         else:
-            found.append(replace(fault, target=robot.sensors.get(fault.target, fault.target)))
-    return found
+            renamed_faults.append(replace(fault, target=robot.sensors.get(fault.target, fault.target)))
+    return renamed_faults
 
 
 def _faults_and_objects_of_scans(
@@ -113,7 +118,7 @@ def _faults_and_objects_of_scans(
 ) -> tuple[list[FoundFault], list[FoundObject]]:
     """Return the faults and objects that the scans show. Append phrases about missing information to `unknowns`.
 
-    Errors of the mount and of the ranges are estimated only if poses and walls are exact (`is_calibrated`).
+    `is_calibrated` states that poses and walls are exact. Only then, errors of the mount and the ranges are estimated.
     """
     scans = drive.scans
     if scans is None or len(scans) < 3:
@@ -136,14 +141,14 @@ def _faults_and_objects_of_scans(
             compared = with_corrected_mount(compared, world, error)
     faults += invalid_scan_faults(compared, drive.duration)
     faults += missing_beam_faults(compared, drive.duration)
-    limits = [*range_faults(compared, drive.duration, robot.lidar_noise)]
-    faults += limits
+    range_limits = [*range_faults(compared, drive.duration, robot.lidar_noise)]
+    faults += range_limits
     false_returns = [*false_return_faults(compared, drive.duration)]
     faults += false_returns
-    if not any(fault.kind == "rain" for fault in limits):
-        # Single beams that end early look like a little noise.
-        is_known = robot.is_known and not false_returns
-        faults += noise_faults(compared, drive.duration, robot.lidar_noise, is_known)
+    if not any(fault.kind == "rain" for fault in range_limits):
+        # False returns look like a little noise, so the noise of the robot file is then not compared exactly.
+        is_noise_known = robot.is_known and not false_returns
+        faults += noise_faults(compared, drive.duration, robot.lidar_noise, is_noise_known)
     if is_calibrated:
         faults += range_error_faults(compared)
     glass = glass_fault(compared, world, usable_scans(compared))
@@ -163,13 +168,13 @@ def _unknown_times(drive: RecordedDrive) -> Iterator[str]:
 def _unknown_reactions(objects: Sequence[FoundObject]) -> Iterator[str]:
     """Yield phrases about reactions of objects to the robot that the log does not show."""
     if any(thing.is_moving and thing.pedestrian is None for thing in objects):
-        yield "whether moving objects react to the robot; those that are no pedestrians follow their recorded tracks"
-    apart = [thing.name for thing in objects if thing.pedestrian is not None and not thing.pedestrian.meets_robot]
-    if apart:
-        yield f"whether {', '.join(apart)} would evade the robot, which was never near; pedestrians do"
+        yield "whether moving objects react to the robot; objects that are no pedestrians follow their recorded tracks"
+    distant = [thing.name for thing in objects if thing.pedestrian is not None and not thing.pedestrian.meets_robot]
+    if distant:
+        yield f"whether {', '.join(distant)} would evade the robot, which was never near; pedestrians do"
 
 
-def _kidnaps(drive: RecordedDrive) -> Iterator[tuple[float, Pose2, Reason]]:
+def _find_kidnaps(drive: RecordedDrive) -> Iterator[tuple[float, Pose2, Reason]]:
     """Yield the time in s, the new pose, and the reason of each sudden jump of the true pose."""
     if not drive.has_true_poses or len(drive.poses) < 2:
         return

@@ -1,4 +1,4 @@
-"""Results of estimators: reasons for parts of the scenario, faults, and time windows in which a condition holds."""
+"""Results of estimators: reasons for parts of the scenario, faults, and time windows in which a condition is true."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class FoundFault:
 
 @dataclass(frozen=True)
 class Window:
-    """Time window from `begin` to `end` in s, with the indices of its `first` and `last` sample."""
+    """Time window from `begin` to `end` in s. `first` and `last` are the indices of its first and last sample."""
 
     begin: float
     end: float
@@ -76,17 +76,17 @@ class Window:
         return slice(self.first, self.last + 1)
 
 
-def windows(mask: Mask, times: Array, min_length: float = 0.0, max_gap: float = 0.0) -> list[Window]:
-    """Return the time windows in which all samples of `mask` (n,) at the `times` (n,) are true.
+def find_windows(mask: Mask, times: Array, min_length: float = 0.0, max_gap: float = 0.0) -> list[Window]:
+    """Return the time windows in which all samples of `mask` (n,) at `times` (n,) in s are true.
 
-    Windows that are at most `max_gap` s apart are merged. Windows shorter than `min_length` s are omitted.
+    Windows that are at most `max_gap` s apart are merged. Windows shorter than `min_length` s are omitted afterwards.
     """
     indices = np.flatnonzero(mask)
     if not len(indices):
         return []
     steps = np.diff(indices)
-    apart = (steps > 1) & (times[indices[1:]] - times[indices[:-1]] > max_gap)
-    first = np.concatenate(([indices[0]], indices[1:][apart]))
-    last = np.concatenate((indices[:-1][apart], [indices[-1]]))
-    found = [Window(float(times[a]), float(times[b]), int(a), int(b)) for a, b in zip(first, last, strict=True)]
-    return [window for window in found if window.length >= min_length]
+    is_gap = (steps > 1) & (times[indices[1:]] - times[indices[:-1]] > max_gap)
+    first = np.concatenate(([indices[0]], indices[1:][is_gap]))
+    last = np.concatenate((indices[:-1][is_gap], [indices[-1]]))
+    windows = [Window(float(times[a]), float(times[b]), int(a), int(b)) for a, b in zip(first, last, strict=True)]
+    return [window for window in windows if window.length >= min_length]

@@ -1,4 +1,4 @@
-"""Reconstruction of a scenario from a log: entry point of this package, which writes the scenario file."""
+"""Entry point of the reconstruction: writes a scenario file from a log."""
 
 from __future__ import annotations
 
@@ -48,7 +48,15 @@ class ReconstructionOptions:
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """Result of a reconstruction: the log, the written files (the scenario first), the drive, and the contents."""
+    """Result of a reconstruction.
+
+    Attributes:
+        log: Path of the log.
+        files: Written files. The first one is the scenario file.
+        drive: Recorded drive in the log.
+        contents: Contents of the scenario file.
+        static_world: World with which the scans of the drive were compared.
+    """
 
     log: Path
     files: tuple[Path, ...]
@@ -64,12 +72,12 @@ class Reconstruction:
     def summary(self) -> Iterator[str]:
         """Yield lines for the user: the number of goals and found objects, then each fault and each incident."""
         estimated = self.contents.estimated
-        people = sum(thing.pedestrian is not None for thing in estimated.objects)
-        moving = sum(thing.is_moving for thing in estimated.objects) - people
-        standing = len(estimated.objects) - moving - people
+        pedestrians = sum(thing.pedestrian is not None for thing in estimated.objects)
+        moving = sum(thing.is_moving for thing in estimated.objects) - pedestrians
+        standing = len(estimated.objects) - moving - pedestrians
         counts = (
             (len(self.contents.goals), "goal"),
-            (people, "pedestrian"),
+            (pedestrians, "pedestrian"),
             (moving, "moving object"),
             (standing, "standing object"),
             (len(estimated.faults), "fault"),
@@ -81,14 +89,14 @@ class Reconstruction:
             yield f"  incident at {incident.time:.2f} s: {incident.kind}, {incident.detail}"
 
 
-def _write_valid(
+def _write_valid_scenario(
     drive: RecordedDrive, given: GivenParts, estimated: EstimatedParts, log: Path, out: Path
 ) -> ScenarioContents:
-    """Write the scenario without objects and faults that make it invalid, such as an object inside the robot.
+    """Write the scenario file, and return its contents.
 
-    An invalid pedestrian first becomes a scripted object. Omitted parts and remaining problems are added to the
-    unknowns, which the file lists for the user. Return the written contents. Raise InvalidInput for a file that cannot
-    be loaded.
+    Objects and faults that make the scenario invalid, such as an object inside the robot, are left out. An invalid
+    pedestrian is first replaced by a scripted object. The file lists all parts that are left out, and the remaining
+    problems, for the user. Raises InvalidInput if the file cannot be loaded for another reason.
     """
     name = scenario_stem(out).replace("_", " ")
     while True:
@@ -96,39 +104,39 @@ def _write_valid(
         out.write_text(scenario_text(contents), encoding="utf-8")
         loaded = try_variations(out, default_root([out]))
         if isinstance(loaded, list):
-            estimated = _without_refused_faults(estimated, loaded)
+            estimated = _without_invalid_faults(estimated, loaded)
             continue
-        wrong = {problem.message for problem in check_in_world(loaded[0], WorldCache()) if problem.severity == "error"}
-        refused = {thing.name for thing in estimated.objects if any(f"`{thing.name}`" in message for message in wrong)}
-        if not refused:
+        errors = {problem.message for problem in check_in_world(loaded[0], WorldCache()) if problem.severity == "error"}
+        invalid = {thing.name for thing in estimated.objects if any(f"`{thing.name}`" in error for error in errors)}
+        if not invalid:
             break
-        walking = {thing.name for thing in estimated.objects if thing.pedestrian is not None}
+        pedestrians = {thing.name for thing in estimated.objects if thing.pedestrian is not None}
+        omitted = invalid - pedestrians
         objects = [
-            replace(thing, pedestrian=None) if thing.name in refused else thing
+            replace(thing, pedestrian=None) if thing.name in invalid else thing
             for thing in estimated.objects
-            if thing.name not in refused - walking
+            if thing.name not in omitted
         ]
         unknowns = [
-            f"how {name} fits, which was left out because it makes the scenario invalid"
-            for name in sorted(refused - walking)
+            f"how {name} fits, which was left out because it makes the scenario invalid" for name in sorted(omitted)
         ]
         estimated = replace(estimated, objects=objects, unknowns=[*estimated.unknowns, *unknowns])
-    if wrong:
-        unknowns = [f"what to correct, so that the scenario can run: {message}" for message in wrong]
+    if errors:
+        unknowns = [f"what to correct, so that the scenario can run: {error}" for error in errors]
         estimated = replace(estimated, unknowns=[*estimated.unknowns, *sorted(unknowns)])
         contents = scenario_contents(drive, given, estimated, name, log.name)
         out.write_text(scenario_text(contents), encoding="utf-8")
     return contents
 
 
-def _without_refused_faults(estimated: EstimatedParts, problems: list[Problem]) -> EstimatedParts:
-    """Return the parts without the faults that the problems mention. Raise InvalidInput if they mention no fault."""
-    refusals = "\n".join(problem.message for problem in problems)
-    refused = [fault for fault in estimated.faults if f"fault `{fault.kind}` does not fit `{fault.target}`" in refusals]
-    if not refused:
+def _without_invalid_faults(estimated: EstimatedParts, problems: list[Problem]) -> EstimatedParts:
+    """Return the parts without the faults that `problems` mention. Raise InvalidInput if `problems` mention no fault."""
+    messages = "\n".join(problem.message for problem in problems)
+    invalid = [fault for fault in estimated.faults if f"fault `{fault.kind}` does not fit `{fault.target}`" in messages]
+    if not invalid:
         raise InvalidInput(problems)
-    unknowns = [f"how to write the fault that {fault.target} has: {fault.reason.comment}" for fault in refused]
-    faults = [fault for fault in estimated.faults if fault not in refused]
+    unknowns = [f"how to write the fault that {fault.target} has: {fault.reason.comment}" for fault in invalid]
+    faults = [fault for fault in estimated.faults if fault not in invalid]
     return replace(estimated, faults=faults, unknowns=[*estimated.unknowns, *unknowns])
 
 
@@ -137,31 +145,31 @@ def scenario_from_log(log: Path, out: Path, options: ReconstructionOptions) -> R
 
     For a log with several robots, `options.files.robot` is the name of the robot to reconstruct. Raises InvalidInput
     for an unusable log or file, UsageError if a map or robot file to write exists, and OSError if a file cannot be
-    written. The map and robot files are then removed.
+    written. After an exception, the new map and robot files are removed.
     """
-    new = NewFiles()
+    new_files = NewFiles()
     try:
-        return _reconstruct(log, out, options, new)
+        return _reconstruct(log, out, options, new_files)
     except BaseException:
-        new.remove()
+        new_files.remove()
         raise
 
 
-def _reconstruct(log: Path, out: Path, options: ReconstructionOptions, new: NewFiles) -> Reconstruction:
-    """Write the scenario file `out`, and other files, which are added to `new`."""
-    robot_of_log = checked_robot_name(log, options.files.robot)
-    files = replace(options.files, robot="") if robot_of_log else options.files
-    drive = read_drive(log, options.truth, options.topics, robot_of_log)
-    described = read_description(log, options.root or Path.cwd(), robot_of_log)
-    choice = choose_world(drive, described, files, out, new)
+def _reconstruct(log: Path, out: Path, options: ReconstructionOptions, new_files: NewFiles) -> Reconstruction:
+    """Write the scenario file `out`, and write other files, which are added to `new_files`."""
+    robot_name = checked_robot_name(log, options.files.robot)
+    files = replace(options.files, robot="") if robot_name else options.files
+    drive = read_drive(log, options.truth, options.topics, robot_name)
+    described = read_description(log, options.root or Path.cwd(), robot_name)
+    choice = choose_world(drive, described, files, out, new_files)
     static_world = StaticWorld(choice.world, drive.lidar_height)
-    given = prepare_given_parts(drive, described, choice, files, out, static_world, new)
+    given = prepare_given_parts(drive, described, choice, files, out, static_world, new_files)
     is_known = bool(files.robot) or described.robot is not None
     robot = robot_properties(given.robot, out.parent, is_known)
-    others = [
+    other_robots = [
         object_of_robot(name, outline, times[times >= drive.begin] - drive.begin, poses[times >= drive.begin])
         for name, outline, times, poses in described.other_robots
     ]
-    estimated = run_estimators(drive, static_world, robot, others, choice.is_built)
-    contents = _write_valid(drive, given, estimated, log, out)
-    return Reconstruction(log, (out, *new.paths), drive, contents, static_world)
+    estimated = run_estimators(drive, static_world, robot, other_robots, choice.is_built)
+    contents = _write_valid_scenario(drive, given, estimated, log, out)
+    return Reconstruction(log, (out, *new_files.paths), drive, contents, static_world)

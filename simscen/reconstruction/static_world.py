@@ -26,13 +26,43 @@ from simscen.worlds.maps.occupancy_map import draw_map, walls_from_map
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 MAP_WALL_HEIGHT_M = 1.0
-"""Height of the walls that are made from the occupied cells of a map."""
+"""Height of walls that `world_from_map` builds from the occupied cells of a map."""
 UNMAPPED_DISTANCE_M = 1e3
 """Result of `StaticWorld.distance_to_walls` for points outside of the map, and for a map without occupied cells."""
+RESOLUTION_M = 0.05
+"""Cell size of the map that is built from scans."""
+MAX_CELLS = 100_000_000
+"""Maximum number of cells of the map that is built from scans."""
+MARGIN_M = 1.0
+"""Distance between the border of the map and all hits and poses."""
+NO_SCANS_MARGIN_M = 5.0
+"""Distance between the border of the map and all poses, for a drive without scans."""
+TARGET_SCANS = 1500
+"""Minimum number of scans that are used from a long drive. At most twice as many scans are used."""
+BODY_RADIUS_M = 0.15
+"""Assumed minimum radius of a robot. Cells at most this far from the driven path are free."""
+MAX_RANGE_M = 15.0
+"""Maximum range that is used to build the map."""
+HIT_LOG_ODDS, PASS_LOG_ODDS = 0.85, -0.4
+"""Changes of the log odds of a cell by a beam that ends in the cell, and by a beam that passes the cell.
+
+Source: Thrun, Burgard, Fox: Probabilistic Robotics, table 9.1.
+"""
+MAX_LOG_ODDS = 20.0
+"""Maximum absolute value of the log odds of a cell."""
+MIN_OCCUPIED_LOG_ODDS, MAX_FREE_LOG_ODDS = 0.8, -0.4
+"""Log odds above which a cell is occupied, and below which a cell is free."""
 
 
 class StaticWorld:
-    """World without the objects that the reconstruction has to find, with a map `grid` at the height of the lidar."""
+    """World without the objects that the reconstruction has to find.
+
+    Attributes:
+        world: Walls and known obstacles.
+        height: Height of the lidar in m.
+        grid: Map of the world at the height of the lidar.
+        built: World with its triangles and `grid`.
+    """
 
     def __init__(self, world: World, height: float) -> None:
         """Draw the map at `height` m. Bodies of the world, such as doors, are walls at their initial poses."""
@@ -52,11 +82,11 @@ class StaticWorld:
 
         `angles` (beams,) are the directions of the beams in rad in the frame of the lidar.
         """
-        directions = poses[:, 2:3] + angles[None, :]
-        flat = directions.ravel()
-        rays = np.column_stack((np.cos(flat), np.sin(flat), np.zeros(len(flat))))
-        origins = np.column_stack((np.repeat(poses[:, :2], len(angles), axis=0), np.full(len(flat), self.height)))
-        return self._scene.cast(origins, rays, max_range).reshape(len(poses), len(angles))
+        headings = (poses[:, 2:3] + angles[None, :]).ravel()
+        directions = np.column_stack((np.cos(headings), np.sin(headings), np.zeros(len(headings))))
+        heights = np.full(len(headings), self.height)
+        origins = np.column_stack((np.repeat(poses[:, :2], len(angles), axis=0), heights))
+        return self._scene.cast(origins, directions, max_range).reshape(len(poses), len(angles))
 
     def distance_to_walls(self, points: Array) -> Array:
         """Return the distance (n,) in m of `points` (n, 2) in the map frame to the nearest occupied cell."""
@@ -78,7 +108,7 @@ def lidar_poses(drive: RecordedDrive, scans: Scans) -> Array:
 
 
 def offset_poses(poses: Array, offset: Pose2) -> Array:
-    """Return the composition (n, 3) of each of `poses` x, y, yaw (n, 3) with the pose `offset`."""
+    """Return the poses x, y, yaw (n, 3) that have the pose `offset` in the frames at `poses` (n, 3)."""
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     x = poses[:, 0] + c * offset.x - s * offset.y
     y = poses[:, 1] + s * offset.x + c * offset.y
@@ -86,10 +116,11 @@ def offset_poses(poses: Array, offset: Pose2) -> Array:
 
 
 def beam_ends(poses: Array, angles: Array, ranges: Array) -> Array:
-    """Return the ends (n, beams, 2) of beams with `ranges` (n, beams) in m, in the same frame as `poses` (n, 3).
+    """Return the ends (n, beams, 2) of beams, in the same frame as `poses`.
 
-    `poses` are poses of the lidar. `angles` (beams,) are the directions of the beams in rad, relative to the lidar.
-    Beams without a finite range have no finite end.
+    poses:   poses x, y, yaw (n, 3) of the lidar
+    angles:  directions of the beams (beams,) in rad, relative to the lidar
+    ranges:  ranges (n, beams) in m; the end of a beam with an infinite range or nan is not finite
     """
     directions = poses[:, 2:3] + angles[None, :]
     with np.errstate(invalid="ignore"):
@@ -98,76 +129,59 @@ def beam_ends(poses: Array, angles: Array, ranges: Array) -> Array:
     return np.stack((x, y), axis=-1)
 
 
-RESOLUTION_M = 0.05
-"""Cell size of the map that is built from scans."""
-MAX_CELLS = 100_000_000
-"""Maximum number of cells of the map that is built from scans."""
-MARGIN_M = 1.0
-"""Distance between the border of the map and all hits and poses."""
-TARGET_SCANS = 1500
-"""Minimum number of scans that are used from a long drive. At most twice as many scans are used."""
-BODY_RADIUS_M = 0.15
-"""Assumed minimum radius of a robot. Cells at most this far from the driven path are free."""
-MAX_RANGE_M = 15.0
-"""Maximum range that is used to build the map."""
-HIT_LOG_ODDS, PASS_LOG_ODDS, MAX_LOG_ODDS = 0.85, -0.4, 20.0
-"""Change of a cell's log odds by a beam that ends in the cell, change by a passing beam, and limit of the magnitude.
-
-Source: Thrun, Burgard, Fox: Probabilistic Robotics, table 9.1.
-"""
-MIN_OCCUPIED_LOG_ODDS, MAX_FREE_LOG_ODDS = 0.8, -0.4
-"""Log odds above which a cell is occupied, and below which a cell is free."""
-
-
 def map_from_scans(drive: RecordedDrive) -> OccupancyGrid:
-    """Return a map built from the scans and poses of a drive; without scans, a free map around the driven path.
+    """Return a map built from the scans and poses of a drive. For a drive without scans, all cells are free.
 
     Raises InvalidInput if the map would have more than MAX_CELLS cells.
     """
     path = drive.poses.values[:, :2]
-    known = None if drive.scans is None else scans_with_pose(drive, drive.scans)
-    if known is None or not len(known):
-        low, high = path.min(axis=0) - 5.0, path.max(axis=0) + 5.0
+    usable_scans = None if drive.scans is None else scans_with_pose(drive, drive.scans)
+    if usable_scans is None or not len(usable_scans):
+        low, high = path.min(axis=0) - NO_SCANS_MARGIN_M, path.max(axis=0) + NO_SCANS_MARGIN_M
         return OccupancyGrid(np.zeros(_shape(drive, low, high), dtype=np.int8), RESOLUTION_M, Pose2(*low.tolist()))
-    scans = known.thinned(TARGET_SCANS)
-    poses, hits = lidar_poses(drive, scans), scans.is_hit() & (scans.ranges <= MAX_RANGE_M)
+    scans = usable_scans.thinned(TARGET_SCANS)
+    poses, is_hit = lidar_poses(drive, scans), scans.is_hit() & (scans.ranges <= MAX_RANGE_M)
     ends = beam_ends(poses, scans.angles, scans.ranges)
-    everything = np.concatenate((ends[hits], path))
-    low, high = everything.min(axis=0) - MARGIN_M, everything.max(axis=0) + MARGIN_M
+    points = np.concatenate((ends[is_hit], path))
+    low, high = points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
     low = np.floor(low / RESOLUTION_M) * RESOLUTION_M
-    odds = np.zeros(_shape(drive, low, high))
+    log_odds = np.zeros(_shape(drive, low, high))
     for row in range(len(scans)):
-        if hits[row].any():
-            _add_scan(odds, poses[row, :2] - low, ends[row][hits[row]] - low)
-    odds[_driven_cells(odds.shape, _driven_path(drive.poses) - low)] = -MAX_LOG_ODDS
-    cells = np.where(odds > MIN_OCCUPIED_LOG_ODDS, OCCUPIED, np.where(odds < MAX_FREE_LOG_ODDS, FREE, UNKNOWN))
+        if is_hit[row].any():
+            _add_scan(log_odds, poses[row, :2] - low, ends[row][is_hit[row]] - low)
+    log_odds[_driven_cells(log_odds.shape, _driven_path(drive.poses) - low)] = -MAX_LOG_ODDS
+    is_occupied, is_free = log_odds > MIN_OCCUPIED_LOG_ODDS, log_odds < MAX_FREE_LOG_ODDS
+    cells = np.where(is_occupied, OCCUPIED, np.where(is_free, FREE, UNKNOWN))
     return OccupancyGrid(cells.astype(np.int8), RESOLUTION_M, Pose2(float(low[0]), float(low[1]), 0.0))
 
 
 def _driven_path(poses: TimedValues) -> Array:
     """Return points (n, 2) at most RESOLUTION_M apart on the path through the poses.
 
-    Jumps, which are longer than MAX_STEP_M or faster than MAX_STEP_M in STEP_S, get no points between their ends.
+    Jumps, which are longer than MAX_STEP_M or faster than MAX_STEP_M in STEP_S, have no points between their ends.
     """
     steps, seconds = np.diff(poses.values[:, :2], axis=0), np.diff(poses.times)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     is_jump = lengths > MAX_STEP_M * np.minimum(seconds / STEP_S, 1.0)
-    parts = np.where(is_jump, 1, np.ceil(lengths / RESOLUTION_M)).astype(int)
-    starts = np.repeat(np.arange(len(parts)), parts)
-    shares = (np.arange(len(starts)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[starts]
-    points = poses.values[starts, :2] + shares[:, None] * steps[starts]
+    counts = np.where(is_jump, 1, np.ceil(lengths / RESOLUTION_M)).astype(int)
+    starts = np.repeat(np.arange(len(counts)), counts)
+    fractions = (np.arange(len(starts)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[starts]
+    points = poses.values[starts, :2] + fractions[:, None] * steps[starts]
     return np.concatenate((points, poses.values[-1:, :2]))
 
 
 def _driven_cells(shape: tuple[int, ...], path: Array) -> Mask:
-    """Return a mask (rows, columns) of cells within BODY_RADIUS_M of a `path` (n, 2) relative to the map's corner."""
+    """Return a mask (rows, columns) of the cells that are at most BODY_RADIUS_M from a path.
+
+    The points of `path` (n, 2) are relative to the corner of the map.
+    """
     is_path = np.zeros(shape, dtype=bool)
-    is_path.reshape(-1)[_index(path, shape)] = True
+    is_path.reshape(-1)[_flat_indices(path, shape)] = True
     return distance_transform_edt(~is_path) * RESOLUTION_M <= BODY_RADIUS_M
 
 
 def _shape(drive: RecordedDrive, low: Array, high: Array) -> tuple[int, int]:
-    """Return the numbers of rows and columns of the map between two opposite corners (2,) in m."""
+    """Return the numbers of rows and columns of the map between the corners `low` (2,) and `high` (2,) in m."""
     columns, rows = np.ceil((high - low) / RESOLUTION_M).astype(int).tolist()
     if rows * columns > MAX_CELLS:
         width, height = (high - low).tolist()
@@ -176,24 +190,25 @@ def _shape(drive: RecordedDrive, low: Array, high: Array) -> tuple[int, int]:
     return rows + 1, columns + 1
 
 
-def _add_scan(odds: Array, origin: Array, ends: Array) -> None:
+def _add_scan(log_odds: Array, origin: Array, ends: Array) -> None:
     """Update the log odds of the cells that the beams of a scan from `origin` (2,) to `ends` (n, 2) pass or hit.
 
-    Each cell is updated once. Coordinates are relative to the corner of the map.
+    Each cell is updated once. A cell that one beam hits and another beam passes counts as hit. Coordinates are relative
+    to the corner of the map.
     """
-    reach = np.hypot(*(ends - origin).T)
-    steps = np.arange(0.0, float(reach.max()), RESOLUTION_M)
-    share = steps[None, :] / np.maximum(reach, 1e-9)[:, None]
-    passes = share < 1.0 - RESOLUTION_M / np.maximum(reach, RESOLUTION_M)[:, None]
-    points = origin + share[..., None] * (ends - origin)[:, None, :]
-    through, hit = _index(points[passes], odds.shape), _index(ends, odds.shape)
-    flat = odds.reshape(-1)
-    with_hits = np.minimum(flat[hit] + HIT_LOG_ODDS, MAX_LOG_ODDS)
-    flat[through] = np.maximum(flat[through] + PASS_LOG_ODDS, -MAX_LOG_ODDS)
-    flat[hit] = with_hits
+    ranges = np.hypot(*(ends - origin).T)
+    distances = np.arange(0.0, float(ranges.max()), RESOLUTION_M)
+    fractions = distances[None, :] / np.maximum(ranges, 1e-9)[:, None]
+    is_passed = fractions < 1.0 - RESOLUTION_M / np.maximum(ranges, RESOLUTION_M)[:, None]
+    points = origin + fractions[..., None] * (ends - origin)[:, None, :]
+    passed, hit = _flat_indices(points[is_passed], log_odds.shape), _flat_indices(ends, log_odds.shape)
+    flat = log_odds.reshape(-1)
+    hit_log_odds = np.minimum(flat[hit] + HIT_LOG_ODDS, MAX_LOG_ODDS)
+    flat[passed] = np.maximum(flat[passed] + PASS_LOG_ODDS, -MAX_LOG_ODDS)
+    flat[hit] = hit_log_odds
 
 
-def _index(points: Array, shape: tuple[int, ...]) -> Indices:
+def _flat_indices(points: Array, shape: tuple[int, ...]) -> Indices:
     """Return the indices (n,) of the cells of points (n, 2) in the flattened map."""
     cells = np.clip((points / RESOLUTION_M).astype(np.int64), 0, [shape[1] - 1, shape[0] - 1])
     return cells[:, 1] * shape[1] + cells[:, 0]

@@ -1,7 +1,8 @@
-"""Reads and decodes the messages of a log that a reconstruction uses, by the role of their topic.
+"""Reads and decodes the messages of a log that a reconstruction uses, by the role of the topic.
 
-A role is the purpose of a topic, such as `odom` or `goal`. Each role has a default topic. The clock of the stamps can
-have another origin or rate than the clock of the log times.
+A role is the purpose of a topic, such as `odom` or `goal`. Each role has a default topic. The log time of a message is
+the time at which the recorder received the message. The clock of the stamps can have another origin or rate than the
+clock of the log times.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from simscen.record.messages.decode import MessageReader
 
 
 class LoggedMessage(NamedTuple):
-    """A decoded message with log time and header stamp in ns; the stamp is 0 for a message without a header."""
+    """A decoded message with log time and header stamp in ns. The stamp is 0 if the message has no header."""
 
     log_time: int
     stamp: int
@@ -99,9 +100,13 @@ _DECODERS: dict[str, Decoders] = {
 
 @dataclass
 class LogMessages:
-    """Messages of a log by role, in order of log time, and message types by topic.
+    """Messages of a log.
 
-    `is_complete` is false for a truncated log. `notes` are as in RecordedDrive.
+    Attributes:
+        by_role: Messages by role, in the order of log times.
+        topics: Message types of all topics, by topic.
+        is_complete: False for a truncated log.
+        notes: Phrases for the user that complete the sentence "The log does not show …".
     """
 
     by_role: dict[str, list[LoggedMessage]] = field(default_factory=dict)
@@ -109,29 +114,31 @@ class LogMessages:
     is_complete: bool = True
     notes: list[str] = field(default_factory=list)
 
-    def of(self, role: str) -> list[LoggedMessage]:
-        """Return the messages of a role; [] if the log has none."""
+    def get(self, role: str) -> list[LoggedMessage]:
+        """Return the messages of a role; [] if the log has no messages of this role."""
         return self.by_role.get(role, [])
 
 
-def collect_messages(path: Path, named: Mapping[str, str], has_truth: bool = False, robot: str = "") -> LogMessages:
+def collect_messages(
+    path: Path, chosen_topics: Mapping[str, str], has_truth: bool = False, robot: str = ""
+) -> LogMessages:
     """Read the messages of an MCAP file or a rosbag2 folder.
 
     If the default scan topic has no messages, the scans of another topic are used. Raises UnusableLog if the log cannot
-    be read, or if one of the `named` topics has no usable messages.
+    be read, or if one of `chosen_topics` has no usable messages.
 
-    named:      topics by role, for roles whose topic is not the default, and for the role "truth"
-    has_truth:  whether the log may have simscen's own ground truth
-    robot:      the robot whose messages are read, without its name in topics and frames, in a simscen log with several
-        robots
+    chosen_topics:  topics by role, for roles whose topic is not the default, and for the role "truth"
+    has_truth:      whether the log may have simscen's own ground truth
+    robot:          in a simscen log with several robots, the robot whose messages are read. Its name is removed from
+        topics and frames.
     """
     prefix = f"/{robot}" if robot else ""
     namespace, frame_prefix = f"{prefix}/" if robot else "", RobotFrames(robot).prefix
-    names = {**TOPICS, **EXTRA_TOPICS, **({"truth": topics.TRUTH.name} if has_truth else {}), **named}
-    absolute = {role: topic if topic.startswith(namespace) else prefix + topic for role, topic in names.items()}
+    names = {**TOPICS, **EXTRA_TOPICS, **({"truth": topics.TRUTH.name} if has_truth else {}), **chosen_topics}
+    absolute_names = {role: topic if topic.startswith(namespace) else prefix + topic for role, topic in names.items()}
     roles: dict[str, list[str]] = {}
     for role in sorted(names):
-        roles.setdefault(absolute[role], []).append(role)
+        roles.setdefault(absolute_names[role], []).append(role)
     stream = open_messages(path, _TopicsToRead(roles) if path.is_dir() else roles)
     messages = LogMessages()
     other_scans: dict[str, list[LoggedMessage]] = {}
@@ -142,24 +149,24 @@ def collect_messages(path: Path, named: Mapping[str, str], has_truth: bool = Fal
                 try:
                     messages.by_role.setdefault(role, []).append(_decode(raw, role, frame_prefix))
                 except InvalidPose:
-                    invalid_poses[raw.topic] += role == roles[raw.topic][0]
+                    invalid_poses[raw.topic] += role == roles[raw.topic][0]  # count each message once
         if raw.topic not in roles and raw.type == topics.SCAN_TYPE and raw.topic.startswith(namespace):
             other_scans.setdefault(raw.topic, []).append(_decode(raw, "scan", frame_prefix))
     messages.notes += [
         f"{count} poses on {topic}, whose orientation is invalid" for topic, count in invalid_poses.items()
     ]
-    for role in named:
-        if not messages.of(role):
-            topic, hint = absolute[role], f"its topics: {', '.join(sorted(stream.topics)[:12]) or 'none'}"
+    for role in chosen_topics:
+        if not messages.get(role):
+            topic, hint = absolute_names[role], f"its topics: {', '.join(sorted(stream.topics)[:12]) or 'none'}"
             if topic not in stream.topics:
                 raise UnusableLog(f"it has no topic {topic}", hint)
             if topic in invalid_poses:
                 raise UnusableLog(f"all messages of {topic} have an invalid orientation", hint)
             raise UnusableLog(type_mismatch(topic, stream.topics[topic], _DECODERS[role]) or f"{topic} is empty", hint)
-    if not messages.of("scan") and other_scans:
+    if not messages.get("scan") and other_scans:
         topic = min(other_scans)
         messages.by_role["scan"] = other_scans[topic]
-        messages.notes.append(f"scans on {names['scan']}; those on {topic} are used, see --topic scan=/TOPIC")
+        messages.notes.append(f"scans on {names['scan']}; the scans on {topic} are used, see --topic scan=/TOPIC")
     robot_topics = {name: kind for name, kind in stream.topics.items() if name.startswith(namespace)}
     messages.topics = {name.removeprefix(prefix): kind for name, kind in robot_topics.items()}
     messages.is_complete = stream.is_complete
@@ -171,14 +178,15 @@ def collect_messages(path: Path, named: Mapping[str, str], has_truth: bool = Fal
 class _TopicsToRead:
     """Container of the topics to read: topics with a role, and topics with "scan" in their name."""
 
-    def __init__(self, roles: Container[str]) -> None:
-        self._roles = roles
+    def __init__(self, topics_with_role: Container[str]) -> None:
+        self._topics_with_role = topics_with_role
 
     def __contains__(self, topic: object) -> bool:
-        return topic in self._roles or "scan" in str(topic)
+        return topic in self._topics_with_role or "scan" in str(topic)
 
 
 def _decode(raw: RawMessage, role: str, frame_prefix: str) -> LoggedMessage:
+    """Return the decoded message. Raises InvalidPose or UnusableLog if it is invalid."""
     message = raw.decode(_DECODERS[role], frame_prefix=frame_prefix)
     return LoggedMessage(raw.time, getattr(message, "stamp", 0) or 0, message)
 
@@ -186,37 +194,39 @@ def _decode(raw: RawMessage, role: str, frame_prefix: str) -> LoggedMessage:
 MAX_CLOCK_DIFFERENCE_NS = 10 * NS_PER_SECOND
 """Maximum difference between the stamp and the log time of a message if both are from the same clock."""
 MAX_CLOCK_RATE_ERROR = 0.002
-"""Maximum deviation from 1 of the ratio between the rates of two clocks that measure the same time."""
+"""Maximum deviation of a clock rate from 1. With a larger deviation, the clock runs in slow motion or time lapse."""
 
 
-def _stamped(messages: LogMessages) -> list[list[LoggedMessage]]:
-    """Return the messages with stamps of each role whose stamps are compared with the log times."""
+def _messages_with_stamp(messages: LogMessages) -> list[list[LoggedMessage]]:
+    """Return the messages with a stamp of each role whose stamps are compared with the log times."""
     roles = ("scan", "odom", "amcl_pose", "truth")
-    return [[message for message in messages.of(role) if message.stamp] for role in roles]
+    return [[message for message in messages.get(role) if message.stamp] for role in roles]
 
 
 def adjust_clock_rate(messages: LogMessages) -> None:
-    """Convert all log times to the clock of the stamps if its rate differs, as for a simulator in slow motion."""
-    anchor = max(_stamped(messages), key=len)
+    """Convert all log times to the clock of the stamps if its rate differs, as with a simulator in slow motion."""
+    anchor = max(_messages_with_stamp(messages), key=len)
     if not anchor:
         return
-    logged, stamps = (np.array([message[column] for message in anchor], dtype=np.int64) for column in (0, 1))
-    rate = float(np.ptp(stamps)) / max(1.0, float(np.ptp(logged)))
-    is_same_clock = np.median(np.abs(stamps - logged)) <= MAX_CLOCK_DIFFERENCE_NS
+    log_times = np.array([message.log_time for message in anchor], dtype=np.int64)
+    stamps = np.array([message.stamp for message in anchor], dtype=np.int64)
+    rate = float(np.ptp(stamps)) / max(1.0, float(np.ptp(log_times)))
+    is_same_clock = np.median(np.abs(stamps - log_times)) <= MAX_CLOCK_DIFFERENCE_NS
     if is_same_clock or rate < MIN_CLOCK_RATE or abs(rate - 1.0) <= MAX_CLOCK_RATE_ERROR:
         return
     messages.notes.append(f"delays of messages, because stamps advance {rate:.3f} s per second of log time")
-    for role, of_role in messages.by_role.items():
-        times = np.array([message.log_time for message in of_role], dtype=np.int64)
-        converted = to_clock_of_stamps(times, logged, stamps).tolist()
+    for role, role_messages in messages.by_role.items():
+        times = np.array([message.log_time for message in role_messages], dtype=np.int64)
+        converted = to_clock_of_stamps(times, log_times, stamps).tolist()
         messages.by_role[role] = [
-            message._replace(log_time=time) for message, time in zip(of_role, converted, strict=True)
+            message._replace(log_time=time) for message, time in zip(role_messages, converted, strict=True)
         ]
 
 
 def clock_offset(messages: LogMessages) -> int:
-    """Return the difference in ns between the clock of the stamps and the clock of the log; 0 for one clock."""
-    differences = [message.stamp - message.log_time for of_role in _stamped(messages) for message in of_role]
+    """Return the clock of the stamps minus the clock of the log times in ns; 0 if both are the same clock."""
+    stamped = _messages_with_stamp(messages)
+    differences = [message.stamp - message.log_time for role_messages in stamped for message in role_messages]
     if not differences or abs(offset := max(differences)) <= MAX_CLOCK_DIFFERENCE_NS:
         return 0
     messages.notes.append("the smallest delay of messages, because stamps and log times are of different clocks")

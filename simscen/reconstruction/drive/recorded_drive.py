@@ -11,15 +11,24 @@ from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.core.geometry import Array, Pose2, wrap_array
 
 Polygon = tuple[tuple[float, float], ...]
+"""Corners (x, y) in m."""
 Mask = npt.NDArray[np.bool_]
+"""Array of booleans that selects elements."""
 Indices = npt.NDArray[np.int64]
+"""Array of indices."""
 DEFAULT_LIDAR_HEIGHT_M = 0.2
-"""Assumed height of a lidar with unknown mount."""
+"""Assumed height of a lidar whose mount is unknown."""
 
 
 @dataclass(frozen=True, eq=False)
 class TimedValues:
-    """Signal with `values` (n, k) measured at the ascending `times` (n,) and logged at the times `arrivals` (n,)."""
+    """Signal with n samples.
+
+    Attributes:
+        times: Times of measurement (n,) in s, in ascending order.
+        values: Values (n, k). For poses, the first three columns are x, y, yaw.
+        arrivals: Log times (n,) in s.
+    """
 
     times: Array
     values: Array
@@ -30,7 +39,7 @@ class TimedValues:
 
     @property
     def period(self) -> float:
-        """Median time between two messages in s; nan for fewer than two messages."""
+        """Median time between two samples in s; nan for fewer than two samples."""
         return _median_period(self.times)
 
     def poses_at(self, times: Array) -> Array:
@@ -40,7 +49,7 @@ class TimedValues:
         return np.column_stack((*columns, wrap_array(yaw)))
 
     def values_at(self, times: Array) -> Array:
-        """Return the newest values (m, k) at `times` (m,); before the first measurement, the first values."""
+        """Return the newest values (m, k) at `times` (m,). Before the first sample, these are the first values."""
         return self.values[np.maximum(np.searchsorted(self.times, times, side="right") - 1, 0)]
 
 
@@ -49,15 +58,15 @@ def _median_period(times: Array) -> float:
 
 
 def usual_period(times: Array) -> float:
-    """Return the 20th percentile of the times between messages in s, to ignore gaps; nan for fewer than two messages.
+    """Return the usual time between messages at `times` (n,) in s; nan for fewer than two messages.
 
-    `times` (n,) are the times of the messages.
+    It is the 20th percentile of the times between messages, so that gaps have no effect.
     """
     return float(np.percentile(np.diff(times), 20)) if len(times) > 1 else float("nan")
 
 
 def no_values(columns: int) -> TimedValues:
-    """Return a signal of length 0 with this number of columns."""
+    """Return a signal without samples that has this number of columns."""
     return TimedValues(np.empty(0), np.empty((0, columns)), np.empty(0))
 
 
@@ -100,13 +109,16 @@ class Scans:
         with np.errstate(invalid="ignore"):
             return np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
 
-    def subset(self, which: slice | Mask) -> Scans:
-        """Return the scans of a slice of indices, or of a mask (n,)."""
+    def subset(self, selection: slice | Mask) -> Scans:
+        """Return the scans that a slice or a mask (n,) selects."""
         names = ("times", "arrivals", "ranges", "is_malformed")
-        return replace(self, **{name: getattr(self, name)[which] for name in names})
+        return replace(self, **{name: getattr(self, name)[selection] for name in names})
 
     def thinned(self, target: int) -> Scans:
-        """Return evenly spread scans: at least `target` and less than twice as many, or all scans of a short drive."""
+        """Return every second, third, … scan: at least `target` and fewer than twice as many scans.
+
+        Return all scans if there are fewer than twice as many.
+        """
         return self.subset(slice(None, None, max(1, len(self) // target)))
 
 
@@ -117,17 +129,17 @@ class RecordedGoal:
     Attributes:
         name: Name of the goal; "goal-1", "goal-2", … if the log has no name.
         pose: Pose in the map frame.
-        sent: Time in s at which the goal was accepted or, if unknown, sent.
-        ended: Time in s of the result; None if the log has no result.
+        sent_time: Time in s at which the goal was accepted. If this time is unknown, time at which the goal was sent.
+        end_time: Time in s of the result; None if the log has no result.
         status: "reached", "passed" (without a stop), "failed", "canceled", or "unknown".
-        error: Name of the error code; "" for none.
+        error: Name of the error code; "" without an error code.
         source: Source of the goal in words. It begins with `/goal_pose` if the goal is from a message on this topic.
     """
 
     name: str
     pose: Pose2
-    sent: float
-    ended: float | None = None
+    sent_time: float
+    end_time: float | None = None
     status: str = "unknown"
     error: str = ""
     source: str = ""
@@ -148,7 +160,7 @@ class RecordedDrive:
         odometry: Poses x, y, yaw in the odom frame and velocities vx, vy, wz in the base frame (n, 6).
         commands: Commanded velocities vx, vy, wz (n, 3).
         turn_rates: Turn rates of the gyroscope about the vertical axis (n, 1).
-        bumper: 1 while the bumper is pressed, otherwise 0 (n, 1).
+        bumper: State of the bumper (n, 1): 1 if it is pressed, otherwise 0.
         scans: Scans of the lidar frame with the most scans; None without scans.
         map: Last map in the log; None without a map.
         goals: Goals in the order in which they were sent.

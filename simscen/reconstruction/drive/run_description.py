@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from simscen.core.errors import InvalidInput
 from simscen.core.geometry import Array
@@ -21,6 +21,22 @@ from simscen.record.log_reader import Log, invalid_log, read_log
 from simscen.sim.body.outline import circle
 
 
+class RecordedRobot(NamedTuple):
+    """Another robot in the log, which is not reconstructed.
+
+    Attributes:
+        name: Name of the robot.
+        outline: Corners of the footprint in m, in the frame of the robot.
+        times: Times (n,) in s since the start of the log.
+        poses: True poses x, y, yaw (n, 3) in the map frame.
+    """
+
+    name: str
+    outline: Polygon
+    times: Array
+    poses: Array
+
+
 @dataclass(frozen=True)
 class RunDescription:
     """Description of the recorded run. The defaults are for logs of real robots.
@@ -31,8 +47,7 @@ class RunDescription:
         has_map: Whether the robot had a map.
         robot: Name of a shipped robot, or robot file; None if unknown.
         stack: Key `stack` of the recorded scenario.
-        other_robots: For each robot that is not reconstructed: name, corners of the footprint in m, times (n,) in s,
-            and true poses x, y, yaw (n, 3).
+        other_robots: Robots that are not reconstructed.
         notes: Notes for the user about missing files.
     """
 
@@ -41,14 +56,14 @@ class RunDescription:
     has_map: bool = True
     robot: str | Path | None = None
     stack: Mapping[str, Any] = field(default_factory=dict)
-    other_robots: tuple[tuple[str, Polygon, Array, Array], ...] = ()
+    other_robots: tuple[RecordedRobot, ...] = ()
     notes: tuple[str, ...] = ()
 
 
 def checked_robot_name(log: Path, name: str) -> str:
     """Return `name` for a simscen log with several robots, and "" for all other logs.
 
-    Raises InvalidInput if the log has several robots, but none with this name.
+    Raises InvalidInput if the log has several robots, but no robot with this name.
     """
     robots = () if log.is_dir() else recorded_robots(log)
     if robots and name not in robots:
@@ -61,8 +76,8 @@ def checked_robot_name(log: Path, name: str) -> str:
 def read_description(log: Path, root: Path, robot: str = "") -> RunDescription:
     """Return the description from the header of a log, or the default description for the log of a real robot.
 
-    `root` is the folder of the files of the recorded scenario. In a log with several robots, `robot` is the name of the
-    robot to describe. Raises InvalidInput if the recorded scenario is no YAML mapping.
+    `root` is the folder of the files that the recorded scenario refers to. In a log with several robots, `robot` is the
+    name of the robot to describe. Raises InvalidInput if the recorded scenario is not a YAML mapping.
     """
     if log.is_dir() or not is_simscen_log(log):
         return RunDescription()
@@ -71,27 +86,28 @@ def read_description(log: Path, root: Path, robot: str = "") -> RunDescription:
     if not isinstance(tree, MappingNode):
         raise InvalidInput(problems)
     if not robot:
-        return _described_run(recorded.header, tree.plain, root)
-    own = tree.plain.get("robots", {}).get(robot, {})
-    scenario_data = {**tree.plain, "robot": own, "stack": own.get("stack", tree.plain.get("stack", {}))}
-    described = _described_run(recorded.header.robots[robot], scenario_data, root)
-    return replace(described, other_robots=tuple(_other_robots(recorded, robot)))
+        return _describe_run(recorded.header, tree.plain, root)
+    robot_data = tree.plain.get("robots", {}).get(robot, {})
+    stack = robot_data.get("stack", tree.plain.get("stack", {}))
+    scenario_data = {**tree.plain, "robot": robot_data, "stack": stack}
+    description = _describe_run(recorded.header.robots[robot], scenario_data, root)
+    return replace(description, other_robots=tuple(_other_robots(recorded, robot)))
 
 
-def _other_robots(recorded: Log, robot: str) -> Iterator[tuple[str, Polygon, Array, Array]]:
-    """Yield the entries of RunDescription.other_robots for all robots except `robot`."""
+def _other_robots(recorded: Log, robot: str) -> Iterator[RecordedRobot]:
+    """Yield all robots except `robot`."""
     for name, log in recorded.robots.items():
         if name != robot:
             truth, case = log.trace.truth, log.header.case
             outline = case.footprint or tuple(circle(case.inscribed_radius))
-            yield name, outline, truth.ticks / log.trace.tick_rate, truth.values[:, :3]
+            yield RecordedRobot(name, outline, truth.ticks / log.trace.tick_rate, truth.values[:, :3])
 
 
-def _described_run(header: LogHeader, scenario_data: Mapping[str, Any], root: Path) -> RunDescription:
+def _describe_run(header: LogHeader, scenario_data: Mapping[str, Any], root: Path) -> RunDescription:
     """Return the description of a run from the log header and `scenario_data`, the content of the recorded scenario."""
     scenario_folder = root / Path(header.name).parent
     notes: list[str] = []
-    world, named = scenario_data.get("world"), scenario_data.get("robot", {}).get("model", "turtlebot")
+    world, robot_model = scenario_data.get("world"), scenario_data.get("robot", {}).get("model", "turtlebot")
     if isinstance(world, str):
         file = (scenario_folder / world).resolve()
         if not file.is_file():
@@ -99,11 +115,11 @@ def _described_run(header: LogHeader, scenario_data: Mapping[str, Any], root: Pa
         world = file if file.is_file() else None
     elif isinstance(world, Mapping):
         world = {key: value for key, value in world.items() if key != "objects"}
-    model: str | Path | None = named
-    if named.endswith((".yaml", ".yml", ".urdf", ".xacro")):
-        file = (scenario_folder / named).resolve()
+    robot: str | Path | None = robot_model
+    if robot_model.endswith((".yaml", ".yml", ".urdf", ".xacro")):
+        file = (scenario_folder / robot_model).resolve()
         if not file.is_file():
-            notes.append(f"the robot `{named}` of the run is not below {root}; use --root or --robot")
-        model = file if file.is_file() else None
+            notes.append(f"the robot `{robot_model}` of the run is not below {root}; use --root or --robot")
+        robot = file if file.is_file() else None
     has_map, stack = header.map is not None, scenario_data.get("stack", {})
-    return RunDescription(header.seed, world, has_map, model, stack, notes=tuple(notes))
+    return RunDescription(header.seed, world, has_map, robot, stack, notes=tuple(notes))

@@ -10,7 +10,7 @@ from scipy.ndimage import uniform_filter1d
 
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive
-from simscen.reconstruction.reasons import FoundFault, Reason, windows
+from simscen.reconstruction.reasons import FoundFault, Reason, find_windows
 
 SAMPLE_PERIOD_S = 0.025
 """Period of the samples at which commands and odometry are compared."""
@@ -112,7 +112,7 @@ def _ignored_commands(times: Array, commanded: Array, driven: Array) -> list[Fou
         np.abs(driven[:, 0]) < IGNORED_RATIO * np.abs(commanded[:, 0])
     )
     found = []
-    for window in windows(stands, times, MIN_IGNORED_S, 0.1):
+    for window in find_windows(stands, times, MIN_IGNORED_S, 0.1):
         reason = Reason("the base stands although it is commanded to drive", window.begin, window.end, "medium")
         found.append(FoundFault("cmd_vel", "off", {}, max(0.0, window.begin - 0.5), window.length + 0.5, reason))
     return found
@@ -122,7 +122,7 @@ def _kept_speeds(times: Array, commanded: Array, driven: Array) -> Iterator[Foun
     """Yield a fault for each time window in which the base kept its speed although it was commanded to slow down."""
     speed = _moving_average(driven[:, 0])
     keeps = (np.abs(speed) > MIN_COMMAND_M_S) & (np.abs(commanded[:, 0]) < KEPT_RATIO * np.abs(speed))
-    for window in windows(keeps, times, MIN_KEPT_S, 0.1):
+    for window in find_windows(keeps, times, MIN_KEPT_S, 0.1):
         if float(np.std(speed[window.samples])) < MAX_LIMIT_SPREAD_M_S:
             text = "the base keeps its speed although it is commanded to stop"
             reason = Reason(text, window.begin, window.end, "medium")

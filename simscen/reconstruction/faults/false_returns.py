@@ -20,7 +20,7 @@ from simscen.reconstruction.faults.lidar_readings import (
     mask_runs,
     usable_windows,
 )
-from simscen.reconstruction.reasons import FoundFault, Reason, windows
+from simscen.reconstruction.reasons import FoundFault, Reason, find_windows
 from simscen.reconstruction.static_world import StaticWorld, beam_ends
 from simscen.worlds.geometry.triangulation import merge_solids
 
@@ -67,7 +67,7 @@ def false_return_faults(compared: ComparedScans, end: float) -> Iterator[FoundFa
         }
         text = f"something {distance:.2f} m away moves with the lidar"
         shown = compared.is_short[:, first : last + 1].mean(axis=1) > 0.3
-        for window in windows(shown & usable, compared.scans.times, MIN_WINDOW_S, 2.0):
+        for window in find_windows(shown & usable, compared.scans.times, MIN_WINDOW_S, 2.0):
             yield lidar_fault_in_window("ghost", values, window, compared, end, text)
             break
 

@@ -14,7 +14,7 @@ from scipy.ndimage import median_filter
 from simscen.core.geometry import Array
 from simscen.reconstruction.compared_scans import ComparedScans
 from simscen.reconstruction.drive.recorded_drive import Mask
-from simscen.reconstruction.reasons import FoundFault, Reason, Window, windows
+from simscen.reconstruction.reasons import FoundFault, Reason, Window, find_windows
 
 MIN_EXTRA_NOISE_M, EXTRA_NOISE_FACTOR = 0.012, 0.8
 """Noise of a lidar with only typical values is reported if it exceeds the nominal noise by the larger of a distance and
@@ -187,7 +187,7 @@ def usable_windows(mask: Mask, compared: ComparedScans) -> list[Window]:
     """Return the time windows in which `mask` (n,) is true. An invalid scan has the value of the last valid scan."""
     usable = ~compared.is_invalid
     newest = np.maximum.accumulate(np.where(usable, np.arange(len(mask)), 0))
-    return windows(mask[newest] & usable[newest], compared.scans.times, MIN_WINDOW_S, MAX_WINDOW_GAP_S)
+    return find_windows(mask[newest] & usable[newest], compared.scans.times, MIN_WINDOW_S, MAX_WINDOW_GAP_S)
 
 
 def lidar_fault_in_window(

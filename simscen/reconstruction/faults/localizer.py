@@ -11,7 +11,7 @@ import numpy as np
 from simscen.core.geometry import Array, Pose2, wrap, wrap_array
 from simscen.reconstruction.drive.gaps import belief_with_pose, recording_gaps, seconds_in_gaps
 from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive
-from simscen.reconstruction.reasons import FoundFault, Reason, windows
+from simscen.reconstruction.reasons import FoundFault, Reason, find_windows
 
 MIN_JUMP_M, MIN_JUMP_RAD = 0.2, math.radians(10)
 """Minimum change of the error of position or heading, from one estimate to the next, that counts as a jump."""
@@ -129,7 +129,7 @@ def _without_corrections(drive: RecordedDrive) -> Iterator[FoundFault]:
     if len(corrections) < 2:
         return
     still = np.abs(np.diff(corrections.values, axis=0)).max(axis=1) < MIN_CORRECTION_M_RAD
-    usual = windows(still, corrections.times[1:])
+    usual = find_windows(still, corrections.times[1:])
     if not usual or still.all():
         return
     shortest = float(np.percentile([window.length for window in usual], 25)) if len(usual) >= 5 else 0.0

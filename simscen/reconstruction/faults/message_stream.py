@@ -13,7 +13,7 @@ import numpy as np
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.gaps import Gaps, seconds_in_gaps
 from simscen.reconstruction.drive.recorded_drive import Mask, Scans, usual_period
-from simscen.reconstruction.reasons import FoundFault, Reason, windows
+from simscen.reconstruction.reasons import FoundFault, Reason, find_windows
 
 MIN_OUTAGE_PERIODS = 4.5
 """Minimum gap between two messages, in periods, that counts as an outage."""
@@ -97,7 +97,7 @@ def _slow_fault(target: str, times: Array, period: float, end: float) -> FoundFa
     is_slow = steps > SLOW_FACTOR * period
     if not is_slow.all() and not _is_regular(steps[~is_slow]):
         return None
-    for window in windows(is_slow, times[1:], max_gap=1.2 * period):
+    for window in find_windows(is_slow, times[1:], max_gap=1.2 * period):
         inside = steps[window.samples]
         if len(inside) < 4 or not _is_regular(inside):
             continue
@@ -121,7 +121,7 @@ def _delay_faults(target: str, times: Array, arrivals: Array, period: float, end
     limit = max(MIN_DELAY_S, MIN_DELAY_PERIODS * period)
     usual = max(0.0, float(np.percentile(delays, 2)))
     late = delays > limit
-    for window in windows(late, times, max_gap=4 * period):
+    for window in find_windows(late, times, max_gap=4 * period):
         inside = delays[window.samples]
         if len(inside) < 3:
             continue
@@ -150,7 +150,7 @@ def repeated_scans(scans: Scans) -> Mask:
 
 def stuck_scans(scans: Scans, end: float) -> Iterator[FoundFault]:
     """Yield a fault for each time window in which a lidar repeated its last scan."""
-    for window in windows(repeated_scans(scans), scans.times, max_gap=0.5 * scans.period):
+    for window in find_windows(repeated_scans(scans), scans.times, max_gap=0.5 * scans.period):
         if window.last - window.first + 1 < MIN_REPEATED_SCANS:
             continue
         begin = max(0.0, window.begin - 1.5 * scans.period)

@@ -14,7 +14,7 @@ from simscen.core.geometry import Array
 from simscen.reconstruction.drive.gaps import pose_is_known
 from simscen.reconstruction.drive.motion_steps import STEP_S, MotionSteps
 from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive
-from simscen.reconstruction.reasons import FoundFault, Reason, Window, windows
+from simscen.reconstruction.reasons import FoundFault, Reason, Window, find_windows
 
 MIN_DISTANCE_M, MIN_TURN_RAD = 1.0, 1.5
 """Minimum distance and turn of a drive for estimating the scales of distances and turns."""
@@ -56,7 +56,7 @@ def _slip(steps: MotionSteps, wheel_separation: float) -> Iterator[FoundFault]:
     measured, true = (_wheel_distances(motion, wheel_separation) for motion in (steps.measured, steps.true))
     lost = np.abs(measured) - np.abs(true)
     slips = ((lost > MIN_SLIP_FRACTION * np.abs(measured)) & (lost > MIN_SLIP_STEP_M)).any(axis=1)
-    for window in windows(np.asarray(slips), steps.times, max_gap=2.2 * STEP_S):
+    for window in find_windows(np.asarray(slips), steps.times, max_gap=2.2 * STEP_S):
         whole = window.length > LONG_FRACTION * float(np.ptp(steps.times))
         if whole or window.length < MIN_SLIP_S:
             continue

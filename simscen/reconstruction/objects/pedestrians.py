@@ -14,7 +14,7 @@ from simscen.core.geometry.polylines import path_corners
 from simscen.pedestrians.forces import RELAXATION_TIME_S
 from simscen.reconstruction.objects.found_object import FittedPedestrian, FoundObject
 from simscen.reconstruction.objects.pedestrian_trial import PedestrianTrial
-from simscen.reconstruction.reasons import windows
+from simscen.reconstruction.reasons import find_windows
 
 MIN_CYLINDER_RADIUS_M, MAX_CYLINDER_RADIUS_M = 0.15, 0.4
 """Minimum and maximum radius of a round object that can be a person."""
@@ -180,7 +180,7 @@ def _reactions(track: _Track, distances: Array, meets_robot: bool) -> Iterator[_
     yield _Reaction()
     if meets_robot:
         yield _Reaction(blind_to=frozenset({"robots"}))
-    for stop in windows(track.speeds < MOVING_SPEED_M_S, track.times, MIN_STOP_S):
+    for stop in find_windows(track.speeds < MOVING_SPEED_M_S, track.times, MIN_STOP_S):
         walks_before_and_after = stop.first > 0 and stop.last < len(track.times) - 1
         if walks_before_and_after and distances[stop.first] < SURPRISE_DISTANCE_M:
             yield _Reaction("surprised", round(stop.length, 1))

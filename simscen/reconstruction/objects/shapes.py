@@ -11,7 +11,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 from simscen.core.geometry import Array
 from simscen.reconstruction.drive.recorded_drive import Mask
 from simscen.reconstruction.objects.clusters import ScanCluster
-from simscen.reconstruction.reasons import windows
+from simscen.reconstruction.reasons import find_windows
 
 MAX_ROUND_RADIUS_M, MAX_ROUND_ERROR_M = 0.6, 0.035
 """Maximum radius of a round object, and maximum mean distance of its hits from a circle."""
@@ -106,7 +106,7 @@ def _moving_box(clusters: list[ScanCluster], times: Array) -> ObjectShape:
 def _constant_at_rest(times: Array, centers: Array, is_moving: Mask) -> Array:
     """Return `centers` (n, 2) with a constant center in each time window in which the object stands."""
     result: Array = centers.copy()
-    for rest in windows(~is_moving, times, MIN_STAND_S):
+    for rest in find_windows(~is_moving, times, MIN_STAND_S):
         result[rest.samples] = np.median(centers[rest.samples], axis=0)
     return result
 

@@ -161,8 +161,8 @@ def passing_radius(drive: RecordedDrive) -> float | None:
 
     The result is the largest distance between a passed goal and the estimated pose at this time, rounded up.
     """
-    passed = [goal for goal in drive.goals if goal.status == "passed" and goal.ended is not None]
-    distances = [_believed_pose(drive, goal.ended or 0.0).distance(goal.pose) for goal in passed]
+    passed = [goal for goal in drive.goals if goal.status == "passed" and goal.end_time is not None]
+    distances = [_believed_pose(drive, goal.end_time or 0.0).distance(goal.pose) for goal in passed]
     return round(math.ceil(max(distances) / RADIUS_STEP_M) * RADIUS_STEP_M, 2) if distances else None
 
 
@@ -203,7 +203,7 @@ def _goals(drive: RecordedDrive) -> Iterator[ScenarioGoal]:
     for number, goal in enumerate(drive.goals):
         name = unique_name(goal.name.replace("#", " loop "), taken, "-")
         following = drive.goals[number + 1] if number + 1 < len(drive.goals) else None
-        refused = goal.ended is not None and goal.ended - goal.sent < MAX_REFUSAL_S
+        refused = goal.end_time is not None and goal.end_time - goal.sent_time < MAX_REFUSAL_S
         expect = goal.error if refused and goal.error in INVALID_GOAL_CODES else ""
         yield ScenarioGoal(
             name, goal.pose, _timeout(goal, drive.duration), _goal_reason(goal), expect, _wait(goal, following)
@@ -215,23 +215,23 @@ def _goal_reason(goal: RecordedGoal) -> Reason:
         goal.status, f"{goal.status}{f' ({goal.error})' if goal.error else ''}"
     )
     confidence = "high" if goal.source.startswith("/") else "medium"
-    return Reason(f"{goal.source}; {result}", goal.sent, goal.ended, confidence)
+    return Reason(f"{goal.source}; {result}", goal.sent_time, goal.end_time, confidence)
 
 
 def _timeout(goal: RecordedGoal, duration: float) -> float:
     """Return the timeout of a goal in s. `duration` is the duration of the drive in s."""
-    if goal.ended is not None and goal.error == TIMEOUT_CODE:
-        return goal.ended - goal.sent
-    if goal.ended is None:
-        return max(MIN_TIMEOUT_S, math.ceil(UNFINISHED_TIMEOUT_FACTOR * (duration - goal.sent)))
-    return max(MIN_TIMEOUT_S, math.ceil(TIMEOUT_FACTOR * (goal.ended - goal.sent)))
+    if goal.end_time is not None and goal.error == TIMEOUT_CODE:
+        return goal.end_time - goal.sent_time
+    if goal.end_time is None:
+        return max(MIN_TIMEOUT_S, math.ceil(UNFINISHED_TIMEOUT_FACTOR * (duration - goal.sent_time)))
+    return max(MIN_TIMEOUT_S, math.ceil(TIMEOUT_FACTOR * (goal.end_time - goal.sent_time)))
 
 
 def _wait(goal: RecordedGoal, following: RecordedGoal | None) -> float:
     """Return the time in s that the robot waits at a goal before the following goal."""
-    if following is None or goal.ended is None or goal.status not in ("reached", "unknown"):
+    if following is None or goal.end_time is None or goal.status not in ("reached", "unknown"):
         return 0.0
-    gap = following.sent - goal.ended
+    gap = following.sent_time - goal.end_time
     return round(gap, 1) if gap >= MIN_WAIT_S else 0.0
 
 

@@ -92,9 +92,9 @@ def _localization(drive: RecordedDrive, belief: TimedValues, broken: Mapping[str
 
 
 def _efficiency(drive: RecordedDrive) -> Iterator[ProposedCriterion]:
-    if not drive.goals or drive.goals[-1].ended is None:
+    if not drive.goals or drive.goals[-1].end_time is None:
         return
-    took = drive.goals[-1].ended - drive.goals[0].sent
+    took = drive.goals[-1].end_time - drive.goals[0].sent_time
     limit = max(MIN_TIME_LIMIT_S, TIME_MARGIN * took)
     yield ProposedCriterion("time_to_goal", {"max": f"{limit:.0f} s"}, Reason(f"held: it took {took:.1f} s"))
     length = path_length(drive.poses.values[:, :2])

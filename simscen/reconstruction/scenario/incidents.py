@@ -11,7 +11,7 @@ from simscen.core.geometry import Array
 from simscen.reconstruction.drive.gaps import belief_with_pose
 from simscen.reconstruction.drive.goals import BEND_SOURCE, STOP_SOURCE
 from simscen.reconstruction.drive.recorded_drive import RecordedDrive, TimedValues
-from simscen.reconstruction.reasons import windows
+from simscen.reconstruction.reasons import find_windows
 
 STUCK_RADIUS_M, STUCK_S = 0.5, 10.0
 """A robot with a goal is stuck if it stays in a circle of this radius for this time, as in Nav2's progress checker."""
@@ -54,7 +54,7 @@ def _position(drive: RecordedDrive, time: float) -> tuple[float, float]:
 
 
 def _contacts(drive: RecordedDrive) -> Iterator[Incident]:
-    for pressed in windows(drive.bumper.values[:, 0] > 0.5, drive.bumper.times, max_gap=0.3):
+    for pressed in find_windows(drive.bumper.values[:, 0] > 0.5, drive.bumper.times, max_gap=0.3):
         detail = f"the bumper was pressed for {max(pressed.length, 0.05):.2f} s"
         yield Incident("contact", pressed.begin, _position(drive, pressed.begin), detail, "collisions")
 
@@ -65,8 +65,8 @@ def _standstills(drive: RecordedDrive) -> Iterator[Incident]:
     If the goal was derived from the driven path, the robot must also have been commanded to drive away.
     """
     for goal in drive.goals:
-        end = drive.duration if goal.ended is None else goal.ended
-        chosen = (drive.poses.times >= goal.sent) & (drive.poses.times <= end)
+        end = drive.duration if goal.end_time is None else goal.end_time
+        chosen = (drive.poses.times >= goal.sent_time) & (drive.poses.times <= end)
         times, positions = drive.poses.times[chosen], drive.poses.values[chosen, :2]
         begin, length = longest_stay(times, positions, STUCK_RADIUS_M)
         is_estimated = goal.source in (STOP_SOURCE, BEND_SOURCE)
@@ -108,13 +108,13 @@ def _lost(drive: RecordedDrive) -> Iterator[Incident]:
         return
     if drive.has_true_poses:
         errors = np.hypot(*(belief.values[:, :2] - drive.poses.poses_at(belief.times)[:, :2]).T)
-        for window in windows(errors > LOST_ERROR_M, belief.times, max_gap=1.0):
+        for window in find_windows(errors > LOST_ERROR_M, belief.times, max_gap=1.0):
             largest = float(errors[window.samples].max())
             detail = f"the localization error reached {largest:.2f} m"
             yield Incident("lost", window.begin, _position(drive, window.begin), detail, "localization_error")
         return
     deviation = np.sqrt(np.maximum(belief.values[:, 3], belief.values[:, 6]))
-    for window in windows(deviation > MAX_STD_M, belief.times, min_length=0.5, max_gap=1.0):
+    for window in find_windows(deviation > MAX_STD_M, belief.times, min_length=0.5, max_gap=1.0):
         detail = f"the localizer reported a standard deviation of {float(deviation[window.samples].max()):.2f} m"
         yield Incident("lost", window.begin, _position(drive, window.begin), detail, "localization_error")
 
@@ -122,11 +122,15 @@ def _lost(drive: RecordedDrive) -> Iterator[Incident]:
 def _goals(drive: RecordedDrive) -> Iterator[Incident]:
     """Yield an incident for each failed goal, and for the last goal if it has no result."""
     for number, goal in enumerate(drive.goals):
-        if goal.status == "failed" and goal.ended is not None:
+        if goal.status == "failed" and goal.end_time is not None:
             code = f" with {goal.error}" if goal.error else ""
             yield Incident(
-                "failed goal", goal.ended, _position(drive, goal.ended), f"`{goal.name}` failed{code}", "goals_reached"
+                "failed goal",
+                goal.end_time,
+                _position(drive, goal.end_time),
+                f"`{goal.name}` failed{code}",
+                "goals_reached",
             )
-        elif goal.ended is None and number == len(drive.goals) - 1:
+        elif goal.end_time is None and number == len(drive.goals) - 1:
             detail = f"`{goal.name}` has no result when the log ends"
             yield Incident("unfinished goal", drive.duration, _position(drive, drive.duration), detail, "goals_reached")

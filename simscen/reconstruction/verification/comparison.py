@@ -151,7 +151,9 @@ def compare_drives(recorded: RecordedDrive, repeated: RecordedDrive) -> Iterator
         if again is None:
             yield ComparedQuantity(f"goal {goal.name}", goal.status, "not sent", "")
         else:
-            difference = "" if goal.ended is None or again.ended is None else f"{again.ended - goal.ended:+.2f} s"
+            difference = (
+                "" if goal.end_time is None or again.end_time is None else f"{again.end_time - goal.end_time:+.2f} s"
+            )
             yield ComparedQuantity(f"goal {goal.name}", _outcome(goal), _outcome(again), difference)
     nearest, nearest_again = nearest_return(recorded), nearest_return(repeated)
     if nearest is not None and nearest_again is not None:
@@ -169,7 +171,7 @@ def _numbers(name: str, log: float, run: float, unit: str) -> ComparedQuantity:
 
 def _outcome(goal: RecordedGoal) -> str:
     """Return status, time, and error of a goal as text."""
-    end = "" if goal.ended is None else f" at {goal.ended:.2f} s"
+    end = "" if goal.end_time is None else f" at {goal.end_time:.2f} s"
     return f"{goal.status}{end}{f' ({goal.error})' if goal.error else ''}"
 
 

@@ -54,7 +54,7 @@ def test_without_a_ground_truth_an_uncertain_belief_is_lost():
 def test_a_robot_that_stays_in_place_with_a_goal_is_stuck():
     times = np.arange(0.0, 30.0, 0.1)
     stands = np.tile([1.0, 3.0, 0.0], (len(times), 1))
-    goal = replace(REACHED, ended=None, status="unknown")
+    goal = replace(REACHED, end_time=None, status="unknown")
     one = replace(drives.drive(), duration=30.0, poses=drives.signal(times, stands), goals=(goal,))
     assert "stuck" in kinds(one) and "unfinished goal" in kinds(one)
 
@@ -64,7 +64,7 @@ def test_a_parked_robot_whose_goal_is_where_it_stopped_is_not_stuck(speed, expec
     times = np.arange(0.0, 30.0, 0.1)
     stands = np.tile([1.0, 3.0, 0.0], (len(times), 1))
     text = drives.signal(times, np.column_stack((np.full(len(times), speed), np.zeros((len(times), 2)))))
-    goal = replace(REACHED, ended=30.0, source=STOP_SOURCE)
+    goal = replace(REACHED, end_time=30.0, source=STOP_SOURCE)
     one = replace(drives.drive(), duration=30.0, poses=drives.signal(times, stands), goals=(goal,), commands=text)
     assert [kind for kind in kinds(one) if kind == "stuck"] == expected
 
@@ -109,7 +109,7 @@ def test_limit_of_the_speed_ignores_a_robot_that_is_carried_off():
 def test_a_broken_criterion_has_the_limit_that_was_broken():
     times = np.arange(0.0, 30.0, 0.1)
     stands = np.tile([1.0, 3.0, 0.0], (len(times), 1))
-    goal = replace(REACHED, ended=None, status="unknown")
+    goal = replace(REACHED, end_time=None, status="unknown")
     one = replace(drives.drive(), duration=30.0, poses=drives.signal(times, stands), goals=(goal,))
     found = limits(one)
     assert found["stuck"] == {"max": "10 s"}

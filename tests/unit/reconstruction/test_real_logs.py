@@ -151,7 +151,7 @@ def test_a_drive_without_stops_has_goals_where_its_path_bends():
     path = np.column_stack([np.interp(times, [0, 5, 10, 15, 19.9], column) for column in zip(*corners, strict=True)])
     goals = list(goals_from_motion(drives.signal(times, np.column_stack((path, np.zeros(len(times)))))))
     np.testing.assert_allclose([goal.pose[:2] for goal in goals], corners[1:], atol=0.05)
-    assert [goal.ended for goal in goals] == pytest.approx([5, 10, 15, 19.9], abs=0.1)
+    assert [goal.end_time for goal in goals] == pytest.approx([5, 10, 15, 19.9], abs=0.1)
     assert [goal.source for goal in goals] == [BEND_SOURCE] * 3 + [STOP_SOURCE]
 
 
@@ -282,7 +282,7 @@ def test_goals_come_from_the_ends_of_plans_and_the_status_of_the_action(tmp_path
     drive = read_drive(logs.write_bag(tmp_path / "bag", sorted(recorded, key=lambda one: one.time)))
     (only,) = drive.goals
     assert math.dist(only.pose[:2], GOAL) < 0.01
-    assert (only.status, only.ended) == ("reached", pytest.approx(11.0, abs=0.2))
+    assert (only.status, only.end_time) == ("reached", pytest.approx(11.0, abs=0.2))
 
 
 def test_a_drive_starts_when_its_first_plan_does_even_if_the_robot_is_stuck(tmp_path):
@@ -296,7 +296,7 @@ def test_a_drive_starts_when_its_first_plan_does_even_if_the_robot_is_stuck(tmp_
 
 def test_log_before_the_first_goal_is_ignored(tmp_path):
     drive = read_drive(logs.write_bag(tmp_path / "bag", messages(idle=5.0)))
-    assert drive.goals[0].sent == 0.0
+    assert drive.goals[0].sent_time == 0.0
     assert drive.duration == pytest.approx(drives.DURATION_S, abs=0.2)
     assert any("before the first goal" in note for note in drive.notes)
 

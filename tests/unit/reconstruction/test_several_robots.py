@@ -69,15 +69,15 @@ def test_the_box_of_a_robot_is_around_its_footprint():
 
 
 def test_a_robot_without_a_lidar_does_not_get_the_scans_of_another_one(log):
-    assert len(collect_messages(log, {}, robot="blue").of("scan")) > 10
-    assert collect_messages(log, {}, robot="blu").of("scan") == []
+    assert len(collect_messages(log, {}, robot="blue").get("scan")) > 10
+    assert collect_messages(log, {}, robot="blu").get("scan") == []
 
 
 @pytest.mark.parametrize("robot", ["a", "s", "robot"])
 def test_topics_are_those_of_the_robot_whatever_its_name(robot, tmp_path):
     recorded = [replace(one, topic=f"/{robot}{one.topic}") for one in logs.drive(2.0)]
     read = collect_messages(logs.write_mcap(tmp_path / "log.mcap", recorded), {"truth": "/mocap"}, robot=robot)
-    assert {role for role in ("odom", "amcl_pose", "scan", "cmd_vel", "truth") if not read.of(role)} == set()
+    assert {role for role in ("odom", "amcl_pose", "scan", "cmd_vel", "truth") if not read.get(role)} == set()
     topics = {"odom": f"/{robot}/odom", "truth": f"/{robot}/mocap"}
     named = collect_messages(tmp_path / "log.mcap", topics, robot=robot)
-    assert named.of("odom") and named.of("truth")
+    assert named.get("odom") and named.get("truth")

@@ -22,7 +22,7 @@ from foreign_logs import (
 )  # fmt: skip
 
 from simscen.core.records.verdict import Evidence
-from simscen.record.foreign.options import Clock, ForeignLogOptions
+from simscen.record.foreign.options import ForeignLogOptions, TimeSource
 from simscen.record.foreign.raw_messages import UnusableLog
 from simscen.record.foreign.read import ForeignLog
 from simscen.record.foreign.timebase import check_recorder_clock, find_clock_step
@@ -247,7 +247,7 @@ def transforms(stamp_of_step: Callable[[int], int]) -> list[Message]:
 
 
 @pytest.mark.parametrize("clock", ["header", "log"])
-def test_log_times_replace_zero_stamps_of_transforms(read: Callable[..., ForeignLog], clock: Clock) -> None:
+def test_log_times_replace_zero_stamps_of_transforms(read: Callable[..., ForeignLog], clock: TimeSource) -> None:
     log = read(transforms(lambda _: 0), ForeignLogOptions(truth="map:base_link", clock=clock))
     np.testing.assert_allclose(log.trace.truth.values[:, 0], SPEED * log.trace.truth.ticks / 1000, atol=1e-6)
     assert len(log.trace.truth) == 201
