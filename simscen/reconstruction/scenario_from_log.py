@@ -130,7 +130,7 @@ def _write_valid_scenario(
 
 
 def _without_invalid_faults(estimated: EstimatedParts, problems: list[Problem]) -> EstimatedParts:
-    """Return the parts without the faults that `problems` mention. Raise InvalidInput if `problems` mention no fault."""
+    """Return the parts without the faults that `problems` mention. Raises InvalidInput if no fault is mentioned."""
     messages = "\n".join(problem.message for problem in problems)
     invalid = [fault for fault in estimated.faults if f"fault `{fault.kind}` does not fit `{fault.target}`" in messages]
     if not invalid:

@@ -164,7 +164,7 @@ class _DriveReader:
         return np.where(is_stamped, (stamps - self._stamp_start) / NS_PER_SECOND, arrivals), arrivals
 
     def _signal(self, role: str, columns: int, row_of: Callable[[Any], Sequence[float]]) -> TimedValues:
-        """Return the signal of a role, without invalid values. `row_of` converts a decoded message to a row of values."""
+        """Return the valid values of a role as a signal. `row_of` converts a decoded message to a row of values."""
         messages = self._messages.get(role)
         if not messages:
             return no_values(columns)

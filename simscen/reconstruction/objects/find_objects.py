@@ -22,20 +22,25 @@ from simscen.reconstruction.static_world import StaticWorld, offset_poses
 MIN_DISPLACEMENT_M = 0.4
 """Minimum displacement of a moving object."""
 MIN_FREED_FRACTION = 0.5
-"""Minimum fraction of points that shows that an object has moved: of its first points, through which beams pass later,
-or of its points at the farthest position, through which beams passed before."""
+"""Minimum fraction of free points that shows that an object has moved.
+
+These are the first points of the object, through which beams pass later, or its points at the farthest position,
+through which beams passed before."""
 SEEN_FREE_FRACTION = 0.6
 """Minimum fraction of an object's points through which beams pass while the object is absent."""
 COMPARED_CLUSTERS = 5
 """Number of clusters to compare at the start of a track, and where the track is farthest from the start."""
-KEYFRAME_TOLERANCE_M, KEYFRAME_TOLERANCE_RAD, MAX_KEYFRAMES = 0.05, math.radians(10), 400
-"""Maximum distance and turn between a track and its keyframes, and approximate maximum number of keyframes."""
+KEYFRAME_TOLERANCE_M, KEYFRAME_TOLERANCE_RAD = 0.05, math.radians(10)
+"""Maximum distance and turn between a track and the interpolation of its keyframes."""
+MAX_KEYFRAMES = 400
+"""Approximate maximum number of keyframes of an object."""
 MERGE_DISTANCE_M = 0.3
 """Maximum distance between the nearest hits of two tracks of the same standing object."""
 MIN_CLUSTERS_STANDING = 10
 """Minimum number of clusters of a standing object."""
 PART_MARGIN_M, PART_FRACTION = 0.15, 0.5
-"""A track is part of a known object if more than PART_FRACTION of its clusters are within PART_MARGIN_M of it."""
+"""A track is part of a known object if more than PART_FRACTION of its clusters are at most PART_MARGIN_M from the
+object."""
 MIN_SIZE_M = 0.06
 """Minimum length of the longest side, or of the radius, of an object."""
 MAX_OBJECT_SPEED_M_S = 4.0
@@ -45,7 +50,10 @@ MAX_OBJECT_SPEED_M_S = 4.0
 def find_objects(
     compared: ComparedScans, world: StaticWorld, has_true_poses: bool, robots: Sequence[FoundObject] = ()
 ) -> list[FoundObject]:
-    """Return the other `robots`, then the objects that the scans show and the static world does not contain."""
+    """Return the other `robots`, and after them the objects that the scans show but the static world does not contain.
+
+    The objects are named "moving object 1", "object 1", … in the order of their first appearance.
+    """
     tracks = track_objects(scan_clusters(compared, world, has_true_poses))
     usable = np.flatnonzero(usable_scans(compared))
     moving = [track for track in tracks if _has_moved(compared, track, usable)]
@@ -84,23 +92,26 @@ def object_of_robot(name: str, outline: Polygon, times: Array, poses: Array) -> 
 
 
 def _has_moved(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> bool:
-    """Return whether an object moved, and not only its visible side. `usable` are the indices of valid scans."""
+    """Return whether an object moved. It did not move if only another side of the object became visible.
+
+    `usable` are the indices of usable scans.
+    """
     shape = fit_shape(track.clusters, is_moving=True)
     centers = shape.poses[:, :2]
     start = np.median(centers[:COMPARED_CLUSTERS], axis=0)
-    away = np.hypot(*(centers - start).T)
-    far = int(np.argmax(median_of_three(away)))
-    if float(median_of_three(away)[far]) < MIN_DISPLACEMENT_M:
+    distances = median_of_three(np.hypot(*(centers - start).T))
+    farthest = int(np.argmax(distances))
+    if float(distances[farthest]) < MIN_DISPLACEMENT_M:
         return False
-    first = np.concatenate([cluster.points for cluster in track.clusters[:COMPARED_CLUSTERS]])
-    near = max(0, far - COMPARED_CLUSTERS // 2)
-    last = np.concatenate([cluster.points for cluster in track.clusters[near : near + COMPARED_CLUSTERS]])
-    rows_late = usable[(usable >= track.clusters[far].scan - 2) & (usable <= track.clusters[far].scan + 20)]
-    rows_early = usable[(usable >= track.clusters[0].scan - 5) & (usable <= track.clusters[0].scan + 3)]
-    freed, was_free = (
-        fraction_seen_free(compared, points, rows) for points, rows in ((first, rows_late), (last, rows_early))
-    )
-    return max(_median_fraction(freed), _median_fraction(was_free)) > MIN_FREED_FRACTION
+    first_points = np.concatenate([cluster.points for cluster in track.clusters[:COMPARED_CLUSTERS]])
+    begin = max(0, farthest - COMPARED_CLUSTERS // 2)
+    far_points = np.concatenate([cluster.points for cluster in track.clusters[begin : begin + COMPARED_CLUSTERS]])
+    first_scan, far_scan = track.clusters[0].scan, track.clusters[farthest].scan
+    late_rows = usable[(usable >= far_scan - 2) & (usable <= far_scan + 20)]
+    early_rows = usable[(usable >= first_scan - 5) & (usable <= first_scan + 3)]
+    freed_later = fraction_seen_free(compared, first_points, late_rows)
+    free_before = fraction_seen_free(compared, far_points, early_rows)
+    return max(_median_fraction(freed_later), _median_fraction(free_before)) > MIN_FREED_FRACTION
 
 
 def median_of_three(values: Array) -> Array:
@@ -112,7 +123,7 @@ def median_of_three(values: Array) -> Array:
 
 
 def _median_fraction(fractions: Array) -> float:
-    """Return the median of the fractions that are not nan; 0 if all are."""
+    """Return the median of the fractions that are not nan; 0 if all fractions are nan."""
     return float(np.nanmedian(fractions)) if np.isfinite(fractions).any() else 0.0
 
 
@@ -120,11 +131,11 @@ def _merge_tracks(tracks: list[ObjectTrack], compared: ComparedScans, usable: In
     """Merge tracks of the same standing object."""
     merged: list[ObjectTrack] = []
     for track in tracks:
-        same = next((earlier for earlier in merged if _is_same(earlier, track, compared, usable)), None)
-        if same is None:
+        earlier = next((candidate for candidate in merged if _is_same(candidate, track, compared, usable)), None)
+        if earlier is None:
             merged.append(ObjectTrack([*track.clusters]))
         else:
-            same.clusters = sorted([*same.clusters, *track.clusters], key=lambda cluster: cluster.time)
+            earlier.clusters = sorted([*earlier.clusters, *track.clusters], key=lambda cluster: cluster.time)
     return merged
 
 
@@ -135,86 +146,94 @@ def _is_same(earlier: ObjectTrack, later: ObjectTrack, compared: ComparedScans, 
     if float(np.hypot(*(a[:, None] - b[None]).transpose(2, 0, 1)).min()) > MERGE_DISTANCE_M:
         return False
     first, last = earlier.clusters[-1].scan, later.clusters[0].scan
-    between = usable[(usable > first) & (usable < last)]
-    return not len(between) or _median_fraction(fraction_seen_free(compared, b, between)) < SEEN_FREE_FRACTION
+    rows = usable[(usable > first) & (usable < last)]
+    return not len(rows) or _median_fraction(fraction_seen_free(compared, b, rows)) < SEEN_FREE_FRACTION
 
 
 def _is_part(track: ObjectTrack, thing: FoundObject) -> bool:
-    """Return whether most clusters of a track are at the position of the object `thing` at the same time."""
+    """Return whether most clusters of a track are hits on the object `thing`, by position and time."""
     times = np.array([cluster.time for cluster in track.clusters])
     centers = np.array([cluster.center for cluster in track.clusters])
-    inside = np.hypot(*(centers - thing.poses_at(times)[:, :2]).T) < thing.radius + PART_MARGIN_M
-    present = (times >= thing.keyframes[0][0] - 0.5) & (times <= thing.keyframes[-1][0] + 0.5)
-    return float(np.mean(inside & present)) > PART_FRACTION
+    is_inside = np.hypot(*(centers - thing.poses_at(times)[:, :2]).T) < thing.radius + PART_MARGIN_M
+    is_present = (times >= thing.keyframes[0][0] - 0.5) & (times <= thing.keyframes[-1][0] + 0.5)
+    return float(np.mean(is_inside & is_present)) > PART_FRACTION
 
 
 def _object_of_track(compared: ComparedScans, track: ObjectTrack, usable: Indices, is_moving: bool) -> FoundObject:
-    """Return the object of a track, still without a name."""
+    """Return the object of a track. Its name is still empty."""
     shape = fit_shape(track.clusters, is_moving)
     keyframes = keyframes_of(shape) if is_moving else [_keyframe(shape, 0)]
-    appear_time = _appearance(compared, track, usable)
-    disappear_time = _disappearance(compared, track, usable)
+    appear_time = _appear_time(compared, track, usable)
+    disappear_time = _disappear_time(compared, track, usable)
     if disappear_time is not None and is_moving:
         disappear_time = max(disappear_time, keyframes[-1][0] + 0.01)
-    seen = f"seen in {len(track.clusters)} scans"
+    text = f"seen in {len(track.clusters)} scans"
     if is_moving:
         length = float(np.hypot(*np.diff(shape.poses[:, :2], axis=0).T).sum())
-        text = f"{seen}, moved {length:.1f} m"
+        text += f", moved {length:.1f} m"
     else:
-        text = f"{seen} at one place, and not on the map"
+        text += " at one place, and not on the map"
     confidence = "high" if len(track.clusters) >= 20 else "medium"
     reason = Reason(text, track.begin, track.end, confidence)
     return FoundObject("", shape.size, tuple(keyframes), appear_time, disappear_time, reason)
 
 
-def _appearance(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> float | None:
+def _appear_time(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> float | None:
     """Return the time in s at which the object appeared; None if no earlier scan shows that its first place is free."""
     points = np.concatenate([cluster.points for cluster in track.clusters[:3]])
-    before = usable[usable < track.clusters[0].scan]
-    if not len(before):
+    earlier_rows = usable[usable < track.clusters[0].scan]
+    if not len(earlier_rows):
         return None
-    shares = fraction_seen_free(compared, points, before)
-    free = before[np.nan_to_num(shares, nan=0.0) > SEEN_FREE_FRACTION]
-    return float(compared.scans.times[free[-1] + 1]) if len(free) else None
+    fractions = fraction_seen_free(compared, points, earlier_rows)
+    free_rows = earlier_rows[np.nan_to_num(fractions, nan=0.0) > SEEN_FREE_FRACTION]
+    return float(compared.scans.times[free_rows[-1] + 1]) if len(free_rows) else None
 
 
-def _disappearance(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> float | None:
-    """Return the time in s at which the object disappeared; None if no later scan shows that its last place is free."""
+def _disappear_time(compared: ComparedScans, track: ObjectTrack, usable: Indices) -> float | None:
+    """Return the time in s at which the object disappeared; None if it stayed.
+
+    It disappeared if two successive later scans show that its last place is free.
+    """
     points = np.concatenate([cluster.points for cluster in track.clusters[-3:]])
-    after = usable[usable > track.clusters[-1].scan]
-    if not len(after):
+    later_rows = usable[usable > track.clusters[-1].scan]
+    if not len(later_rows):
         return None
-    free = np.nan_to_num(fraction_seen_free(compared, points, after), nan=0.0) > SEEN_FREE_FRACTION
-    twice = free & np.append(free[1:], free[-1])
-    return float(compared.scans.times[after[np.argmax(twice)]]) if twice.any() else None
+    is_free = np.nan_to_num(fraction_seen_free(compared, points, later_rows), nan=0.0) > SEEN_FREE_FRACTION
+    is_free_twice = is_free & np.append(is_free[1:], is_free[-1])
+    return float(compared.scans.times[later_rows[np.argmax(is_free_twice)]]) if is_free_twice.any() else None
 
 
 def _keyframe(shape: ObjectShape, index: int) -> Keyframe:
+    """Return the pose of a shape with this index as a keyframe."""
     x, y, yaw = shape.poses[index].tolist()
     return float(shape.times[index]), x, y, yaw
 
 
 def keyframes_of(shape: ObjectShape) -> list[Keyframe]:
-    """Return few keyframes whose linear interpolation approximates the poses of a shape (Douglas-Peucker)."""
+    """Return keyframes whose linear interpolation approximates the poses of a shape.
+
+    The Douglas-Peucker algorithm selects the keyframes. Keyframes that require more than MAX_OBJECT_SPEED_M_S are
+    omitted.
+    """
     times, poses = shape.times, shape.poses.copy()
     poses[:, 2] = np.unwrap(poses[:, 2])
     scale = np.array([1.0, 1.0, KEYFRAME_TOLERANCE_M / KEYFRAME_TOLERANCE_RAD])
-    kept, parts = {0, len(times) - 1}, [(0, len(times) - 1)]
-    while parts and len(kept) < MAX_KEYFRAMES:
+    selected, parts = {0, len(times) - 1}, [(0, len(times) - 1)]
+    while parts and len(selected) < MAX_KEYFRAMES:
         first, last = parts.pop()
         if last - first < 2:
             continue
-        share = (times[first : last + 1] - times[first]) / max(times[last] - times[first], 1e-9)
-        line = poses[first] + share[:, None] * (poses[last] - poses[first])
+        fractions = (times[first : last + 1] - times[first]) / max(times[last] - times[first], 1e-9)
+        line = poses[first] + fractions[:, None] * (poses[last] - poses[first])
         errors = np.linalg.norm((poses[first : last + 1] - line) * scale, axis=1)
         worst = int(np.argmax(errors))
         if errors[worst] > KEYFRAME_TOLERANCE_M:
-            kept.add(first + worst)
+            selected.add(first + worst)
             parts += [(first, first + worst), (first + worst, last)]
-    frames = [_keyframe(shape, index) for index in sorted(kept)]
-    slow = frames[:1]
-    for frame in frames[1:]:
-        step = frame[0] - slow[-1][0]
-        if step > 1e-6 and math.dist(frame[1:3], slow[-1][1:3]) <= MAX_OBJECT_SPEED_M_S * step:
-            slow.append(frame)
-    return slow
+    candidates = [_keyframe(shape, index) for index in sorted(selected)]
+    keyframes = candidates[:1]
+    for keyframe in candidates[1:]:
+        step = keyframe[0] - keyframes[-1][0]
+        if step > 1e-6 and math.dist(keyframe[1:3], keyframes[-1][1:3]) <= MAX_OBJECT_SPEED_M_S * step:
+            keyframes.append(keyframe)
+    return keyframes

@@ -1,4 +1,4 @@
-"""Data of an object that the scans show and the map does not contain: shape, keyframes, and fitted pedestrian."""
+"""Data of an object that the scans show but the map does not contain: shape, keyframes, and fitted pedestrian."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class FittedPedestrian:
         appear_time: Time in s at which the pedestrian appears.
         walker: Start, goals, speed, and behavior of the pedestrian.
         times: Times (n,) in s of the simulation.
-        positions: Positions (n, 2) of the pedestrian in the simulation.
+        positions: Positions (n, 2) in the map frame of the pedestrian in the simulation.
         rmse: RMSE in m between the simulated positions and the track.
-        time_shift: Magnitude in s of the time shift with which the positions fit the track best.
+        time_shift: Absolute value in s of the time shift with which the positions fit the track best.
         meets_robot: Whether the robot came so near that the track shows how the person reacts to the robot.
     """
 
@@ -93,8 +93,8 @@ class FoundObject:
 
     def poses_at(self, times: Array) -> Array:
         """Return the poses x, y, yaw (n, 3) at `times` (n,) by linear interpolation between the keyframes."""
-        frames = np.array(self.keyframes)
-        return np.column_stack([np.interp(times, frames[:, 0], frames[:, axis]) for axis in (1, 2, 3)])
+        keyframes = np.array(self.keyframes)
+        return np.column_stack([np.interp(times, keyframes[:, 0], keyframes[:, axis]) for axis in (1, 2, 3)])
 
     @property
     def comment(self) -> str:

@@ -1,6 +1,6 @@
 """Simulation of pedestrians in a recorded drive, in which the robot and other objects move as in the log.
 
-It shows whether a fitted pedestrian walks like the recorded person.
+The simulation shows whether a fitted pedestrian walks like the recorded person.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from simscen.sim.body.outline import circle
 
 STEP_S = 0.05
 """Time step of the pedestrian simulation."""
-NEAR_M = 4.0
-"""Maximum distance of objects and people from the simulated pedestrians in a step. Others are omitted to save time."""
+MAX_OBSERVED_DISTANCE_M = 4.0
+"""Maximum distance between a simulated pedestrian and the objects and people that are simulated in a step."""
 Walker = tuple[float, WalkingPedestrian]
 """Time in s at which a pedestrian appears, and the pedestrian."""
 IsGivenUp = Callable[[float, tuple[float, float]], bool]
-"""Function (time in s, position of a pedestrian) that returns whether to end the simulation."""
+"""Function that returns whether to end the simulation. Its arguments are the time in s and a pedestrian's position."""
 
 
 class PedestrianTrial:
@@ -48,10 +48,10 @@ class PedestrianTrial:
         end: float,
         is_given_up: IsGivenUp = lambda _time, _position: False,
     ) -> dict[str, tuple[Array, Array]]:
-        """Simulate the pedestrians `walkers` until `end` in s, or until `is_given_up` returns true for one of them.
+        """Simulate the pedestrians `walkers`, and return the times (n,) and positions (n, 2) of each one by name.
 
-        Return the times (n,) and positions (n, 2) of each pedestrian by name. `people` and `objects` follow their
-        keyframes. The pedestrians treat `people` like robots, and `objects` like walls.
+        The simulation ends at `end` in s, or when `is_given_up` returns True for a pedestrian. `people` and `objects`
+        follow their keyframes. The simulated pedestrians treat `people` like robots, and `objects` like walls.
         """
         crowd = Crowd(self.world.walls, self.world.plan_path)
         paths: dict[str, list[tuple[float, float, float]]] = {walker.name: [] for _, walker in walkers}
@@ -61,7 +61,7 @@ class PedestrianTrial:
         robot = _RecordedDisc("robot", self._radius, self._poses.poses_at(times))
         discs = [_RecordedDisc(person.name, person.radius, person.poses_at(times)) for person in people]
         outlines = [_RecordedOutline(thing, times) for thing in objects]
-        present = [np.array([thing.is_present(time) for time in times.tolist()]) for thing in (*people, *objects)]
+        presence = [np.array([thing.is_present(time) for time in times.tolist()]) for thing in (*people, *objects)]
         for index, time in enumerate(times.tolist()):
             while waiting and waiting[0][0] <= time + 1e-9:
                 crowd.add(waiting.pop(0)[1])
@@ -71,37 +71,41 @@ class PedestrianTrial:
             if any(is_given_up(time, (pose.x, pose.y)) for pose in poses.values()):
                 break
             positions = np.array([pose[:2] for pose in poses.values()])
-            near = [
-                thing
-                for thing, is_present in zip((*discs, *outlines), present, strict=True)
-                if is_present[index] and thing.is_near(index, positions)
+            nearby = [
+                motion
+                for motion, is_present in zip((*discs, *outlines), presence, strict=True)
+                if is_present[index] and motion.is_near(index, positions)
             ]
-            robots = tuple(disc.observed(index) for disc in (robot, *near) if isinstance(disc, _RecordedDisc))
-            things = tuple(one.observed(index) for one in near if isinstance(one, _RecordedOutline))
-            crowd.step(Surroundings(robots, things), STEP_S)
+            observed_robots = tuple(
+                disc.observed(index) for disc in (robot, *nearby) if isinstance(disc, _RecordedDisc)
+            )
+            observed_objects = tuple(item.observed(index) for item in nearby if isinstance(item, _RecordedOutline))
+            crowd.step(Surroundings(observed_robots, observed_objects), STEP_S)
         arrays = {name: np.array(path).reshape(-1, 3) for name, path in paths.items()}
         return {name: (path[:, 0], path[:, 1:]) for name, path in arrays.items()}
 
 
 class _RecordedMotion:
-    """Robot, person, or object with a recorded pose for each step of the simulation. `poses` is (n, 3)."""
+    """Robot, person, or object with a recorded pose x, y, yaw for each step of the simulation: `poses` (n, 3)."""
 
     def __init__(self, poses: Array) -> None:
         self.poses = poses
 
     def is_near(self, index: int, positions: Array) -> bool:
-        """Return whether the pose in the step `index` is within NEAR_M of one of the positions (m, 2)."""
-        return bool(len(positions)) and float(np.hypot(*(positions - self.poses[index, :2]).T).min()) < NEAR_M
+        """Return whether any of `positions` (m, 2) is within MAX_OBSERVED_DISTANCE_M of the pose in step `index`."""
+        if not len(positions):
+            return False
+        return float(np.hypot(*(positions - self.poses[index, :2]).T).min()) < MAX_OBSERVED_DISTANCE_M
 
 
 class _RecordedDisc(_RecordedMotion):
-    """Robot or person as a disc that pedestrians treat like a robot."""
+    """Robot or person as a disc, which pedestrians treat like a robot."""
 
     def __init__(self, name: str, radius: float, poses: Array) -> None:
         super().__init__(poses)
         self._name, self._radius, self._outline = name, radius, np.array(circle(radius, 12))
-        several = len(poses) > 1
-        self._velocities: Array = np.gradient(poses[:, :2], STEP_S, axis=0) if several else np.zeros((1, 2))
+        has_motion = len(poses) > 1
+        self._velocities: Array = np.gradient(poses[:, :2], STEP_S, axis=0) if has_motion else np.zeros((1, 2))
 
     def observed(self, index: int) -> ObservedRobot:
         """Return the disc in the step `index` of the simulation."""
@@ -110,7 +114,7 @@ class _RecordedDisc(_RecordedMotion):
 
 
 class _RecordedOutline(_RecordedMotion):
-    """Object as an outline that pedestrians treat like a wall."""
+    """Object as an outline, which pedestrians treat like a wall."""
 
     def __init__(self, thing: FoundObject, times: Array) -> None:
         super().__init__(thing.poses_at(times))

@@ -16,15 +16,17 @@ from simscen.reconstruction.reasons import find_windows
 MAX_ROUND_RADIUS_M, MAX_ROUND_ERROR_M = 0.6, 0.035
 """Maximum radius of a round object, and maximum mean distance of its hits from a circle."""
 MAX_HALF_ANGLE_RAD = math.radians(80.0)
-"""Upper limit of half the angle that an object covers, so that the radius computed from this angle is finite."""
+"""Maximum of half the angle that an object covers, so that the radius computed from this angle is finite."""
 MIN_SIDE_M = 0.1
 """Minimum side of a box."""
 SIZE_PERCENTILE = 90.0
 """Percentile of the visible sizes in single scans that is used as the size of a moving box."""
 HEADING_SPEED_M_S, HEADING_SPAN_S = 0.25, 0.8
-"""Speed above which the direction of motion is the heading, and time before and after over which it is measured."""
+"""Speed above which the direction of motion is the heading, and time on each side over which the motion is measured."""
 MIN_STAND_S = 1.5
-"""Minimum duration of a stop, in which the speed is below HEADING_SPEED_M_S."""
+"""Minimum duration of a stop, in which the speed is at most HEADING_SPEED_M_S."""
+MAX_POINTS = 4000
+"""Maximum number of hits that are used for the box of a standing object."""
 SMOOTHING_SCANS = 5
 """Number of scans over which positions are smoothed."""
 TRIED_ANGLES_RAD = np.radians(np.arange(0.0, 90.0, 2.0))
@@ -33,9 +35,12 @@ TRIED_ANGLES_RAD = np.radians(np.arange(0.0, 90.0, 2.0))
 
 @dataclass(frozen=True, eq=False)
 class ObjectShape:
-    """Size of an object, and its `poses` x, y, yaw (n, 3) in the map frame at `times` (n,) in s.
+    """Size and poses of an object.
 
-    `size` is (length, width) of a box in m, or (radius,) of a cylinder.
+    Attributes:
+        size: (length, width) of a box in m, or (radius,) of a cylinder.
+        times: Times (n,) of the poses in s.
+        poses: Poses x, y, yaw (n, 3) of the center in the map frame.
     """
 
     size: tuple[float, ...]
@@ -57,35 +62,38 @@ def fit_shape(clusters: list[ScanCluster], is_moving: bool) -> ObjectShape:
 
 
 def _fit_cylinder(clusters: list[ScanCluster]) -> tuple[float, float]:
-    """Return radius and mean error in m of the cylinder that fits the fully visible clusters; inf for few clusters."""
-    whole = [cluster for cluster in clusters if cluster.is_fully_visible and len(cluster.points) >= 5]
-    if len(whole) < 3:
+    """Return the radius and the mean error in m of the cylinder that fits the fully visible clusters.
+
+    Both are inf if fewer than three clusters are fully visible.
+    """
+    visible = [cluster for cluster in clusters if cluster.is_fully_visible and len(cluster.points) >= 5]
+    if len(visible) < 3:
         return math.inf, math.inf
-    radius = float(np.median([_radius_of(cluster) for cluster in whole]))
+    radius = float(np.median([_circle_radius(cluster) for cluster in visible]))
     errors = [
         float(np.mean(np.abs(np.hypot(*(cluster.points - _circle_center(cluster, radius)).T) - radius)))
-        for cluster in whole
+        for cluster in visible
     ]
     return radius, float(np.median(errors))
 
 
-def _radius_of(cluster: ScanCluster) -> float:
+def _circle_radius(cluster: ScanCluster) -> float:
     """Return the radius in m of the circle with the same nearest range and the same angle, seen from the lidar."""
-    near = float(np.hypot(*(cluster.points - cluster.lidar).T).min())
+    nearest_range = float(np.hypot(*(cluster.points - cluster.lidar).T).min())
     sine = math.sin(min(cluster.angle / 2, MAX_HALF_ANGLE_RAD))
-    return near * sine / (1.0 - sine)
+    return nearest_range * sine / (1.0 - sine)
 
 
 def _circle_center(cluster: ScanCluster, radius: float) -> Array:
     """Return the center (2,) of the circle with this radius that fits the hits, in the mean direction of the hits."""
     offsets = cluster.points - cluster.lidar
-    distance = np.hypot(*offsets.T)
-    middle = (offsets / distance[:, None]).mean(axis=0)
-    middle /= max(float(np.hypot(*middle)), 1e-9)
-    # Each hit gives a distance of the center along the mean direction. Their median is robust against outliers.
-    across = offsets @ np.array([-middle[1], middle[0]])
-    along = offsets @ middle + np.sqrt(np.maximum(radius**2 - across**2, 0.0))
-    center: Array = cluster.lidar + middle * float(np.median(along))
+    distances = np.hypot(*offsets.T)
+    direction = (offsets / distances[:, None]).mean(axis=0)
+    direction /= max(float(np.hypot(*direction)), 1e-9)
+    # Each hit gives a distance of the center along the mean direction. The median is robust against outliers.
+    across = offsets @ np.array([-direction[1], direction[0]])
+    center_distances = offsets @ direction + np.sqrt(np.maximum(radius**2 - across**2, 0.0))
+    center: Array = cluster.lidar + direction * float(np.median(center_distances))
     return center
 
 
@@ -114,19 +122,19 @@ def _constant_at_rest(times: Array, centers: Array, is_moving: Mask) -> Array:
 def _standing_box(clusters: list[ScanCluster], times: Array) -> ObjectShape:
     """Return the rectangle that fits the hits of all clusters together."""
     points = np.concatenate([cluster.points for cluster in clusters])
-    if len(points) > 4000:
-        points = points[:: len(points) // 4000 + 1]
+    if len(points) > MAX_POINTS:
+        points = points[:: len(points) // MAX_POINTS + 1]
     yaw = _orientation(points)
-    turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
-    local = points @ turn
+    rotation = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+    local = points @ rotation
     low, high = np.percentile(local, 1, axis=0), np.percentile(local, 99, axis=0)
     size = np.maximum(high - low, MIN_SIDE_M)
-    middle = (low + high) / 2
+    center = (low + high) / 2
     for axis in (0, 1):
-        if high[axis] - low[axis] < MIN_SIDE_M:  # only one face was seen: the object is behind it
-            lidar = float(np.mean([cluster.lidar @ turn[:, axis] for cluster in clusters]))
-            middle[axis] += math.copysign((size[axis] - (high[axis] - low[axis])) / 2, middle[axis] - lidar)
-    x, y = (turn @ middle).tolist()
+        if high[axis] - low[axis] < MIN_SIDE_M:  # the lidar saw only one face, and the object is behind this face
+            lidar = float(np.mean([cluster.lidar @ rotation[:, axis] for cluster in clusters]))
+            center[axis] += math.copysign((size[axis] - (high[axis] - low[axis])) / 2, center[axis] - lidar)
+    x, y = (rotation @ center).tolist()
     return ObjectShape(
         (round(float(size[0]), 2), round(float(size[1]), 2)), times, np.tile([x, y, yaw], (len(times), 1))
     )
@@ -137,34 +145,37 @@ def _orientation(points: Array) -> float:
 
     Source: Zhang, Xu, Dong and Dolan, Efficient L-shape fitting for vehicle detection using laser scanners (2017).
     """
-    best, found = -math.inf, 0.0
+    best_closeness, best_angle = -math.inf, 0.0
     for angle in TRIED_ANGLES_RAD.tolist():
         along = points @ np.array([math.cos(angle), math.sin(angle)])
         across = points @ np.array([-math.sin(angle), math.cos(angle)])
-        edges = [np.minimum(side - np.percentile(side, 1), np.percentile(side, 99) - side) for side in (along, across)]
-        closeness = float(np.sum(1.0 / np.maximum(np.minimum(np.abs(edges[0]), np.abs(edges[1])), 0.03)))
-        if closeness > best + 1e-9:
-            best, found = closeness, angle
-    return found
+        distances = [
+            np.abs(np.minimum(axis - np.percentile(axis, 1), np.percentile(axis, 99) - axis))
+            for axis in (along, across)
+        ]
+        closeness = float(np.sum(1.0 / np.maximum(np.minimum(*distances), 0.03)))
+        if closeness > best_closeness + 1e-9:
+            best_closeness, best_angle = closeness, angle
+    return best_angle
 
 
 def _headings(times: Array, centers: Array) -> tuple[Array, Mask]:
     """Return the heading (n,) in rad at each time, and a mask (n,) of the times at which the object moves.
 
-    A standing object keeps its last heading. Before the first motion, it has the heading of the first motion.
+    A standing object keeps its last heading. Before the first motion, the heading is that of the first motion.
     """
     before = np.maximum(np.searchsorted(times, times - HEADING_SPAN_S), 0)
     after = np.minimum(np.searchsorted(times, times + HEADING_SPAN_S), len(times) - 1)
-    motion = centers[after] - centers[before]
-    speed = np.hypot(*motion.T) / np.maximum(times[after] - times[before], 1e-3)
-    is_moving = speed > HEADING_SPEED_M_S
-    fast = np.flatnonzero(is_moving)
-    if not len(fast):
-        whole = centers[-1] - centers[0]
-        return np.full(len(times), math.atan2(whole[1], whole[0])), is_moving
-    newest = np.searchsorted(fast, np.arange(len(times)), side="right") - 1
-    chosen = motion[fast[np.maximum(newest, 0)]]
-    return np.arctan2(chosen[:, 1], chosen[:, 0]), is_moving
+    motions = centers[after] - centers[before]
+    speeds = np.hypot(*motions.T) / np.maximum(times[after] - times[before], 1e-3)
+    is_moving = speeds > HEADING_SPEED_M_S
+    moving_indices = np.flatnonzero(is_moving)
+    if not len(moving_indices):
+        total_motion = centers[-1] - centers[0]
+        return np.full(len(times), math.atan2(total_motion[1], total_motion[0])), is_moving
+    last_moving = np.searchsorted(moving_indices, np.arange(len(times)), side="right") - 1
+    last_motions = motions[moving_indices[np.maximum(last_moving, 0)]]
+    return np.arctan2(last_motions[:, 1], last_motions[:, 0]), is_moving
 
 
 def _extents(clusters: list[ScanCluster], yaw: Array) -> tuple[Array, Array]:
@@ -178,17 +189,18 @@ def _extents(clusters: list[ScanCluster], yaw: Array) -> tuple[Array, Array]:
 
 
 def _box_centers(clusters: list[ScanCluster], yaw: Array, low: Array, high: Array, size: Array) -> Array:
-    """Return the centers (n, 2) of boxes with this `size` (2,) whose faces toward the lidar are at the hits.
+    """Return the centers (n, 2) of boxes of this `size` (2,). The faces toward the lidar are at the hits.
 
     `low` and `high` (n, 2) are the extents of the hits along and across the headings `yaw` (n,).
     """
     c, s = np.cos(yaw), np.sin(yaw)
-    at = np.array([cluster.lidar for cluster in clusters])
-    lidar = np.column_stack((c * at[:, 0] + s * at[:, 1], c * at[:, 1] - s * at[:, 0]))
-    middle = (low + high) / 2
-    middle = np.where(lidar < low, low + size / 2, middle)
-    middle = np.where(lidar > high, high - size / 2, middle)
-    return np.column_stack((c * middle[:, 0] - s * middle[:, 1], s * middle[:, 0] + c * middle[:, 1]))
+    positions = np.array([cluster.lidar for cluster in clusters])
+    x, y = positions.T
+    lidar = np.column_stack((c * x + s * y, c * y - s * x))
+    center = (low + high) / 2
+    center = np.where(lidar < low, low + size / 2, center)
+    center = np.where(lidar > high, high - size / 2, center)
+    return np.column_stack((c * center[:, 0] - s * center[:, 1], s * center[:, 0] + c * center[:, 1]))
 
 
 def _smoothed(centers: Array) -> Array:

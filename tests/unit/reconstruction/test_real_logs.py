@@ -135,7 +135,7 @@ def test_a_robot_that_stands_still_has_no_goal(tmp_path):
     ]
     drive = read_drive(logs.write_bag(tmp_path / "bag", recorded))
     assert not drive.goals
-    assert "a goal, because the robot got none and did not drive anywhere" in drive.notes
+    assert "a goal, because the robot got no goal and did not drive anywhere" in drive.notes
 
 
 def test_without_goals_the_end_of_the_motion_is_the_goal(tmp_path):
@@ -165,7 +165,7 @@ def test_scans_of_another_topic_are_used_with_a_note(tmp_path):
     recorded = [replace(one, topic="/front/scan") if one.topic == "/scan" else one for one in messages()]
     drive = read_drive(logs.write_bag(tmp_path / "bag", recorded))
     assert len(drive.scans) > 50
-    assert "scans on /scan; those on /front/scan are used, see --topic scan=/TOPIC" in drive.notes
+    assert "scans on /scan; the scans on /front/scan are used, see --topic scan=/TOPIC" in drive.notes
 
 
 def upside_down(recorded):
