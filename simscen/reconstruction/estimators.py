@@ -146,7 +146,7 @@ def _faults_and_objects_of_scans(
     false_returns = [*false_return_faults(compared, drive.duration)]
     faults += false_returns
     if not any(fault.kind == "rain" for fault in range_limits):
-        # False returns look like a little noise, so the noise of the robot file is then not compared exactly.
+        # False returns look like a little noise, so that only larger noise is then reported.
         is_noise_known = robot.is_known and not false_returns
         faults += noise_faults(compared, drive.duration, robot.lidar_noise, is_noise_known)
     if is_calibrated:

@@ -20,13 +20,15 @@ STEP_M, STEP_RAD = 0.01, math.radians(0.25)
 TRIED_YAWS_RAD = tuple(math.radians(yaw) for yaw in range(-24, 25, 3))
 """Yaw errors of the mount to try as initial values of the estimate."""
 MAX_MISFIT_RATIO = 0.7
-"""Maximum ratio of the median range difference at a tried yaw error to the difference at the nominal mount. At a larger
-ratio, the estimate starts at the nominal mount."""
+"""Maximum ratio of the median range difference at a tried yaw error to the median range difference at the nominal
+mount. At a larger ratio, the estimate starts at the nominal mount."""
 ITERATIONS = 6
 """Number of Gauss-Newton steps."""
-OUTLIER_M = 0.5
-"""Difference between measured and expected range above which a beam is ignored. While the mount is estimated, this
-limit is halved after each Gauss-Newton step, down to 0.1 m."""
+OUTLIER_M, MIN_OUTLIER_M = 0.5, 0.1
+"""Difference between measured and expected range above which a beam is ignored, and minimum of this limit. While the
+mount is estimated, the limit is halved after each Gauss-Newton step."""
+MAX_SLOPE = 20.0
+"""Maximum derivative of a range, in m per m or rad. At edges of objects, derivatives are larger."""
 MIN_BEAMS = 200
 """Minimum number of beams for estimating the mount."""
 MIN_OFFSET_M, MIN_OFFSET_RAD = 0.03, math.radians(1.0)
@@ -41,31 +43,32 @@ def mount_error(compared: ComparedScans, world: StaticWorld) -> Pose2:
     The poses of the drive must be a ground truth. Return the identity if too few beams hit the static world.
     """
     step = max(1, len(compared.scans) // TARGET_SCANS)
-    chosen = np.flatnonzero(~compared.scans.is_malformed)[::step]
+    rows = np.flatnonzero(~compared.scans.is_malformed)[::step]
     error = Pose2(0.0, 0.0, 0.0)
-    if not len(chosen):
+    if not len(rows):
         return error
-    ranges, angles, reach = compared.scans.ranges[chosen], compared.scans.angles, compared.scans.range_max
-    hit = compared.is_hit[chosen]
-    if int(hit.sum()) < MIN_BEAMS:
+    ranges, angles, range_max = compared.scans.ranges[rows], compared.scans.angles, compared.scans.range_max
+    is_hit = compared.is_hit[rows]
+    if int(is_hit.sum()) < MIN_BEAMS:
         return error
 
     def differences(offset: Pose2) -> Array:
-        return ranges - world.ranges_from(offset_poses(compared.poses[chosen], offset), angles, reach)
+        return ranges - world.ranges_from(offset_poses(compared.poses[rows], offset), angles, range_max)
+
+    def misfit(yaw: float) -> float:
+        clipped = np.minimum(np.abs(differences(Pose2(0.0, 0.0, yaw))), 1.0)
+        return float(np.nanmedian(np.where(is_hit, clipped, np.nan)))
 
     with np.errstate(invalid="ignore"):
-        misfit = {
-            yaw: float(np.nanmedian(np.where(hit, np.minimum(np.abs(differences(Pose2(0.0, 0.0, yaw))), 1.0), np.nan)))
-            for yaw in TRIED_YAWS_RAD
-        }
-    nearest = min(TRIED_YAWS_RAD, key=lambda yaw: (misfit[yaw], abs(yaw)))
-    error = Pose2(0.0, 0.0, nearest if misfit[nearest] < MAX_MISFIT_RATIO * misfit[0.0] else 0.0)
-    outlier = OUTLIER_M
+        misfits = {yaw: misfit(yaw) for yaw in TRIED_YAWS_RAD}
+    best_yaw = min(TRIED_YAWS_RAD, key=lambda yaw: (misfits[yaw], abs(yaw)))
+    error = Pose2(0.0, 0.0, best_yaw if misfits[best_yaw] < MAX_MISFIT_RATIO * misfits[0.0] else 0.0)
+    outlier_limit = OUTLIER_M
     for _ in range(ITERATIONS):
         with np.errstate(invalid="ignore"):
-            base = differences(error)
+            current = differences(error)
             slopes = [
-                (differences(error.compose(change)) - base) / size
+                (differences(error.compose(change)) - current) / size
                 for change, size in (
                     (Pose2(STEP_M, 0.0), STEP_M),
                     (Pose2(0.0, STEP_M), STEP_M),
@@ -73,19 +76,19 @@ def mount_error(compared: ComparedScans, world: StaticWorld) -> Pose2:
                 )
             ]
             jacobian = np.stack(slopes, axis=-1)
-            good = hit & (np.abs(base) < outlier) & (np.abs(jacobian).max(axis=-1) < 20.0)
-        if int(good.sum()) < MIN_BEAMS:
+            is_used = is_hit & (np.abs(current) < outlier_limit) & (np.abs(jacobian).max(axis=-1) < MAX_SLOPE)
+        if int(is_used.sum()) < MIN_BEAMS:
             return Pose2(0.0, 0.0, 0.0)
-        # A constant error of all ranges must not look like a shift of the mount.
-        matrix = np.column_stack((jacobian[good], -np.ones(int(good.sum()))))
-        solution = np.linalg.lstsq(matrix, -base[good], rcond=None)[0]
+        # The last column is a constant error of all ranges, which must not look like a shift of the mount.
+        matrix = np.column_stack((jacobian[is_used], -np.ones(int(is_used.sum()))))
+        solution = np.linalg.lstsq(matrix, -current[is_used], rcond=None)[0]
         error = error.compose(Pose2(float(solution[0]), float(solution[1]), float(solution[2])))
-        outlier = max(0.1, outlier / 2)
+        outlier_limit = max(MIN_OUTLIER_M, outlier_limit / 2)
     return error
 
 
 def mount_fault(error: Pose2) -> FoundFault | None:
-    """Return the fault of a wrong mount of the lidar from its `mount_error`; None if the error is small."""
+    """Return the fault of a wrong mount of the lidar. `error` is the `mount_error`. Return None if it is small."""
     shift = math.hypot(error.x, error.y)
     if shift < MIN_OFFSET_M and abs(error.yaw) < MIN_OFFSET_RAD:
         return None
@@ -94,13 +97,13 @@ def mount_fault(error: Pose2) -> FoundFault | None:
         values |= {"x": f"{100 * error.x:.1f} cm", "y": f"{100 * error.y:.1f} cm"}
     if abs(error.yaw) >= MIN_OFFSET_RAD / 3:
         values["yaw"] = f"{math.degrees(error.yaw):.1f} deg"
-    turned = math.degrees(error.yaw)
-    text = f"the scans fit the walls if the lidar is turned by {turned:.1f} deg and shifted by {shift:.2f} m"
+    angle = math.degrees(error.yaw)
+    text = f"the scans fit the walls if the lidar is turned by {angle:.1f} deg and shifted by {shift:.2f} m"
     return FoundFault("lidar", "extrinsic", values, reason=Reason(text, None, None, "medium"))
 
 
 def with_corrected_mount(compared: ComparedScans, world: StaticWorld, error: Pose2) -> ComparedScans:
-    """Compare the scans again with the lidar at its true pose on the robot, from its `mount_error`."""
+    """Return the comparison of the scans for the corrected mount of the lidar. `error` is the `mount_error`."""
     poses = offset_poses(compared.poses, error)
     expected = world.ranges_from(poses, compared.scans.angles, compared.scans.range_max)
     return replace(compared, poses=poses, expected=expected)
@@ -109,23 +112,23 @@ def with_corrected_mount(compared: ComparedScans, world: StaticWorld, error: Pos
 def range_error_faults(compared: ComparedScans) -> Iterator[FoundFault]:
     """Yield at most one fault: a drift, a wrong scale, or a constant error (bias) of all ranges."""
     residuals = np.where(np.abs(np.nan_to_num(compared.residuals, nan=9.0)) < OUTLIER_M, compared.residuals, np.nan)
-    rows = np.isfinite(residuals).sum(axis=1) >= 20
-    if int(rows.sum()) < 10:
+    has_residuals = np.isfinite(residuals).sum(axis=1) >= 20
+    if int(has_residuals.sum()) < 10:
         return
-    medians, times = np.nanmedian(residuals[rows], axis=1), compared.scans.times[rows]
+    medians, times = np.nanmedian(residuals[has_residuals], axis=1), compared.scans.times[has_residuals]
     slope, start = np.polyfit(times - times[0], medians, 1).tolist()
-    grown = slope * float(times[-1] - times[0])
-    if abs(slope) > MIN_DRIFT_M_S and abs(grown) > 2 * MIN_BIAS_M and abs(grown) > 2 * abs(start):
-        text = f"the ranges drift by {100 * grown:.1f} cm during the drive"
+    change = slope * float(times[-1] - times[0])
+    if abs(slope) > MIN_DRIFT_M_S and abs(change) > 2 * MIN_BIAS_M and abs(change) > 2 * abs(start):
+        text = f"the ranges drift by {100 * change:.1f} cm during the drive"
         values = {"range": f"{100 * slope:.2f} cm/s"}
         yield FoundFault("lidar", "drift", values, reason=Reason(text, float(times[0]), float(times[-1]), "medium"))
         return
-    finite = np.isfinite(residuals)
-    expected, errors = compared.expected[finite], residuals[finite]
-    scale, bias = np.polyfit(expected, errors, 1).tolist()
-    if abs(scale) > MIN_SCALE_ERROR and abs(scale * float(np.mean(expected))) > abs(bias):
-        text = f"ranges are {100 * (1 + scale):.1f} % of the distances"
-        yield FoundFault("lidar", "scale", {"factor": f"{100 * (1 + scale):.1f} %"}, reason=Reason(text))
+    is_finite = np.isfinite(residuals)
+    expected, errors = compared.expected[is_finite], residuals[is_finite]
+    scale_error, bias = np.polyfit(expected, errors, 1).tolist()
+    if abs(scale_error) > MIN_SCALE_ERROR and abs(scale_error * float(np.mean(expected))) > abs(bias):
+        text = f"ranges are {100 * (1 + scale_error):.1f} % of the distances"
+        yield FoundFault("lidar", "scale", {"factor": f"{100 * (1 + scale_error):.1f} %"}, reason=Reason(text))
     elif abs(float(np.median(errors))) > MIN_BIAS_M:
         bias = float(np.median(errors))
         text = f"ranges differ from the distances by {100 * bias:.1f} cm"

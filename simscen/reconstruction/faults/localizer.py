@@ -14,7 +14,7 @@ from simscen.reconstruction.drive.recorded_drive import Mask, RecordedDrive
 from simscen.reconstruction.reasons import FoundFault, Reason, find_windows
 
 MIN_JUMP_M, MIN_JUMP_RAD = 0.2, math.radians(10)
-"""Minimum change of the error of position or heading, from one estimate to the next, that counts as a jump."""
+"""Minimum change of the error of position or heading, from one estimate to the next estimate, that counts as a jump."""
 MIN_OUTAGE_S, MIN_OUTAGE_PERIODS = 1.0, 6.0
 """Minimum duration of a reported outage: the larger of a time and a multiple of the period of the estimates."""
 MIN_CORRECTION_M_RAD = 1e-9
@@ -22,7 +22,8 @@ MIN_CORRECTION_M_RAD = 1e-9
 MAX_JUMP_S = 30.0
 """Maximum time between a jump and the jump back."""
 MIN_DRIVEN_M = 0.6
-"""Minimum distance between the positions at start and end of an outage: over twice Nav2's update_min_d of 0.25 m."""
+"""Minimum distance between the positions at start and end of an outage: more than twice Nav2's update_min_d of
+0.25 m."""
 
 
 def localizer_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
@@ -30,54 +31,54 @@ def localizer_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
     if len(drive.belief) < 5:
         return
     if drive.has_true_poses:
-        yield from _jump(replace(drive, belief=belief_with_pose(drive)))
+        yield from _jump_faults(replace(drive, belief=belief_with_pose(drive)))
     yield from _outages(drive)
 
 
-def _jump(drive: RecordedDrive) -> Iterator[FoundFault]:
+def _jump_faults(drive: RecordedDrive) -> Iterator[FoundFault]:
     """Yield the first jump of the estimated pose away from the true pose and back, or a single jump without return."""
     belief, truth = drive.belief.values[:, :3], drive.poses.poses_at(drive.belief.times)
     errors = belief - truth
     errors[:, 2] = wrap_array(errors[:, 2])
-    sizes, jumps = _sizes(errors), _sizes(np.diff(errors, axis=0)) > 1.0
-    indices = np.flatnonzero(jumps.any(axis=1)) + 1
+    sizes, is_jump = _relative_sizes(errors), _relative_sizes(np.diff(errors, axis=0)) > 1.0
+    indices = np.flatnonzero(is_jump.any(axis=1)) + 1
     if len(indices) == 1:
         yield from _lasting_jump(drive, belief, truth, sizes, int(indices[0]))
-    for out, back in zip(indices[:-1].tolist(), indices[1:].tolist(), strict=True):
-        begin, end = float(drive.belief.times[out]), float(drive.belief.times[back])
-        is_small = np.maximum(sizes[out - 1], sizes[back]) <= 0.5 * np.median(sizes[out:back], axis=0)
-        returns = jumps[out - 1] & is_small
-        if end - begin > MAX_JUMP_S or _is_kidnapped(drive, begin - 0.5, end + 0.5) or not returns.any():
+    for first, last in zip(indices[:-1].tolist(), indices[1:].tolist(), strict=True):
+        begin, end = float(drive.belief.times[first]), float(drive.belief.times[last])
+        is_small_outside = np.maximum(sizes[first - 1], sizes[last]) <= 0.5 * np.median(sizes[first:last], axis=0)
+        jumps_back = is_jump[first - 1] & is_small_outside
+        if end - begin > MAX_JUMP_S or _is_kidnapped(drive, begin - 0.5, end + 0.5) or not jumps_back.any():
             continue
-        values = _jump_values(truth[out], belief[out])
-        text = f"the estimated pose jumps by {_size_text(errors[out], returns)} and back"
+        values = _jump_values(truth[first], belief[first])
+        text = f"the estimated pose jumps by {_size_text(errors[first], jumps_back)} and back"
         yield FoundFault("localizer", "jump", values, begin, end - begin, Reason(text, begin, end))
         return
 
 
 def _lasting_jump(drive: RecordedDrive, belief: Array, truth: Array, sizes: Array, index: int) -> Iterator[FoundFault]:
-    """Yield the fault of a jump of the poses `belief` (n, 3) at `index` if they never return to `truth` (n, 3).
+    """Yield a fault if the poses `belief` (n, 3) jump at `index` and never return to the poses `truth` (n, 3).
 
-    `sizes` (n, 2) are the sizes of the errors.
+    `sizes` (n, 2) are the relative sizes of the errors.
     """
     begin = float(drive.belief.times[index])
-    stays = (sizes[index:].min(axis=0) > 1.0) & (sizes[:index].max(axis=0) < 1.0)
-    if stays.any() and not _is_kidnapped(drive, begin - 0.5, begin + 0.5):
-        text = f"the estimated pose jumps by {_size_text(belief[index] - truth[index], stays)} and stays there"
+    is_lasting = (sizes[index:].min(axis=0) > 1.0) & (sizes[:index].max(axis=0) < 1.0)
+    if is_lasting.any() and not _is_kidnapped(drive, begin - 0.5, begin + 0.5):
+        text = f"the estimated pose jumps by {_size_text(belief[index] - truth[index], is_lasting)} and stays there"
         reason = Reason(text, begin, float(drive.belief.times[-1]), "medium")
         yield FoundFault("localizer", "jump", _jump_values(truth[index], belief[index]), begin, None, reason)
 
 
-def _sizes(differences: Array) -> Array:
-    """Return the sizes (n, 2) of differences in position and heading (n, 3), in multiples of the minimum jump."""
+def _relative_sizes(differences: Array) -> Array:
+    """Return the sizes (n, 2) in position and heading of pose differences (n, 3), in multiples of the minimum jump."""
     distances = np.hypot(differences[:, 0], differences[:, 1])
     return np.column_stack((distances / MIN_JUMP_M, np.abs(wrap_array(differences[:, 2])) / MIN_JUMP_RAD))
 
 
-def _size_text(error: Array, parts: Mask) -> str:
-    """Return the size of an error (3,) as text. `parts` (2,) selects position and heading."""
+def _size_text(error: Array, is_listed: Mask) -> str:
+    """Return the size of a pose error (3,) as text. `is_listed` (2,) selects position and heading."""
     texts = f"{math.hypot(error[0], error[1]):.2f} m", f"{abs(math.degrees(wrap(error[2]))):.0f} deg"
-    return " / ".join(text for text, is_part in zip(texts, parts, strict=True) if is_part)
+    return " / ".join(text for text, is_part in zip(texts, is_listed, strict=True) if is_part)
 
 
 def _jump_values(truth: Array, belief: Array) -> dict[str, object]:
@@ -87,16 +88,16 @@ def _jump_values(truth: Array, belief: Array) -> dict[str, object]:
 
 
 def _is_kidnapped(drive: RecordedDrive, begin: float, end: float) -> bool:
-    """Return whether the true pose jumps, compared with the odometry, between two times in s."""
+    """Return whether the true pose jumps, relative to the odometry, between two times in s."""
     first, last = np.searchsorted(drive.poses.times, (begin, end))
-    chosen = slice(max(0, first - 1), last + 1)
-    motion = _motion(drive.poses.values[chosen])
+    samples = slice(max(0, first - 1), last + 1)
+    motion = _relative_motion(drive.poses.values[samples])
     if len(drive.odometry) > 1:
-        motion -= _motion(drive.odometry.poses_at(drive.poses.times[chosen]))
-    return bool((_sizes(motion) > 1.0).any())
+        motion -= _relative_motion(drive.odometry.poses_at(drive.poses.times[samples]))
+    return bool((_relative_sizes(motion) > 1.0).any())
 
 
-def _motion(poses: Array) -> Array:
+def _relative_motion(poses: Array) -> Array:
     """Return the motion x, y, yaw (n - 1, 3) between poses (n, 3), each in the frame of the pose before it."""
     dx, dy, turn = np.diff(poses[:, :3], axis=0).T
     c, s = np.cos(poses[:-1, 2]), np.sin(poses[:-1, 2])
@@ -104,46 +105,49 @@ def _motion(poses: Array) -> Array:
 
 
 def _outages(drive: RecordedDrive) -> Iterator[FoundFault]:
-    """Yield the outages while the robot drives: gaps between estimates or, without such gaps, missing corrections."""
+    """Yield the outages while the robot drives.
+
+    Outages are gaps between estimates. Without such gaps, outages are times without corrections of the odometry.
+    """
     if len(drive.odometry) < 2:
         return
     times = np.append(drive.belief.times, drive.odometry.times[-1])
     limit = max(MIN_OUTAGE_S, MIN_OUTAGE_PERIODS * drive.belief.period)
-    silent = np.diff(times) - seconds_in_gaps(recording_gaps(drive), times[:-1], times[1:])
+    silent_seconds = np.diff(times) - seconds_in_gaps(recording_gaps(drive), times[:-1], times[1:])
     gaps = [
         (index, float(times[index]), float(times[index + 1]))
-        for index in np.flatnonzero(silent > limit).tolist()
-        if _distance(drive, float(times[index]), float(times[index + 1])) > MIN_DRIVEN_M
+        for index in np.flatnonzero(silent_seconds > limit).tolist()
+        if _driven_distance(drive, float(times[index]), float(times[index + 1])) > MIN_DRIVEN_M
     ]
     for index, begin, end in gaps:
         text = f"no pose from the localizer for {end - begin:.1f} s"
         duration = end - begin if index + 2 < len(times) else None
         yield FoundFault("localizer", "off", {}, begin, duration, Reason(text, begin, end))
     if not gaps:
-        yield from _without_corrections(drive)
+        yield from _missing_corrections(drive)
 
 
-def _without_corrections(drive: RecordedDrive) -> Iterator[FoundFault]:
+def _missing_corrections(drive: RecordedDrive) -> Iterator[FoundFault]:
     """Yield the outages in which the transform from map to odom stays constant although the robot drives."""
     corrections = drive.corrections
     if len(corrections) < 2:
         return
-    still = np.abs(np.diff(corrections.values, axis=0)).max(axis=1) < MIN_CORRECTION_M_RAD
-    usual = find_windows(still, corrections.times[1:])
-    if not usual or still.all():
+    is_constant = np.abs(np.diff(corrections.values, axis=0)).max(axis=1) < MIN_CORRECTION_M_RAD
+    windows = find_windows(is_constant, corrections.times[1:])
+    if not windows or is_constant.all():
         return
-    shortest = float(np.percentile([window.length for window in usual], 25)) if len(usual) >= 5 else 0.0
-    limit = max(MIN_OUTAGE_S, MIN_OUTAGE_PERIODS * shortest)
-    for window in usual:
+    usual_length = float(np.percentile([window.length for window in windows], 25)) if len(windows) >= 5 else 0.0
+    limit = max(MIN_OUTAGE_S, MIN_OUTAGE_PERIODS * usual_length)
+    for window in windows:
         begin, end = float(corrections.times[window.first]), window.end
-        if window.length > limit and _distance(drive, begin, end) > MIN_DRIVEN_M:
+        if window.length > limit and _driven_distance(drive, begin, end) > MIN_DRIVEN_M:
             text = f"the localizer does not correct the odometry for {end - begin:.1f} s"
-            until_end = end >= float(corrections.times[-1]) - MIN_OUTAGE_S
+            is_until_end = end >= float(corrections.times[-1]) - MIN_OUTAGE_S
             reason = Reason(text, begin, end, "medium")
-            yield FoundFault("localizer", "off", {}, begin, None if until_end else end - begin, reason)
+            yield FoundFault("localizer", "off", {}, begin, None if is_until_end else end - begin, reason)
 
 
-def _distance(drive: RecordedDrive, begin: float, end: float) -> float:
+def _driven_distance(drive: RecordedDrive, begin: float, end: float) -> float:
     """Return the straight distance in m, by odometry, between the positions at two times in s."""
     ends = drive.odometry.poses_at(np.array([begin, end]))
     return float(np.hypot(*(ends[1, :2] - ends[0, :2])))
