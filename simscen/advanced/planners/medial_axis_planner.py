@@ -60,7 +60,7 @@ class MedialAxisPlanner:
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         """Return a path in a costmap, which can be a window of the entire costmap."""
         costs = self._make_costs(costmap)
-        self._costs = costs.reusing_cache(self._costs) if costmap.costs.size <= MAX_CACHED_CELLS else None
+        self._costs = costs.share_cache(self._costs) if costmap.costs.size <= MAX_CACHED_CELLS else None
         return Path(with_headings(self._points(costs, start, goal, seed), goal))
 
     def _path_on_part(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> tuple[Array, float]:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from simscen.core.geometry import Array
 from simscen.core.geometry.polylines import resample_polyline
-from simscen.stack.planners.path_postprocessing import smoothed
+from simscen.stack.planners.path_postprocessing import smooth_path
 from simscen.stack.planners.traversal_costs import SAMPLE_SPACING_CELLS, TraversalCosts
 
 REFINEMENT_ROUNDS = ((0.3, 0.4, 9), (0.3, 0.2, 9), (0.25, 0.12, 7), (0.2, 0.06, 7))
@@ -38,7 +38,7 @@ def refine(costs: TraversalCosts, points: Array) -> Array:
                 break
         if new_cost < cost:
             points, cost = other, new_cost
-    return smoothed(costs, points)
+    return smooth_path(costs, points)
 
 
 def _with_shortcuts(costs: TraversalCosts, points: Array) -> Array:

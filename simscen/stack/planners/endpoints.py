@@ -1,4 +1,4 @@
-"""Start and goal of a path search: checks that they are free, and displacement to free cells nearby."""
+"""Start and goal of a path search: checks that both are free, and moves them to free cells nearby if necessary."""
 
 import math
 from collections.abc import Iterator
@@ -20,9 +20,9 @@ MAX_ESCAPE_M = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Endpoints:
-    """Start and goal (x, y) of a search, moved to free cells if necessary.
+    """Start and goal (x, y) in m of a search, moved to free cells if necessary.
 
-    `reachable` (height, width) are the free cells that are connected with the start.
+    `reachable` (height, width) is the mask of the free cells that are connected with the start.
     """
 
     start: tuple[float, float]
@@ -33,9 +33,9 @@ class Endpoints:
 def find_endpoints(costs: TraversalCosts, start: Pose2, goal: Pose2, tolerance: float) -> Endpoints:
     """Return the start and goal of the search.
 
-    A start too close to an obstacle is moved to the nearest free point; no obstacle may lie on the straight line to it.
-    An unreachable goal is moved to the nearest reachable point within `tolerance` m. Raises NavigationFailure with
-    START_OUTSIDE_MAP, GOAL_OUTSIDE_MAP, START_OCCUPIED, GOAL_OCCUPIED, or NO_VALID_PATH.
+    A start too close to an obstacle is moved to the nearest free point that a straight line without obstacles connects
+    with the start. An unreachable goal is moved to the nearest reachable point within `tolerance` m. Raises
+    NavigationFailure with START_OUTSIDE_MAP, GOAL_OUTSIDE_MAP, START_OCCUPIED, GOAL_OCCUPIED, or NO_VALID_PATH.
     """
     _raise_if_blocked(costs, start, ErrorCode.START_OUTSIDE_MAP, ErrorCode.START_OCCUPIED, "start")
     _raise_if_blocked(costs, goal, ErrorCode.GOAL_OUTSIDE_MAP, ErrorCode.GOAL_OCCUPIED, "goal")
@@ -54,7 +54,7 @@ def find_endpoints(costs: TraversalCosts, start: Pose2, goal: Pose2, tolerance: 
 
 
 def reachable_cells(costs: TraversalCosts, start: tuple[float, float]) -> npt.NDArray[np.bool_]:
-    """Return the free cells (height, width) that are connected with `start`, which must be free."""
+    """Return the mask (height, width) of the free cells that are connected with `start`, which must be free."""
     regions, _ = label(costs.free)
     return np.asarray(regions == regions[costs.cell(start)])
 
@@ -71,9 +71,9 @@ def _raise_if_blocked(costs: TraversalCosts, pose: Pose2, outside: ErrorCode, oc
 def free_points(
     costs: TraversalCosts, free: npt.NDArray[np.bool_], pose: Pose2, max_distance: float
 ) -> Iterator[tuple[float, float]]:
-    """Yield the position of `pose` if its cell is free, then the centers of free cells, the nearest first.
+    """Yield the position of `pose` if its cell is free, then the centers of free cells, nearest first.
 
-    `free` (height, width) are the free cells. Cells farther away than `max_distance` m are left out.
+    `free` (height, width) is the mask of the free cells. Cells farther away than `max_distance` m are left out.
     """
     row, column = costs.cell((pose.x, pose.y))
     if free[row, column]:
@@ -84,10 +84,10 @@ def free_points(
     x = costs.origin[0] + (cells[:, 1] + 0.5) * costs.resolution
     y = costs.origin[1] + (cells[:, 0] + 0.5) * costs.resolution
     distance = np.hypot(x - pose.x, y - pose.y)
-    for best in np.argsort(distance, kind="stable").tolist():
-        if distance[best] > max_distance:
+    for nearest in np.argsort(distance, kind="stable").tolist():
+        if distance[nearest] > max_distance:
             return
-        yield float(x[best]), float(y[best])
+        yield float(x[nearest]), float(y[nearest])
 
 
 def _is_line_free(costs: TraversalCosts, start: Pose2, point: tuple[float, float]) -> bool:

@@ -1,4 +1,4 @@
-"""Grid planners for round robots, as Nav2's NavFn and SmacPlanner2D: find the cheapest path from cell to cell."""
+"""Grid planners for round robots, like NavFn and SmacPlanner2D of Nav2: find the cheapest path from cell to cell."""
 
 import numpy as np
 
@@ -7,26 +7,32 @@ from simscen.core.messages.navigation import ErrorCode, Path
 from simscen.grid_graph import EIGHT_NEIGHBORS, SIXTEEN_NEIGHBORS, GridGraph
 from simscen.model.planners import Navfn, Smac2d
 from simscen.stack.planners.endpoints import Endpoints, find_endpoints
-from simscen.stack.planners.path_postprocessing import SPACING_M, avoid_cell_corners, densify, smoothed, with_headings
+from simscen.stack.planners.path_postprocessing import (
+    SPACING_M,
+    avoid_cell_corners,
+    densify,
+    smooth_path,
+    with_headings,
+)
 from simscen.stack.planners.planning_window import plan_in_windows
 from simscen.stack.planners.traversal_costs import TraversalCosts
 from simscen.stack.protocols import MAX_NON_OBSTACLE, CostmapView, NavigationFailure, Planner, RobotModel
 from simscen.stack.setting import Setting
 
 COST_FACTOR, COST_NEUTRAL = 0.8, 50
-"""Coefficients of NavFn, in which a cell costs 50 + 0.8 · cost (nav2_navfn_planner/navfn.hpp)."""
+"""Coefficients of NavFn: the traversal cost of a cell is 50 + 0.8 · cost (nav2_navfn_planner/navfn.hpp)."""
 BORDER_CELLS = 2
 """Width of the border of blocked cells around the costmap, which GridGraph needs."""
 
 
 def navfn(spec: Navfn, setting: Setting) -> Planner:
-    """Build NavFn, but with moves in 16 directions instead of a gradient descent on the potential."""
+    """Build a planner like NavFn, but with moves in 16 directions instead of a gradient descent on the potential."""
     multiplier = COST_FACTOR * MAX_NON_OBSTACLE / COST_NEUTRAL
     return GridPlanner(spec.tolerance, multiplier, spec.allow_unknown, SIXTEEN_NEIGHBORS, True, setting.robot)
 
 
 def smac_2d(spec: Smac2d, setting: Setting) -> Planner:
-    """Build SmacPlanner2D, which moves to the eight neighbors (Moore neighborhood)."""
+    """Build a planner like SmacPlanner2D, with moves to the eight neighbors (Moore neighborhood)."""
     return GridPlanner(
         spec.tolerance,
         spec.cost_travel_multiplier,
@@ -57,7 +63,7 @@ class GridPlanner:
         self._moves, self._smooth, self._robot = moves, smooth, robot
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return a path of poses in the map frame, at most 5 cm apart. Raises NavigationFailure if there is none.
+        """Return a path of poses in the map frame, at most 5 cm apart. Raises NavigationFailure if there is no path.
 
         The seed has no effect.
         """
@@ -76,7 +82,7 @@ class GridPlanner:
         `cells` (n, 2) are the centers of the cells on the path.
         """
         raw = np.vstack((ends.start, cells[1:-1], ends.goal))
-        for points in (smoothed(costs, raw), raw) if self._smooth else (raw,):
+        for points in (smooth_path(costs, raw), raw) if self._smooth else (raw,):
             path = avoid_cell_corners(costs, densify(points, SPACING_M))
             if path is not None:
                 return path

@@ -30,15 +30,15 @@ from simscen.stack.protocols import NO_INFORMATION, CostmapView, NavigationFailu
 from simscen.stack.setting import Setting
 
 POSITION_PLANNERS = ("bit_star", "aorrtc", "medial_axis")
-"""Types of planners that search only over positions. PosePlanner uses RRT-Connect instead."""
+"""Types of planners that search only over positions. PosePlanner uses RRT-Connect instead of these planners."""
 MIN_TURNING_RADIUS_M = 0.2
 """Minimum turning radius in plans of PosePlanner, also for robots that can turn in place."""
 TURNING_RADIUS_RATIO = 1.15
-"""Turning radius in plans of a car, relative to its minimum: larger, so that the controller can correct deviations."""
+"""Turning radius in plans of a car, relative to its minimum. A larger radius lets the controller correct deviations."""
 FINAL_CHECKS_PER_STEP = 50
-"""Number of collision checks of the footprint per step of a found path."""
+"""Number of collision checks of the footprint per step of a path, after the search."""
 MAX_DEEPENING_M = 0.01
-"""Distance by which a footprint that is in collision at the start may get deeper into the obstacle."""
+"""Maximum distance by which a footprint that is in collision at the start may get deeper into the obstacle."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Attempt:
 
 
 class PosePlanner:
-    """Planner for cars and long robots: searches over poses, and checks the footprint at each pose."""
+    """Planner for cars and long robots, which searches over poses and checks the footprint at each pose."""
 
     def __init__(self, spec: OmplParameters, robot: RobotModel, footprint: Footprint, space: Space) -> None:
         self._spec, self._robot, self._footprint, self._space = spec, robot, footprint, space
@@ -83,25 +83,26 @@ class PosePlanner:
         escape = self._escape_path(costs, start)
         free_start = Pose2(*escape[-1].tolist())
         for attempt in self._attempts(costs, ends, free_start, goal):
-            valid = self._validity_check(field, attempt, (free_start, goal))
+            is_valid = self._make_pose_check(field, attempt, (free_start, goal))
             iterations = max(1, round(attempt.iteration_fraction * self._spec.max_iterations))
-            found: list[Array] = []
+            paths: list[Array] = []
             for _ in range(self._spec.pose_searches):
                 seed += 1
                 poses = search_poses(
-                    self._type, self._space, self._turning_radius, attempt.bounds, free_start, goal, valid, seed,
+                    self._type, self._space, self._turning_radius, attempt.bounds, free_start, goal, is_valid, seed,
                     iterations, attempt.spacing, self._configure, self._improving_iterations,
                 )  # fmt: skip
                 if poses is None:
                     break
-                found.append(np.array(poses))
-            for cheapest in sorted(found, key=lambda poses: self._cost(costs, poses)):
-                if self._is_collision_free(costs, cheapest):
-                    return Path(np.concatenate((escape[:-1], cheapest)))
+                paths.append(np.array(poses))
+            for path in sorted(paths, key=lambda path: self._cost(costs, path)):
+                if self._is_collision_free(costs, path):
+                    return Path(np.concatenate((escape[:-1], path)))
         message = f"{self._type}: no path in {self._spec.max_iterations} iterations"
         raise NavigationFailure(ErrorCode.NO_VALID_PATH, message)
 
     def _configure(self, planner: Any) -> None:
+        """Set the parameters of OMPL's planner, if the specification has such parameters."""
         if isinstance(self._spec, PlannerSpec):
             set_parameters(planner, self._spec)
 
@@ -112,7 +113,7 @@ class PosePlanner:
         return float((steps * costs.at(midpoints)).sum()) + self._spec.cusp_penalty * int(cusps(poses).size)
 
     def _attempts(self, costs: TraversalCosts, ends: Endpoints, free_start: Pose2, goal: Pose2) -> Iterator[Attempt]:
-        """Yield attempts with decreasing clearance, the last one with finer collision checks."""
+        """Yield attempts with decreasing clearance. The last attempt has finer collision checks."""
         bounds, reachable = reachable_bounds(costs, ends), ends.reachable
         size, (x0, y0) = costs.resolution, costs.origin
         rows, columns = reachable.shape
@@ -140,12 +141,12 @@ class PosePlanner:
         return bool(self._footprint.free(costs.costmap, checked).all() and np.isfinite(costs.at(checked[:, :2])).all())
 
     def _block_unknown(self, costmap: CostmapView) -> CostmapView:
-        """Return a copy of the costmap in which unknown cells count as too close to an obstacle."""
+        """Return a copy of the costmap in which unknown cells are too close to an obstacle."""
         limited = np.minimum(costmap.distance, np.float32(self._inscribed))
         return replace(costmap, distance=np.where(costmap.costs == NO_INFORMATION, limited, costmap.distance))
 
     def _move_goal_to_fit(self, costmap: CostmapView, goal: Pose2, points: Iterable[tuple[float, float]]) -> Pose2:
-        """Return the goal moved to the first point where the footprint fits. Raises GOAL_OCCUPIED otherwise."""
+        """Return the goal, moved to the first point at which the footprint fits. Raises GOAL_OCCUPIED if none fits."""
         poses = np.array([(*point, goal.yaw) for point in points])
         free = self._footprint.free(costmap, poses)
         if not free.any():
@@ -154,64 +155,64 @@ class PosePlanner:
         return Pose2(*poses[free.argmax()].tolist())
 
     def _escape_path(self, costs: TraversalCosts, start: Pose2) -> Array:
-        """Return poses (n, 3) on the shortest arc from the start to a pose where the footprint fits.
+        """Return poses (n, 3) on the shortest arc from the start to a pose at which the footprint fits.
 
-        The arc may not lead deeper into an obstacle. Raises START_OCCUPIED if there is no such arc.
+        The arc must not lead deeper into an obstacle. Raises START_OCCUPIED if no arc does this.
         """
         costmap, best = costs.costmap, None
         for arc in escape_arcs(self._space, self._turning_radius, start):
             free = self._footprint.free(costmap, arc) & np.isfinite(costs.at(arc[:, :2]))
-            clear = int(free.argmax())
-            if not free[clear] or (best is not None and clear + 1 >= len(best)):
+            first_free = int(free.argmax())
+            if not free[first_free] or (best is not None and first_free + 1 >= len(best)):
                 continue
-            clearances = self._footprint.clearance(costmap, arc[: clear + 1])
+            clearances = self._footprint.clearance(costmap, arc[: first_free + 1])
             if (clearances >= clearances[0] - MAX_DEEPENING_M).all():
-                best = arc[: clear + 1]
+                best = arc[: first_free + 1]
         if best is None:
             message = f"the robot does not fit at the start ({start.x:.2f}, {start.y:.2f}) and cannot get away from it"
             raise NavigationFailure(ErrorCode.START_OCCUPIED, message)
         return best
 
-    def _validity_check(self, field: DistanceLookup, attempt: Attempt, ends: tuple[Pose2, Pose2]) -> PoseCheck:
+    def _make_pose_check(self, field: DistanceLookup, attempt: Attempt, ends: tuple[Pose2, Pose2]) -> PoseCheck:
         """Return a function that checks that a pose is reachable, free of collisions, and has the attempt's clearance.
 
-        Near the `ends`, clearance is not required.
+        Near start and goal (`ends`), no clearance is required.
         """
         offsets = self._footprint.discs.offsets.tolist()
         required = self._footprint.discs.radius + attempt.clearance
-        # The distances are those between cell centers, which are wrong by up to a cell diagonal.
-        certain = self._footprint.discs.radius + math.sqrt(2.0) * field.resolution
-        inner = self._inscribed
+        # Distances are between cell centers, and therefore wrong by up to a cell diagonal.
+        certainly_free = self._footprint.discs.radius + math.sqrt(2.0) * field.resolution
+        inscribed = self._inscribed
         distance_of, contains, free, costmap = field.distance, attempt.contains, self._footprint.free, field.costmap
 
-        def valid(x: float, y: float, yaw: float) -> bool:
-            if not contains(x, y) or distance_of(x, y) <= inner:
+        def is_valid(x: float, y: float, yaw: float) -> bool:
+            if not contains(x, y) or distance_of(x, y) <= inscribed:
                 return False
             cosine, sine = math.cos(yaw), math.sin(yaw)
             distance = min(distance_of(x + offset * cosine, y + offset * sine) for offset in offsets)
             if distance <= required and min(math.hypot(x - end.x, y - end.y) for end in ends) > 2 * required:
                 return False
-            return distance > certain or bool(free(costmap, np.array([(x, y, yaw)]))[0])
+            return distance > certainly_free or bool(free(costmap, np.array([(x, y, yaw)]))[0])
 
-        return valid
+        return is_valid
 
 
 FINE_SPACING_CELLS = 0.125
-"""Spacing of the collision checks of later searches, after a search has returned a path through a blocked cell."""
+"""Spacing of collision checks in the searches after a search whose path crosses a blocked cell."""
 MAX_SEARCHES = 4
 """Maximum number of searches, each with a different seed, before planning fails."""
 REPEATED_REWIRE_FACTOR = 1.6
-"""Default `rewire_factor` of searches after one without a path: permits longer motions, which find narrow gaps."""
+"""Default `rewire_factor` after a search without a path. It permits longer motions, which find narrow gaps."""
 
 
 class OmplPlanner:
-    """Planner for robots that are neither cars nor long: searches over positions of a disc of the inscribed radius."""
+    """Planner for robots that are neither cars nor long, which searches over positions of the inscribed circle."""
 
     def __init__(self, spec: PlannerSpec, robot: RobotModel) -> None:
         self._spec, self._robot = spec, robot
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return a path of poses in the map frame, at most 5 cm apart. Raises NavigationFailure if there is none."""
+        """Return a path of poses in the map frame, at most 5 cm apart. Raises NavigationFailure if there is no path."""
         return plan_in_windows(self._plan, costmap, start, goal, seed)
 
     def _plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
@@ -224,7 +225,7 @@ class OmplPlanner:
         return Path(with_headings(points, goal))
 
     def _avoid_narrow_gaps(self, costs: TraversalCosts, ends: Endpoints) -> tuple[TraversalCosts, Endpoints]:
-        """Return costs and endpoints with narrow gaps blocked; unchanged if the goal is only reachable through them."""
+        """Return costs and endpoints with blocked narrow gaps; without this change if the goal is then unreachable."""
         if self._spec.gap_clearance == 0.0:
             return costs, ends
         wide = costs.without_narrow_gaps(self._spec.gap_clearance, (ends.start, ends.goal))
@@ -254,7 +255,7 @@ def make_problem(costs: TraversalCosts, ends: Endpoints) -> Problem:
 
 
 LONG_HULL_RATIO = 2.0
-"""Ratio of circumscribed to inscribed radius above which a robot is long, so that its heading is planned, too."""
+"""Ratio of circumscribed to inscribed radius above which a robot is long, so that plans include the heading."""
 
 
 def ompl_planner(spec: PlannerSpec, setting: Setting) -> Planner:

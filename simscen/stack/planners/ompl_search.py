@@ -1,4 +1,4 @@
-"""OMPL search for the cheapest path over positions (x, y). Each search has a seed and a maximum of iterations."""
+"""OMPL search for the cheapest path over positions (x, y), with a seed and a maximum number of iterations."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator
@@ -37,12 +37,12 @@ CHECK_PERIOD_ITERATIONS = 16
 """Number of iterations between two calls of `is_done` (see `stop_after`)."""
 PERTURBATIONS_M = (0.5, 0.15)
 """Distances by which path simplification moves states, in two successive passes."""
-ou.setLogLevel(ou.LOG_NONE)  # OMPL warns that its random generator is seeded again, although this has an effect
+ou.setLogLevel(ou.LOG_NONE)  # OMPL warns that seeding its random generator again has no effect, which is wrong
 
 
 @dataclass(frozen=True)
 class Problem:
-    """Search problem: a path from `start` to `goal` within `bounds` (min x, min y, max x, max y), all in m."""
+    """Search problem: find a path from `start` to `goal` within `bounds` (min x, min y, max x, max y), all in m."""
 
     start: Point
     goal: Point
@@ -80,7 +80,7 @@ class _CostBeyondLengthObjective(ob.OptimizationObjective):  # type: ignore[misc
 
 
 class _MotionCostObjective(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # ompl has no types
-    """Objective: the cost of a motion. A subclass of the path length, because OMPL then has informed sampling."""
+    """Objective: the cost of a motion. Derived from the path length, because OMPL then supports informed sampling."""
 
     def __init__(self, information: Any, motion_cost: MotionCost) -> None:
         super().__init__(information)
@@ -122,16 +122,16 @@ class OmplSearch:
         try:
             return self._solve(simplify)
         finally:
-            for callback in self._callbacks:  # OMPL's bindings leak their callbacks: release the costmap
+            for callback in self._callbacks:  # OMPL's bindings leak callbacks, which must not keep the costmap alive
                 callback.motion_cost = lambda *_: math.inf
 
     def _solve(self, simplify: bool) -> list[Point] | None:
-        ou.RNG.setSeed(self.seed)  # before any object of OMPL is created: it has one generator for the whole process
+        ou.RNG.setSeed(self.seed)  # global; must be called before any object of OMPL is created
         problem, information = self.problem, self._make_information()
         motions = information.getMotionValidator()
         ends = _state(information, problem.start), _state(information, problem.goal)
         if not all(information.satisfiesBounds(end) and information.isValid(end) for end in ends):
-            return None  # a planner would wait for a better goal, 5 ms per iteration
+            return None  # otherwise, a planner waits for a valid goal, 5 ms per iteration
         definition = ob.ProblemDefinition(information)
         definition.setStartAndGoalStates(*ends)
         objective = self._make_objective(information)
@@ -139,7 +139,7 @@ class OmplSearch:
         planner = PLANNERS[self.spec.type](information)
         self._configure(planner)
         if self.spec.type == "bit_star":
-            # BIT* drops motions with infinite cost by itself. This validator accepts all without calling Python.
+            # BIT* itself drops motions with infinite cost. This validator accepts all motions without calling Python.
             everywhere_free = ob.SpaceInformation(information.getStateSpace())
             everywhere_free.setStateValidityChecker(ob.AllValidStateValidityChecker(everywhere_free))
             everywhere_free.setup()
@@ -156,6 +156,7 @@ class OmplSearch:
         return [(state[0], state[1]) for state in path.getStates()]
 
     def _configure(self, planner: Any) -> None:
+        """Set the parameters of OMPL's planner."""
         if self.spec.type == "bit_star":
             planner.setUseKNearest(False)
             planner.setRewireFactor(DEFAULT_BIT_STAR_REWIRE_FACTOR)
@@ -164,7 +165,7 @@ class OmplSearch:
         set_parameters(planner, self.spec)
 
     def _make_termination(self, planner: Any) -> Termination:
-        """Return the termination condition: after `max_iterations`, or when a path has been improved enough."""
+        """Return the termination condition: `max_iterations`, or a path that has been improved enough."""
         spec = self.spec
         if spec.type in FIRST_PATH_PLANNERS:
             return stop_after(spec.max_iterations)
@@ -178,6 +179,7 @@ class OmplSearch:
         return stop_after(spec.max_iterations, is_solved, spec.improving_iterations)
 
     def _make_validity(self) -> StateValidity:
+        """Return the check of single states."""
         return StateValidity(self.problem.motion_cost)
 
     def _make_information(self) -> Any:
@@ -196,12 +198,12 @@ class OmplSearch:
         return information
 
     def _make_objective(self, information: Any) -> Any:
-        """Return the objective: the cost of motions, if possible split into OMPL's path length and the rest."""
+        """Return the objective: the cost of motions. If possible, OMPL's path length is a separate part, for speed."""
         motion_cost = self.problem.motion_cost
         if self.spec.type == "informed_rrt_star":
-            whole = _MotionCostObjective(information, motion_cost)
-            self._callbacks.append(whole)
-            return whole
+            objective = _MotionCostObjective(information, motion_cost)
+            self._callbacks.append(objective)
+            return objective
         beyond = _CostBeyondLengthObjective(information, motion_cost)
         self._callbacks.append(beyond)
         total = ob.MultiOptimizationObjective(information)
@@ -213,7 +215,7 @@ class OmplSearch:
 
 
 def set_parameters(planner: Any, spec: PlannerSpec) -> None:
-    """Set the parameters of the specification on a planner of OMPL, except unset and unsupported ones."""
+    """Set parameters of the specification on a planner of OMPL. Skip unset and unsupported parameters."""
     for setter, value in (
         ("setSamplesPerBatch", spec.samples_per_batch),
         ("setRewireFactor", spec.rewire_factor),
@@ -225,7 +227,7 @@ def set_parameters(planner: Any, spec: PlannerSpec) -> None:
 
 
 def _simplify(simplifier: Any, path: Any, steps: int) -> None:
-    """Shorten a path, and move its states if that reduces the cost, in passes of at most `steps` steps.
+    """Shorten a path, and move states of the path if this reduces the cost, in passes of at most `steps` steps.
 
     OMPL's simplify() is not used, because it stops by wall-clock time.
     """
@@ -236,13 +238,14 @@ def _simplify(simplifier: Any, path: Any, steps: int) -> None:
 
 
 def _state(information: Any, point: Point) -> Any:
+    """Return a state of OMPL at a point."""
     state = information.allocState()
     state[0], state[1] = point
     return state
 
 
 def stop_after(iterations: int, is_done: Termination = lambda: False, min_iterations: int = 0) -> Termination:
-    """Return a termination condition: after `iterations`, or after `min_iterations` as soon as `is_done` returns True.
+    """Return a termination condition: `iterations`, or at least `min_iterations` if `is_done` returns True.
 
     `is_done` is called once per `CHECK_PERIOD_ITERATIONS` iterations.
     """

@@ -1,4 +1,4 @@
-"""Postprocessing of planned paths: adds points and headings, smooths paths, and avoids corners of blocked cells."""
+"""Postprocessing of planned paths: more points, headings, smoothing, and detours around corners of blocked cells."""
 
 import math
 
@@ -27,22 +27,22 @@ def densify(points: Array, spacing: float) -> Array:
 
 
 def with_headings(points: Array, goal: Pose2) -> Array:
-    """Return poses (n, 3) at points (n, 2): each heads to the next point, the last pose has the heading of the goal."""
+    """Return poses (n, 3) at points (n, 2). Each pose heads to the next point, the last pose like the goal."""
     steps = np.diff(points, axis=0)
     yaw = np.append(np.arctan2(steps[:, 1], steps[:, 0]), goal.yaw)
     return np.column_stack((points, yaw))
 
 
-def smoothed(costs: TraversalCosts, points: Array) -> Array:
-    """Return the path (n, 2) with rounded corners, as long as it is not blocked and the cost hardly increases."""
+def smooth_path(costs: TraversalCosts, points: Array) -> Array:
+    """Return the path (n, 2) with rounded corners. Smoothing stops before the path is blocked or costs clearly more."""
     cost = costs.along(points)
     for _ in range(SMOOTHING_PASSES):
-        other = points.copy()
-        other[1:-1] += 0.5 * (0.5 * (points[:-2] + points[2:]) - points[1:-1])
-        new_cost = costs.along(other)
+        smoother = points.copy()
+        smoother[1:-1] += 0.5 * (0.5 * (points[:-2] + points[2:]) - points[1:-1])
+        new_cost = costs.along(smoother)
         if math.isinf(new_cost) or new_cost > MAX_COST_RATIO * cost:
             break
-        points, cost = other, new_cost if math.isinf(cost) else cost
+        points, cost = smoother, new_cost if math.isinf(cost) else cost
     return points
 
 
@@ -51,7 +51,7 @@ CORNER_OFFSET_CELLS = 0.02
 
 
 def avoid_cell_corners(costs: TraversalCosts, points: Array) -> Array | None:
-    """Return the path (n, 2) with detours around the corners of blocked cells that it cuts.
+    """Return the path (n, 2) with detours around the corners of blocked cells that the path cuts.
 
     Return None if the path crosses more of a blocked cell than a corner.
     """
@@ -61,32 +61,33 @@ def avoid_cell_corners(costs: TraversalCosts, points: Array) -> Array | None:
     path = points if np.hypot(*steps.T).max(initial=0.0) <= costs.resolution else densify(points, costs.resolution)
     positions = (path - costs.origin) / costs.resolution
     cells = np.floor(positions)
-    # No step is longer than a cell, so that it crosses at most one edge per axis.
+    # A step is at most as long as a cell. Therefore, a step crosses at most one cell edge per axis.
     diagonal = np.flatnonzero((cells[1:] != cells[:-1]).all(axis=1))
-    before, after = cells[diagonal], cells[diagonal + 1]
-    corners = np.maximum(before, after)
-    reached = (corners - positions[diagonal]) / (positions[diagonal + 1] - positions[diagonal])
-    is_vertical_first = (reached[:, 0] < reached[:, 1])[:, None]  # crosses the vertical edge before the horizontal one
-    beside = _cells_beside(before, after)
+    start_cells, end_cells = cells[diagonal], cells[diagonal + 1]
+    corners = np.maximum(start_cells, end_cells)
+    edge_ratios = (corners - positions[diagonal]) / (positions[diagonal + 1] - positions[diagonal])
+    is_vertical_first = (edge_ratios[:, 0] < edge_ratios[:, 1])[:, None]  # the step crosses the vertical edge first
+    beside = _cells_beside(start_cells, end_cells)
     crossed, opposite = np.where(is_vertical_first, *beside), np.where(is_vertical_first, *reversed(beside))
-    cut = ~_free(costs, crossed)
-    if not (np.isfinite(costs.at(path)).all() and _free(costs, opposite[cut]).all()):
+    is_cut = ~_are_free(costs, crossed)
+    if not (np.isfinite(costs.at(path)).all() and _are_free(costs, opposite[is_cut]).all()):
         return None
-    if not cut.any():
+    if not is_cut.any():
         return points
-    detours = corners[cut] + CORNER_OFFSET_CELLS * np.sign(opposite[cut] + 0.5 - corners[cut])
-    return np.insert(path, diagonal[cut] + 1, detours * costs.resolution + np.array(costs.origin), axis=0)
+    detours = corners[is_cut] + CORNER_OFFSET_CELLS * np.sign(opposite[is_cut] + 0.5 - corners[is_cut])
+    return np.insert(path, diagonal[is_cut] + 1, detours * costs.resolution + np.array(costs.origin), axis=0)
 
 
-def _cells_beside(before: Array, after: Array) -> tuple[Array, Array]:
+def _cells_beside(start_cells: Array, end_cells: Array) -> tuple[Array, Array]:
     """Return the two cells that share an edge with both cells of each diagonal step, all (n, 2) as (column, row).
 
-    A step leads from `before` to `after`. The first result is in the column of `after`, the second in that of `before`.
+    The first result is in the column of the end cell, the second result in the column of the start cell.
     """
-    return np.column_stack((after[:, 0], before[:, 1])), np.column_stack((before[:, 0], after[:, 1]))
+    in_end_column = np.column_stack((end_cells[:, 0], start_cells[:, 1]))
+    return in_end_column, np.column_stack((start_cells[:, 0], end_cells[:, 1]))
 
 
-def _free(costs: TraversalCosts, cells: Array) -> npt.NDArray[np.bool_]:
+def _are_free(costs: TraversalCosts, cells: Array) -> npt.NDArray[np.bool_]:
     """Return which of the cells (n, 2), given as (column, row), are not blocked."""
     columns, rows = cells.astype(np.int64).T
     return np.asarray(np.isfinite(costs.rates[rows, columns]))

@@ -1,4 +1,4 @@
-"""Planning on large costmaps: search a window around start and goal first, and enlarge the window if necessary."""
+"""Planning on large costmaps: searches a window around start and goal first, and enlarges the window if necessary."""
 
 import contextlib
 import math
@@ -10,7 +10,7 @@ from simscen.core.messages.navigation import Path
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 MAX_FULL_SEARCH_CELLS = 1_000_000
-"""Size up to which the whole costmap is searched at once: 50 x 50 m with a cell size of 5 cm."""
+"""Maximum size of a costmap that is searched without windows: 50 x 50 m with a cell size of 5 cm."""
 WINDOW_MARGIN_M = 10.0
 """Minimum margin of the first window around start and goal."""
 WINDOW_MARGIN_RATIO = 1 / 3
@@ -23,24 +23,24 @@ PlanFunction = Callable[[CostmapView, Pose2, Pose2, int], Path]
 def plan_in_windows(plan: PlanFunction, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
     """Call `plan` for a window around start and goal, then for larger windows, and finally for the whole costmap.
 
-    A path in a window is returned only if no path that leaves the window can be shorter. Raises the failure of the last
-    call.
+    A path in a window is returned only if no path that leaves the window can be shorter. Raises NavigationFailure if
+    the last call does.
     """
     margin = max(WINDOW_MARGIN_M, WINDOW_MARGIN_RATIO * start.distance(goal))
     while costmap.costs.size > MAX_FULL_SEARCH_CELLS:
-        part = crop_costmap(costmap, start, goal, margin)
-        if part is None or 2 * part.costs.size > costmap.costs.size:
+        window = crop_costmap(costmap, start, goal, margin)
+        if window is None or 2 * window.costs.size > costmap.costs.size:
             break
         with contextlib.suppress(NavigationFailure):
-            path = plan(part, start, goal, seed)
-            if path.length() <= _min_length_outside(costmap, part, start, goal):
+            path = plan(window, start, goal, seed)
+            if path.length() <= _min_length_outside(costmap, window, start, goal):
                 return path
         margin *= 2
     return plan(costmap, start, goal, seed)
 
 
 def crop_costmap(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float) -> CostmapView | None:
-    """Return the part of the costmap with a margin around start and goal; None if start or goal is off the map."""
+    """Return the costmap around start and goal, with a margin in m; None if start or goal is off the map."""
     (rows, columns), size = costmap.costs.shape, costmap.resolution
     low, high = [], []
     for ends, corner, cells in (
@@ -56,21 +56,21 @@ def crop_costmap(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float)
     return replace(costmap, costs=costmap.costs[window], distance=costmap.distance[window], origin=origin)
 
 
-def _min_length_outside(costmap: CostmapView, part: CostmapView, start: Pose2, goal: Pose2) -> float:
-    """Return the minimum length in m of a path that leaves a part of the costmap; inf if no path can leave the part.
+def _min_length_outside(costmap: CostmapView, window: CostmapView, start: Pose2, goal: Pose2) -> float:
+    """Return the minimum length in m of a path that leaves a window of the costmap; inf if no path can leave it.
 
-    This is the length of a line from the start to the goal mirrored at the nearest side of the part.
+    The minimum is the distance from the start to the goal, mirrored at the nearest side of the window.
     """
     shortest = math.inf
     for axis, start_coordinate, goal_coordinate, lateral in (
         (0, start.x, goal.x, goal.y - start.y),
         (1, start.y, goal.y, goal.x - start.x),
     ):
-        low, high = _sides(part, axis)
+        low, high = _sides(window, axis)
         first, last = _sides(costmap, axis)
-        if low > first + part.resolution / 2:
+        if low > first + window.resolution / 2:
             shortest = min(shortest, math.hypot(start_coordinate - low + goal_coordinate - low, lateral))
-        if high < last - part.resolution / 2:
+        if high < last - window.resolution / 2:
             shortest = min(shortest, math.hypot(high - start_coordinate + high - goal_coordinate, lateral))
     return shortest
 

@@ -22,10 +22,10 @@ PoseCheck = Callable[[float, float, float], bool]
 POSE_SPACING_M = 0.05
 """Maximum distance between the poses of a path."""
 MIN_CHORD_RATIO = 0.995
-"""Minimum ratio of the distance of two successive poses to the path length between them. If it is lower, there may be a
-cusp (change of driving direction) between them, which is searched for."""
+"""Ratio of the distance of two successive poses to the path length between them, below which a cusp (change of the
+driving direction) between both poses is searched for."""
 CUSP_TOLERANCE_M = 1e-4
-"""Accuracy of the position of a cusp."""
+"""Maximum error of the position of a cusp along the path."""
 SHORTCUT_ATTEMPTS = 60
 """Maximum number of attempts to shorten the path by removing states."""
 
@@ -37,7 +37,7 @@ def search_poses(
     bounds: tuple[float, float, float, float],
     start: Pose2,
     goal: Pose2,
-    valid: PoseCheck,
+    is_valid: PoseCheck,
     seed: int,
     iterations: int,
     check_spacing: float = POSE_SPACING_M,
@@ -47,13 +47,13 @@ def search_poses(
     """Return poses from start to goal, at most POSE_SPACING_M apart; None if no path is found in `iterations`.
 
     planner_type:    key of PLANNERS
-    space:           "dubins" drives only forward, "reeds_shepp" also backward, "se2" in any direction
+    space:           driving directions: only forward ("dubins"), also backward ("reeds_shepp"), or all ("se2")
     turning_radius:  minimum radius of arcs in m; without effect for "se2"
     bounds:          (min x, min y, max x, max y) in m
-    valid:           check of single poses, called every `check_spacing` m
+    is_valid:        check of single poses, called every `check_spacing` m
     configure:       sets the parameters of OMPL's planner
 
-    A planner that improves its path stops after `improving_iterations`, or later with its first path.
+    A planner that improves its path stops after `improving_iterations`, or with the first path if that is later.
     """
     ou.RNG.setSeed(seed)
     states = _make_space(space, turning_radius)
@@ -63,12 +63,12 @@ def search_poses(
         limits.setHigh(axis, bounds[axis + 2])
     states.setBounds(limits)
     information = ob.SpaceInformation(states)
-    information.setStateValidityChecker(lambda state: valid(state.getX(), state.getY(), state.getYaw()))
+    information.setStateValidityChecker(lambda state: is_valid(state.getX(), state.getY(), state.getYaw()))
     information.setStateValidityCheckingResolution(check_spacing / states.getMaximumExtent())
     information.setup()
     ends = _state(information, start), _state(information, goal)
     if not all(information.satisfiesBounds(end) and information.isValid(end) for end in ends):
-        return None  # a planner would wait for a better goal, 5 ms per iteration
+        return None  # otherwise, a planner waits for a valid goal, 5 ms per iteration
     problem = ob.ProblemDefinition(information)
     problem.setStartAndGoalStates(*ends)
     planner = PLANNERS[planner_type](information)
@@ -98,8 +98,8 @@ def _reeds_shepp_poses(states: Any, waypoints: Any) -> list[Pose2]:
             continue
         count = max(1, math.ceil(length / POSE_SPACING_M))
 
-        def pose_at(length_along: float, first: Any = first, last: Any = last, length: float = length) -> Pose2:
-            states.interpolate(first, last, length_along / length, state)
+        def pose_at(path_length: float, first: Any = first, last: Any = last, length: float = length) -> Pose2:
+            states.interpolate(first, last, path_length / length, state)
             return _pose(state)
 
         stations = [length * k / count for k in range(count + 1)]
@@ -121,10 +121,12 @@ def _cusps(pose_at: Callable[[float], Pose2], low: float, high: float) -> list[f
 
 
 def _pose(state: Any) -> Pose2:
+    """Return the pose of a state of OMPL."""
     return Pose2(state.getX(), state.getY(), state.getYaw())
 
 
 def _make_space(kind: Space, turning_radius: float) -> Any:
+    """Return OMPL's state space of this kind. `turning_radius` is in m."""
     if kind == "dubins":
         return ob.DubinsStateSpace(turning_radius)
     if kind == "reeds_shepp":
@@ -133,6 +135,7 @@ def _make_space(kind: Space, turning_radius: float) -> Any:
 
 
 def _state(information: Any, pose: Pose2) -> Any:
+    """Return a state of OMPL with this pose."""
     state = information.allocState()
     state.setX(pose.x)
     state.setY(pose.y)
@@ -141,30 +144,31 @@ def _state(information: Any, pose: Pose2) -> Any:
 
 
 ESCAPE_DIRECTIONS = 16
-"""Number of directions in which a holonomic base may leave a collision."""
+"""Number of directions in which a holonomic base can leave a collision."""
 ESCAPE_CURVATURE_RATIOS = (0.0, 0.5, -0.5, 1.0, -1.0)
-"""Curvatures, relative to the maximum, of the arcs on which all other bases may leave a collision."""
+"""Curvatures, relative to the maximum, of the arcs on which all other bases can leave a collision."""
 
 
 def escape_arcs(space: Space, turning_radius: float, start: Pose2) -> Iterator[Array]:
-    """Yield arcs, MAX_ESCAPE_M long, on which the robot may leave a collision at `start`, as poses (n, 3)."""
-    length_along = np.linspace(0.0, MAX_ESCAPE_M, round(MAX_ESCAPE_M / POSE_SPACING_M) + 1)
+    """Yield the poses (n, 3) of arcs of MAX_ESCAPE_M on which the robot can leave a collision at `start`."""
+    path_lengths = np.linspace(0.0, MAX_ESCAPE_M, round(MAX_ESCAPE_M / POSE_SPACING_M) + 1)
     if space == "se2":
         for heading in np.arange(ESCAPE_DIRECTIONS) * (2.0 * math.pi / ESCAPE_DIRECTIONS):
-            yield _arc(start, length_along, 0.0, float(heading))
+            yield _arc(start, path_lengths, 0.0, float(heading))
         return
-    for signed_length in (length_along,) if space == "dubins" else (length_along, -length_along):
+    for signed_lengths in (path_lengths,) if space == "dubins" else (path_lengths, -path_lengths):
         for ratio in ESCAPE_CURVATURE_RATIOS:
-            yield _arc(start, signed_length, ratio / turning_radius, 0.0)
+            yield _arc(start, signed_lengths, ratio / turning_radius, 0.0)
 
 
-def _arc(start: Pose2, length_along: Array, curvature: float, heading: float) -> Array:
-    """Return poses (n, 3) at the path lengths `length_along` (n,) in m of an arc with this `curvature` in 1/m.
+def _arc(start: Pose2, path_lengths: Array, curvature: float, heading: float) -> Array:
+    """Return poses (n, 3) at the given path lengths (n,) in m on an arc with this `curvature` in 1/m.
 
-    `heading` is the initial direction of motion relative to the heading of the start, in rad.
+    Negative path lengths lead backward. `heading` is the initial direction of motion relative to the heading of the
+    start, in rad.
     """
-    turned = curvature * length_along
-    chord = length_along * np.sinc(turned / (2.0 * math.pi))
+    turned = curvature * path_lengths
+    chord = path_lengths * np.sinc(turned / (2.0 * math.pi))
     direction = start.yaw + heading + 0.5 * turned
     yaw = wrap_array(start.yaw + turned)
     yaw[0] = start.yaw

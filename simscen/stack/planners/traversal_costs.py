@@ -14,23 +14,23 @@ from simscen.stack.costmap.distance_transform import squared_distances_within
 from simscen.stack.protocols import MAX_NON_OBSTACLE, NO_INFORMATION, CostmapView, RobotModel
 
 UNKNOWN_COST = 253
-"""Cost of an unknown cell: just above the highest cost of a free cell (nav2_navfn_planner)."""
+"""Cost of an unknown cell: just above the maximum cost of a free cell (nav2_navfn_planner)."""
 NO_ROTATION_COST_FACTOR = 4.0
-"""Factor on the costs of cells in which a robot that is not round cannot turn in place."""
+"""Factor of the costs of cells in which a robot that is not round cannot turn in place."""
 EXEMPT_HALF_SIDE_M = 0.5
-"""Half the side length of the square around start and goal in which narrow gaps are allowed."""
+"""Half the side length of the squares around start and goal in which narrow gaps are allowed."""
 SAMPLE_SPACING_CELLS = 0.67
-"""Distance in cells between two samples of the costs along a path, and minimum distance along a motion of a search."""
+"""Spacing in cells of cost samples along a path, and minimum spacing along a motion of a search."""
 SAMPLE_SPACING_RATIO = 0.4
-"""Distance between two samples of the costs along a motion of a search, relative to the inscribed radius."""
+"""Spacing of cost samples along a motion of a search, relative to the inscribed radius."""
 
 
 class TraversalCosts:
     """Traversal costs per meter on a costmap, `rates` (height, width): 1 in free space, inf in blocked cells.
 
-    Costs are 1 + `multiplier` · cost / 252, as in nav2_smac_planner, and higher where the robot cannot turn in place.
-    A cell is blocked if the inscribed circle of the robot does not fit there, or if it is unknown and `allow_unknown`
-    is False.
+    Rates are 1 + `multiplier` · cost / 252, as in nav2_smac_planner, and higher where the robot cannot turn in place.
+    A cell is blocked if the inscribed circle of the robot does not fit there. Without `allow_unknown`, an unknown cell
+    is blocked as well.
     """
 
     def __init__(self, costmap: CostmapView, robot: RobotModel, multiplier: float, allow_unknown: bool) -> None:
@@ -48,55 +48,56 @@ class TraversalCosts:
         self.rates: npt.NDArray[np.float32] = rates
         self._per_meter = 1.0 / costmap.resolution
         self._flat_rates = _padded_view(rates)
-        # An obstacle blocks at least a disc of the inscribed radius, but a single unknown cell may block a motion, too.
+        # An obstacle blocks at least a disc of the inscribed radius. In contrast, an unknown cell blocks only itself.
         search_spacing = SAMPLE_SPACING_RATIO * robot.inscribed_radius if allow_unknown else 0.0
         self.stride = max(SAMPLE_SPACING_CELLS * costmap.resolution, search_spacing)
         """Distance in m between two samples of `between`."""
         self.cache: dict[object, Any] = {}
-        """Cached results derived from these costs, reused by the next plan if the costs have not changed."""
+        """Cached results derived from these costs. The next plan uses them if the costs have not changed."""
         self._last_motion: tuple[float, float, float, float] | None = None
         self._last_cost = 0.0
 
     def without_narrow_gaps(self, clearance: float, exempt: Sequence[tuple[float, float]]) -> "TraversalCosts":
-        """Return a copy in which gaps are blocked if the robot has less than `clearance` m on each side.
+        """Return a copy in which gaps are blocked if a robot in the middle has less than `clearance` m on each side.
 
         Cells near the `exempt` points (x, y) keep their costs.
         """
         reach = math.ceil(clearance * self._per_meter)
         wide = self.costmap.distance > np.float32(self.inscribed + clearance)
-        narrow = squared_distances_within(wide, reach) > reach * reach
-        side = math.ceil(EXEMPT_HALF_SIDE_M * self._per_meter)
+        is_narrow = squared_distances_within(wide, reach) > reach * reach
+        half_side = math.ceil(EXEMPT_HALF_SIDE_M * self._per_meter)
         for point in exempt:
             row, column = self.cell(point)
-            narrow[max(0, row - side) : row + side + 1, max(0, column - side) : column + side + 1] = False
+            rows = slice(max(0, row - half_side), row + half_side + 1)
+            is_narrow[rows, max(0, column - half_side) : column + half_side + 1] = False
         costs = copy.copy(self)
-        costs.rates = np.where(narrow, np.float32(np.inf), self.rates)
+        costs.rates = np.where(is_narrow, np.float32(np.inf), self.rates)
         costs._flat_rates, costs.cache, costs._last_motion = _padded_view(costs.rates), {}, None
         costs.__dict__.pop("_costly_cells", None)
         return costs
 
     @cached_property
     def _costly_cells(self) -> Any:
-        """Summed-area table (height + 1, width + 1) of the cells that do not cost 1 per meter, as a flat memoryview."""
+        """Summed-area table (height + 1, width + 1) of cells with a rate other than 1, as a flat memoryview."""
         table = np.zeros((self.height + 1, self.width + 1), dtype=np.int32)
         np.cumsum(self.rates != 1.0, axis=0, out=table[1:, 1:])
         np.cumsum(table, axis=1, out=table)
         flat: Any = table.reshape(-1)
         return memoryview(flat)
 
-    def reusing_cache(self, previous: "TraversalCosts | None") -> "TraversalCosts":
-        """Use the cache of `previous`, the costs of the previous plan, if both costs are equal. Return this object."""
+    def share_cache(self, previous: "TraversalCosts | None") -> "TraversalCosts":
+        """Use the cache of the costs of the previous plan if the costs are equal. Return this object."""
         if previous is not None and np.array_equal(previous.rates, self.rates):
             self.cache = previous.cache
         return self
 
     @property
     def free(self) -> npt.NDArray[np.bool_]:
-        """Cells (height, width) that are not blocked."""
+        """Mask (height, width) of the cells that are not blocked."""
         return np.isfinite(self.rates)
 
     def cell(self, point: tuple[float, float]) -> tuple[int, int]:
-        """Return the cell (row, column) at a point, possibly outside the map."""
+        """Return the cell (row, column) at a point. The cell may be outside the map."""
         x, y = (point[0] - self.origin[0]) / self.resolution, (point[1] - self.origin[1]) / self.resolution
         return math.floor(y), math.floor(x)
 
@@ -111,7 +112,7 @@ class TraversalCosts:
         return rates
 
     def between(self, ax: float, ay: float, bx: float, by: float) -> float:
-        """Return the cost of the straight motion from (ax, ay) to (bx, by), both on the map; inf if it is blocked."""
+        """Return the cost of the straight motion from (ax, ay) to (bx, by), both on the map; inf if blocked."""
         motion = (ax, ay, bx, by)
         if motion == self._last_motion:  # OMPL asks for cost and validity of a motion one after the other
             return self._last_cost
@@ -161,6 +162,6 @@ class TraversalCosts:
 
 
 def _padded_view(rates: npt.NDArray[np.float32]) -> Any:
-    """Return the cells as a flat memoryview, padded with inf, for fast indexing."""
+    """Return the rates as a flat memoryview, padded with inf, for fast indexing."""
     padded: Any = np.append(rates.reshape(-1), np.full(rates.shape[1] + 1, np.inf, dtype=np.float32))
     return memoryview(padded)

@@ -6,7 +6,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
 
-from simscen.advanced.planners.path_refinement import refine, smoothed
+from simscen.advanced.planners.path_refinement import refine, smooth_path
 from simscen.core.geometry import Pose2
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model.costmaps import Costmap as CostmapSpec
@@ -176,7 +176,7 @@ def test_path_that_barely_fails_to_fit_is_not_smoothed_through_walls() -> None:
     rates = TraversalCosts(view, ROBOT, 2.0, True)
     way = np.array([(2.0, 2.0), (2.0, 6.15), (4.05, 6.15), (6.0, 6.15), (6.0, 2.0)])  # for a radius of 22 cm
     assert np.isinf(rates.along(way)) and not struck(view, densify(way, SPACING_M))
-    for better in (smoothed(rates, way), refine(rates, way)):
+    for better in (smooth_path(rates, way), refine(rates, way)):
         assert not struck(view, densify(better, SPACING_M))
 
 
