@@ -54,7 +54,7 @@ class ClearancePlan(FollowedPlan):
         tracker = self._updated_tracker
         if not self._has_lost.any():
             return False
-        along, index = tracker.along, tracker.index
+        along, index = tracker.path_lengths, tracker.index
         end = int(np.searchsorted(along, along[index] + CLEARANCE_HORIZON_M, side="right"))
         return bool(self._has_lost[index:end].any())
 

@@ -11,7 +11,7 @@ from simscen.advanced.trail import Trail
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
-from simscen.stack.footprint import distance_at, lethal_near
+from simscen.stack.footprint import distance_at, lethal_cells_near
 from simscen.stack.kinematics import poses_along
 from simscen.stack.moving_obstacles import Mask
 from simscen.stack.protocols import CostmapView, NavigationFailure, RobotModel
@@ -128,7 +128,9 @@ class TrailFollower:
         if not blocked.any():
             return blocked
         edge = costmap.resolution
-        cells = lethal_near(costmap, pose.x, pose.y, self._footprint.circumscribed + self.speed * HORIZON_S + edge)
+        cells = lethal_cells_near(
+            costmap, pose.x, pose.y, self._footprint.circumscribed + self.speed * HORIZON_S + edge
+        )
         known_poses = self._trail.poses[self._window()][: max(0, self._trail.known_count - self._index)]
         passed = self._footprint.point_distances(cells, known_poses).min(axis=0, initial=edge)
         current = self._footprint.point_distances(cells, np.array([pose]))[0]

@@ -100,7 +100,7 @@ class AdvancedStack(ReferenceStack):
         if command == STOP or self._monitor.is_silent(tick):
             self._commands.stop(tick)
         elif not self._commands.is_busy(tick):
-            self._commands.request(tick, command, self._commands.periods(tick))
+            self._commands.request(tick, command, self._commands.elapsed_periods(tick))
 
 
 FIRST_CLEARING_WAIT_S = 10.0

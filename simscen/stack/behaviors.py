@@ -14,7 +14,7 @@ from simscen.stack.protocols import Behavior, CostmapView, NavigationFailure
 from simscen.stack.setting import Setting
 
 SPIN_TOLERANCE_RAD = 0.01
-"""Remaining angle at which a spin is done: half a degree, the accuracy of odometry."""
+"""Maximum remaining angle at which a spin is done: half a degree, the accuracy of odometry."""
 
 
 class Spin:
@@ -25,20 +25,20 @@ class Spin:
     def __init__(self, spec: model.Spin, setting: Setting) -> None:
         self._spec, self._robot, self._footprint = spec, setting.robot, setting.footprint
         self._deceleration = spec.rotational_acc_lim or setting.robot.angular_acceleration
-        self._turned, self._yaw = 0.0, 0.0
+        self._turned_angle, self._last_yaw = 0.0, 0.0
 
     def start(self, pose: Pose2) -> None:
         """Start at this pose."""
-        self._turned, self._yaw = 0.0, pose.yaw
+        self._turned_angle, self._last_yaw = 0.0, pose.yaw
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Return the command `seconds` after the start; None when done or if the robot is a car, which cannot spin.
+        """Return the command `seconds` after the start; None when done, and for a car, which cannot spin.
 
         Raises NavigationFailure with SPIN_COLLISION_AHEAD or SPIN_TIMEOUT.
         """
-        self._turned += wrap(pose.yaw - self._yaw)
-        self._yaw = pose.yaw
-        remaining = abs(self._spec.spin_dist) - math.copysign(1.0, self._spec.spin_dist) * self._turned
+        self._turned_angle += wrap(pose.yaw - self._last_yaw)
+        self._last_yaw = pose.yaw
+        remaining = abs(self._spec.spin_dist) - math.copysign(1.0, self._spec.spin_dist) * self._turned_angle
         if remaining <= SPIN_TOLERANCE_RAD or self._robot.turning_radius > 0.0:
             return None
         if seconds > self._spec.time_allowance:
@@ -56,19 +56,19 @@ class Spin:
 class BackUp:
     """Recovery behavior that drives straight back by `backup_dist` m.
 
-    It fails if a collision is predicted within `simulate_ahead_time`. With `backup_partial`, it stops before the
-    obstacle instead, and fails only if it cannot move by one costmap cell.
+    The behavior fails if it predicts a collision within `simulate_ahead_time`. With `backup_partial`, the robot stops
+    before the obstacle instead, and the behavior fails only if the robot cannot move by one costmap cell.
     """
 
     name = "backup"
 
     def __init__(self, spec: model.BackUp, setting: Setting) -> None:
         self._spec, self._robot, self._footprint = spec, setting.robot, setting.footprint
-        self._from = Pose2(0.0, 0.0)
+        self._start_pose = Pose2(0.0, 0.0)
 
     def start(self, pose: Pose2) -> None:
         """Start at this pose."""
-        self._from = pose
+        self._start_pose = pose
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
         """Return the command `seconds` after the start; None when done.
@@ -76,7 +76,7 @@ class BackUp:
         Raises NavigationFailure with BACKUP_COLLISION_AHEAD, BACKUP_TIMEOUT, or, if the robot cannot drive backward,
         BACKUP_INVALID_INPUT.
         """
-        remaining = self._spec.backup_dist - self._from.distance(pose)
+        remaining = self._spec.backup_dist - self._start_pose.distance(pose)
         speed = min(self._spec.backup_speed, self._robot.max_reverse)
         if remaining <= 0.0:
             return None
@@ -89,7 +89,7 @@ class BackUp:
         free_time = time_to_collision(self._footprint, costmap, pose, command, horizon)
         if free_time >= horizon or (self._spec.backup_partial and free_time * speed >= costmap.resolution):
             return command
-        if self._spec.backup_partial and self._from.distance(pose) >= costmap.resolution:
+        if self._spec.backup_partial and self._start_pose.distance(pose) >= costmap.resolution:
             return None
         raise NavigationFailure(ErrorCode.BACKUP_COLLISION_AHEAD, "no room behind")
 
@@ -111,7 +111,7 @@ class Wait:
 
 
 class ClearCostmap:
-    """Recovery behavior that clears obstacles around the robot or, with `clear_entirely`, everywhere.
+    """Recovery behavior that removes obstacles from the costmaps: around the robot, or all with `clear_entirely`.
 
     Obstacles in the latest sensor readings remain.
     """
@@ -133,36 +133,37 @@ class ClearCostmap:
 PLANNER_CODES = frozenset(get_args(PlannerCode))
 """Names of the error codes of planners."""
 MIN_PROGRESS_M = 1.0
-"""With `retries_since_progress`: how much nearer the goal must be than at every earlier recovery, so that all retries
-are restored and the behaviors start with the first one again."""
+"""With `retries_since_progress`, all retries are restored if the goal is this much closer than at all earlier
+recoveries. The sequence then starts with the first behavior again."""
 
 
 class BehaviorSequence:
     """Recovery behaviors in cyclic order (Nav2's RoundRobin). Each retry of a goal uses the next behavior."""
 
     def __init__(self, behaviors: Sequence[Behavior], spec: Recovery) -> None:
-        """Take the behaviors in order, and the parameters, such as `number_of_retries` per goal."""
+        """Take the behaviors in order, and the parameters `number_of_retries` per goal, `planner_codes`, and so on."""
         self._behaviors, self._max_retries = tuple(behaviors), spec.number_of_retries
         self._final_codes = PLANNER_CODES.difference(spec.planner_codes)
         self._resets_on_progress = spec.retries_since_progress
-        self._next, self._used, self._nearest = 0, 0, math.inf
+        self._next_index, self._used_retries, self._min_goal_distance = 0, 0, math.inf
 
     def can_help(self, failure: NavigationFailure) -> bool:
-        """Return whether to try a recovery: False for a planner error whose code is not in `planner_codes`."""
+        """Return whether to try a recovery. False for an error of the planner whose code is not in `planner_codes`."""
         return getattr(failure.code, "name", "") not in self._final_codes
 
     def reset(self) -> None:
         """Restore all retries for a new goal. The cyclic order continues, as in Nav2."""
-        self._used, self._nearest = 0, math.inf
+        self._used_retries, self._min_goal_distance = 0, math.inf
 
-    def next(self, goal_distance: float) -> Behavior | None:
-        """Return the next behavior and count a retry; None if no retry is left. `goal_distance` is in m."""
-        if self._resets_on_progress and goal_distance <= self._nearest - MIN_PROGRESS_M and self._used:
-            self._used = self._next = 0
-        self._nearest = min(self._nearest, goal_distance)
-        if not self._behaviors or self._used >= self._max_retries:
+    def next_behavior(self, goal_distance: float) -> Behavior | None:
+        """Return the next behavior, and count a retry; None if no retry is left. `goal_distance` is in m."""
+        has_progress = goal_distance <= self._min_goal_distance - MIN_PROGRESS_M
+        if self._resets_on_progress and has_progress and self._used_retries:
+            self._used_retries = self._next_index = 0
+        self._min_goal_distance = min(self._min_goal_distance, goal_distance)
+        if not self._behaviors or self._used_retries >= self._max_retries:
             return None
-        behavior = self._behaviors[self._next % len(self._behaviors)]
-        self._next += 1
-        self._used += 1
+        behavior = self._behaviors[self._next_index % len(self._behaviors)]
+        self._next_index += 1
+        self._used_retries += 1
         return behavior

@@ -1,4 +1,4 @@
-"""Construction of the reference stack and its components from a specification."""
+"""Functions and a class that build the reference stack and its components from a specification."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -48,10 +48,10 @@ def build_stack(
     wrap_localizer: Callable[[Localizer], Localizer] = lambda localizer: localizer,
     mode: Mode = "navigate_to_pose",
 ) -> CheckedStack:
-    """Build a stack from its specification, in a wrapper that checks its decisions.
+    """Build a stack from its specification, and return it in a wrapper that validates its decisions.
 
-    `wrap_localizer` returns a wrapper of the localizer, for example one that injects faults. The rest of the stack uses
-    the wrapper. Raises ValueError if `controller_frequency` does not divide the tick rate.
+    `wrap_localizer` returns a wrapper of the localizer, for example a wrapper that injects faults. The other components
+    use the wrapper. Raises ValueError if `controller_frequency` does not divide the tick rate.
     """
     period = clock.seconds(clock.period(spec.controller_frequency))
     setting = Setting(
@@ -74,13 +74,17 @@ def configured_stack(spec: StackSpec, setting: Setting) -> ReferenceStack:
 
 
 class StackBuilder:
-    """Builder of the reference stack. Subclasses replace components by `plan_manager` and the methods `make_…`.
+    """Builder of the reference stack. Subclasses override `plan_manager` and methods `make_…` to replace components.
 
-    If the cells of the map are larger than those of the costmap, the map is refined. Each component has its own random
-    stream, for example "localizer". Each plan has one, too: "planner#1", "planner#2", ….
+    Each component has its own random stream, for example "localizer". Each plan has its own random seed.
+
+    surroundings:  surroundings of the stack; the map has cells no larger than those of the costmap
+    latency:       latency in ticks by component, for example "planner"
+    full_speed:    maximum speed of the controller in m/s; set by `build`
     """
 
     plan_manager: ClassVar[type[PlanManager]] = PlanManager
+    """Class of the plan manager."""
 
     def __init__(self, spec: StackSpec, setting: Setting) -> None:
         surroundings = setting.surroundings
@@ -96,28 +100,29 @@ class StackBuilder:
         spec, setting, robot = self.spec, self.setting, self.robot
         period = setting.clock.period(spec.controller_frequency)
         odometry = OdometryHistory(self.surroundings.tick_rate, trail_s=TRAIL_S)
-        driving = replace(
+        control_setting = replace(
             setting,
             surroundings=self.surroundings,
             name="controller",
             resolution=spec.local_costmap.with_defaults_from(spec.costmap).resolution,
             trail=odometry.trail,
         )
-        controller: Controller = build_component(CheckedController, spec.controller, driving)
+        controller: Controller = build_component(CheckedController, spec.controller, control_setting)
         self.full_speed = controller.full_speed
         lookahead_distance = self.full_speed * spec.controller.lookahead_s
         costmaps = Costmaps(spec, self.surroundings, lookahead_distance, self.latency["costmap"])
         monitor = CollisionMonitor(spec.collision_monitor, robot, self.surroundings.lidars, self.surroundings.tick_rate)
-        driving = replace(
-            driving,
+        control_setting = replace(
+            control_setting,
             clear_costmap=costmaps.clear,
             clear_around=costmaps.clear_around,
             limit_command=monitor.limit_command,
         )
-        planning = replace(driving, name="planner", resolution=costmaps.global_costmap.view.resolution)
+        global_resolution = costmaps.global_costmap.view.resolution
+        planner_setting = replace(control_setting, name="planner", resolution=global_resolution)
         plans = self.plan_manager(
             spec.planner,
-            CheckedPlanner(spec.planner, planning),
+            CheckedPlanner(spec.planner, planner_setting),
             costmaps.global_costmap,
             self.plan_seed,
             robot.inscribed_radius,
@@ -128,8 +133,8 @@ class StackBuilder:
         navigator = Navigator(
             plans,
             controller,
-            BehaviorSequence(_behaviors(spec.recovery, driving), spec.recovery),
-            build_component(CheckedGoalChecker, spec.goal_checker, driving.named("goal_checker")),
+            BehaviorSequence(_build_behaviors(spec.recovery, control_setting), spec.recovery),
+            build_component(CheckedGoalChecker, spec.goal_checker, control_setting.named("goal_checker")),
             ProgressChecker(spec.progress_checker),
             costmaps,
             setting.control_period,
@@ -143,9 +148,10 @@ class StackBuilder:
             period,
             (self.latency["controller"], self.latency["collision_monitor"]),
         )
+        localizer = build_component(CheckedLocalizer, spec.localizer, control_setting.named("localizer"))
         return self.make_stack(
             self.surroundings,
-            setting.wrap_localizer(build_component(CheckedLocalizer, spec.localizer, driving.named("localizer"))),
+            setting.wrap_localizer(localizer),
             costmaps,
             controller,
             navigator,
@@ -160,11 +166,11 @@ class StackBuilder:
         )
 
     def plan_seed(self, number: int) -> int:
-        """Return the random seed of the n-th plan of the run."""
+        """Return the random seed of the plan with this number in the run (1, 2, …)."""
         return self.streams.library_seed(f"planner#{number}")
 
     def make_odometry_filter(self) -> "OdometryFilter | None":
-        """Make the filter that fuses wheel odometry and IMU; None if the stack uses unfiltered wheel odometry."""
+        """Return a filter that fuses wheel odometry and IMU; None if the stack uses unfiltered wheel odometry."""
         if not self.spec.filters_odometry(self.surroundings.has_imu):
             return None
         from simscen.stack.localizers.odometry_filter import OdometryFilter
@@ -172,7 +178,7 @@ class StackBuilder:
         return OdometryFilter(self.spec.odometry, self.surroundings.tick_rate)
 
     def make_clearing_policy(self) -> ClearingPolicy:
-        """Make the policy that decides how much of the global costmap is cleared when planning has failed."""
+        """Return the policy that decides how much of the global costmap is cleared when planning has failed."""
         return ClearingPolicy()
 
     def make_stack(self, *arguments: Any) -> ReferenceStack:
@@ -180,7 +186,7 @@ class StackBuilder:
         return ReferenceStack(*arguments)
 
 
-def _behaviors(spec: Recovery, setting: Setting) -> list[Behavior]:
+def _build_behaviors(spec: Recovery, setting: Setting) -> list[Behavior]:
     """Build the recovery behaviors that the robot can execute, each with its own random stream."""
     can_turn = setting.robot.turning_radius == 0.0
     possible = [each for each in spec.behavior_specs() if can_turn or not each.turns_in_place]

@@ -17,8 +17,8 @@ STANDSTILL_CHECKS = 10
 class SimpleGoalChecker:
     """Decides whether the goal is reached, like nav2_controller::SimpleGoalChecker.
 
-    With `stateful`, the position stays reached until the robot leaves the position tolerance. Until the robot has stood
-    still for a while, the tolerances are multiplied by `well_inside`, so that it does not stop at their edge.
+    While the robot moves, the tolerances are multiplied by `well_inside`, so that the robot does not stop at the edge
+    of a tolerance. With `stateful`, the full position tolerance applies once the position has been reached.
     """
 
     def __init__(self, spec: GoalSpec, setting: Setting) -> None:
@@ -32,20 +32,20 @@ class SimpleGoalChecker:
     def reached(self, goal: Goal, pose: Pose2, twist: Twist) -> bool:
         """Return whether the robot has reached the goal, given its estimated pose in the map frame and its velocity."""
         self._standstill_checks = self._standstill_checks + 1 if is_standstill(twist) else 0
-        factor = 1.0 if self._standstill_checks >= STANDSTILL_CHECKS else self._well_inside
+        ratio = 1.0 if self._standstill_checks >= STANDSTILL_CHECKS else self._well_inside
         distance = math.hypot(pose.x - goal.pose.x, pose.y - goal.pose.y)
-        is_close = distance <= factor * goal.xy_tolerance
+        is_close = distance <= ratio * goal.xy_tolerance
         stays_close = self._is_stateful and self._is_position_reached and distance <= goal.xy_tolerance
         self._is_position_reached = is_close or stays_close
         heading_error = abs(wrap(goal.pose.yaw - pose.yaw))
-        return self._is_position_reached and heading_error <= factor * goal.yaw_tolerance
+        return self._is_position_reached and heading_error <= ratio * goal.yaw_tolerance
 
 
 class ProgressChecker:
     """Decides whether the robot is stuck, like nav2_controller's SimpleProgressChecker and PoseProgressChecker.
 
-    The robot must move by `required_movement_radius` (m), or turn by `required_movement_angle` (rad) if given, within
-    `movement_time_allowance` (s).
+    Within `movement_time_allowance` s, the robot must move by `required_movement_radius` m. If
+    `required_movement_angle` is set, it is enough to turn by this angle in rad.
     """
 
     def __init__(self, spec: ProgressSpec) -> None:
@@ -55,7 +55,7 @@ class ProgressChecker:
         self._baseline_time = 0.0
 
     def reset(self) -> None:
-        """Restart with the next pose."""
+        """Measure progress from the next pose on."""
         self._baseline = None
 
     def is_stuck(self, pose: Pose2, now: float) -> bool:

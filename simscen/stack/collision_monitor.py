@@ -1,6 +1,6 @@
 """Collision monitor (nav2_collision_monitor): slows the robot down before obstacles in the latest scans.
 
-It uses neither map nor costmap. If the stack predicts moving obstacles, the monitor uses the predictions.
+The monitor does not use map or costmaps. If the stack predicts moving obstacles, the monitor uses the predictions.
 """
 
 import math
@@ -20,21 +20,23 @@ from simscen.stack.protocols import RobotModel
 DEFAULT_STEPS = 8
 """Number of time steps until `time_before_collision` if `simulation_time_step` is not set."""
 STEP_TOLERANCE = 1e-9
-"""Rounding error, in time steps, that does not add a time step."""
+"""A remainder of the division into time steps up to this fraction of a step is a rounding error, and adds no step."""
 MAX_STEPS = 1000
-"""Largest number of time steps, so that a tiny `simulation_time_step` cannot exhaust the memory."""
+"""Maximum number of time steps, so that a tiny `simulation_time_step` cannot exhaust the memory."""
 ORIGIN = Pose2(0.0, 0.0)
+"""Current pose of the robot in the base frame."""
 MIN_BENEFIT_M = 0.005
-"""The robot brakes for a moving obstacle only if braking increases the distance to it by more than this value."""
+"""The robot brakes for a moving obstacle only if braking increases the distance to the obstacle by more than this."""
 ROUNDING_M = 1e-6
 """Rounding error allowed for distances to moving obstacles."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedScan:
-    """The latest scan of a lidar, and the pose of the robot in the odom frame at the time of the scan.
+    """The latest scan of a lidar.
 
-    All hits are at least `nearest` m from the base.
+    odometry:  pose of the robot in the odom frame at the time of the scan
+    nearest:   lower bound in m on the distance from the base to any hit
     """
 
     scan: Scan
@@ -51,7 +53,7 @@ class CollisionMonitor:
         self._arrivals: dict[str, tuple[int, int]] = {}
         """For each lidar, the tick at which its latest message arrived and the tick of the scan."""
         self.hold_ticks = spec.hold_timeout * tick_rate or math.inf
-        """Time in ticks for which the monitor may stop the robot before that counts as a failure."""
+        """Time in ticks after which stopping the robot counts as a failure; inf if disabled."""
         self._scan_ticks, self._oldest, self._start_tick = dict.fromkeys(lidars, -math.inf), -math.inf, 0
         self._scans: dict[str, RecordedScan] = {}
         self._moving, self._has_moving = NO_MOVING_OBSTACLES, False
@@ -70,11 +72,11 @@ class CollisionMonitor:
             self._max_edge_distance, self._miter_factor = robot.radius, 1.0
 
     def start(self, tick: int) -> None:
-        """Set the tick from which `silence_reason` counts the time of lidars that have not sent a scan yet."""
+        """Set the start of the task, from which `silence_reason` counts the time without a first scan."""
         self._start_tick = tick
 
     def on_scan(self, scan: Scan, odometry: Pose2, tick: int = 0) -> None:
-        """Store a scan that arrived at `tick`. It is not usable if all ranges are invalid or too short.
+        """Store a scan that arrived at `tick`, if it is usable: not all ranges are invalid or too short.
 
         `odometry` is the pose of the robot in the odom frame when the scan was taken.
         """
@@ -87,15 +89,15 @@ class CollisionMonitor:
         self._scans[scan.sensor] = RecordedScan(scan, odometry, nearest - math.hypot(scan.mount.x, scan.mount.y))
 
     def set_moving_obstacles(self, moving: MovingObstacles) -> None:
-        """Set the moving obstacles in the base frame. Scans must mark the beams that hit them (ScanWithMovingHits)."""
+        """Set the moving obstacles in the base frame. Scans must mark their hits (ScanWithMovingHits)."""
         self._moving, self._has_moving = moving, len(moving) > 0
 
     def is_silent(self, tick: int) -> bool:
-        """Return whether the last usable scan of any lidar is older than `source_timeout` s; False if disabled."""
+        """Return whether the last usable scan of some lidar is older than `source_timeout`; False if disabled."""
         return tick - self._oldest > self._timeout and self._spec.enabled and bool(self._scan_ticks)
 
     def silence_reason(self, tick: int) -> str:
-        """Return a message that states which lidar is silent, and whether its scans are missing, empty, or late."""
+        """Return a message that names the silent lidar, and states whether its scans are missing, empty, or late."""
         name = min(self._scan_ticks, key=lambda sensor: self._scan_ticks[sensor])
         limit = f"source_timeout is {self._spec.source_timeout:g} s"
         elapsed = (tick - max(self._scan_ticks[name], self._start_tick)) / self._tick_rate
@@ -104,8 +106,8 @@ class CollisionMonitor:
             return f"lidar `{name}` has been silent for {elapsed:.2f} s; {limit}"
         if taken != self._scan_ticks[name]:
             return f"lidar `{name}` has been blind for {elapsed:.2f} s: its scans contain no returns; {limit}"
-        late = (arrived - taken) / self._tick_rate
-        return f"scans of lidar `{name}` are {late:.2f} s old when they arrive; {limit}"
+        delay = (arrived - taken) / self._tick_rate
+        return f"scans of lidar `{name}` are {delay:.2f} s old when they arrive; {limit}"
 
     def limit_command(self, command: Twist, odometry: Pose2) -> Twist:
         """Return the command, scaled down if it leads to a collision within `time_before_collision` s.
@@ -147,17 +149,17 @@ class CollisionMonitor:
     def _may_meet_moving(self, command: Twist, horizon: float) -> bool:
         """Return whether a moving obstacle may come within the stop margin of the footprint within `horizon` s.
 
-        Quick check that may return True too often. It uses the closest approach of straight motions, and an upper bound
-        for the effect of the turn rate.
+        This quick check returns False only if it is certain. It uses the closest approach of straight motions, and an
+        upper bound on the effect of the turn rate.
         """
-        own_velocity = complex(command.vx, command.vy)
-        deviation = abs(own_velocity) * abs(command.wz) * horizon * horizon / 2
+        robot_velocity = complex(command.vx, command.vy)
+        deviation = abs(robot_velocity) * abs(command.wz) * horizon * horizon / 2
         margin = self._spec.stop_margin
         for position, velocity, radius, *_ in self._moving.obstacles:
-            towards = velocity - own_velocity
-            square = towards.real * towards.real + towards.imag * towards.imag
-            time = -(position * towards.conjugate()).real / square if square > 0.0 else 0.0
-            closest = abs(position + min(max(time, 0.0), horizon) * towards) - deviation
+            relative = velocity - robot_velocity
+            square = relative.real * relative.real + relative.imag * relative.imag
+            time = -(position * relative.conjugate()).real / square if square > 0.0 else 0.0
+            closest = abs(position + min(max(time, 0.0), horizon) * relative) - deviation
             if closest <= (self._max_edge_distance + radius + margin) * self._miter_factor + ROUNDING_M:
                 return True
         return False
@@ -165,7 +167,7 @@ class CollisionMonitor:
     def _time_to_moving(self, command: Twist, horizon: float) -> float:
         """Return the time in s until a moving obstacle is within the stop margin of the footprint, at most `horizon`.
 
-        Obstacles that come equally close to a stationary robot do not count, because braking would not help.
+        Obstacles that come as close to a stationary robot do not count, because braking does not help.
         """
         times = self._times
         centers = self._moving.at(times)
@@ -175,15 +177,15 @@ class CollisionMonitor:
             return horizon
         gaps_standing = self._moving_gaps(centers, STOP)
         unavoidable = (gaps_standing[1:] < 0.0) & (gaps_standing[1:] < gaps_standing[0] - 1e-4)
-        first = (collides | unavoidable).argmax(axis=0)  # for each obstacle, the time at which both are compared
-        worse = (gaps < gaps_standing - MIN_BENEFIT_M)[1 + first, np.arange(len(first))]
-        is_contact = (collides & worse).any(axis=1)
+        first = (collides | unavoidable).argmax(axis=0)  # time step at which driving and standing are compared
+        is_closer = (gaps < gaps_standing - MIN_BENEFIT_M)[1 + first, np.arange(len(first))]
+        is_contact = (collides & is_closer).any(axis=1)
         return float(times[int(is_contact.argmax())]) if is_contact.any() else horizon
 
     def _moving_gaps(self, centers: Array, twist: Twist) -> Array:
-        """Return distances (times, obstacles) in m from the stop margin to moving obstacles, for a constant `twist`.
+        """Return distances (times, obstacles) in m from the edge of the stop margin to moving obstacles.
 
-        `centers` (times, obstacles, 2) are the predicted positions of the obstacles.
+        The robot moves with a constant `twist`. `centers` (times, obstacles, 2) are the predicted obstacle positions.
         """
         return self._footprint_gaps(centers, poses_along(ORIGIN, twist, self._times)) - (
             self._moving.radii + self._spec.stop_margin
@@ -192,7 +194,7 @@ class CollisionMonitor:
     def _footprint_gaps(self, points: Array, poses: Array) -> Array:
         """Return distances (k, n) in m from the footprint at poses (k, 3) to points (k or 1, n, 2); negative inside.
 
-        For a polygon, the result is a lower bound: the largest signed distance from its edge lines.
+        For a polygon, the result is a lower bound: the largest signed distance from the lines through its edges.
         """
         dx = points[:, :, 0] - poses[:, None, 0]
         dy = points[:, :, 1] - poses[:, None, 1]
@@ -205,16 +207,16 @@ class CollisionMonitor:
 
 
 def _miter_factor(normals: Array) -> float:
-    """Return the miter factor of a convex polygon with edge normals (n, 2).
+    """Return the miter factor of a convex polygon with the outward unit normals (n, 2) of its edges.
 
-    A point within the distance d of all edge lines is at most d times this factor from the origin.
+    A point p with n · p <= d for all normals n is at most d times this factor away from the origin.
     """
     angles = np.sort(np.arctan2(normals[:, 1], normals[:, 0]))
     return float(1.0 / np.cos(np.diff(angles, append=angles[0] + math.tau).max() / 2))
 
 
 def _shortest_range(scan: Scan) -> float | None:
-    """Return the shortest valid range in m (inf without hits); None if all are invalid or too short."""
+    """Return the shortest valid range in m (inf without hits); None if all ranges are invalid or too short."""
     nearest = float(np.fmin.reduce(scan.ranges, initial=math.inf))
     if nearest >= scan.range_min and nearest < math.inf:
         return nearest
@@ -223,7 +225,7 @@ def _shortest_range(scan: Scan) -> float | None:
 
 
 def _points_within(scan: Scan, reach: float) -> Array:
-    """Return the static hits (n, 2) in the base frame: all within `reach` m of the base, and some farther away."""
+    """Return hits (n, 2) on static obstacles in the base frame: all within `reach` m, and some farther away."""
     max_range = reach + math.hypot(scan.mount.x, scan.mount.y)
     hits = (scan.ranges >= scan.range_min) & (scan.ranges <= min(max_range, scan.range_max))
     beams = np.flatnonzero(hits & ~scan.moving if isinstance(scan, ScanWithMovingHits) else hits)

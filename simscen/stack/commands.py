@@ -15,11 +15,11 @@ class VelocitySmoother:
     """Limits velocity and acceleration of commands, like nav2_velocity_smoother with OPEN_LOOP feedback."""
 
     def __init__(self, spec: SmootherSpec, robot: RobotModel, period: float) -> None:
-        """Use the speed limits of `spec` and, for each acceleration limit, the lower one of `spec` and `robot`.
+        """Use the speed limits of `spec`, and the lower acceleration limits of `spec` and `robot`.
 
         `period` is the controller period in s.
         """
-        self._enabled = spec.enabled
+        self._is_enabled = spec.enabled
         acceleration = min(spec.max_accel or robot.linear_acceleration, robot.linear_acceleration)
         deceleration = min(spec.max_decel or robot.linear_deceleration, robot.linear_deceleration)
         self._speed_up_step, self._slow_down_step = acceleration * period, deceleration * period
@@ -34,15 +34,15 @@ class VelocitySmoother:
         self._last = twist
 
     def smooth(self, command: Twist, periods: int = 1) -> Twist:
-        """Return the velocity to send now, `periods` controller periods after the previous one."""
-        if not self._enabled:
+        """Return the velocity to send, `periods` controller periods after the previous velocity."""
+        if not self._is_enabled:
             return command
         target_x, target_y, wz = self._limited(command)
         last_x, last_y, last_wz = self._last
         vx = target_x if target_x == last_x else self._accelerated(last_x, target_x, periods)
         vy = target_y if target_y == last_y else self._accelerated(last_y, target_y, periods)
         if self._is_steered and target_x != 0.0:
-            wz = vx * wz / target_x  # like scale_velocities in Nav2: a car keeps its curvature while it accelerates
+            wz = vx * wz / target_x  # a car keeps its curvature while it accelerates (Nav2: scale_velocities)
         else:
             step = periods * self._turn_step
             wz = min(max(wz, last_wz - step), last_wz + step)
@@ -63,7 +63,7 @@ class VelocitySmoother:
         return Twist(vx, vy, wz)
 
     def _accelerated(self, current: float, target: float, periods: int) -> float:
-        """Return the speed of one axis after `periods`; a change of direction stops at zero first."""
+        """Return the speed along one axis after `periods`. To change its sign, the speed reaches zero first."""
         if current * target < 0.0:
             target = 0.0
         step = periods * (self._speed_up_step if abs(target) > abs(current) else self._slow_down_step)
@@ -76,12 +76,17 @@ class CommandPipeline:
     def __init__(
         self, smoother: VelocitySmoother, monitor: CollisionMonitor, period: int, latency: tuple[int, int]
     ) -> None:
-        """Take the components and, in ticks, the controller `period` and the `latency` of (controller, monitor)."""
+        """Take the components, and in ticks the controller `period` and the `latency` of (controller, monitor)."""
         self._smoother, self._monitor, self._period = smoother, monitor, period
-        self._requested, self._allowed = LatencyQueue[tuple[Twist, int]](latency[0]), LatencyQueue[Twist](latency[1])
+        self._requested = LatencyQueue[tuple[Twist, int]](latency[0])
+        """Commands that the controller computes, each with the number of periods since the previous command."""
+        self._allowed = LatencyQueue[Twist](latency[1])
+        """Commands that the monitor has limited."""
         self._immediate: tuple[Twist, int] | None = None
-        """Requested command and its periods; without latency, used instead of the queues, which are slower."""
-        self._last_request_tick, self._last_free_tick = 0, 0
+        """Like an element of `_requested`. Replaces the queues if there is no latency, because queues are slower."""
+        self._last_request_tick = 0
+        self._last_free_tick = 0
+        """Latest tick at which the monitor did not hold the robot."""
         self.latency = latency[0]
         """Latency of the controller in ticks."""
         self.has_latency = any(latency)
@@ -93,12 +98,12 @@ class CommandPipeline:
         """Return whether the controller is still computing its last command."""
         return self.has_latency and self._requested.is_busy(tick)
 
-    def periods(self, tick: int) -> int:
+    def elapsed_periods(self, tick: int) -> int:
         """Return the number of controller periods since the last command or stop, at least 1."""
         return max(1, (tick - self._last_request_tick) // self._period)
 
     def request(self, tick: int, command: Twist, periods: int) -> None:
-        """Submit the controller's command of this tick, `periods` controller periods after the previous one."""
+        """Submit the controller's command of this tick, `periods` controller periods after the previous command."""
         self._last_request_tick = tick
         if self.has_latency:
             self._requested.put(tick, (command, periods))
@@ -124,7 +129,7 @@ class CommandPipeline:
         while tick >= self._allowed.due:
             self.sent = self._allowed.take()
 
-    def hold_timed_out(self, tick: int) -> bool:
+    def check_hold_timeout(self, tick: int) -> bool:
         """Return whether the monitor has kept the robot stopped for `hold_timeout`. If so, restart the timeout."""
         is_over = tick - self._last_free_tick >= self._monitor.hold_ticks
         if is_over:
@@ -137,7 +142,7 @@ class CommandPipeline:
         allowed = self._monitor.limit_command(smoothed, odometry)
         if allowed is not smoothed:
             self._smoother.reset(allowed)
-        is_slow_by_itself = allowed is smoothed and is_standstill(command)
-        if command == STOP or is_slow_by_itself or not is_standstill(allowed):
+        is_intended_standstill = command == STOP or (allowed is smoothed and is_standstill(command))
+        if is_intended_standstill or not is_standstill(allowed):
             self._last_free_tick = tick
         return allowed

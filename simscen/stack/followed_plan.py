@@ -15,11 +15,12 @@ from simscen.stack.localizers.beams import ComplexPoints
 from simscen.stack.protocols import Controller, CostmapView
 
 WATCH_DISTANCE_M = 0.5
-"""Costmap changes within this distance of the plan, or the inscribed radius if larger, cause a new check."""
+"""Costmap changes within this distance of the plan cause a new check of the plan. The inscribed radius, if larger, is
+used instead."""
 WATCH_EVERY_POINTS = 4
 """Only every n-th point of the plan is compared with the positions of costmap changes."""
 MAX_DEFERRED_MOTION_M = 0.5
-"""Motion of the robot after which its position on the plan is updated at the latest."""
+"""Motion of the robot after which its position on the plan is updated even if nothing needs the position."""
 MAX_CROSS_TRACK_M, MIN_REMAINING_M = 0.2, 0.03
 """A car has missed its plan if it is farther than 0.2 m from the plan, or if less than 0.03 m of the plan remain."""
 COMPARISON_DISTANCE_M = 1.0
@@ -27,14 +28,14 @@ COMPARISON_DISTANCE_M = 1.0
 MIN_SHIFT_M = 0.01
 """Shift of the map frame in the odom frame above which the controller gets the path again."""
 ROUNDING_M = 1e-9
-"""Shift of the map frame in the odom frame that rounding alone can cause."""
+"""Maximum shift of the map frame in the odom frame that rounding can cause."""
 
 
 class FollowedPlan:
     """A plan in the map frame and the position of the robot on it."""
 
     def __init__(self, path: Path, radius: float, costmap: CostmapView) -> None:
-        """Take a path, the inscribed `radius` of the robot in m, and the costmap that shows which points are free."""
+        """Take a path, the inscribed `radius` of the robot in m, and the costmap that shows the occupied points."""
         self.path, self._radius = path, radius
         self._tracker = PathTracker(path)
         self._pending_pose: Pose2 | None = None
@@ -58,13 +59,13 @@ class FollowedPlan:
         self._occupied = distances(costmap, self.path.points[:, :2]) <= np.float32(self._radius)
 
     def locate(self, pose: Pose2) -> None:
-        """Set the pose of the robot in the map frame. Its position on the plan is computed when needed."""
+        """Set the pose of the robot in the map frame. The position on the plan is computed when needed."""
         self._pending_pose, (x, y, _) = pose, self._located_pose
         if self._tracker.has_cusps or abs(pose.x - x) + abs(pose.y - y) > MAX_DEFERRED_MOTION_M:
             self._update_tracker(pose)
 
     def _update_tracker(self, pose: Pose2) -> None:
-        """Compute the position on the plan for this pose."""
+        """Compute the position of the robot on the plan for this pose."""
         self._tracker.locate(pose)
         self._located_pose, self._pending_pose = pose, None
 
@@ -76,14 +77,14 @@ class FollowedPlan:
         return self._tracker
 
     @property
-    def ahead(self) -> Array:
-        """The points (n, 3) ahead of the robot."""
+    def points_ahead(self) -> Array:
+        """Points (n, 3) of the plan ahead of the robot."""
         tracker = self._updated_tracker
         points: Array = tracker.points[tracker.index :]
         return points
 
     def sampled_points(self, every: int) -> list[complex]:
-        """Return every n-th point ahead of the robot as x + iy."""
+        """Return every n-th point of the plan ahead of the robot as x + iy; `every` is n."""
         return self._updated_tracker.sampled_points(every)
 
     def is_missed(self, pose: Pose2) -> bool:
@@ -99,8 +100,8 @@ class FollowedPlan:
     def is_blocked(self) -> bool:
         """Return whether any point ahead of the robot is occupied.
 
-        Every second point is checked. Occupied points before the first free one are ignored, so that a robot in
-        collision can leave.
+        Every second point is checked. Occupied points before the first free point are ignored, so that a robot that
+        touches an obstacle can drive away.
         """
         occupied = self._occupied[self._updated_tracker.index :: 2]
         if not occupied.any():
@@ -110,9 +111,9 @@ class FollowedPlan:
 
 
 class LocalPathSender:
-    """Passes each plan to the controller, in the odom frame.
+    """Passes each plan to the controller, transformed to the odom frame.
 
-    When the transform from map to odom frame has changed, the controller gets the rest of the plan again.
+    When the transform from map to odom frame has changed, the controller gets the remaining part of the plan again.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -134,11 +135,11 @@ class LocalPathSender:
             self._send(plan, plan.path.points)
         elif not is_unchanged and frames.map_shift(self._sent_odom_from_map, COMPARISON_DISTANCE_M) > MIN_SHIFT_M:
             plan.locate(frames.pose)
-            self._send(plan, plan.ahead)
-        local = self._local_goal
-        if local is None or goal is not self._goal or not is_unchanged:
-            self._goal, self._local_goal = goal, (local := goal.at(self._odom_from_map.compose(goal.pose)))
-        return local
+            self._send(plan, plan.points_ahead)
+        local_goal = self._local_goal
+        if local_goal is None or goal is not self._goal or not is_unchanged:
+            self._goal, self._local_goal = goal, (local_goal := goal.at(self._odom_from_map.compose(goal.pose)))
+        return local_goal
 
     def _send(self, plan: FollowedPlan, points: Array) -> None:
         """Pass `points` (n, 3) of the plan to the controller."""

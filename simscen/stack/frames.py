@@ -9,9 +9,10 @@ from simscen.core.geometry import Array, Pose2, wrap_array
 
 
 class Frames(NamedTuple):
-    """The estimated pose of the robot in the map frame, and its odometry pose in the odom frame.
+    """Pose of the robot in the map frame and in the odom frame.
 
-    The pose in the map frame jumps when the localizer corrects it; odometry is continuous but drifts.
+    pose:      estimated pose in the map frame, which jumps when the localizer corrects it
+    odometry:  pose in the odom frame, which is continuous but drifts
     """
 
     pose: Pose2
@@ -24,11 +25,11 @@ class Frames(NamedTuple):
 
     @property
     def odom_from_map(self) -> Pose2:
-        """The inverse transform."""
+        """The inverse transform: pose of the map frame in the odom frame."""
         return self.odometry.compose(self.pose.inverse())
 
     def map_shift(self, earlier_odom_from_map: Pose2, radius: float) -> float:
-        """Return how far in m the map has moved in the odom frame since `odom_from_map` had an earlier value.
+        """Return the distance in m that the map has moved in the odom frame since an earlier transform.
 
         The result is an upper bound for all points of the map within `radius` m of the robot: the shift of the map at
         the position of the robot, plus the rotation of the map times the radius.
@@ -42,7 +43,7 @@ class Frames(NamedTuple):
 
 
 def transform_poses(frame: Pose2, poses: Array) -> Array:
-    """Return poses (n, 3) given in `frame`, expressed in its parent frame."""
-    moved = np.empty((len(poses), 3))
-    moved[:, :2], moved[:, 2] = frame.apply(poses[:, :2]), wrap_array(poses[:, 2] + frame.yaw)
-    return moved
+    """Return poses (n, 3), given in `frame`, in the parent frame of `frame`."""
+    transformed = np.empty((len(poses), 3))
+    transformed[:, :2], transformed[:, 2] = frame.apply(poses[:, :2]), wrap_array(poses[:, 2] + frame.yaw)
+    return transformed

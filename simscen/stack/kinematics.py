@@ -15,11 +15,11 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.stack.protocols import RobotModel
 
 MIN_YAW_RATE_RAD_S = 1e-6
-"""Yaw rate below which an arc is taken for a straight line."""
+"""Yaw rate below which an arc is treated as a straight line."""
 STANDSTILL_SPEED_M_S, STANDSTILL_YAW_RATE_RAD_S = 0.02, 0.1
 """The robot counts as standing still below these speeds."""
 LOCAL_PLAN_TIMES_S = tuple(0.25 * step for step in range(7))
-"""Times of the poses in a local plan that is logged as an arc."""
+"""Times at which a controller's arc is sampled for the local plan in the log."""
 
 
 def is_standstill(twist: Twist) -> bool:
@@ -45,7 +45,7 @@ def poses_along(pose: Pose2, twist: Twist, times: Array) -> Array:
 
 
 def arc_poses(pose: Pose2, twist: Twist, times: Iterable[float]) -> Array:
-    """Return the poses (n, 3) of `poses_along`, with wrapped headings. Faster for up to about a dozen times."""
+    """Return the same poses (n, 3) as `poses_along`, but with wrapped headings. Faster for up to a dozen times."""
     (x, y, yaw), (vx, vy, wz) = pose, twist
     start, velocity = complex(x, y), cmath.rect(1.0, yaw) * complex(vx, vy)
     poses: list[tuple[float, float, float]] = []
@@ -58,9 +58,9 @@ def arc_poses(pose: Pose2, twist: Twist, times: Iterable[float]) -> Array:
 
 
 def mean_velocity(step: Pose2, seconds: float) -> Twist:
-    """Return the constant velocity that moves a base by `step` within `seconds`; `step` is in the base frame.
+    """Return the constant velocity that moves a base by `step` within `seconds`. `step` is in the base frame.
 
-    The length of the arc is approximated by that of its chord.
+    The length of the arc is approximated by the length of the chord.
     """
     x, y, turn = step
     c, s = math.cos(turn / 2), math.sin(turn / 2)  # the chord of the arc is at half the turn
@@ -87,15 +87,19 @@ def cusps(poses: Array) -> npt.NDArray[np.int64]:
 Axes = tuple[float, float, float]
 """Values for vx, vy, and turn rate, in this order."""
 OptionalAxes = tuple[float | None, float | None, float | None]
+"""Like Axes; None stands for the limit of the robot."""
 Limits = TypeVar("Limits", bound="VelocityLimits")
 Real = TypeVar("Real", np.float32, np.float64)
 
 
 @dataclass(frozen=True)
 class VelocityLimits:
-    """Limits of velocity, acceleration, and (negative) deceleration for vx, vy, and the turn rate, in SI units and rad.
+    """Limits for vx, vy, and the turn rate, in SI units and rad.
 
-    `turning_radius` is the minimum turning radius in m; 0 for a base that turns in place.
+    low, high:       minimum and maximum velocity
+    acceleration:    maximum acceleration
+    deceleration:    deceleration limit, negative
+    turning_radius:  minimum turning radius in m; 0 for a base that turns in place
     """
 
     low: Axes
@@ -105,7 +109,7 @@ class VelocityLimits:
     turning_radius: float
 
     def scaled(self: Limits, ratio: float) -> Limits:
-        """Return limits with velocities multiplied by `ratio`; the same object if `ratio` is at least 1."""
+        """Return limits with the velocities multiplied by `ratio`; the same object if `ratio` is at least 1."""
         if ratio >= 1.0:
             return self
         (a, b, c), (d, e, f) = self.low, self.high
@@ -120,7 +124,7 @@ def velocity_limits(
     deceleration: OptionalAxes,
     turning_radius: float | None = None,
 ) -> VelocityLimits:
-    """Return the requested limits, bounded by those of the robot. None stands for the limit of the robot."""
+    """Return the requested limits, bounded by the limits of the robot. None stands for the limit of the robot."""
     linear, lateral, angular = robot.max_linear, robot.max_lateral, robot.max_angular
     increase, decrease = robot.linear_acceleration, -robot.linear_deceleration
     angular_change = robot.angular_acceleration
@@ -134,7 +138,7 @@ def velocity_limits(
 
 
 def _bounded(bound: Callable[[float, float], float], requested: OptionalAxes, limits: Axes) -> Axes:
-    """Return `bound(value, limit)` for each requested value; the limit for None. `bound` is min or max."""
+    """Return `bound(value, limit)` for each requested value; `limit` for None. `bound` is min or max."""
     x, y, turn = (
         limit if value is None else bound(value, limit) for value, limit in zip(requested, limits, strict=True)
     )
@@ -142,7 +146,7 @@ def _bounded(bound: Callable[[float, float], float], requested: OptionalAxes, li
 
 
 def accumulate_rows(rows: npt.NDArray[Real]) -> npt.NDArray[Real]:
-    """Replace the rows (m, n) by their cumulative sums, in place, and return them. Faster than np.cumsum."""
+    """Replace the rows (m, n) by cumulative sums over the rows, in place, and return them. Faster than np.cumsum."""
     for previous, row in pairwise(rows):
         np.add(previous, row, out=row)
     return rows

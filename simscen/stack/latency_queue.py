@@ -8,13 +8,14 @@ T = TypeVar("T")
 
 
 class LatencyQueue(Generic[T]):
-    """First-in, first-out queue of results, each available `latency` ticks after its computation started.
+    """First-in, first-out queue of results. A result is available `latency` ticks after its computation has started.
 
-    `due` is the tick at which the oldest result becomes available: `while tick >= queue.due: queue.take()`.
+    `due` is the tick at which the oldest result becomes available, inf without results. To take all available results:
+    `while tick >= queue.due: queue.take()`.
     """
 
     def __init__(self, latency: int) -> None:
-        """Create an empty queue; `latency` in ticks."""
+        """Create an empty queue. `latency` is in ticks."""
         self._latency = latency
         self._waiting: deque[tuple[int, T]] = deque()
         self.due: float = math.inf

@@ -14,20 +14,22 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 
 MAX_INFLATION_M = 0.8
-"""Largest distance by which an obstacle is inflated: for its uncertainty, and in `nearness` also for the margin."""
+"""Maximum distance by which an obstacle is inflated: for its uncertainty, and in `nearness` also for the margin."""
 MAX_STEP_S, MIN_STEP_S = 0.5, 0.05
-"""Maximum time step of `is_surely_clear` near an obstacle, and the step below which the result is uncertain."""
+"""Maximum time step of `is_surely_clear` near an obstacle, and time step below which the result is uncertain."""
 CONTACT_DISTANCE_M = 0.03
-"""Distance below which obstacles count as touching."""
+"""Distance below which a disc and an obstacle count as in contact."""
 
 Mask = npt.NDArray[np.bool_]
 Reals = npt.NDArray[np.floating]
+"""Array of 32-bit or 64-bit floats."""
 
 
 class MovingObstacle(NamedTuple):
-    """A moving upright cylinder: `position` of its axis in m, velocity in m/s, and radius in m.
+    """A moving upright cylinder: position of its axis in m, velocity in m/s, and radius in m.
 
-    The uncertainty is the same along x and y. `covariance` is the covariance of position and velocity along one axis.
+    The uncertainty is the same along x and y. The variances are those along one axis. `covariance` is the covariance
+    of position and velocity along one axis.
     """
 
     position: complex
@@ -47,18 +49,19 @@ class MovingObstacle(NamedTuple):
         return math.sqrt(variance + seconds * (2.0 * covariance + velocity_variance * seconds) + drift * drift)
 
     def min_distance(self, start: complex, speed: float, seconds: float) -> float:
-        """Return the smallest distance in m, within `seconds`, to a point that moves from `start` at `speed`.
+        """Return the smallest possible distance in m, within `seconds`, to a point that leaves `start` at `speed`.
 
-        The point moves in the worst direction. The distance is negative if the point can get into the obstacle.
+        The point can move in any direction. The distance is negative if the point can get into the obstacle.
         """
         offset, velocity = self.position - start, self.velocity
-        own_speed = abs(velocity)
-        if speed >= own_speed:
+        obstacle_speed = abs(velocity)
+        if speed >= obstacle_speed:
             time = seconds
-        else:  # the minimum lies between the closest approach to `start` and the end of the time
+        else:  # the distance has its minimum between the closest approach to `start` and the end of the time
             product = offset.conjugate() * velocity
-            along, across = product.real / own_speed, abs(product.imag) / own_speed
-            time = (across * speed / math.sqrt(own_speed * own_speed - speed * speed) - along) / own_speed
+            along, across = product.real / obstacle_speed, abs(product.imag) / obstacle_speed
+            lead = across * speed / math.sqrt(obstacle_speed * obstacle_speed - speed * speed)
+            time = (lead - along) / obstacle_speed
             time = min(max(0.0, time), seconds)
         return abs(offset + velocity * time) - self.radius - speed * time
 
@@ -66,7 +69,8 @@ class MovingObstacle(NamedTuple):
 class MovingObstacles:
     """Moving obstacles in one frame at one time. The parameter `times` of the methods is in s after this time.
 
-    `acceleration` is the standard deviation of their acceleration in m/s². It makes the uncertainty grow with time.
+    `acceleration` is the standard deviation of the obstacles' acceleration in m/s². Because of it, the uncertainty of
+    their positions grows with time.
     """
 
     __slots__ = ("acceleration", "obstacles")
@@ -118,49 +122,50 @@ class MovingObstacles:
         return nearest
 
     def nearness(self, x: Reals, y: Reals, times: Reals, radius: float, margin: float) -> tuple[Reals, Mask]:
-        """Return the nearness (…,) of discs at points (…,) to the nearest obstacle at `times`, and whether they touch.
+        """Return the nearness (…,) of discs at points (…,) to the nearest obstacle, and whether any is in contact.
 
-        The nearness is 1 at contact and falls linearly with the distance. It is 0 at `margin` m plus one standard
-        deviation of the obstacle's position, at most at MAX_INFLATION_M, and negative beyond.
+        The nearness falls linearly with the distance at `times`. It is 1 at contact, 0 at `margin` m plus one standard
+        deviation of the obstacle's position (at most at MAX_INFLATION_M), and negative farther away.
         """
         shape = np.broadcast_shapes(x.shape, times.shape)
-        nearest, touched = np.full(shape, -np.inf, x.dtype), np.zeros(shape, np.bool_)
+        nearness, in_contact = np.full(shape, -np.inf, x.dtype), np.zeros(shape, np.bool_)
         for obstacle, gap in self._gaps(x, y, times):
-            touched |= gap < radius + CONTACT_DISTANCE_M
-            required = np.minimum(margin + self._position_std(obstacle, times), MAX_INFLATION_M)
-            np.maximum(nearest, (radius - gap) / required, out=nearest)
-        nearest += 1.0
-        return nearest, touched
+            in_contact |= gap < radius + CONTACT_DISTANCE_M
+            inflation = np.minimum(margin + self._position_std(obstacle, times), MAX_INFLATION_M)
+            np.maximum(nearness, (radius - gap) / inflation, out=nearness)
+        nearness += 1.0
+        return nearness, in_contact
 
     def is_surely_clear(
         self, position: Callable[[float], complex], speed: float, radius: float, margin: float, seconds: float
     ) -> bool:
         """Return True if the `nearness` of a moving disc is certainly at most 0 for `seconds`; False if uncertain.
 
-        The disc is at `position(t)`, x + iy in m, after t s. It is not faster than `speed` in m/s.
+        After t s, the disc is at `position(t)`, x + iy in m. The disc is never faster than `speed` m/s.
         """
         for obstacle in self.obstacles:
             closing_speed, time = max(speed + abs(obstacle.velocity), 1e-3), 0.0
             while time < seconds:
                 offset = abs(obstacle.position + obstacle.velocity * time - position(time))
-                required = min(
+                inflation = min(
                     margin + obstacle.position_std(min(time + MAX_STEP_S, seconds), self.acceleration),
                     MAX_INFLATION_M,
                 )
-                slack = (offset - obstacle.radius - radius - required) / closing_speed
+                slack = (offset - obstacle.radius - radius - inflation) / closing_speed
                 if slack < MIN_STEP_S:
                     return False
-                time += max(min(slack, MAX_STEP_S), slack - (MAX_INFLATION_M - required) / closing_speed)
+                # `inflation` is valid for MAX_STEP_S. A longer step must assume the maximum inflation.
+                time += max(min(slack, MAX_STEP_S), slack - (MAX_INFLATION_M - inflation) / closing_speed)
         return True
 
     def _position_std(self, obstacle: MovingObstacle, times: Reals) -> Reals:
-        """Return the standard deviation (…,) in m of an obstacle's predicted position along any axis."""
+        """Return the standard deviation (…,) in m of an obstacle's predicted position along one axis."""
         drift = (0.5 * self.acceleration * times**2) ** 2
         *_, variance, covariance, velocity_variance = obstacle
         return np.asarray(np.sqrt(variance + 2.0 * covariance * times + velocity_variance * times**2 + drift))
 
     def _gaps(self, x: Reals, y: Reals, times: Reals) -> Iterator[tuple[MovingObstacle, Reals]]:
-        """Yield each obstacle, and the distances (…,) in m from points (…,) to its surface at `times`."""
+        """Yield each obstacle, with the distances (…,) in m from points (…,) to the obstacle's surface at `times`."""
         for obstacle in self.obstacles:
             position, velocity, radius, *_ = obstacle
             dx, dy = x - (position.real + velocity.real * times), y - (position.imag + velocity.imag * times)
@@ -177,22 +182,22 @@ class MovingObstacles:
         The robot moves from (x, y) at `speed` in any direction.
         """
         start = complex(x, y)
-        close = [each for each in self.obstacles if each.min_distance(start, speed, seconds) < reach]
-        return self if len(close) == len(self.obstacles) else MovingObstacles(close, self.acceleration)
+        reachable = [each for each in self.obstacles if each.min_distance(start, speed, seconds) < reach]
+        return self if len(reachable) == len(self.obstacles) else MovingObstacles(reachable, self.acceleration)
 
     def in_frame(self, frame: Pose2) -> "MovingObstacles":
-        """Return the obstacles expressed in another frame; `frame` is its pose in the current one."""
+        """Return the obstacles in another frame. `frame` is the pose of the other frame in the current frame."""
         origin, turn = complex(frame.x, frame.y), cmath.rect(1.0, -frame.yaw)
         return MovingObstacles(
             [
-                MovingObstacle((position - origin) * turn, velocity * turn, *rest)
-                for position, velocity, *rest in self.obstacles
+                MovingObstacle((position - origin) * turn, velocity * turn, *radius_and_variances)
+                for position, velocity, *radius_and_variances in self.obstacles
             ],
             self.acceleration,
         )
 
     def after(self, seconds: float) -> "MovingObstacles":
-        """Return the obstacles as predicted after `seconds`."""
+        """Return the obstacles with the states predicted after `seconds`."""
         speed_change = self.acceleration * seconds
         drift = 0.5 * speed_change * seconds
         predicted = [

@@ -1,11 +1,11 @@
 """Navigation to one goal: the replanning and recovery logic of Nav2's default behavior trees, as a state machine.
 
 After a planning failure, the global costmap is cleared and planning is retried once. After a control failure, the local
-costmap is cleared and control is retried once. If the retry fails too, the next recovery behavior runs. Then planning
+costmap is cleared and control is retried once. If the retry fails, too, the next recovery behavior runs. Then planning
 and control can each be retried again. After `number_of_retries` behaviors, the goal fails with the last error code.
 
-The goal fails at once after a planner error that is not in `planner_codes`. After GOAL_OCCUPIED, it fails after the
-first retry if the robot does not fit on the map at the goal or at a via pose.
+There are two exceptions. After a planner error that is not in `planner_codes`, the goal fails at once. After
+GOAL_OCCUPIED, the goal fails after the first retry if the robot does not fit on the map at the goal or at a via pose.
 """
 
 from typing import NamedTuple
@@ -24,9 +24,9 @@ from simscen.stack.protocols import Behavior, Controller, GoalChecker, Navigatio
 
 
 class ClearingPolicy:
-    """Decides how much of the global costmap is cleared when planning has failed: all of it, as in Nav2's default tree.
+    """Decides how much of the global costmap is cleared after a planning failure.
 
-    Subclasses may clear less.
+    This class clears the entire costmap, as Nav2's default behavior tree does. Subclasses may clear less.
     """
 
     def reset(self) -> None:
@@ -35,13 +35,19 @@ class ClearingPolicy:
     def clears_entirely(self, now: float, goal_distance: float) -> bool:
         """Return True to clear the entire global costmap, False to clear only the area around the robot.
 
-        `now` is the navigator's time in s, `goal_distance` the straight distance to the goal in m.
+        `now` is the navigator's time in s. `goal_distance` is the straight-line distance to the goal in m.
         """
         return True
 
 
 class StepResult(NamedTuple):
-    """Result of a step of the navigator: either the goal is reached, or it has failed, or the command is sent."""
+    """Result of a step of the navigator.
+
+    command:  velocity command; only used if the goal is neither reached nor failed
+    reached:  whether the goal is reached
+    failure:  the failure with which the goal has failed; None if it has not failed
+    events:   events of this step
+    """
 
     command: Twist = STOP
     reached: bool = False
@@ -50,9 +56,9 @@ class StepResult(NamedTuple):
 
 
 class Navigator:
-    """Drives the robot to one goal at a time; call `step` at the controller's rate.
+    """Drives the robot to one goal at a time. Call `step` at the controller's rate.
 
-    Goals and plans are in the map frame; controller and recovery behaviors work in the odom frame.
+    Goals and plans are in the map frame. Controller and recovery behaviors work in the odom frame.
     """
 
     def __init__(
@@ -79,18 +85,22 @@ class Navigator:
         self._local_path, self._clearing = LocalPathSender(controller), clearing
         self._period, self._failure_tolerance = period, failure_tolerance
         self._velocity_thresholds = velocity_thresholds
-        self._clock = 0.0
+        self._now = 0.0
+        """Time in s for which the navigator has had a goal."""
         self.goal: Goal | None = None
+        """The current goal; None to stop."""
         self.via: tuple[Goal, ...] = ()
         """Intermediate goals to pass before the goal, in this order."""
         self._reset()
 
     def _reset(self) -> None:
-        self.plans.reset(self._clock)
+        """Discard the plan, the active behavior, and the record of failures."""
+        self.plans.reset(self._now)
         self._behavior: Behavior | None = None
-        self._behavior_since = 0.0
-        self._planning_retried = self._control_retried = False
-        self._failing_since: float | None = None
+        self._behavior_start = 0.0
+        self._has_retried_planning = self._has_retried_control = False
+        self._first_control_failure: float | None = None
+        """Time in s of the first control failure since the last command or retry; None if there is none."""
 
     def pursue(self, goal: Goal) -> None:
         """Set the goal for the following steps, and restore all retries."""
@@ -102,20 +112,20 @@ class Navigator:
         self._progress.reset()
 
     def stop(self, tick: int) -> tuple[Event, ...]:
-        """Remove the goal, so that `step` requests a stop. Return the event that ends the active behavior, if any."""
+        """Remove the goal, so that `step` returns a stop. Return the event that ends the active behavior, if any."""
         behavior, self.goal, self.via = self._behavior, None, ()
         self._reset()
         return () if behavior is None else (_recovery_ended(tick, behavior, {"outcome": "canceled"}),)
 
     def step(self, tick: int, frames: Frames, twist: Twist, is_held: bool = False, periods: int = 1) -> StepResult:
-        """Run one step, `periods` controller periods after the previous one. `twist` is the measured velocity.
+        """Run one step, `periods` controller periods after the previous step. `twist` is the measured velocity.
 
         `is_held`: the collision monitor has kept the robot stopped for `hold_timeout`, which is a control failure.
         """
         goal = self.goal
         if goal is None:
             return StepResult()
-        self._clock += periods * self._period
+        self._now += periods * self._period
         if self._behavior is not None:
             return self._recover(tick, frames, self._behavior)
         if any(self._velocity_thresholds):
@@ -124,12 +134,12 @@ class Navigator:
             return StepResult(reached=True)
         events: tuple[Event, ...] = ()
         try:
-            events = self.plans.step(tick, self._clock, goal, frames.pose, self.via)
+            events = self.plans.step(tick, self._now, goal, frames.pose, self.via)
             command = self._follow(goal, frames, twist, is_held)
         except NavigationFailure as failure:
             result = self._handle_failure(tick, goal, frames, failure)
             return result._replace(events=(*events, *result.events))
-        self._failing_since = None
+        self._first_control_failure = None
         return StepResult(command, events=events)
 
     def _follow(self, goal: Goal, frames: Frames, twist: Twist, is_held: bool) -> Twist:
@@ -137,37 +147,37 @@ class Navigator:
         plan = self.plans.plan
         if plan is None:
             return STOP
-        self._planning_retried = False
-        following = self.via[0] if self.via else goal  # the final goal may be close while intermediate goals remain
-        local = self._local_path.update(plan, following, frames)
-        command = self._controller.command(frames.odometry, twist, self._costmaps.local_costmap.view, local)
+        self._has_retried_planning = False
+        target = self.via[0] if self.via else goal  # the final goal may be close while intermediate goals remain
+        local_target = self._local_path.update(plan, target, frames)
+        command = self._controller.command(frames.odometry, twist, self._costmaps.local_costmap.view, local_target)
         if is_held:
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the collision monitor holds the robot")
-        if self._progress.is_stuck(frames.pose, self._clock):
+        if self._progress.is_stuck(frames.pose, self._now):
             self._progress.reset()
             raise NavigationFailure(ErrorCode.FAILED_TO_MAKE_PROGRESS, "the robot made no progress")
         return command
 
     def _handle_failure(self, tick: int, goal: Goal, frames: Frames, failure: NavigationFailure) -> StepResult:
         """Tolerate the failure, clear a costmap and retry, start a recovery behavior, or let the goal fail."""
-        planning, events = 200 <= failure.code < 300, tuple[Event, ...]()
-        if planning:
+        is_planning_failure, events = 200 <= failure.code < 300, tuple[Event, ...]()
+        if is_planning_failure:
             events = (Event(tick, EventKind.PLAN_FAILED, "", _failure_data(failure)),)
             if not self._recovery.can_help(failure):
                 return StepResult(failure=failure, events=events)
-            retry, self._planning_retried = not self._planning_retried, True
+            should_retry, self._has_retried_planning = not self._has_retried_planning, True
         else:
             if failure.code != ErrorCode.FAILED_TO_MAKE_PROGRESS:
                 if self._is_tolerated():
                     return StepResult()
                 failure = self._with_patience_exceeded(failure)
             self.plans.report_control_failure()
-            retry, self._control_retried = not self._control_retried, True
-        if retry:
-            self._failing_since = None
-            if planning:
+            should_retry, self._has_retried_control = not self._has_retried_control, True
+        if should_retry:
+            self._first_control_failure = None
+            if is_planning_failure:
                 goal_distance = frames.pose.distance(goal.pose)
-                self._costmaps.clear_global(entirely=self._clearing.clears_entirely(self._clock, goal_distance))
+                self._costmaps.clear_global(entirely=self._clearing.clears_entirely(self._now, goal_distance))
             else:
                 self._costmaps.clear_local()
             self.plans.drop("recovery")
@@ -175,24 +185,24 @@ class Navigator:
         if self._is_unreachable(goal, failure):
             return StepResult(failure=failure, events=events)
         self.plans.drop("recovery")
-        self._planning_retried, self._control_retried, self._failing_since = False, False, None
-        self._behavior = self._recovery.next(frames.pose.distance(goal.pose))
+        self._has_retried_planning, self._has_retried_control, self._first_control_failure = False, False, None
+        self._behavior = self._recovery.next_behavior(frames.pose.distance(goal.pose))
         if self._behavior is None:
             return StepResult(failure=failure, events=events)
-        self._behavior_since = self._clock
+        self._behavior_start = self._now
         self._behavior.start(frames.odometry)
-        started = Event(tick, EventKind.RECOVERY_STARTED, self._behavior.name, _failure_data(failure))
-        return StepResult(events=(*events, started))
+        start_event = Event(tick, EventKind.RECOVERY_STARTED, self._behavior.name, _failure_data(failure))
+        return StepResult(events=(*events, start_event))
 
     def _is_tolerated(self) -> bool:
         """Return whether control has failed for less than `failure_tolerance`."""
-        if self._failing_since is None:
-            self._failing_since = self._clock
+        if self._first_control_failure is None:
+            self._first_control_failure = self._now
         tolerance = self._failure_tolerance
-        return tolerance < 0.0 or self._clock - self._failing_since < tolerance
+        return tolerance < 0.0 or self._now - self._first_control_failure < tolerance
 
     def _with_patience_exceeded(self, failure: NavigationFailure) -> NavigationFailure:
-        """Return the failure. If `failure_tolerance` is positive, replace NO_VALID_CONTROL by PATIENCE_EXCEEDED."""
+        """Return the failure; PATIENCE_EXCEEDED instead of NO_VALID_CONTROL if `failure_tolerance` is positive."""
         if self._failure_tolerance <= 0.0 or failure.code != ErrorCode.NO_VALID_CONTROL:
             return failure
         return NavigationFailure(ErrorCode.PATIENCE_EXCEEDED, f"for {self._failure_tolerance:g} s: {failure}")
@@ -204,10 +214,11 @@ class Navigator:
         )
 
     def _recover(self, tick: int, frames: Frames, behavior: Behavior) -> StepResult:
+        """Run one step of the active recovery behavior."""
         result: dict[str, Value] = {"outcome": "succeeded"}
         try:
             costmap = self._costmaps.local_costmap.view
-            command = behavior.step(frames.odometry, costmap, self._clock - self._behavior_since)
+            command = behavior.step(frames.odometry, costmap, self._now - self._behavior_start)
         except NavigationFailure as failure:
             command, result = None, {"outcome": "failed", **_failure_data(failure)}
         if command is not None:
@@ -218,13 +229,15 @@ class Navigator:
 
 
 def _above_thresholds(velocity: Twist, thresholds: Twist) -> Twist:
-    """Return the velocity with 0 for each component up to its threshold (getThresholdedTwist of nav2_controller)."""
+    """Return the velocity; components up to their threshold become 0 (getThresholdedTwist of nav2_controller)."""
     return Twist(*(0.0 if abs(value) <= limit else value for value, limit in zip(velocity, thresholds, strict=True)))
 
 
 def _recovery_ended(tick: int, behavior: Behavior, result: dict[str, Value]) -> Event:
+    """Return the event that ends a behavior."""
     return Event(tick, EventKind.RECOVERY_ENDED, behavior.name, result)
 
 
 def _failure_data(failure: NavigationFailure) -> dict[str, Value]:
+    """Return code, name, and message of the failure, as data of an event."""
     return {"error_code": int(failure.code), "error_name": failure.code.name, "message": str(failure)}

@@ -9,8 +9,8 @@ HISTORY_S = 10
 """Time for which past poses can be looked up: the default of tf2's buffer."""
 TRAIL_S = 60
 """Time covered by the trail of the robot in the reference stack. Recovery behaviors use the trail."""
-# Larger values, as from a broken encoder, are rejected: their squares could overflow.
 _MAX_VALUE = 1e6
+"""Larger values, as from a broken encoder, are rejected, because their squares could overflow."""
 
 
 def is_plausible(values: tuple[float, float, float]) -> bool:
@@ -20,10 +20,10 @@ def is_plausible(values: tuple[float, float, float]) -> bool:
 
 
 class OdometryHistory:
-    """Odometry poses of the last HISTORY_S seconds by tick, and the trail: the poses of about `trail_s` seconds."""
+    """Odometry poses of the last HISTORY_S seconds by tick, and the trail: all poses of the last `trail_s` seconds."""
 
     def __init__(self, tick_rate: int, trail_s: float = HISTORY_S) -> None:
-        """Create an empty history. `tick_rate` is in Hz."""
+        """Create an empty history. `tick_rate` is in Hz. `trail_s` must be at least HISTORY_S."""
         self._history_ticks, self._trail_ticks = HISTORY_S * tick_rate, trail_s * tick_rate
         self._max_ticks = (trail_s + 1) * tick_rate  # old poses are removed only once per second
         self.clear()
@@ -33,7 +33,7 @@ class OdometryHistory:
         self._readings: list[tuple[int, Pose2]] = []
         self._newest: float = -math.inf
         self._next_prune_tick: float = -math.inf
-        self.now = Pose2(0.0, 0.0)
+        self.latest_pose = Pose2(0.0, 0.0)
         """The latest pose; the origin if there is none."""
 
     @property
@@ -42,17 +42,17 @@ class OdometryHistory:
         return bool(self._readings)
 
     def add(self, tick: int, pose: Pose2) -> bool:
-        """Add a pose. Return False if it is rejected: not plausible, or not newer than the latest."""
+        """Add a pose. Return False if the pose is rejected: not plausible, or not newer than the latest pose."""
         if tick <= self._newest or not is_plausible(pose):
             return False
-        self._newest, self.now = tick, pose
+        self._newest, self.latest_pose = tick, pose
         self._readings.append((tick, pose))
         if tick > self._next_prune_tick:
             self._prune()
         return True
 
     def _prune(self) -> None:
-        """Remove poses that are older than the trail, and set the tick after which to do so again."""
+        """Remove poses that are older than the trail, and set the tick of the next call of this method."""
         del self._readings[: bisect_left(self._readings, (self._newest - self._trail_ticks,))]
         self._next_prune_tick = self._readings[0][0] + self._max_ticks
 
@@ -61,7 +61,7 @@ class OdometryHistory:
         return bisect_left(self._readings, (self._newest - self._history_ticks,))
 
     def trail(self) -> list[Pose2]:
-        """Return the poses of the trail, the oldest first."""
+        """Return the poses of the trail, oldest first. Poses up to one second older may be included."""
         return [pose for _, pose in self._readings]
 
     def reaches(self, tick: int) -> bool:
@@ -69,16 +69,16 @@ class OdometryHistory:
         return self._newest >= tick
 
     def latest_until(self, tick: int) -> Pose2:
-        """Return the latest pose up to `tick` without interpolation, or the oldest pose if all are later."""
+        """Return the latest pose up to `tick`, without interpolation; the oldest pose if all poses are later."""
         if tick >= self._newest:
-            return self.now
+            return self.latest_pose
         first = self._oldest_index()
         return self._readings[max(first, bisect_left(self._readings, (tick + 1,), first) - 1)][1]
 
     def at(self, tick: int) -> Pose2 | None:
         """Return the pose at `tick`, interpolated linearly; None before the oldest or after the latest pose."""
         if tick == self._newest:
-            return self.now
+            return self.latest_pose
         first = self._oldest_index()
         after = bisect_left(self._readings, (tick,), first)
         if after == len(self._readings):
@@ -94,6 +94,6 @@ class OdometryHistory:
         return earlier.compose(Pose2(fraction * step.x, fraction * step.y, fraction * step.yaw))
 
     def past_pose(self, latest: Pose2, tick: int) -> Pose2:
-        """Return the pose at `tick`, not interpolated, in another frame. `latest` is the latest pose in that frame."""
+        """Return `latest_until(tick)` in another frame. `latest` is the latest pose in the other frame."""
         past = self.latest_until(tick)
-        return latest if past is self.now else latest.compose(self.now.between(past))
+        return latest if past is self.latest_pose else latest.compose(self.latest_pose.between(past))

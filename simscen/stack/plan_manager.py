@@ -1,4 +1,4 @@
-"""Planning part of Nav2's default behavior trees: request a plan, monitor it while the robot follows it, replace it."""
+"""Planning part of Nav2's default behavior trees: requests, monitors, and replaces the plan that the robot follows."""
 
 import math
 from collections.abc import Callable
@@ -16,13 +16,13 @@ from simscen.stack.followed_plan import FollowedPlan
 from simscen.stack.protocols import CostmapView, NavigationFailure, Planner
 
 MIN_MISSED_AGE_S = 1.0
-"""Minimum age of a plan that can count as missed by a car (see FollowedPlan.is_missed)."""
+"""Minimum age of a plan that a car can have missed (see FollowedPlan.is_missed)."""
 CHECK_EVERY_STEPS = 2
 """Number of steps between two checks of the plan: 10 Hz at the default controller rate."""
 TO_POSE_RATE_HZ, THROUGH_POSES_RATE_HZ = 1.0, 0.333
 """Replanning rates of Nav2's default trees, without and with intermediate goals."""
 PLAN_END_M = 0.1
-"""Remaining length of the plan below which intermediate goals that are not reached count as missed."""
+"""Remaining length of the plan below which the remaining intermediate goals count as missed."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,13 @@ class PlanResult:
 
 @dataclass(frozen=True)
 class _Request:
-    """A request to the planner, whose answer is available at tick `due`. `is_optional`: ignore a failure."""
+    """A request to the planner.
+
+    due:          tick at which the answer becomes available
+    reason:       reason for the request, as in the event PLAN_MADE
+    is_optional:  whether the current plan stays valid if planning fails
+    answer:       the plan, or the failure
+    """
 
     due: int
     reason: str
@@ -70,7 +76,8 @@ class PlanManager:
         """Take the planner and the costmap to plan on.
 
         `plan_seed` returns the seed of the n-th plan. `radius` is the inscribed radius of the robot in m. A car cannot
-        turn in place. `latency` is the planning time in ticks. Subclasses use the `speed` in m/s of driving a plan.
+        turn in place. `latency` is the planning time in ticks. `speed` is the robot's speed on a plan in m/s, which
+        only subclasses use.
         """
         self._spec, self.planner, self._costmap = spec, planner, costmap
         self._plan_seed, self._radius, self._is_car, self._latency = plan_seed, radius, is_car, latency
@@ -82,6 +89,7 @@ class PlanManager:
         """Prepare for a new goal."""
         self.drop("goal")
         self._adopted_at = self._scheduled_at = now
+        """Times at which the plan was adopted, and at which periodic replanning was last due."""
         self._is_partial, self._origin = False, (0.0, 0.0)
         self._steps = 0
 
@@ -92,10 +100,10 @@ class PlanManager:
         self._reason = reason
 
     def report_control_failure(self) -> None:
-        """React to a control failure. Subclasses override this method, which does nothing."""
+        """React to a control failure. Does nothing here; subclasses may override this method."""
 
     def step(self, tick: int, now: float, goal: Goal, pose: Pose2, via: tuple[Goal, ...] = ()) -> tuple[Event, ...]:
-        """Request, receive, or replace the plan. Return an event if the robot follows a new plan from now on.
+        """Request, receive, or replace the plan. Return an event if the robot now follows a new plan.
 
         The plan leads through the goals `via` to `goal` (Nav2's ComputePathThroughPoses). `plan` stays None while the
         first plan is being computed. Raises NavigationFailure when planning fails.
@@ -130,7 +138,7 @@ class PlanManager:
         self._request = _Request(due, reason, is_optional, answer)
 
     def _receive(self, tick: int, now: float) -> tuple[Event, ...]:
-        """Follow the requested plan once it is available. Raises the failure of a request that is not optional."""
+        """Follow the requested plan if it is available. Raises the failure of a request that is not optional."""
         request = self._request
         if request is None or tick < request.due:
             return ()
@@ -145,7 +153,7 @@ class PlanManager:
         return (self._adopt(tick, now, request.answer, request.reason),)
 
     def _mandatory_reason(self, now: float, pose: Pose2, plan: FollowedPlan) -> str:
-        """Return why the plan must be replaced; "" if it can still be followed."""
+        """Return the reason why the plan must be replaced; "" if it can still be followed."""
         if self._is_car and now - self._adopted_at >= MIN_MISSED_AGE_S and plan.is_missed(pose):
             return "missed"
         if self._via and not self._is_partial and plan.remaining() < PLAN_END_M:
@@ -153,7 +161,7 @@ class PlanManager:
         return self._scheduled_reason(now, plan)
 
     def _scheduled_reason(self, now: float, plan: FollowedPlan) -> str:
-        """Return "rate", "blocked", or "window" (the costmap has rolled) if periodic replanning is due, else ""."""
+        """Return "rate", "blocked", or "window" (the costmap has rolled) if it is time for a new plan, else ""."""
         rate = self._spec.replanning_rate or (THROUGH_POSES_RATE_HZ if self._via else TO_POSE_RATE_HZ)
         if now - self._scheduled_at < 1.0 / rate:
             return ""
@@ -162,19 +170,20 @@ class PlanManager:
             if self._is_blocked(plan):
                 return "blocked"
             return "window" if self._is_partial and self._costmap.view.origin != self._origin else ""
-        may_keep = plan.remaining() < self._spec.proximity_threshold and not self._is_partial
-        return "" if may_keep and not self._is_blocked(plan) else "rate"
+        is_near_goal = plan.remaining() < self._spec.proximity_threshold and not self._is_partial
+        return "" if is_near_goal and not self._is_blocked(plan) else "rate"
 
     def _optional_reason(self, now: float, goal: Goal, pose: Pose2, plan: FollowedPlan) -> str:
-        """Return why a better plan may exist, or "". Subclasses override this method, which returns ""."""
+        """Return the reason why a better plan may exist, or "". Always "" here; subclasses may override this method."""
         return ""
 
     def _is_blocked(self, plan: FollowedPlan) -> bool:
+        """Return whether the plan is blocked on the current costmap."""
         plan.update_occupied_if_changed(self._costmap)
         return plan.is_blocked()
 
     def _accepts(self, reason: str, result: PlanResult) -> bool:
-        """Return whether to follow a new plan. Subclasses override this method, which returns True."""
+        """Return whether to follow a new plan. Always True here; subclasses may override this method."""
         return True
 
     def _compute(self, tick: int, goal: Goal, pose: Pose2) -> PlanResult:
@@ -191,24 +200,26 @@ class PlanManager:
         return PlanResult(path, is_partial, view.origin, view is not self._costmap.view)
 
     def _planning_view(self, pose: Pose2) -> CostmapView:
+        """Return the costmap to plan on. Subclasses may add moving obstacles."""
         return self._costmap.view
 
     def _compute_leg(self, view: CostmapView, goal: Goal, start: Pose2) -> tuple[Array, bool]:
         """Return the poses (n, 3) from start to goal, and whether they lead only to the edge of the costmap."""
         self._plan_count += 1
-        aim = self._costmap.goal_in_window(start, goal.pose)
-        is_partial = aim is not goal.pose
+        target = self._costmap.goal_in_window(start, goal.pose)
+        is_partial = target is not goal.pose
         tolerance = math.inf if is_partial else goal.xy_tolerance
-        return self._plan_leg(view, start, aim, tolerance, self._plan_seed(self._plan_count)).points, is_partial
+        return self._plan_leg(view, start, target, tolerance, self._plan_seed(self._plan_count)).points, is_partial
 
     def _plan_leg(self, view: CostmapView, start: Pose2, goal: Pose2, tolerance: float, seed: int) -> Path:
-        """Return the planner's path. Raises NavigationFailure, also if it ends over `tolerance` m from the goal."""
+        """Return the planner's path. Raises NavigationFailure if it ends more than `tolerance` m from the goal."""
         path = self.planner.plan(view, start, goal, seed)
         if goal.distance(Pose2(*path.points[-1].tolist())) > tolerance:
             raise NavigationFailure(ErrorCode.GOAL_OCCUPIED, "the robot does not fit within the goal's tolerance")
         return path
 
     def _make_followed_plan(self, path: Path) -> FollowedPlan:
+        """Return the plan to follow. Subclasses may return a subclass of FollowedPlan."""
         return FollowedPlan(path, self._radius, self._costmap.view)
 
     def _adopt(self, tick: int, now: float, result: PlanResult, reason: str) -> Event:

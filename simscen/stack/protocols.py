@@ -1,12 +1,13 @@
 """Protocols of a navigation stack and its components, with the data that they exchange.
 
-You can implement each protocol in a package of your own. Contracts are written as *given … then …*; tests/contracts
-checks them for every implementation. These contracts apply to all protocols:
+You can implement each protocol in a package of your own. Contracts are written as *given … then …*. The tests in
+tests/contracts check the contracts for each implementation. These contracts apply to all protocols:
 
-- *Given* the same calls and random generators *then* the results are bit-identical. So the component uses no wall
-  clock and no global random generator.
+- *Given* the same calls and random generators *then* the results are bit-identical. A component must therefore use
+  neither the wall clock nor a global random generator.
 - *Given* arguments of a call *then* the component does not change them, neither during the call nor later.
-- *Given* a failure *then* it raises NavigationFailure with one of Nav2's error codes, and no other exception.
+- *Given* a failure *then* the component raises NavigationFailure with one of Nav2's error codes, and no other
+  exception.
 """
 
 from dataclasses import dataclass, field, replace
@@ -29,7 +30,7 @@ from simscen.stack.moving_obstacles import NO_MOVING_OBSTACLES, MovingObstacles
 
 
 class NavigationFailure(Exception):
-    """Failure of a component. `code` is one of Nav2's error codes."""
+    """Exception for the failure of a component. `code` is one of Nav2's error codes."""
 
     def __init__(self, code: ErrorCode, message: str) -> None:
         """Take the error code and a message for logs and reports."""
@@ -39,11 +40,14 @@ class NavigationFailure(Exception):
 
 @dataclass(frozen=True)
 class RobotModel:
-    """Description of the robot for its stack, in SI units. Speeds and accelerations are limits of the base.
+    """Description of the robot for its stack, in SI units and rad.
 
-    `footprint` contains the corners in the base frame, counterclockwise. For a round robot, it is a regular polygon,
-    and `radius` is not None. `turning_radius` is the minimum turning radius; 0 for a base that turns in place. A
-    `holonomic` base can drive sideways.
+    footprint:       corners in the base frame, counterclockwise; a regular polygon for a round robot
+    radius:          radius of a round robot; None for other robots
+    max_…:           maximum speeds of the base: forward, backward, to the side, and turn rate
+    linear_…:        maximum acceleration and deceleration of the base
+    turning_radius:  minimum turning radius; 0 for a base that turns in place
+    holonomic:       whether the base can drive sideways
     """
 
     footprint: Polygon
@@ -82,11 +86,11 @@ class Localizer(Protocol):
         ...
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Process an odometry reading. Several can arrive before `belief` is read."""
+        """Process an odometry reading. Several readings can arrive before `belief` is read."""
         ...
 
     def on_scan(self, scan: Scan) -> None:
-        """Process a lidar scan. A localizer may ignore it until the robot has moved enough."""
+        """Process a lidar scan. A localizer may ignore scans until the robot has moved far enough."""
         ...
 
     def on_imu(self, imu: Imu) -> None:
@@ -120,18 +124,20 @@ FREE, MAX_NON_OBSTACLE, INSCRIBED, LETHAL, NO_INFORMATION = 0, 252, 253, 254, 25
 class CostmapView:
     """State of a costmap. Planners get the global costmap, controllers and behaviors get the local costmap.
 
-    The global costmap is in the map frame, the local one in the odom frame. Poses, paths, and goals in the same call
-    are in the frame of the costmap. The arrays are valid until the next update of the costmap.
+    The global costmap is in the map frame, the local costmap in the odom frame. Poses, paths, and goals in the same
+    call are in the frame of the costmap. The arrays are valid until the next update of the costmap.
 
     costs:             costs (height, width) as in nav2_costmap_2d: 0 free, 253 inscribed, 254 lethal, 255 unknown
-    distance:          distances (height, width) in m from the center of each cell to that of the nearest lethal cell.
-                       They are cut off at the inflation radius, or 0.5 m beyond the circumscribed radius if larger.
+    distance:          distances (height, width) in m from the center of each cell to the center of the nearest lethal
+                       cell. Distances are at most the inflation radius or, if this is larger, the circumscribed radius
+                       plus 0.5 m.
     resolution:        cell size in m
     origin:            corner (x, y) of cell (0, 0), which has the lowest x and y
     revision:          number that increases with each change
     inflation_radius:  distance in m up to which obstacles increase costs
     moving:            moving obstacles with predicted positions (see `Footprint.gap`); empty without motion prediction.
-                       `costs` contain them only in the costmap for a planner: where the robot would meet them.
+                       Only in the costmap for a planner, `costs` contain moving obstacles: at the positions where the
+                       robot would meet them.
     """
 
     costs: npt.NDArray[np.uint8]
@@ -151,10 +157,11 @@ class CostmapView:
 class Planner(Protocol):
     """Finds a path on a costmap.
 
-    *Given* a start or goal outside the map or in an obstacle *then* it fails at once, for example with GOAL_OCCUPIED.
-    *Given* that no path exists *then* it fails with NO_VALID_PATH after a bounded number of iterations.
+    *Given* a start or goal outside the map or in an obstacle *then* the planner fails at once, for example with
+    GOAL_OCCUPIED.
+    *Given* that no path exists *then* the planner fails with NO_VALID_PATH after a bounded number of iterations.
     *Given* success *then* the path starts at `start` and ends within the planner's tolerance of `goal`. At each pose of
-    the path, the footprint is free of lethal cells.
+    the path, the footprint contains no lethal cell.
     """
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
@@ -166,13 +173,13 @@ class Controller(Protocol):
     """Follows a path. All inputs are in the odom frame, because this frame is continuous.
 
     *Given* velocity limits of the robot and a speed limit *then* no command exceeds them.
-    *Given* an obstacle *then* its command is free of collisions, or it fails with NO_VALID_CONTROL.
+    *Given* an obstacle *then* the command causes no collision, or the controller fails with NO_VALID_CONTROL.
     """
 
     def set_path(self, path: Path) -> None:
         """Follow this path from now on.
 
-        When the transform from map to odom frame has changed, the stack passes the rest of the current path again.
+        When the transform from map to odom frame has changed, the stack passes the remaining part of the path again.
         """
         ...
 
@@ -182,7 +189,7 @@ class Controller(Protocol):
         ...
 
     def set_speed_limit(self, limit: float | None) -> None:
-        """Set the speed limit in m/s; None removes it."""
+        """Set the speed limit in m/s; None removes the limit."""
         ...
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
@@ -206,18 +213,19 @@ class SupportsArc(Protocol):
 
 
 class Behavior(Protocol):
-    """A recovery behavior such as spin, called until it is done. Poses are in the odom frame."""
+    """A recovery behavior such as spin. The stack calls `step` until it returns None. Poses are in the odom frame."""
 
     name: str
+    """Name of the behavior in events and logs."""
 
     def start(self, pose: Pose2) -> None:
         """Start the behavior at this pose."""
         ...
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Return the velocity command, `seconds` after the start, or None when the behavior is done.
+        """Return the velocity command, `seconds` after the start; None when the behavior is done.
 
-        Raises NavigationFailure if there is an obstacle or if it takes too long.
+        Raises NavigationFailure if an obstacle is in the way, or if the behavior takes too long.
         """
         ...
 
@@ -249,8 +257,8 @@ class SupportsZones(Protocol):
 class Stack(Protocol):
     """A complete navigation stack: takes the readings of each tick, and returns a velocity command.
 
-    *Given* no goal or an ended task *then* it commands a stop. Exception: if the task was not canceled, the robot may
-    move out of the way of an obstacle and return.
+    *Given* no goal or an ended task *then* the stack commands a stop. Exception: if the task was not canceled, the
+    robot may move out of the way of an obstacle and return.
     """
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:

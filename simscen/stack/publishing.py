@@ -1,4 +1,4 @@
-"""Output of a stack: plans, local plans, beliefs, costmaps, and events if a component keeps the robot waiting."""
+"""Output of a stack: plans, local plans, beliefs, costmaps, and events about components that hold the robot."""
 
 import math
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from simscen.stack.protocols import Controller, Localizer, SupportsArc
 BELIEF_RATE_HZ, LOCAL_PLAN_RATE_HZ = 10.0, 5.0
 """Rate at which the belief is published if no scans arrive, and maximum rate of local plans."""
 MAX_CELLS_PER_SECOND = 125_000
-"""Maximum number of cells published per second for each costmap. It limits the rate of large costmaps."""
+"""Maximum number of cells published per second for each costmap, which limits the rate of large costmaps."""
 _OCCUPANCY_TABLE = np.array(
     [0, *(1 + 97 * (cost - 1) // 251 for cost in range(1, 253)), 99, 100, UNKNOWN], dtype=np.int8
 ).tobytes()
@@ -44,7 +44,7 @@ class Publisher:
         self._belief_period = math.ceil(tick_rate / BELIEF_RATE_HZ)
         self._local_plan_period = math.ceil(tick_rate / LOCAL_PLAN_RATE_HZ)
         self.belief_due = 0
-        """Tick from which on the belief is published without a scan."""
+        """Tick from which the belief is published even without a scan."""
         self._local_plan_due = self._local_plan_period
         self._arcs = controller if isinstance(controller, SupportsArc) else None
         self._plan: Path | None = None
@@ -52,7 +52,7 @@ class Publisher:
         self._local_costmap = _CostmapPublisher("local", local_frame)
 
     def belief(self, tick: int) -> Belief:
-        """Return the belief to publish at this tick. Call it after each scan, and at the tick `belief_due`."""
+        """Return the belief to publish at this tick. Call this method after each scan, and at the tick `belief_due`."""
         self.belief_due = tick + self._belief_period
         return self._localizer.belief
 
@@ -64,8 +64,8 @@ class Publisher:
             local_plan = self._map_local_plan(tick, frames)
         if tick >= self._global_costmap.due or tick >= self._local_costmap.due:
             pairs = (self._global_costmap, costmaps.global_costmap), (self._local_costmap, costmaps.local_costmap)
-            due = (each.update(tick, costmap, self._tick_rate) for each, costmap in pairs if tick >= each.due)
-            grids = tuple(grid for grid in due if grid is not None)
+            updates = (each.update(tick, costmap, self._tick_rate) for each, costmap in pairs if tick >= each.due)
+            grids = tuple(grid for grid in updates if grid is not None)
         if plan is None or plan is self._plan:
             return NO_UPDATES if local_plan is None and not grids else (None, local_plan, grids)
         self._plan = plan
@@ -85,7 +85,11 @@ class Publisher:
 
 @dataclass
 class _CostmapPublisher:
-    """Publisher of one costmap. `due` is the tick of the next publication, `revision` the one published last."""
+    """Publisher of one costmap.
+
+    due:       tick of the next publication
+    revision:  revision of the costmap that was published last; -1 before the first publication
+    """
 
     name: str
     frame: str
@@ -109,31 +113,31 @@ class _CostmapPublisher:
 
 
 REPORT_AFTER_S = 1.0
-"""Time for which a component must hold the robot before an event reports it."""
+"""Time for which a component must hold the robot before an event reports the hold."""
 
 
 class StandstillReporter:
-    """Reports by an event that a component has kept the robot from driving for REPORT_AFTER_S, and when this ends."""
+    """Returns an event when a component has kept the robot from driving for REPORT_AFTER_S, and when the hold ends."""
 
     def __init__(self, tick_rate: int) -> None:
-        self._after = round(REPORT_AFTER_S * tick_rate)
+        self._report_after_ticks = round(REPORT_AFTER_S * tick_rate)
         self.holder = ""
         """Name of the component that holds the robot; empty if none does."""
-        self._since, self._is_reported = 0, False
+        self._hold_start_tick, self._is_reported = 0, False
 
     def report_hold(self, tick: int, component: str, reason: Callable[[], str]) -> tuple[Event, ...]:
         """Record that a component holds the robot, and return new events. `reason` returns the message of the event."""
         ended: tuple[Event, ...] = ()
         if component != self.holder:
             ended = self.report_release(tick)
-            self.holder, self._since = component, tick
-        if self._is_reported or tick - self._since < self._after:
+            self.holder, self._hold_start_tick = component, tick
+        if self._is_reported or tick - self._hold_start_tick < self._report_after_ticks:
             return ended
         self._is_reported = True
         return (*ended, Event(tick, EventKind.ROBOT_HELD, component, {"message": reason()}))
 
     def report_release(self, tick: int) -> tuple[Event, ...]:
-        """Record that no component holds the robot any more, or that it has no goal. Return new events."""
+        """Record that no component holds the robot any more, or that the robot has no goal. Return new events."""
         if not self.holder:
             return ()
         component, is_reported, self.holder, self._is_reported = self.holder, self._is_reported, "", False

@@ -35,7 +35,8 @@ class ReferenceStack:
     """Localizer, costmaps, navigator, controller, velocity smoother, and collision monitor of one robot.
 
     The stack computes a command in each controller period, and repeats the command in between. The methods `_on_…` and
-    `_adjust_…` are extension points for subclasses. In this class, most of them do nothing or return their argument.
+    `_adjust_…` are extension points for subclasses. In this class, most of these methods do nothing, or return their
+    argument.
     """
 
     def __init__(
@@ -56,8 +57,8 @@ class ReferenceStack:
     ) -> None:
         """Take the components. `control_period` and `localizer_latency` are in ticks.
 
-        `fuses_odometry`: the localizer (an EKF), not the wheel odometry, provides the pose in the odom frame.
-        `odometry_filter`: filter of the wheel odometry; None to use unfiltered odometry.
+        `fuses_odometry`: the localizer (an EKF) provides the pose in the odom frame, instead of the wheel odometry.
+        `odometry_filter`: filter of the wheel odometry; None to use unfiltered wheel odometry.
         """
         self._speed_filter = SpeedFilter(surroundings)
         self._localizer, self._costmaps, self._controller = localizer, costmaps, controller
@@ -67,7 +68,8 @@ class ReferenceStack:
         self._control_period = control_period
         self._publishing = Publisher(surroundings.tick_rate, localizer, controller, "map" if fuses_odometry else "odom")
         self._fuses_odometry, self._odometry_filter = fuses_odometry, odometry_filter
-        self._filtered: list[Odometry] = []
+        self._filtered_readings: list[Odometry] = []
+        """Filtered odometry for the log since the last decision."""
         self._localizer_scans = LatencyQueue[Scan](localizer_latency)
         self._events: list[Event] = []
         self._tick = 0
@@ -138,14 +140,14 @@ class ReferenceStack:
         has_scan = self._process_readings(tick, readings)
         plan, local_plan, costmaps = self._control_step(tick) if is_control_tick else NO_UPDATES
         if is_control_tick or self._commands.has_latency:
-            self._commands.step(tick, self._odometry.now)
+            self._commands.step(tick, self._odometry.latest_pose)
         if has_scan or (tick >= self._publishing.belief_due and (readings or is_control_tick)):
             belief = self._publishing.belief(tick)
         sent = self._adjust_sent_command(self._commands.sent)
-        filtered = self._filtered
+        filtered = self._filtered_readings
         if belief is None and plan is None and local_plan is None and not (costmaps or self._events or filtered):
             return self._repeated_decision(sent)
-        events, self._events, self._filtered = tuple(self._events), [], []
+        events, self._events, self._filtered_readings = tuple(self._events), [], []
         return Decision(sent, belief, plan, local_plan, events, (), costmaps, tuple(filtered))
 
     # Extension points -------------------------------------------------------------------------------------------------
@@ -154,7 +156,7 @@ class ReferenceStack:
         """Process an odometry or IMU reading with plausible values."""
 
     def _on_odometry_step(self, wheels: Pose2, fused: Pose2) -> None:
-        """Process an odometry reading: its unfiltered pose `wheels`, and `fused`, the pose in the odom frame."""
+        """Process the poses of an odometry reading: `wheels`, unfiltered, and `fused`, the pose in the odom frame."""
 
     def _on_lidar_scan(self, tick: int, scan: Scan) -> Scan:
         """Process a scan. Return the scan to pass to costmaps and collision monitor."""
@@ -181,7 +183,7 @@ class ReferenceStack:
     # Readings ---------------------------------------------------------------------------------------------------------
 
     def _can_wait(self, tick: int, readings: Readings) -> bool:
-        """Return whether these readings can be processed later, at the next scan or controller period."""
+        """Return whether the readings can be processed later, at the next scan or controller period."""
         if self._events or self._commands.has_latency or self._fuses_odometry:
             return False
         if tick >= self._publishing.belief_due or tick >= self._localizer_scans.due:
@@ -189,7 +191,7 @@ class ReferenceStack:
         return MOTION_READINGS.issuperset(map(type, readings))
 
     def _repeated_decision(self, sent: Twist) -> Decision:
-        """Return a decision with only the command. While the command stays the same, return the same object."""
+        """Return a decision with only the command: the same object as long as the command is the same."""
         if sent is not self._last_decision.command:
             self._last_decision = Decision(sent)
         return self._last_decision
@@ -218,6 +220,7 @@ class ReferenceStack:
         return bool(scans)
 
     def _process_scan(self, tick: int, scan: Scan) -> None:
+        """Pass a scan to the localizer, if the lidar is one of `lidars`, and to collision monitor and costmaps."""
         if scan.sensor in self._lidars:  # sonars show obstacles, but the localizer cannot match them
             self._localizer_scans.put(tick, scan)
             while tick >= self._localizer_scans.due:
@@ -227,7 +230,7 @@ class ReferenceStack:
         self._costmaps.add_reading(processed)
 
     def _process_imu(self, reading: Imu) -> None:
-        """Pass a reading to the odometry filter and the localizer. Of several IMUs, only the first one counts."""
+        """Pass a reading to the odometry filter and the localizer. Readings of a second IMU are ignored."""
         self._imu_sensor = self._imu_sensor or reading.sensor
         if reading.sensor != self._imu_sensor:
             return
@@ -264,7 +267,7 @@ class ReferenceStack:
     def _filtered_odometry(self, reading: Odometry) -> Odometry | None:
         """Return the filtered odometry; None if there is no new estimate. Without a filter, return the reading.
 
-        Only the sensor of the first reading is used, because the poses of two sensors drift apart.
+        Readings of a second odometry sensor are ignored, because the poses of two sensors drift apart.
         """
         if reading.sensor != self._wheel_sensor:
             return None
@@ -272,7 +275,7 @@ class ReferenceStack:
             return reading
         odometry = self._odometry_filter.fuse(reading)
         if odometry is not None:
-            self._filtered.append(odometry)
+            self._filtered_readings.append(odometry)
         return odometry
 
     def _believed_pose(self) -> Pose2:
@@ -283,8 +286,9 @@ class ReferenceStack:
     # Control ----------------------------------------------------------------------------------------------------------
 
     def _control_step(self, tick: int) -> Updates:
+        """Run one controller period. Return plans and costmaps to publish."""
         pose = self._believed_pose()
-        frames = Frames(pose, self._odometry.now if self._odometry.has_pose else pose)
+        frames = Frames(pose, self._odometry.latest_pose if self._odometry.has_pose else pose)
         self._update_costmaps(tick, frames)
         self._on_costmaps_updated(tick, frames)
         self._control(tick, frames)
@@ -292,11 +296,12 @@ class ReferenceStack:
         return self._publishing.updates(tick, frames, None if plan is None else plan.path, self._costmaps)
 
     def _update_costmaps(self, tick: int, frames: Frames) -> None:
+        """Apply changed zones, and update the costmaps that are due."""
         if self._zones is not None and self._costmaps.is_global_due(tick):
             self._costmaps.set_zones(self._zones)
             self._speed_filter.set_zones(self._zones)
             self._zones = None
-        if tick >= self._costmaps.next:
+        if tick >= self._costmaps.next_update_tick:
             self._costmaps.update(tick, frames, self._odometry)
 
     def _control(self, tick: int, frames: Frames) -> None:
@@ -330,9 +335,10 @@ class ReferenceStack:
             self._events += self._standstill.report_release(tick)
 
     def _navigate(self, tick: int, frames: Frames) -> None:
+        """Run one step of the navigator, and submit its command or end the goal."""
         if self._speed_filter.is_used:
             self._controller.set_speed_limit(self._speed_filter.limit(frames.pose, self._controller.full_speed))
-        is_held, periods = self._commands.hold_timed_out(tick), self._commands.periods(tick)
+        is_held, periods = self._commands.check_hold_timeout(tick), self._commands.elapsed_periods(tick)
         step = self._navigator.step(tick, frames, self._twist, is_held, periods)
         self._events += step.events
         if step.failure is not None:
@@ -363,10 +369,12 @@ class ReferenceStack:
         return goal
 
     def _fail_goal(self, tick: int, failure: NavigationFailure) -> None:
+        """End the current goal as failed, and stop the robot."""
         self._events += self._task.record_failed(tick, failure.code, str(failure))
         self._stop(tick)
 
     def _stop(self, tick: int) -> None:
+        """Stop the robot, and end the navigation to the current goal."""
         self._events += self._standstill.report_release(tick)
         self._events += self._navigator.stop(tick)
         self._commands.stop(tick)

@@ -17,11 +17,12 @@ from simscen.stack.footprint import Footprint
 from simscen.stack.protocols import Localizer, RobotModel, Surroundings
 
 UNKNOWN_POSE = Estimate(None)
+"""Estimate of a pose that is not known."""
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """Second argument of the constructor of a component or stack: `Class(specification, setting)`.
+    """Second argument of the constructor of a component or a stack: `Class(specification, setting)`.
 
     Units are SI and rad. The base frame has x forward and y to the left (REP 103).
 
@@ -30,15 +31,16 @@ class Setting:
     streams:          random streams by name, derived from the seed of the run; use `rng` for your own stream
     control_period:   time in s between two calls of a controller, goal checker, or behavior
     resolution:       cell size in m of the costmaps that the component gets
-    estimate:         initial pose estimate of a localizer that is built alone; in a run, the estimate is unknown until
-                      `reset` or `start` passes it
+    estimate:         initial pose estimate, for a localizer outside a run; in a run, `reset` or `start` passes the
+                      estimate later
     stop_on_failure:  whether a failed goal ends the task (for a whole stack)
     mode:             Nav2 action that the task imitates (for a whole stack)
     clear_costmap:    clears both costmaps, as described in `Costmaps.clear` (for a behavior)
     clear_around:     like `clear_costmap`, but only the area of the local costmap (for a behavior)
     trail:            returns the poses of the last minute in the odom frame, the oldest first (for a behavior)
-    limit_command:    returns a command as the collision monitor would limit it, given the pose in the odom frame
-    wrap_localizer:   takes the localizer, and returns a wrapper that the other components use, such as one that injects
+    limit_command:    returns the command that the collision monitor would send, given a command and the pose in the
+                      odom frame
+    wrap_localizer:   returns a wrapper of the localizer that the other components use, such as a wrapper that injects
                       faults (for the reference stack)
     """
 
@@ -77,7 +79,7 @@ class Setting:
 
     @cached_property
     def rng(self) -> np.random.Generator:
-        """The component's own random generator, independent of those of other components."""
+        """The random generator of the component, independent of the generators of other components."""
         return self.streams.generator(self.name)
 
     @cached_property

@@ -11,7 +11,8 @@ Events = tuple[Event, ...]
 class Task:
     """Goals in the order in which the robot drives to them. Methods that change the task return the resulting events.
 
-    Intermediate goals (`via`) and the goal after them form one action: they fail, or are canceled, together.
+    Intermediate goals (`via`) and the goal after them form one action. All goals of an action fail, or are canceled,
+    together.
     """
 
     def __init__(self, stop_on_failure: bool, *, clock: Clock | None = None, mode: Mode = "navigate_to_pose") -> None:
@@ -23,9 +24,13 @@ class Task:
         self._stop_on_failure = stop_on_failure
         self._clock, self._mode = clock or Clock(), mode
         self._waiting: list[Goal] = []
+        """Goals that have not been accepted yet."""
         self._accepted = 0
+        """Number of accepted goals."""
         self._failure: ErrorCode | int | None = None
+        """Error code of the task; None if no goal has failed."""
         self._wait_until: int | None = None
+        """Tick at which the wait at a goal ends; None without a wait."""
         self.goal: Goal | None = None
         """The current goal; None also while the robot waits at a goal."""
         self.since = 0
@@ -37,13 +42,13 @@ class Task:
         self._wait_until = None
 
     def accept_next(self, tick: int) -> Events:
-        """End the wait if its time is over. Accept the next goal if there is no current goal and no wait."""
+        """End the wait at a goal if its time is over. Accept the next goal if there is no current goal and no wait."""
         events = self.end_wait(tick)
         if self.goal is None and self._wait_until is None and self._waiting:
             self.goal, self.since = self._waiting.pop(0), tick
             pose = self.goal.pose
-            at: dict[str, Value] = {"x": float(pose.x), "y": float(pose.y), "yaw": float(pose.yaw)}
-            accepted = Event(tick, EventKind.GOAL_ACCEPTED, self.goal.name, {**at, "index": self._accepted})
+            position: dict[str, Value] = {"x": float(pose.x), "y": float(pose.y), "yaw": float(pose.yaw)}
+            accepted = Event(tick, EventKind.GOAL_ACCEPTED, self.goal.name, {**position, "index": self._accepted})
             self._accepted += 1
             return (*events, accepted)
         return events
@@ -54,7 +59,7 @@ class Task:
         return self._wait_until is not None
 
     def end_wait(self, tick: int) -> Events:
-        """End the wait at a goal if its time is over. End the task, too, if no goal is left."""
+        """End the wait at a goal if its time is over. Then end the task if no goal is left."""
         if self._wait_until is None or tick < self._wait_until:
             return ()
         self._wait_until = None
@@ -69,7 +74,7 @@ class Task:
         return tuple(self._waiting[: last + 1])
 
     def record_reached(self, tick: int) -> Events:
-        """Record that the current goal is reached, and start the wait of this goal, if any."""
+        """Record that the current goal is reached. Start the wait at this goal, if it has one."""
         assert self.goal is not None
         reached = self._event(tick, EventKind.GOAL_REACHED)
         if self.goal.wait > 0:
@@ -78,11 +83,11 @@ class Task:
         return (reached, *self._end_goal(tick, TaskResult.SUCCEEDED))
 
     def record_passed(self, tick: int) -> Events:
-        """Record that the robot has passed the current goal, an intermediate one."""
+        """Record that the robot has passed the current goal, which is an intermediate goal."""
         return (self._event(tick, EventKind.GOAL_PASSED), *self._end_goal(tick, TaskResult.SUCCEEDED))
 
     def record_failed(self, tick: int, code: ErrorCode | int, message: str) -> Events:
-        """Record that the current goal has failed, and end the task if it stops on failures.
+        """Record that the current goal has failed. End the task if `stop_on_failure` is true.
 
         `code` is an int if a stack of another package uses an error code that ErrorCode does not contain.
         """
@@ -96,7 +101,7 @@ class Task:
         return (*dropped, *self._end_goal(tick, TaskResult.FAILED))
 
     def cancel(self, tick: int) -> Events:
-        """Cancel the current goal or wait, and all later goals. Without any of them, do nothing.
+        """Cancel the current goal or wait, and all later goals. Do nothing if there is nothing to cancel.
 
         The task ends as canceled even if an earlier goal has failed.
         """
@@ -124,12 +129,12 @@ class Task:
         return tuple(dropped)
 
     def _end_goal(self, tick: int, result: TaskResult) -> Events:
-        """End the current goal, and the task with this result if no goal is left."""
+        """End the current goal. If no goal is left, end the task with this result."""
         self.goal = None
         return () if self._waiting else self._end_task(tick, result)
 
     def _end_task(self, tick: int, result: TaskResult) -> Events:
-        """End the task with this result, or as failed if a goal has failed."""
+        """End the task with this result; with the result FAILED if a goal has failed."""
         if self._failure is not None:
             result = TaskResult.FAILED
         code = self._failure or ErrorCode.NONE
@@ -143,7 +148,7 @@ class Task:
         return self._waiting[0] if self._waiting else None
 
     def _event(self, tick: int, kind: EventKind, **data: Value) -> Event:
-        """Return an event of the current goal, which is the goal accepted last."""
+        """Return an event of the current goal, which is the goal that was accepted last."""
         assert self.goal is not None
         return Event(tick, kind, self.goal.name, {"index": self._accepted - 1, **data})
 

@@ -110,7 +110,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
         drawn = poses[self._rng.choice(len(poses), count, p=shares)] + self._rng.normal(0.0, CERTAIN_STD, (count, 3))
         drawn[:, 2] = wrap_array(drawn[:, 2])
         self.particles = Particles.with_equal_weights(drawn)
-        self._random = self._descendants = None
+        self._is_random = self._is_descendant = None
         self._scan_weight = 1.0
         return summarize(self.particles, self._sensor.peak_power)
 

@@ -183,7 +183,7 @@ class Avoidance:
         """Return the controller's trajectory at fractions of its speed."""
         if followed is None:
             return arc_rollouts(pose, command, fractions if command != STOP else (1.0,))
-        return followed.rollouts(pose, twist, command, fractions, self._robot, not self._discs.centered)
+        return followed.rollouts(pose, twist, command, fractions, self._robot, not self._discs.is_centered)
 
     def _risk(self, rollouts: Rollouts, moving: MovingObstacles) -> Array:
         """Return the risk (n,) of trajectories: weighted nearness to moving obstacles and collisions with them."""

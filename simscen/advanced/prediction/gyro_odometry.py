@@ -37,7 +37,7 @@ class GyroOdometry:
     def now(self) -> Pose2:
         """The latest pose; the same object until it changes."""
         self._integrate()
-        return self._history.now
+        return self._history.latest_pose
 
     def at(self, tick: int) -> Pose2:
         """Return the latest pose up to a tick; the oldest stored pose if all are later."""
@@ -64,6 +64,6 @@ class GyroOdometry:
         # Rotate the step of the wheels into this frame, with half of the additional turn of the gyroscope.
         rotation = self._yaw - last.pose.yaw + (turn - wheel_turn) / 2
         c, s, dx, dy = cos(rotation), sin(rotation), reading.pose.x - last.pose.x, reading.pose.y - last.pose.y
-        x, y, _ = self._history.now
+        x, y, _ = self._history.latest_pose
         self._yaw += turn
         self._history.add(reading.tick, Pose2(x + c * dx - s * dy, y + s * dx + c * dy, wrap(self._yaw)))

@@ -1,4 +1,4 @@
-"""Collision checks of velocity commands and rotations, shared by the controllers."""
+"""Collision checks of velocity commands and rotations, for all controllers."""
 
 import math
 
@@ -8,13 +8,13 @@ import numpy.typing as npt
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.core.messages.navigation import ErrorCode
-from simscen.stack.footprint import Footprint, distance_at, distances, lethal_near
+from simscen.stack.footprint import Footprint, distance_at, distances, lethal_cells_near
 from simscen.stack.kinematics import MIN_YAW_RATE_RAD_S, poses_along
 from simscen.stack.moving_obstacles import MAX_INFLATION_M
 from simscen.stack.protocols import CostmapView, NavigationFailure
 
 SPEED_FACTORS = (1.0, 0.75, 0.5, 0.25, 0.0)
-"""Factors that are tried in this order on a command that would hit a moving obstacle."""
+"""Factors for a command that would hit a moving obstacle, in the order in which they are tried."""
 MAX_TIME_STEP_S = 0.1
 """Maximum time between two poses that are checked for collisions with moving obstacles."""
 UNCERTAINTY_SIGMAS = 0.5
@@ -35,10 +35,9 @@ class CollisionChecker:
         return horizon if command == STOP else time_to_collision(self._footprint, costmap, pose, command, horizon)
 
     def slow_down(self, command: Twist, free_time: float, horizon: float, full_speed_time: float) -> Twist:
-        """Return the command if its `free_time` is at least `horizon`; otherwise scaled.
+        """Return the command, scaled by `free_time / full_speed_time` if `free_time` is below `horizon`.
 
-        The scale is `free_time` / `full_speed_time`. All times are in s. Raises NO_VALID_CONTROL if the scaled command
-        is slower than the minimum speed.
+        All times are in s. Raises NO_VALID_CONTROL if the scaled command is slower than the minimum speed.
         """
         if free_time >= horizon:
             return command
@@ -50,7 +49,7 @@ class CollisionChecker:
     def slow_down_for_moving(self, command: Twist, costmap: CostmapView, pose: Pose2, horizon: float) -> Twist:
         """Return the command, multiplied by the largest of SPEED_FACTORS that avoids moving obstacles for `horizon` s.
 
-        If no factor avoids them, use the one with the latest collision.
+        If no factor avoids all obstacles, use the factor with the latest collision.
         """
         if not costmap.moving.obstacles or command == STOP:
             return command
@@ -80,14 +79,14 @@ BACKUP_TURN_RATES_RAD_S = (0.0, 0.3, -0.3, 0.6, -0.6)
 
 
 class RotationClearance:
-    """Checks whether a robot has room to rotate in place, and finds a command to back up if it has not."""
+    """Checks whether a robot has room to rotate in place, and finds a command to back up if there is no room."""
 
     def __init__(self, footprint: Footprint, max_reverse: float) -> None:
         """Take the footprint, and the maximum speed in m/s of driving backward."""
         self._footprint, self._backup_speed = footprint, min(BACKUP_SPEED_M_S, max_reverse)
 
     def has_room(self, angle: float, pose: Pose2, costmap: CostmapView) -> bool:
-        """Return whether a rotation by `angle` rad keeps the required clearance, or the current one if smaller."""
+        """Return whether a rotation by `angle` rad keeps the required clearance; the current clearance if smaller."""
         radius = self._footprint.rotation_radius
         if radius == 0.0 or distance_at(costmap, pose.x, pose.y) > radius + 2.0 * costmap.resolution:
             return True
@@ -98,7 +97,7 @@ class RotationClearance:
         return bool((clearance >= required).all())
 
     def backup_command(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
-        """Return the command to back up, with the first turn rate that is free of collisions; None if there is none."""
+        """Return the command to back up with the first collision-free turn rate; None if all turn rates collide."""
         for turn_rate in BACKUP_TURN_RATES_RAD_S if self._backup_speed > 0.0 else ():
             command = Twist(-self._backup_speed, 0.0, turn_rate)
             if time_to_collision(self._footprint, costmap, pose, command, BACKUP_FREE_TIME_S) >= BACKUP_FREE_TIME_S:
@@ -114,7 +113,7 @@ def time_to_collision(footprint: Footprint, costmap: CostmapView, pose: Pose2, t
     """Return the time in s until the first collision with a static obstacle at this velocity, at most `horizon`.
 
     If the robot already is in collision, only motion into another obstacle, or more than half a cell deeper into the
-    same one, counts as a collision. This allows the robot to leave.
+    same obstacle, counts as a collision. The robot can therefore drive away from the obstacle.
     """
     if _is_surely_free(footprint.circumscribed, costmap, pose, twist, horizon):
         return horizon
@@ -124,39 +123,39 @@ def time_to_collision(footprint: Footprint, costmap: CostmapView, pose: Pose2, t
     poses = poses_along(pose, twist, times)
     blocked = ~footprint.free(costmap, poses)
     if blocked[0]:
-        blocked = _is_worse(footprint, costmap, poses)
+        blocked = _is_deeper(footprint, costmap, poses)
     if not blocked.any():
         return horizon
     return float(times[max(0, int(blocked.argmax()) - 1)])
 
 
-def _is_worse(footprint: Footprint, costmap: CostmapView, poses: Array) -> npt.NDArray[np.bool_]:
+def _is_deeper(footprint: Footprint, costmap: CostmapView, poses: Array) -> npt.NDArray[np.bool_]:
     """Return which of the poses (n, 3) are deeper in an obstacle than the first pose, or in another obstacle."""
     reach = footprint.circumscribed + float(np.hypot(*(poses[:, :2] - poses[0, :2]).T).max()) + costmap.resolution
-    gaps = footprint.point_distances(lethal_near(costmap, poses[0, 0].item(), poses[0, 1].item(), reach), poses)
-    deeper = gaps < np.minimum(gaps[0] - 0.5 * costmap.resolution, 0.0)
-    in_lethal_cell = distances(costmap, poses[:, :2]) <= 0.0
-    return np.asarray(deeper.any(axis=1) | (in_lethal_cell & ~in_lethal_cell[0]))
+    gaps = footprint.point_distances(lethal_cells_near(costmap, poses[0, 0].item(), poses[0, 1].item(), reach), poses)
+    is_deeper = gaps < np.minimum(gaps[0] - 0.5 * costmap.resolution, 0.0)
+    is_lethal = distances(costmap, poses[:, :2]) <= 0.0
+    return np.asarray(is_deeper.any(axis=1) | (is_lethal & ~is_lethal[0]))
 
 
 def _is_surely_free(radius: float, costmap: CostmapView, pose: Pose2, twist: Twist, horizon: float) -> bool:
-    """Return True if a disc of `radius` m is certainly free along the arc; False if uncertain. A quick check.
+    """Return True if a disc of `radius` m is certainly free along the arc; False if uncertain.
 
-    Sphere tracing: each step along the arc is as long as the free distance.
+    Quick check by sphere tracing: each step along the arc is as long as the free distance.
     """
     vx, vy, wz = twist
-    speed, turns = math.hypot(vx, vy), abs(wz) >= MIN_YAW_RATE_RAD_S
+    speed, is_turning = math.hypot(vx, vy), abs(wz) >= MIN_YAW_RATE_RAD_S
     cosine, sine, resolution = math.cos(pose.yaw), math.sin(pose.yaw), costmap.resolution
-    required = radius + CELL_DIAGONAL_CELLS * resolution  # distances are those between cell centers
-    time, at_x, at_y = 0.0, pose.x, pose.y
+    required = radius + CELL_DIAGONAL_CELLS * resolution  # because `costmap.distance` is between cell centers
+    time, disc_x, disc_y = 0.0, pose.x, pose.y
     while True:
-        free_distance = distance_at(costmap, at_x, at_y) - required
+        free_distance = distance_at(costmap, disc_x, disc_y) - required
         if free_distance <= resolution and (free_distance <= 0.0 or speed > 0.0):
             return False
         if time >= horizon or speed == 0.0:
             return True
         time += free_distance / speed
         time = min(time, horizon)
-        forward, left = (math.sin(wz * time) / wz, (1.0 - math.cos(wz * time)) / wz) if turns else (time, 0.0)
+        forward, left = (math.sin(wz * time) / wz, (1.0 - math.cos(wz * time)) / wz) if is_turning else (time, 0.0)
         x, y = vx * forward - vy * left, vx * left + vy * forward
-        at_x, at_y = pose.x + cosine * x - sine * y, pose.y + sine * x + cosine * y
+        disc_x, disc_y = pose.x + cosine * x - sine * y, pose.y + sine * x + cosine * y

@@ -9,7 +9,7 @@ from simscen.stack.protocols import NavigationFailure, RobotModel
 DEFAULT_SPEED_M_S = 0.5
 """Nav2's default of desired_linear_vel and of MPPI's vx_max."""
 MAX_SAME_GOAL_DISTANCE_M = 0.1
-"""Maximum distance between the ends of two successive paths that count as paths to the same goal."""
+"""Two successive paths lead to the same goal if the distance between their ends is at most this value."""
 
 
 class PathFollower:
@@ -37,11 +37,11 @@ class PathFollower:
 
     @property
     def full_speed(self) -> float:
-        """Speed in m/s without a speed limit."""
+        """Maximum speed in m/s while no speed limit is set."""
         return self._full_speed
 
     def set_speed_limit(self, limit: float | None) -> None:
-        """Set the speed limit in m/s; None removes it."""
+        """Set the speed limit in m/s; None removes the limit."""
         self._speed_limit = limit
 
     @property

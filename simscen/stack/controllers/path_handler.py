@@ -40,12 +40,12 @@ class PathTracker:
         self.points = np.ascontiguousarray(path.points)
         steps = np.diff(self.points[:, :2], axis=0)
         lengths = np.hypot(steps[:, 0], steps[:, 1])
-        self.along = np.concatenate(([0.0], np.cumsum(lengths)))
-        """Length of path (n,) in m from the start to each point."""
-        self._along: list[float] = self.along.tolist()
+        self.path_lengths = np.concatenate(([0.0], np.cumsum(lengths)))
+        """Lengths (n,) in m of the path from the start to each point."""
+        self._path_lengths: list[float] = self.path_lengths.tolist()
         self._complex_points: list[complex] = (self.points[:, 0] + 1j * self.points[:, 1]).tolist()
         self.longest_step = float(lengths.max(initial=0.0))
-        """Largest distance in m between successive points."""
+        """Maximum distance in m between successive points."""
         self._points_per_meter = 1.0 / (self.longest_step + LENGTH_TOLERANCE_M)
         is_forward = forward_steps(self.points)
         self._segment_ends: list[int] = [*direction_changes(is_forward).tolist(), len(self.points) - 1]
@@ -53,11 +53,12 @@ class PathTracker:
             bool(is_forward[max(0, end - 1)]) if len(is_forward) else True for end in self._segment_ends
         ]
         self.index = self._segment_start = 0
+        """Indices of the point at the position of the robot, and of the start of the current segment."""
 
     @property
     def length(self) -> float:
         """Length of the path in m."""
-        return self._along[-1]
+        return self._path_lengths[-1]
 
     @property
     def has_cusps(self) -> bool:
@@ -79,7 +80,7 @@ class PathTracker:
 
     def _find_nearest(self, pose: Pose2) -> None:
         """Move the position to the nearest point ahead in the current segment, within the search distance."""
-        points, along, robot = self._complex_points, self._along, complex(pose.x, pose.y)
+        points, along, robot = self._complex_points, self._path_lengths, complex(pose.x, pose.y)
         index = nearest = self.index
         end, search_end, shortest = self._segment_ends[0], along[index] + self._search_distance, math.inf
         while index <= end and along[index] <= search_end:
@@ -90,26 +91,26 @@ class PathTracker:
         self.index = nearest
 
     def ahead(self, length: float) -> tuple[Array, Array]:
-        """Return the next points (n, 3) of the segment, and the path length (n,) in m from the first one to each.
+        """Return the next points (n, 3) of the segment, and path lengths (n,) in m from the first point to each.
 
-        They end with the first point beyond `length` m, or with the end of the segment. At the end of the segment,
-        these are its last two points.
+        The last point is the first one beyond `length` m, or the end of the segment. At the end of the segment, return
+        the last two points.
         """
-        end = bisect_right(self._along, self._along[self.index] + length)
+        end = bisect_right(self._path_lengths, self._path_lengths[self.index] + length)
         end = min(end + 1, self._segment_ends[0] + 1)
         start = min(self.index, max(0, end - 2))
-        return self.points[start:end], self.along[start:end] - self.along[start]
+        return self.points[start:end], self.path_lengths[start:end] - self.path_lengths[start]
 
     def sampled_points(self, every: int) -> list[complex]:
-        """Return every n-th point from the position to the end of the path, also beyond cusps, as x + iy."""
+        """Return every n-th point (x + iy) from the position to the end of the path, even beyond cusps."""
         return self._complex_points[self.index :: every]
 
     def samples_ahead(self, spacing: float, reach: float) -> Iterator[tuple[float, complex, float]]:
-        """Yield (path length in m, x + iy, curvature in 1/m) of points of the segment, about `spacing` m apart.
+        """Yield (path length in m, x + iy, curvature in 1/m) for points of the segment, about `spacing` m apart.
 
-        They begin about `spacing` m ahead, and end about `reach` m ahead.
+        The first point is about `spacing` m ahead of the position, the last point about `reach` m ahead.
         """
-        along, start = self._along, self._along[self.index]
+        along, start = self._path_lengths, self._path_lengths[self.index]
         length = spacing
         while length <= reach:
             index = bisect_left(along, start + length)
@@ -120,7 +121,7 @@ class PathTracker:
 
     def _curvature(self, index: int) -> float:
         """Return the approximate absolute curvature at a point in 1/m; 0 near the ends of the segment."""
-        along, points = self._along, self._complex_points
+        along, points = self._path_lengths, self._complex_points
         before = bisect_right(along, along[index] - CURVATURE_SPAN_M) - 1
         after = bisect_left(along, along[index] + CURVATURE_SPAN_M)
         if before < self._segment_start or after > self._segment_ends[0]:
@@ -130,11 +131,11 @@ class PathTracker:
 
     def remaining(self) -> float:
         """Return the remaining length of the path in m."""
-        return self._along[-1] - self._along[self.index]
+        return self._path_lengths[-1] - self._path_lengths[self.index]
 
     def remaining_in_segment(self) -> float:
         """Return the remaining length of the segment in m."""
-        return self._along[self._segment_ends[0]] - self._along[self.index]
+        return self._path_lengths[self._segment_ends[0]] - self._path_lengths[self.index]
 
     @property
     def segment_end(self) -> tuple[float, float]:
@@ -143,17 +144,17 @@ class PathTracker:
         return end.real, end.imag
 
     def carrot(self, pose: Pose2, distance: float, extension: Extension = "none") -> tuple[float, float]:
-        """Return the carrot (x, y): where the segment leaves the circle of radius `distance` m around the robot.
+        """Return the carrot (x, y): the point at which the segment leaves a circle around the robot.
 
-        If the segment, or the part of it that is searched, ends inside the circle, return its end. With an `extension`,
-        return instead the point where a straight line from this end leaves the circle: in the direction of the last two
-        points (`path`, as RPP's interpolate_curvature_after_goal), or in the driving direction of the last pose
-        (`heading`).
+        `distance` is the radius of the circle in m. If the searched part of the segment ends inside the circle, the
+        carrot is its end. With an `extension`, a straight line extends this end, and the carrot is the point at which
+        the line leaves the circle. The direction of the line is the direction of the last two points (`path`, as RPP's
+        interpolate_curvature_after_goal), or the driving direction of the last pose (`heading`).
         """
-        search_end = self._along[self.index] + 2 * distance + CARROT_SEARCH_MARGIN_M
+        search_end = self._path_lengths[self.index] + 2 * distance + CARROT_SEARCH_MARGIN_M
         outside = self._first_outside(pose, distance, search_end)
         if outside is None:
-            end = min(bisect_right(self._along, search_end), self._segment_ends[0])
+            end = min(bisect_right(self._path_lengths, search_end), self._segment_ends[0])
             x, y = self.points[end, :2].tolist()
             if extension == "none":
                 return x, y
@@ -174,11 +175,11 @@ class PathTracker:
         return sign * math.cos(yaw), sign * math.sin(yaw)
 
     def _path_direction(self, index: int) -> tuple[float, float]:
-        """Return the direction to the point `index` from the one before it as a unit vector.
+        """Return the direction from the previous point to the point `index` as a unit vector.
 
-        Points at the same position are skipped. Without another point in the segment, return the heading.
+        Previous points at the same position are skipped. If there is no other point in the segment, return the heading.
         """
-        before = bisect_left(self._along, self._along[index] - LENGTH_TOLERANCE_M) - 1
+        before = bisect_left(self._path_lengths, self._path_lengths[index] - LENGTH_TOLERANCE_M) - 1
         if before < self._segment_start:
             return self._heading(index)
         step = self._complex_points[index] - self._complex_points[before]
@@ -189,18 +190,22 @@ class PathTracker:
 
         The search ends at the path length `search_end` in m, or at the end of the segment.
         """
-        points, along, robot = self._complex_points, self._along, complex(pose.x, pose.y)
+        points, along, robot = self._complex_points, self._path_lengths, complex(pose.x, pose.y)
         index, end = self.index, self._segment_ends[0]
         while index <= end and (index == 0 or along[index - 1] <= search_end):
-            away = abs(points[index] - robot)
-            if away >= distance:
+            point_distance = abs(points[index] - robot)
+            if point_distance >= distance:
                 return index
-            index += int((distance - away) * self._points_per_meter) or 1  # skips points that are certainly inside
+            # Skip points that are certainly inside the circle.
+            index += int((distance - point_distance) * self._points_per_meter) or 1
         return None
 
 
 def _on_circle(ax: float, ay: float, bx: float, by: float, radius: float, center: Pose2) -> tuple[float, float]:
-    """Return (x, y) where the line from a (inside) to b leaves a circle. a and b are relative to its `center`."""
+    """Return the point (x, y) at which the line from a, inside a circle, to b leaves the circle.
+
+    a and b are relative to the `center` of the circle.
+    """
     dx, dy = bx - ax, by - ay
     a, b, c = dx * dx + dy * dy, ax * dx + ay * dy, ax * ax + ay * ay - radius * radius
     t = (-b + math.sqrt(max(0.0, b * b - a * c))) / a if a > 0 else 1.0
@@ -213,7 +218,12 @@ PATH_SPACING_M = 0.05
 
 @dataclass(frozen=True, eq=False)
 class UpcomingPath:
-    """Part of the path ahead of the robot, up to the next cusp: poses (n, 3) at equal `spacing`, and `length`, in m."""
+    """Part of the path ahead of the robot, at most up to the next cusp.
+
+    points:   poses (n, 3) at equal distances
+    spacing:  path length in m between two successive points
+    length:   path length in m from the first to the last point
+    """
 
     points: Array
     spacing: float

@@ -21,7 +21,7 @@ from simscen.stack.setting import Setting
 MIN_SQUARED_CHORD_M2 = 0.001
 """Squared distance of the carrot below which the arc is a straight line (Nav2's calculateCurvature)."""
 CAR_LOOKAHEAD_RATIO = 0.4
-"""Maximum lookahead distance of a car relative to its turning radius. With more, the car would cut S-bends."""
+"""Maximum lookahead distance of a car relative to its turning radius, so that the car does not cut S-bends."""
 MIN_ROTATION_RAD = 0.1
 """Angle to the carrot below which a rotation in place does not help."""
 LOOKAHEAD_RATIOS = (1.0, 0.7, 0.5, 0.35)
@@ -39,14 +39,18 @@ class Carrot(NamedTuple):
         """Distance from the robot in m."""
         return math.hypot(self.x, self.y)
 
-    def bearing(self, backward: bool) -> float:
-        """Return the angle in rad from the front of the robot to the carrot; with `backward`, from its back."""
-        sign = -1.0 if backward else 1.0
+    def bearing(self, is_backward: bool) -> float:
+        """Return the angle in rad from the front of the robot to the carrot; from the back if `is_backward`."""
+        sign = -1.0 if is_backward else 1.0
         return math.atan2(sign * self.y, sign * self.x)
 
 
 class CheckedArc(NamedTuple):
-    """A command, the time in s for which it is free of collisions, and the time for which it must be (`horizon`)."""
+    """A command with the result of its collision check.
+
+    free_time:  time in s, at most `horizon`, for which the command causes no collision
+    horizon:    time in s for which the command must not cause a collision
+    """
 
     command: Twist
     free_time: float
@@ -56,7 +60,7 @@ class CheckedArc(NamedTuple):
 class RegulatedPurePursuit(PathFollower):
     """Steers to a carrot on the path, and regulates the speed by curvature, nearby obstacles, and distance to the goal.
 
-    If the arc to the carrot is blocked, it tries nearer carrots, then a lower speed, and then a rotation in place.
+    If the arc to the carrot is blocked, the controller tries nearer carrots, then a lower speed, and then a rotation.
     """
 
     def __init__(self, spec: RppSpec, setting: Setting) -> None:
@@ -110,18 +114,18 @@ class RegulatedPurePursuit(PathFollower):
                 break
             carrot = _carrot(tracker, pose, ratio * lookahead_distance, "heading" if self._is_car else "none")
             curvature_carrot = carrot if fixed_carrot is None else fixed_carrot
-            backward = not tracker.is_forward or (spec.allow_reversing and carrot.x < 0.0)
-            bearing = curvature_carrot.bearing(backward)
+            is_backward = not tracker.is_forward or (spec.allow_reversing and carrot.x < 0.0)
+            bearing = curvature_carrot.bearing(is_backward)
             if can_rotate and abs(bearing) > spec.rotate_to_heading_min_angle:
                 rotation = bearing
                 break
-            command = self._drive(tracker, curvature_carrot, backward, pose, costmap)
+            command = self._drive(tracker, curvature_carrot, is_backward, pose, costmap)
             arc = self._checked_arc(command, pose, costmap, self._checked_distance(tracker, carrot))
             if arc.free_time >= arc.horizon:
                 return self._slow_down_for_moving(command, pose, costmap, arc.horizon)
             arcs.append(arc)
-            if escape_rotation is None and self._is_straight_free(carrot, backward, command, pose, costmap):
-                escape_rotation = carrot.bearing(backward)
+            if escape_rotation is None and self._is_straight_free(carrot, is_backward, command, pose, costmap):
+                escape_rotation = carrot.bearing(is_backward)
         if rotation is not None:
             return self._rotate(rotation, pose, twist, costmap)
         command, free_time, horizon = max(arcs, key=lambda arc: arc.free_time)
@@ -135,13 +139,13 @@ class RegulatedPurePursuit(PathFollower):
         return self._slow_down_for_moving(slowed, pose, costmap, horizon)
 
     def _is_straight_free(
-        self, carrot: Carrot, backward: bool, command: Twist, pose: Pose2, costmap: CostmapView
+        self, carrot: Carrot, is_backward: bool, command: Twist, pose: Pose2, costmap: CostmapView
     ) -> bool:
         """Return whether a round robot could drive straight to the carrot after a rotation in place.
 
         False if the robot is not round, or if the angle to the carrot is small.
         """
-        angle = carrot.bearing(backward)
+        angle = carrot.bearing(is_backward)
         if not self._spec.use_rotate_to_heading or self._robot.radius is None or abs(angle) < MIN_ROTATION_RAD:
             return False
         rotated = Pose2(pose.x, pose.y, pose.yaw + angle)
@@ -155,7 +159,7 @@ class RegulatedPurePursuit(PathFollower):
         return min(carrot.distance, max(CUSP_REACHED_M, tracker.remaining_in_segment()))
 
     def _rotate(self, angle: float, pose: Pose2, twist: Twist, costmap: CostmapView) -> Twist:
-        """Return the command to rotate in place by `angle` rad or, without room for this rotation, to back up."""
+        """Return the command to rotate in place by `angle` rad; to back up if there is no room for this rotation."""
         if not self._spec.use_collision_detection or self._rotation_clearance.has_room(angle, pose, costmap):
             return self._goal_rotation.turn(angle, twist)
         command = self._rotation_clearance.backup_command(pose, costmap)
@@ -173,7 +177,9 @@ class RegulatedPurePursuit(PathFollower):
             distance = min(distance, max(spec.min_lookahead_dist, CAR_LOOKAHEAD_RATIO * self._robot.turning_radius))
         return distance
 
-    def _drive(self, tracker: PathTracker, carrot: Carrot, backward: bool, pose: Pose2, costmap: CostmapView) -> Twist:
+    def _drive(
+        self, tracker: PathTracker, carrot: Carrot, is_backward: bool, pose: Pose2, costmap: CostmapView
+    ) -> Twist:
         """Return the command for the arc to a carrot, at the regulated speed."""
         squared_chord = carrot.x**2 + carrot.y**2
         curvature = 2.0 * carrot.y / squared_chord if squared_chord > MIN_SQUARED_CHORD_M2 else 0.0
@@ -183,16 +189,16 @@ class RegulatedPurePursuit(PathFollower):
         speed = self._regulated_speed(tracker, curvature, pose, costmap)
         if abs(curvature) * speed > self._robot.max_angular:
             speed = self._robot.max_angular / abs(curvature)
-        if backward:
+        if is_backward:
             speed = -min(speed, self._robot.max_reverse)
         return Twist(speed, 0.0, speed * curvature)
 
     def _regulated_speed(self, tracker: PathTracker, curvature: float, pose: Pose2, costmap: CostmapView) -> float:
         """Return the speed in m/s, regulated by curvature, obstacles, the path ahead, and the end of the segment."""
         speed, regulation, spec = self._speed, self._speed_regulation, self._spec
-        regulated = regulation.for_curvature(speed, curvature)
-        regulated = min(regulated, regulation.for_distance(speed, distance_at(costmap, pose.x, pose.y)))
-        regulated = regulation.for_path_ahead(speed, regulated, tracker, costmap)
+        regulated = regulation.speed_at_curvature(speed, curvature)
+        regulated = min(regulated, regulation.speed_at_distance(speed, distance_at(costmap, pose.x, pose.y)))
+        regulated = regulation.speed_for_path_ahead(speed, regulated, tracker, costmap)
         regulated = max(regulated, spec.regulated_linear_scaling_min_speed)
         return min(speed, self._approach_speed(tracker, regulated, pose))
 
@@ -203,7 +209,7 @@ class RegulatedPurePursuit(PathFollower):
             distance = _to_robot_frame(pose, *tracker.segment_end).distance
             scaled = speed * distance / spec.approach_velocity_scaling_dist
             speed = min(speed, max(scaled, spec.min_approach_linear_velocity))
-            remaining = max(remaining, distance)  # a robot that has left the path at its end has to come back
+            remaining = max(remaining, distance)  # the robot may be beside the end of the path
         braking = math.sqrt(BRAKING_FACTOR * self._robot.linear_deceleration * remaining)
         return min(speed, max(braking, spec.min_approach_linear_velocity))
 
@@ -216,16 +222,18 @@ class RegulatedPurePursuit(PathFollower):
         return CheckedArc(command, self._collision_checker.free_time(costmap, pose, command, horizon), horizon)
 
     def _slow_down_for_moving(self, command: Twist, pose: Pose2, costmap: CostmapView, horizon: float) -> Twist:
+        """Return the command, slowed down to avoid moving obstacles for `horizon` s."""
         if not self._spec.use_collision_detection:
             return command
         return self._collision_checker.slow_down_for_moving(command, costmap, pose, horizon)
 
 
 def _carrot(tracker: PathTracker, pose: Pose2, distance: float, extension: Extension) -> Carrot:
-    """Return the carrot at `distance` m in the base frame. `extension` is that of `PathTracker.carrot`."""
+    """Return the carrot at `distance` m in the base frame. See `PathTracker.carrot` for `extension`."""
     return _to_robot_frame(pose, *tracker.carrot(pose, distance, extension))
 
 
 def _to_robot_frame(pose: Pose2, x: float, y: float) -> Carrot:
+    """Return a point in the frame of `pose`."""
     cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
     return Carrot(cosine * (x - pose.x) + sine * (y - pose.y), cosine * (y - pose.y) - sine * (x - pose.x))

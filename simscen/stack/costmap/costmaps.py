@@ -17,9 +17,9 @@ from simscen.stack.odometry_history import OdometryHistory
 from simscen.stack.protocols import Surroundings
 
 MIN_LOCAL_SIZE_M = 3.0
-"""Smallest default size of the local costmap: the size in Nav2."""
+"""Minimum of the default size of the local costmap: the size in Nav2."""
 MAX_UPDATE_DELAY_S = 1.0
-"""Delay of an update after which windows and zones move with the robot without the update."""
+"""If updates are late by more than this time, windows and zones move with the robot without an update."""
 ZONE_TOLERANCE_M = 0.02
 """Shift of the map frame in the odom frame above which keepout zones are moved in the local costmap."""
 
@@ -27,8 +27,9 @@ ZONE_TOLERANCE_M = 0.02
 class Costmaps:
     """Global and local costmap of one robot, each updated at its own rate.
 
-    The global costmap is in the map frame and contains the map, if any. The local costmap rolls with the robot in the
-    odom frame, without map. Its obstacles do not move when the localizer corrects the pose; only keepout zones do.
+    The global costmap is in the map frame and contains the map, if any. The local costmap is in the odom frame, rolls
+    with the robot, and does not contain the map. When the localizer corrects the pose, only the keepout zones of the
+    local costmap move, not its obstacles.
     """
 
     def __init__(
@@ -55,14 +56,14 @@ class Costmaps:
         slowest = max(self._global_schedule.period, self._local_schedule.period)
         self._max_update_age = slowest + round(MAX_UPDATE_DELAY_S * tick_rate)
         self._updated_at: int | None = None
-        """Tick of the latest update or, before it, of the first reading; None without any reading."""
+        """Tick of the latest update; before the first update, of the first reading; None without any reading."""
         self._has_local_zones = False
         """Whether the local costmap has or had keepout zones."""
-        self.next: float = 0
-        """The tick from which `update` has something to do."""
+        self.next_update_tick: float = 0
+        """The tick at which to call `update` again."""
 
     def add_reading(self, reading: Scan | Image) -> None:
-        """Store a reading for the next update of each costmap. It replaces earlier readings of the same sensor."""
+        """Store a reading for the next update of each costmap, instead of an earlier reading of the same sensor."""
         if self._updated_at is None:
             self._updated_at = reading.tick
         for schedule in (self._global_schedule, self._local_schedule):
@@ -80,27 +81,27 @@ class Costmaps:
     def update(self, tick: int, frames: Frames, odometry: OdometryHistory) -> None:
         """Update the costmaps that are due with the newest reading of each sensor.
 
-        Without usable readings, for example of a robot without a lidar, only windows and zones move with the robot.
+        If there are no usable readings for some time, only windows and zones move with the robot.
         """
         if self._updated_at is None or tick - self._updated_at > self._max_update_age:
             self.global_costmap.follow(frames.pose)
             self._update_local_zones(frames)
             self.local_costmap.follow(frames.odometry)
-        if tick >= self._global_schedule.next:
+        if tick >= self._global_schedule.next_tick:
             for base, reading, _ in self._global_schedule.take(tick, frames, frames.pose, odometry):
                 self.global_costmap.update(base, reading)
                 self._updated_at = tick
-        if tick >= self._local_schedule.next:
+        if tick >= self._local_schedule.next_tick:
             for base, reading, frames_at_start in self._local_schedule.take(tick, frames, frames.odometry, odometry):
                 self._update_local_zones(frames_at_start)
                 self.local_costmap.update(base, reading)
                 self._updated_at = tick
-        self.next = min(self._global_schedule.next, self._local_schedule.next)
+        self.next_update_tick = min(self._global_schedule.next_tick, self._local_schedule.next_tick)
 
     def clear(self) -> None:
         """Clear both costmaps (Nav2's ClearEntireCostmap).
 
-        Obstacles in the newest readings remain, and nearby ones outside the view of all lidars.
+        Obstacles in the newest readings remain, and nearby obstacles outside the field of view of all lidars.
         """
         self.clear_global(entirely=True)
         self.clear_local()
@@ -135,8 +136,9 @@ class Costmaps:
 class _Update(NamedTuple):
     """Update of a costmap with one reading.
 
-    `base` is the pose of the robot at the time of the reading, in the frame of the costmap. `frames` are those at the
-    start of the update.
+    base:     pose of the robot at the time of the reading, in the frame of the costmap
+    reading:  scan or depth image
+    frames:   poses of the robot at the start of the update
     """
 
     base: Pose2
@@ -150,19 +152,21 @@ class _UpdateSchedule:
     def __init__(self, period: int, latency: int) -> None:
         """Take the time between two starts of updates and the duration of an update, in ticks.
 
-        If an update takes longer than `period`, the next update starts at its end.
+        If an update takes longer than `period`, the next update starts when this update ends.
         """
         self.period = max(period, latency)
         """Minimum time between two starts of updates in ticks."""
-        self._updated_at = -self.period
+        self._started_at = -self.period
+        """Tick at which the latest update started."""
         self._updates = LatencyQueue[_Update](latency)
-        self.next: float = 0
+        self.next_tick: float = 0
         """The tick of the next start or end of an update."""
         self.readings: dict[str, Scan | Image] = {}
+        """Newest reading of each sensor since the start of the latest update."""
 
     def is_due(self, tick: int) -> bool:
         """Return whether an update may start at this tick."""
-        return tick - self._updated_at >= self.period
+        return tick - self._started_at >= self.period
 
     def take(self, tick: int, frames: Frames, base: Pose2, odometry: OdometryHistory) -> list[_Update]:
         """Start an update if it is due and there are readings. Return the updates that are complete at this tick.
@@ -170,7 +174,7 @@ class _UpdateSchedule:
         `base` is the current pose of the robot in the frame of the costmap.
         """
         if self.readings and self.is_due(tick):
-            self._updated_at = tick
+            self._started_at = tick
             for reading in self.readings.values():
                 if isinstance(reading, Image) or not _is_blind(reading):
                     self._updates.put(tick, _Update(odometry.past_pose(base, reading.tick), reading, frames))
@@ -178,11 +182,11 @@ class _UpdateSchedule:
         complete: list[_Update] = []
         while tick >= self._updates.due:
             complete.append(self._updates.take())
-        self.next = min(self._updated_at + self.period, self._updates.due)
+        self.next_tick = min(self._started_at + self.period, self._updates.due)
         return complete
 
 
 def _is_blind(scan: Scan) -> bool:
     """Return whether all ranges of a scan are invalid or too short."""
-    ranges, nearest = scan.ranges, scan.range_min
-    return not len(ranges) or not (ranges.item(0) >= nearest or bool((ranges >= nearest).any()))
+    ranges, range_min = scan.ranges, scan.range_min
+    return not len(ranges) or not (ranges.item(0) >= range_min or bool((ranges >= range_min).any()))

@@ -1,9 +1,9 @@
 """Obstacles and ground seen by a depth camera (like Nav2's voxel layer, but without voxels).
 
-Each obstacle cell stores the height of the observed point. The cell is cleared only when the camera sees through that
-point, not when it looks over a low box or below a table top.
+Each obstacle cell stores the height of the observed point. A cell is cleared only when the camera sees through the
+observed point, not when the camera looks over a low box or below a table top.
 
-Ground can be sloping. Each image column is traced from its lowest row upward. Points that rise no more steeply than
+Ground can be sloping. Each image column is traced from the lowest row upward. Points that rise no more steeply than
 `max_ground_slope` are ground. Steeper faces are obstacles.
 """
 
@@ -20,10 +20,11 @@ from simscen.model.costmaps import Costmap as CostmapSpec
 from simscen.stack.costmap.grid_frame import Cells, GridFrame, Mask
 
 Heights = npt.NDArray[np.float32]
+"""Heights in m above the plane on which the robot stands."""
 
 
 class DepthObservation(NamedTuple):
-    """Content of a depth image: obstacle cells (n, 2), their heights (n,) in m, and ground cells (m, 2)."""
+    """Content of a depth image: obstacle cells (n, 2), heights (n,) of the obstacles in m, and ground cells (m, 2)."""
 
     cells: Cells
     heights: Heights
@@ -35,7 +36,7 @@ def project_depth_image(
 ) -> DepthObservation:
     """Return the obstacles and the ground in an image that a robot at `base` has taken.
 
-    `known_ground` (rows, columns) are the cells that earlier images showed as ground.
+    `known_ground` (rows, columns) marks the cells that earlier images have shown as ground.
     """
     across, up = _ray_slopes(image.depth.shape, image.field_of_view)
     depth = image.depth.astype(np.float64)
@@ -47,23 +48,23 @@ def project_depth_image(
     cells[~inside] = 0
     if spec.max_ground_slope > 0.0:
         was_ground = (known_ground[cells[:, 0], cells[:, 1]] & inside).reshape(heights.shape)
-        above, level = heights_above_ground(
+        ground_heights, is_ground = heights_above_ground(
             distances, heights, spec.max_ground_slope, spec.min_obstacle_height, was_ground
         )
     else:
-        above, level = heights, np.zeros(heights.shape, dtype=bool)
-    is_obstacle = (above >= spec.min_obstacle_height) & (above <= spec.max_obstacle_height)
+        ground_heights, is_ground = heights, np.zeros(heights.shape, dtype=bool)
+    is_obstacle = (ground_heights >= spec.min_obstacle_height) & (ground_heights <= spec.max_obstacle_height)
     is_obstacle &= (distances >= spec.obstacle_min_range) & (distances <= spec.obstacle_max_range)
     marked = is_obstacle.reshape(-1) & inside
     return DepthObservation(
-        cells[marked], heights.reshape(-1)[marked].astype(np.float32), cells[level.reshape(-1) & inside]
+        cells[marked], heights.reshape(-1)[marked].astype(np.float32), cells[is_ground.reshape(-1) & inside]
     )
 
 
 def is_seen_through(
     cells: Cells, heights: Heights, frame: GridFrame, image: Image, base: Pose2, spec: CostmapSpec
 ) -> Mask:
-    """Return which of the obstacle cells (n, 2) the camera sees through: it measures a point farther away.
+    """Return which of the obstacle cells (n, 2) the camera sees through, because it measures a point farther away.
 
     `heights` (n,) are the heights of the obstacles in m.
     """
@@ -78,18 +79,18 @@ def is_seen_through(
     inside = is_ahead & (row >= 0) & (column >= 0) & (row < rows) & (column < columns)
     measured = image.depth[np.where(inside, row, 0), np.where(inside, column, 0)]
     with np.errstate(invalid="ignore"):
-        through = inside & (measured > depth + frame.resolution) & (depth <= spec.raytrace_max_range)
-    return np.asarray(through)
+        is_through = inside & (measured > depth + frame.resolution) & (depth <= spec.raytrace_max_range)
+    return np.asarray(is_through)
 
 
 def _focal_length(columns: int, field_of_view: float) -> float:
-    """Return the focal length in pixels."""
+    """Return the focal length in pixels of an image with this number of columns. `field_of_view` is in rad."""
     return columns / 2 / math.tan(field_of_view / 2)
 
 
 @lru_cache(maxsize=8)
 def _ray_slopes(shape: tuple[int, int], field_of_view: float) -> tuple[Array, Array]:
-    """Return the slopes of the ray of each pixel (rows, columns): m to the left, and m up, per m of depth."""
+    """Return the slopes (rows, columns) of the rays of all pixels: m to the left per m of depth, and m up per m."""
     rows, columns = shape
     focal = _focal_length(columns, field_of_view)
     left, up = (columns / 2 - 0.5 - np.arange(columns)) / focal, (rows / 2 - 0.5 - np.arange(rows)) / focal
@@ -99,41 +100,42 @@ def _ray_slopes(shape: tuple[int, int], field_of_view: float) -> tuple[Array, Ar
 GROUND_STEP_M = 0.05
 """Minimum horizontal distance between two points of a column from which a ground slope is computed."""
 MAX_RISE_RATIO = 1.0
-"""Rise in m per m above which points belong to an upright face."""
+"""Rise in m per m above which two points belong to an upright face."""
 SLOPE_ROWS_DIVISOR = 8
-"""The slope at the lowest point of a column is measured over one eighth of the image rows."""
+"""The ground slope at the lowest point of a column is measured over this fraction (1 / 8) of the image rows."""
 
 
 def heights_above_ground(
     distances: Array, heights: Array, max_slope: float, max_step: float, known_ground: Mask
 ) -> tuple[Array, Mask]:
-    """Return the heights in m above the ground of the points of an image (rows, columns), and which points are ground.
+    """Return for each pixel (rows, columns) the height in m above the ground, and whether it shows the ground.
 
-    distances:     horizontal distances of the points from the camera in m, top row first
-    heights:       heights in m above the plane on which the robot stands; nan for pixels without a point
+    distances:     horizontal distance of each point from the camera in m, top row first
+    heights:       height in m above the plane on which the robot stands; nan for pixels without a point
     max_slope:     maximum slope angle of the ground in rad
     max_step:      height in m up to which the lowest point of a column counts as ground
-    known_ground:  which points are on cells that earlier images showed as ground
+    known_ground:  whether each point is in a cell that earlier images have shown as ground
     """
     max_rise, upright = math.tan(max_slope), _is_upright(distances, heights)
     rows, columns = heights.shape
     ground_distance, ground_height = np.zeros(columns), np.zeros(columns)
     is_step = _starts_on_step(distances, heights, upright, max_step)
     has_ground = ~is_step | known_ground[_lowest_rows(heights), np.arange(columns)]
-    above, level = np.full(heights.shape, np.nan), np.zeros(heights.shape, dtype=bool)
+    heights_above, is_ground = np.full(heights.shape, np.nan), np.zeros(heights.shape, dtype=bool)
     for row in range(rows - 1, -1, -1):
         r, z = distances[row], heights[row]
-        is_ground = has_ground & (z - ground_height <= max_rise * (r - ground_distance)) & ~upright[row]
+        is_ground_here = has_ground & (z - ground_height <= max_rise * (r - ground_distance)) & ~upright[row]
         height = z - ground_height * np.minimum(1.0, r / np.maximum(ground_distance, GROUND_STEP_M))
-        above[row], level[row] = np.where(is_ground, np.minimum(height, 0.0), height), is_ground
-        is_ground &= r - ground_distance >= GROUND_STEP_M
-        ground_distance = np.where(is_ground, r, ground_distance)
-        ground_height = np.where(is_ground, z, ground_height)
-    return above, level
+        heights_above[row] = np.where(is_ground_here, np.minimum(height, 0.0), height)
+        is_ground[row] = is_ground_here
+        is_ground_here &= r - ground_distance >= GROUND_STEP_M
+        ground_distance = np.where(is_ground_here, r, ground_distance)
+        ground_height = np.where(is_ground_here, z, ground_height)
+    return heights_above, is_ground
 
 
 def _is_upright(distances: Array, heights: Array) -> Mask:
-    """Return which points are on an upright face: steeply above or below the point in an adjacent row."""
+    """Return which points are on an upright face: they are steeply above or below the point in an adjacent row."""
     steep: Mask = np.diff(-heights, axis=0) > MAX_RISE_RATIO * np.maximum(np.diff(-distances, axis=0), 0.0)
     upright = np.zeros(heights.shape, dtype=bool)
     upright[1:] = steep
@@ -142,10 +144,10 @@ def _is_upright(distances: Array, heights: Array) -> Mask:
 
 
 def _starts_on_step(distances: Array, heights: Array, upright: Mask, max_step: float) -> Mask:
-    """Return in which columns the lowest point is on a step (or an obstacle) whose edge is below the image.
+    """Return in which columns the lowest point is on a step or an obstacle that begins below the image.
 
-    Such a point is higher than `max_step`, and one of two conditions holds: it is on an upright face, or the slope
-    there, extended to the robot, ends higher than `max_step`.
+    The lowest point is on a step if it is higher than `max_step`, and if it is on an upright face or if the slope at
+    this point, extrapolated back to the camera, does not fall to `max_step`.
     """
     rows, columns = heights.shape
     all_columns, lowest = np.arange(columns), _lowest_rows(heights)
@@ -157,6 +159,6 @@ def _starts_on_step(distances: Array, heights: Array, upright: Mask, max_step: f
 
 
 def _lowest_rows(heights: Array) -> npt.NDArray[np.intp]:
-    """Return the lowest row with a point for each column; the last row for columns without a point."""
+    """Return for each column the lowest row with a point; the last row for columns without a point."""
     rows: npt.NDArray[np.intp] = len(heights) - 1 - np.isfinite(heights)[::-1].argmax(axis=0)
     return rows

@@ -9,22 +9,22 @@ import numpy as np
 import numpy.typing as npt
 
 Squared = npt.NDArray[np.uint16]
-"""Squared distances in cells."""
+"""Squared distances in cells², as 16-bit integers."""
 OUT_OF_REACH = 65535
-"""Largest value in 16 bits."""
+"""Maximum squared distance: the maximum of 16 bits."""
 MAX_REACH_CELLS = 255
-"""Largest `reach`, the maximum distance, whose square fits into 16 bits."""
+"""Maximum `reach` (distance up to which results are exact) whose square fits into 16 bits."""
 MAX_COMPARED_CELLS = 60
-"""Largest `reach` for which comparing neighbors is faster than scipy's transform."""
+"""Maximum `reach` for which comparing neighbors is faster than scipy's transform."""
 BLOCK_SIZE = 150_000
 """Number of values that are compared at once, so that they fit into a processor cache."""
 
 
 def squared_distances_within(marked: npt.NDArray[np.bool_], reach: int) -> Squared:
-    """Return the squared distance in cells from each cell to the nearest marked cell.
+    """Return the squared distance in cells from each cell (rows, columns) to the nearest marked cell.
 
-    Exact up to `reach` cells, and at most up to MAX_REACH_CELLS; farther cells have the value reach² + 1 or, if this is
-    too large, OUT_OF_REACH.
+    Distances up to `reach` cells, but at most MAX_REACH_CELLS, are exact. For cells farther away, the result is
+    reach² + 1, but at most OUT_OF_REACH.
     """
     has_marked_cells = bool(marked.any())
     if has_marked_cells and reach <= MAX_COMPARED_CELLS:
@@ -40,12 +40,12 @@ def squared_distances_within(marked: npt.NDArray[np.bool_], reach: int) -> Squar
 class SquaredDistanceTransform:
     """Computes the same as `squared_distances_within` for several grids of one shape, with buffers allocated once.
 
-    The transform is separable. The first pass finds the nearest marked cell in the same row, the second pass compares
-    the results of the rows within reach.
+    The transform is separable. The first pass finds the nearest marked cell in the same row. The second pass compares
+    the results of all rows within `reach`.
     """
 
     def __init__(self, shape: tuple[int, ...], reach: int, reuse: bool = True) -> None:
-        """Allocate buffers for grids of a shape (rows, columns). With `reuse`, optimize for more than one grid."""
+        """Allocate buffers for grids of a shape (rows, columns). `reuse`: optimize for more than one grid."""
         self._reach = reach
         if reach > MAX_COMPARED_CELLS:
             return
@@ -54,13 +54,13 @@ class SquaredDistanceTransform:
             max(1, min(length, BLOCK_SIZE // (reach * other_length))) for length, other_length in (shape, shape[::-1])
         )
         buffer = np.empty(reach * max(block_rows * columns, block_columns * rows), dtype=np.uint16)
-        # Both passes go along the first axis, so that the first one gets the transposed grid (columns, rows).
+        # Both passes go along the first axis. Therefore, the first pass gets the transposed grid (columns, rows).
         self._along_rows = _Pass((columns, rows), reach, buffer[: reach * block_columns * rows], reuse)
         self._along_columns = _Pass((rows, columns), reach, buffer[: reach * block_rows * columns], reuse)
         self._squared: Squared = np.empty((rows, columns), dtype=np.uint16)
 
     def transform(self, marked: npt.NDArray[np.bool_]) -> Squared:
-        """Return the squared distances (rows, columns) of a grid; valid until the next call."""
+        """Return the squared distances (rows, columns) of a grid. The array is valid until the next call."""
         if self._reach > MAX_COMPARED_CELLS:
             return squared_distances_within(marked, self._reach)
         transposed = self._along_rows.values
@@ -78,7 +78,7 @@ class _Pass:
     """
 
     def __init__(self, shape: tuple[int, int], reach: int, buffer: Squared, reuse: bool) -> None:
-        """Take the shape (n, m) of the grid, and a `buffer` for `reach` neighbors of each cell of a block of rows."""
+        """Take the shape (n, m) of the grid, and a `buffer` for `reach` neighbors of each cell in a block of rows."""
         length, width = shape
         padded = np.full((length + 2 * reach, width), reach * reach + 1, dtype=np.uint16)
         self.values: Squared = padded[reach : reach + length]
@@ -89,7 +89,7 @@ class _Pass:
             self._squared_offsets = self._squared_offsets.copy()  # adding a contiguous array takes half the time
         block_length, (row, column) = self._buffer.shape[1], padded.strides
         self._blocks = list[tuple[slice, Squared, Squared]]()
-        """Rows of each block, and views (reach, rows, m) of the values at offsets -1, -2, … and 1, 2, … from them."""
+        """Rows of each block, and views (reach, rows, m) of the values that are 1, 2, … rows before and after them."""
         for first in range(0, length, block_length):
             offset, view_shape = (first + reach) * row, (reach, min(block_length, length - first), width)
             before: Squared = np.ndarray(view_shape, np.uint16, padded, offset - row, (-row, row, column))
@@ -108,11 +108,11 @@ class _Pass:
 ROWS_PER_BLOCK = 64
 """Number of rows of a block of `squared_distance_blocks`."""
 MAX_INT32_EDGE_CELLS = 30_000
-"""Longest edge of a grid for which squared distances fit into 32 bits."""
+"""Maximum edge length of a grid for which squared distances fit into 32 bits."""
 
 
 def squared_distance_blocks(marked: npt.NDArray[np.bool_]) -> Iterator[tuple[slice, npt.NDArray[np.signedinteger]]]:
-    """Yield blocks of rows with the exact squared distance in cells to the nearest marked cell, without a limit.
+    """Yield blocks of rows with exact squared distances in cells to the nearest marked cell, at any distance.
 
     At least one cell must be marked.
     """

@@ -1,4 +1,4 @@
-"""Grid geometry of a costmap: cells at points, centers of cells, and the rolling window around a robot."""
+"""Grid geometry of a costmap: conversion between points and cells, and the rolling window around a robot."""
 
 import math
 from dataclasses import dataclass
@@ -25,19 +25,24 @@ MAX_CACHED_CELLS = 10_000
 
 @dataclass(frozen=True)
 class GridFrame:
-    """An unrotated grid in the frame of its costmap. `origin` (x, y) is the corner of cell (0, 0)."""
+    """An unrotated grid in the frame of its costmap.
+
+    origin:      corner (x, y) of cell (0, 0) in m, which has the lowest x and y
+    resolution:  cell size in m
+    shape:       number of (rows, columns)
+    """
 
     origin: tuple[float, float]
     resolution: float
     shape: tuple[int, int]
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
-        """Return the cell (row, column) at a point, possibly outside the grid."""
+        """Return the cell (row, column) at a point. The cell may be outside the grid."""
         scale = 1.0 / self.resolution
         return math.floor((y - self.origin[1]) * scale), math.floor((x - self.origin[0]) * scale)
 
     def cells(self, points: Array) -> Cells:
-        """Return the cells (n, 2) at points (n, 2), possibly outside the grid."""
+        """Return the cells (n, 2) at points (n, 2). Cells may be outside the grid."""
         local = (points - np.array(self.origin)) * (1.0 / self.resolution)
         cells: Cells = np.floor(local[:, ::-1]).astype(np.int64)
         return cells
@@ -55,7 +60,7 @@ class GridFrame:
     def indices_of(self, points: ComplexPoints, center: complex, reach: float) -> CellIndices:
         """Return the flat indices of the cells at points x + iy (n,). Points outside the grid are left out.
 
-        All points must be within `reach` m of `center`. If this circle lies on the grid, single points are not checked.
+        All points must be within `reach` m of `center`. If this circle lies on the grid, the points are not checked.
         """
         local = points - complex(*self.origin)
         local *= 1.0 / self.resolution
@@ -90,7 +95,7 @@ class GridFrame:
         return points
 
     def extent(self, indices: CellIndices) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Return the bounding box of cells (at least one): lowest (row, column) and highest (row, column)."""
+        """Return the bounding box of at least one cell: lowest (row, column) and highest (row, column)."""
         width, lowest, highest = self.shape[1], np.minimum.reduce, np.maximum.reduce
         first, last, columns = int(lowest(indices)), int(highest(indices)), indices % width
         return (first // width, int(lowest(columns))), (last // width, int(highest(columns)))
@@ -101,7 +106,7 @@ class GridFrame:
         return 0 <= row < self.shape[0] and 0 <= column < self.shape[1]
 
     def from_window(self, window: tuple[slice, slice], indices: CellIndices) -> CellIndices:
-        """Convert flat indices in a window (rows, columns) to flat indices in the grid."""
+        """Return the flat indices in the grid for flat indices in a window (rows, columns)."""
         (rows, columns), width = window, self.shape[1]
         window_width = max(1, columns.stop - columns.start)
         cells: CellIndices = (
@@ -110,7 +115,7 @@ class GridFrame:
         return cells
 
     def window(self, low: tuple[int, int], high: tuple[int, int], margin: int) -> tuple[slice, slice]:
-        """Return the window (rows, columns) from cell `low` to cell `high`, plus `margin` cells, within the grid."""
+        """Return the window (rows, columns) from cell `low` to `high`, enlarged by `margin` cells, within the grid."""
         return (
             slice(max(0, low[0] - margin), max(0, min(self.shape[0], high[0] + 1 + margin))),
             slice(max(0, low[1] - margin), max(0, min(self.shape[1], high[1] + 1 + margin))),
@@ -131,7 +136,7 @@ def _all_cell_centers(shape: tuple[int, int], size: float) -> ComplexPoints:
 
 
 GOAL_EDGE_MARGIN_M = 0.6
-"""Distance from the edge of the window at which a plan ends if the goal is outside."""
+"""Distance from the edge of the window at which a plan ends if the goal is outside the window."""
 ROLL_RATIO = 1 / 8
 """A window is moved when the robot is farther from the window's center than this fraction of its size."""
 MAX_ROLL_OFFSET_M = 0.25
@@ -146,7 +151,7 @@ def window_around(center: Pose2, size: tuple[float, float], resolution: float) -
 
 
 def should_roll(frame: GridFrame, base: Pose2, max_offset: float = math.inf) -> bool:
-    """Return whether the robot is farther from the center than ROLL_RATIO of the size, or than `max_offset` m."""
+    """Return whether the robot is too far from the center: more than ROLL_RATIO of the size, or `max_offset` m."""
     rows, columns = frame.shape
     across, up = columns * frame.resolution, rows * frame.resolution
     offset = abs(base.x - frame.origin[0] - across / 2), abs(base.y - frame.origin[1] - up / 2)
@@ -154,25 +159,25 @@ def should_roll(frame: GridFrame, base: Pose2, max_offset: float = math.inf) -> 
 
 
 def shift_layer(
-    layer: npt.NDArray[ValueType], before: GridFrame, after: GridFrame, fill: float
+    layer: npt.NDArray[ValueType], old_frame: GridFrame, new_frame: GridFrame, fill: float
 ) -> npt.NDArray[ValueType]:
     """Return a copy of the layer for another window of the same size. New cells get the value `fill`."""
-    shifted = np.full(after.shape, fill, dtype=layer.dtype)
-    steps = [round((after.origin[axis] - before.origin[axis]) / after.resolution) for axis in (1, 0)]
-    remaining = [_remaining(step, cells) for step, cells in zip(steps, before.shape, strict=True)]
+    shifted = np.full(new_frame.shape, fill, dtype=layer.dtype)
+    steps = [round((new_frame.origin[axis] - old_frame.origin[axis]) / new_frame.resolution) for axis in (1, 0)]
+    remaining = [_remaining_range(step, cells) for step, cells in zip(steps, old_frame.shape, strict=True)]
     target = tuple(slice(first - step, last - step) for (first, last), step in zip(remaining, steps, strict=True))
     shifted[target] = layer[tuple(slice(first, last) for first, last in remaining)]
     return shifted
 
 
-def _remaining(step: int, cells: int) -> tuple[int, int]:
+def _remaining_range(step: int, cells: int) -> tuple[int, int]:
     """Return the range (first, end) of cells along an axis that remain in the window after a shift by `step` cells."""
     first = min(max(0, step), cells)
     return first, max(first, min(cells, cells + step))
 
 
 def clip_goal(frame: GridFrame, start: Pose2, goal: Pose2) -> Pose2:
-    """Return the goal. If it is outside the window, return a pose inside, on the line from start to goal."""
+    """Return the goal; if it is outside the window, a pose inside the window on the line from start to goal."""
     if frame.covers(goal.x, goal.y):
         return goal
     across, up = frame.shape[1] * frame.resolution, frame.shape[0] * frame.resolution

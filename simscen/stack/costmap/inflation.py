@@ -12,16 +12,21 @@ from simscen.stack.costmap.grid_frame import Mask
 from simscen.stack.protocols import FREE, INSCRIBED, LETHAL, MAX_NON_OBSTACLE, NO_INFORMATION, RobotModel
 
 DISTANCE_MARGIN_M = 0.5
-"""Distances are computed up to the circumscribed radius plus this margin, or to the inflation radius if larger."""
+"""Distances are computed up to the inflation radius or, if larger, the circumscribed radius plus this margin."""
 
 Costs = npt.NDArray[np.uint8]
+"""Costs 0 to 255 of cells (rows, columns)."""
 
 
 class Inflation:
-    """Lookup tables by squared distance in cells: `meters` contains the distance in m, `cost` Nav2's inflated cost.
+    """Lookup tables of distances and costs by squared distance in cells.
 
-    cost = 252 · exp(-scaling · (distance - inscribed)) between the inscribed and the inflation radius (computeCost in
-    nav2_costmap_2d/inflation_layer.hpp). `meters` is at most `reach_m`; `reach_cells` is the same distance in cells.
+    Between inscribed and inflation radius, the cost is 252 · exp(-scaling · (distance - inscribed)), as in computeCost
+    of nav2_costmap_2d/inflation_layer.hpp.
+
+    meters:       distances in m, at most `reach_m`
+    cost:         costs
+    reach_cells:  the distance `reach_m` in cells
     """
 
     def __init__(
@@ -37,7 +42,7 @@ class Inflation:
         self.cost: Costs = cost.astype(np.uint8)
 
     def costs(self, squared: npt.NDArray[np.integer], unknown: Mask | None) -> Costs:
-        """Return the costs of cells at squared distances. `unknown` cells are unknown unless inscribed or lethal."""
+        """Return the costs of cells at squared distances. `unknown` cells are unknown, unless inscribed or lethal."""
         cost = self.cost.take(squared)
         if unknown is not None:
             cost[unknown & (cost < INSCRIBED)] = NO_INFORMATION

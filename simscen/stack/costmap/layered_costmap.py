@@ -1,4 +1,4 @@
-"""Layered costmap: inflates the obstacles of the static map and live obstacles, which sensors see."""
+"""Layered costmap: inflates the obstacles of the static layer (map) and of the obstacle layer (sensors)."""
 
 import math
 from collections import deque
@@ -47,11 +47,11 @@ Cell = tuple[int, int]
 class LayeredCostmap:
     """Costs of cells and distances to the nearest obstacle, available as `view`.
 
-    Updates recompute only the surroundings of changed cells. The poses that `update` gets are in the costmap's frame:
-    map or odom.
+    Updates recompute only the surroundings of changed cells. All poses are in the frame of the costmap: map or odom.
+    Live obstacles are the obstacles that sensors have seen.
 
     Without a map, the costmap is a window of `size` (x, y) in m that rolls with the robot. The window is moved when the
-    robot is farther than `max_offset` m from its center.
+    robot is farther than `max_offset` m from the center of the window.
     """
 
     def __init__(
@@ -62,29 +62,29 @@ class LayeredCostmap:
         max_offset: float = math.inf,
     ) -> None:
         self._spec, self._surroundings = spec, surroundings
-        self._rolling = surroundings.map is None
+        self._is_rolling = surroundings.map is None
         self._size, self._max_offset = size or (spec.rolling_size, spec.rolling_size), max_offset
         self._inscribed = surroundings.robot.inscribed_radius
         resolution = spec.resolution if surroundings.map is None else surroundings.map.resolution
         self._inflation = inflation_for(spec, surroundings.robot, resolution)
         self._min_group_size = spec.denoise_layer.minimal_group_size if spec.denoise_layer.enabled else 0
         self._margin_cells = self._inflation.reach_cells + self._min_group_size
-        """Distance in cells up to which a change of a cell affects other cells."""
+        """Distance in cells up to which a changed cell affects other cells."""
         self._static = self._static_layer_in(window_around(Pose2(0.0, 0.0), self._size, spec.resolution))
         self._frame = self._static.frame
         rows, columns = self._frame.shape
         self._whole: tuple[Cell, Cell] = (0, 0), (rows - 1, columns - 1)
-        # In a small window, most cells are near any change, so that all are recomputed.
-        self._is_small = max(rows, columns) <= 4 * self._inflation.reach_cells
+        # A change of a small costmap affects most cells. Recomputing all cells is then faster.
+        self._recomputes_all = max(rows, columns) <= 4 * self._inflation.reach_cells
         self._live = ObstacleLayer(spec, self._inscribed, self._frame)
         self._unknown = None if self._static.unknown is None else self._static.unknown.copy()
         self._scans = 0
         self._latest_readings: dict[str, tuple[Pose2, Scan | Image]] = {}
         self._revision, self._added_keepout_cells = 0, 0
         self._changes = deque[CellIndices | None](maxlen=MAX_REVISIONS)
-        """Cells with changed obstacles for each of the last revisions; None if obstacles changed in any cell."""
+        """Cells with changed obstacles for each of the last revisions; None if all cells may have changed."""
         self._outdated: tuple[Cell, Cell] | None = None
-        """Lowest and highest cell of the window around all changes that `view` does not contain yet."""
+        """Lowest and highest cell of the bounding box of all changes that `view` does not contain yet."""
         self._view: CostmapView | None = None
         self.moving = NO_MOVING_OBSTACLES
         """Moving obstacles in the frame of the costmap, included in the view."""
@@ -99,7 +99,7 @@ class LayeredCostmap:
     def view(self) -> CostmapView:
         """The current costmap. Its arrays are valid until the next update.
 
-        Access computes costs and distances, once for all updates since the last access.
+        The first access after one or more updates computes costs and distances.
         """
         if self._outdated is not None:
             self.refresh(*self._outdated)
@@ -129,11 +129,11 @@ class LayeredCostmap:
 
     @property
     def obstacle_cell_count(self) -> int:
-        """Number of cells with live obstacles, plus the number of cells that new keepout zones have made lethal."""
+        """Number of cells with live obstacles, plus the number of lethal cells that `set_zones` has added."""
         return self._live.count + self._added_keepout_cells
 
     def update(self, base: Pose2, reading: Scan | Image) -> None:
-        """Clear the cells that a sensor sees through, then mark its obstacles. `base` is the pose of the robot."""
+        """Clear the cells that a sensor sees through, then mark the obstacles it sees. `base`: pose of the robot."""
         self.follow(base)
         self._latest_readings.pop(reading.sensor, None)  # so that the newest reading is the last one
         self._latest_readings[reading.sensor] = (base, reading)
@@ -145,20 +145,20 @@ class LayeredCostmap:
             return
         changed = self._live.on_scan(base, reading, self._static.squared if self._static.has_lethal else None)
         if len(changed):
-            self._mark_changed(*(self._whole if self._is_small else self._frame.extent(changed)), changed)
+            self._mark_changed(*(self._whole if self._recomputes_all else self._frame.extent(changed)), changed)
         if self._unknown is not None:
             self._update_unknown(base, reading, self._unknown)
 
     def follow(self, base: Pose2) -> None:
-        """Move a rolling window if the robot at the pose `base` is too far from its center."""
-        if self._rolling and should_roll(self._frame, base, self._max_offset):
+        """Move a rolling window if the robot, at the pose `base`, is too far from the center of the window."""
+        if self._is_rolling and should_roll(self._frame, base, self._max_offset):
             self._roll(base)
 
     def clear(self, clear_within: float = math.inf, unseen_margin: float = DISTANCE_MARGIN_M) -> None:
         """Clear the live obstacles within `clear_within` m along x and y, except those in the newest readings.
 
-        Obstacles that a lidar has marked, but that no lidar sees now, are kept up to `unseen_margin` m beyond the
-        circumscribed radius, because the robot may back up into them.
+        Marks of lidars outside the present field of view of all lidars are kept up to `unseen_margin` m beyond the
+        circumscribed radius, because the robot may back up into these obstacles.
         """
         latest = list(self._latest_readings.values())
         scans = [(base, reading) for base, reading in latest if isinstance(reading, Scan)]
@@ -176,16 +176,17 @@ class LayeredCostmap:
 
     def set_zones(self, zones: Zones) -> None:
         """Replace all keepout zones and masks."""
-        before = self._static.lethal_cell_count
+        old_count = self._static.lethal_cell_count
         self._surroundings = replace(self._surroundings, keepout=zones.keepout, masks=zones.masks)
         self._static = self._static_layer_in(self._frame)
-        self._added_keepout_cells += self._static.lethal_cell_count - before
+        self._added_keepout_cells += self._static.lethal_cell_count - old_count
         self._reset_to_static_layer()
 
     def fits_static(self, pose: Pose2, tolerance: float) -> bool:
-        """Return whether a pose is not in a wall, and the inscribed circle fits on the map within `tolerance` m of it.
+        """Return whether the robot fits on the map near a pose, without live obstacles.
 
-        Return True for a pose outside the costmap, where walls are unknown.
+        The pose must not be in a wall, and the inscribed circle must fit at a point within `tolerance` m of the pose.
+        For a pose outside the costmap, where walls are unknown, the result is True.
         """
         center = self._frame.cell(pose.x, pose.y)
         if not self._frame.covers(pose.x, pose.y):
@@ -198,17 +199,17 @@ class LayeredCostmap:
         return bool((np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y) <= tolerance).any())
 
     def goal_in_window(self, start: Pose2, goal: Pose2) -> Pose2:
-        """Return the goal; if it is outside a rolling window, a pose inside on the line from start to goal."""
-        return clip_goal(self._frame, start, goal) if self._rolling else goal
+        """Return the goal; if it is outside a rolling window, a pose in the window on the line from start to goal."""
+        return clip_goal(self._frame, start, goal) if self._is_rolling else goal
 
     def _roll(self, base: Pose2) -> None:
         """Move the window so that the robot is at its center. New cells are unknown if unknown space is tracked."""
-        before, self._frame = self._frame, window_around(base, self._size, self._spec.resolution)
+        old_frame, self._frame = self._frame, window_around(base, self._size, self._spec.resolution)
         if self._surroundings.keepout or self._surroundings.masks.keepout is not None:
             self._static = self._static_layer_in(self._frame)
         self._live.roll(self._frame)
         if self._unknown is not None:
-            self._unknown = shift_layer(self._unknown, before, self._frame, True)
+            self._unknown = shift_layer(self._unknown, old_frame, self._frame, True)
         self._mark_changed(*self._whole, None)
 
     def _static_layer_in(self, window: GridFrame) -> StaticLayer:
@@ -236,7 +237,7 @@ class LayeredCostmap:
         return remove_small_groups(marked, self._static.squared[window] == 0, self._spec.denoise_layer)
 
     def _update_unknown(self, base: Pose2, scan: Scan, unknown: Mask) -> None:
-        """With every n-th scan, mark the cells of `unknown` that beams cross as known."""
+        """With every n-th scan, remove the cells that beams cross from the mask `unknown`."""
         self._scans += 1
         if self._scans % SCANS_PER_UNKNOWN_UPDATE != 1:
             return
@@ -245,14 +246,14 @@ class LayeredCostmap:
         cells = frame.from_window(window, np.flatnonzero(unknown[window]))
         if not len(cells):
             return
-        passed, _ = crossed_cells(frame.points(cells), frame.resolution, scan, base, self._spec)
-        cells = cells[passed]
+        crossed, _ = crossed_cells(frame.points(cells), frame.resolution, scan, base, self._spec)
+        cells = cells[crossed]
         if len(cells):
             unknown[np.divmod(cells, frame.shape[1])] = False
             self._mark_changed(*frame.extent(cells), NO_CELLS)
 
     def _mark_changed(self, low: Cell, high: Cell, obstacles: CellIndices | None) -> None:
-        """Mark the window from cell `low` to `high` as outdated, and add a revision with changed `obstacles`."""
+        """Mark the window from cell `low` to `high` as outdated, and add a revision (see `_add_revision`)."""
         if self._outdated is not None:
             outdated_low, outdated_high = self._outdated
             low = min(low[0], outdated_low[0]), min(low[1], outdated_low[1])
@@ -261,23 +262,23 @@ class LayeredCostmap:
         self._add_revision(obstacles)
 
     def _add_revision(self, obstacles: CellIndices | None) -> None:
-        """Add a revision in which `obstacles` changed: flat indices of cells; None means any cells."""
+        """Add a revision. `obstacles`: flat indices of cells with changed obstacles; None if all may have changed."""
         self._revision += 1
         self._changes.append(obstacles)
 
     def refresh(self, low: Cell, high: Cell) -> None:
-        """Recompute distances and costs of all cells that changes in the window from cell `low` to `high` affect."""
+        """Recompute distances and costs of all cells affected by changes in the window from cell `low` to `high`."""
         self._outdated = None
         if (low, high) == self._whole:
             self._refresh_all()
             return
         affected = self._frame.window(low, high, self._margin_cells)
-        outer = self._frame.window(low, high, 2 * self._margin_cells)  # contains the obstacles that determine them
-        part = (
+        outer = self._frame.window(low, high, 2 * self._margin_cells)  # contains all obstacles that affect `affected`
+        affected_in_outer = (
             slice(affected[0].start - outer[0].start, affected[0].stop - outer[0].start),
             slice(affected[1].start - outer[1].start, affected[1].stop - outer[1].start),
         )
-        squared = squared_distances_within(self._obstacles(outer), self._inflation.reach_cells)[part]
+        squared = squared_distances_within(self._obstacles(outer), self._inflation.reach_cells)[affected_in_outer]
         if self._static.has_lethal:
             squared = np.minimum(self._static.squared[affected], squared)
         self._distance[affected] = self._inflation.meters.take(squared)

@@ -1,6 +1,7 @@
 """Obstacle layer: cells that lidars and depth cameras mark and clear, as in nav2_costmap_2d.
 
-Nav2 traces each beam through the grid. Here, each marked cell is checked for a beam that crosses it, which is faster.
+Nav2 traces each beam through the grid. Here, each marked cell is tested for a beam that crosses the cell, which is
+faster.
 """
 
 import cmath
@@ -26,7 +27,7 @@ RANGE_TOLERANCE_M = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class ScanWithMovingHits(Scan):
-    """Scan with a mask `moving` (n,) of beams that hit moving obstacles. These beams clear cells, but mark no cells."""
+    """Scan with a mask `moving` (n,) of the beams that hit moving obstacles. These beams only clear cells."""
 
     moving: npt.NDArray[np.bool_] = field(kw_only=True)
 
@@ -44,7 +45,7 @@ def hit_points(scan: Scan, base: Pose2, nearest: float, farthest: float) -> tupl
 
 @lru_cache(maxsize=2)
 def _hit_offsets(scan: Scan, nearest: float, farthest: float) -> ComplexPoints:
-    """Return the hits x + iy (n,) relative to the position of the lidar, along the axes of the base. Cached."""
+    """Return the hits x + iy (n,) relative to the position of the lidar, in the orientation of the base. Cached."""
     ranges = scan.ranges
     is_valid = (ranges >= max(scan.range_min, nearest)) & (ranges <= min(scan.range_max, farthest))
     if isinstance(scan, ScanWithMovingHits):
@@ -55,13 +56,13 @@ def _hit_offsets(scan: Scan, nearest: float, farthest: float) -> ComplexPoints:
 
 
 def _lidar_position(scan: Scan, base: Pose2) -> complex:
-    """Return the position of the lidar, x + iy, in the same frame as the pose `base`."""
+    """Return the position x + iy of the lidar in the frame of the pose `base`."""
     return complex(base.x, base.y) + cmath.rect(1.0, base.yaw) * complex(scan.mount.x, scan.mount.y)
 
 
 @lru_cache(maxsize=4)
 def _free_lengths(scan: Scan, farthest: float, inf_is_valid: bool) -> Array:
-    """Return for each beam (n,) the length in m up to its hit, at most `farthest`; 0 if the range is invalid.
+    """Return for each beam (n,) the free length in m up to the hit, at most `farthest`; 0 if the range is invalid.
 
     With `inf_is_valid`, beams without a hit are valid.
     """
@@ -83,10 +84,10 @@ def in_view(cells: Cells, frame: GridFrame, scan: Scan, base: Pose2) -> npt.NDAr
 def crossed_cells(
     points: ComplexPoints, resolution: float, scan: Scan, base: Pose2, spec: CostmapSpec
 ) -> tuple[CellIndices, float]:
-    """Return which cells beams cross before their hits, and the distance in m from the lidar to the nearest center.
+    """Return the cells that beams cross before their hits, and the distance in m from the lidar to the nearest center.
 
-    `points` x + iy (n,) are the centers of the cells, at least one. The result contains indices into `points`. Each
-    cell is tested only against the beam nearest to its center.
+    `points` x + iy (n,) are the centers of at least one cell. Cells in the result are indices into `points`. Each cell
+    is tested only against the beam that passes nearest to its center.
     """
     first, step, half = base.yaw + scan.mount.yaw + scan.angle_min, scan.angle_increment, resolution / 2
     relative = points - _lidar_position(scan, base)
@@ -111,12 +112,12 @@ def crossed_cells(
     # A line crosses a square of half-width h if its distance from the center is at most h (|cos| + |sin|).
     reach = half * (np.abs(np.cos(direction)) + np.abs(np.sin(direction)))
     along = distance * np.cos(beam_offset)
-    passed = (
+    is_crossed = (
         (np.abs(distance * np.sin(beam_offset)) <= reach)
         & (along <= free_length - half)
         & (along >= spec.raytrace_min_range)
     )
-    return in_front[passed], nearest
+    return in_front[is_crossed], nearest
 
 
 def _nearest_beams(bearing: Array, scan: Scan, values: Array) -> tuple[CellIndices, Array]:
@@ -137,7 +138,7 @@ def _nearest_beams(bearing: Array, scan: Scan, values: Array) -> tuple[CellIndic
 
 
 WALL_DISTANCE_SQUARED_CELLS = 2
-"""Squared distance from a mapped wall up to which a hit counts as a hit on the wall and is not marked."""
+"""Squared distance from a mapped wall up to which a hit is treated as a hit on the wall, and not marked."""
 NO_CELLS: CellIndices = np.zeros(0, dtype=np.int64)
 EMPTY_MASK: Mask = np.zeros((0, 0), dtype=bool)
 Window = tuple[slice, slice]
@@ -146,7 +147,7 @@ WHOLE_GRID: Window = slice(None), slice(None)
 
 
 class ObstacleLayer:
-    """Live obstacles: cells that sensors have marked. Lidars and depth cameras do not clear each other's marks."""
+    """Live obstacles: cells that sensors have marked. Lidars do not clear marks of depth cameras, and vice versa."""
 
     def __init__(self, spec: CostmapSpec, inscribed: float, frame: GridFrame) -> None:
         self._spec, self._inscribed = spec, inscribed
@@ -160,7 +161,7 @@ class ObstacleLayer:
         self._scanned: Mask = np.zeros(frame.shape, dtype=bool)
         """Cells that lidars have marked."""
         self._scanned_cells: CellIndices = NO_CELLS
-        """Flat indices of these cells. A cell may occur twice."""
+        """Flat indices of the cells in `_scanned`. A cell may occur twice."""
         self._heights: Heights | None = None
         """Heights of the obstacles that depth cameras have marked, nan elsewhere; None before the first image."""
         self._ground: Mask = EMPTY_MASK
@@ -176,9 +177,10 @@ class ObstacleLayer:
             self._heights[window] = np.nan
 
     def out_of_view(self, base: Pose2, meters: float, scans: list[tuple[Pose2, Scan]]) -> Cells:
-        """Return the cells (n, 2) that a lidar has marked but that are outside the field of view of all `scans`.
+        """Return the cells (n, 2) with marks of a lidar that are outside the field of view of all `scans`.
 
-        Only cells within `meters` of the robot along x and y are returned. `scans` are pairs (pose of the robot, scan).
+        The result contains only cells within `meters` of the robot along x and y. `scans` are pairs (pose of the robot,
+        scan).
         """
         center = self._frame.cell(base.x, base.y)
         window = self._frame.window(center, center, math.ceil(meters / self._frame.resolution))
@@ -193,13 +195,13 @@ class ObstacleLayer:
         self._scanned_cells = np.flatnonzero(self._scanned)
 
     def roll(self, frame: GridFrame) -> None:
-        """Use another window of the same size, and keep the marks that are in both."""
-        before, self._frame = self._frame, frame
-        self._scanned = shift_layer(self._scanned, before, frame, False)
+        """Use another window of the same size, and keep the marks that are in both windows."""
+        old_frame, self._frame = self._frame, frame
+        self._scanned = shift_layer(self._scanned, old_frame, frame, False)
         self._scanned_cells = np.flatnonzero(self._scanned)
         if self._heights is not None:
-            self._heights = shift_layer(self._heights, before, frame, np.nan)
-            self._ground = shift_layer(self._ground, before, frame, False)
+            self._heights = shift_layer(self._heights, old_frame, frame, np.nan)
+            self._ground = shift_layer(self._ground, old_frame, frame, False)
 
     def marked(self, window: Window = WHOLE_GRID) -> Mask:
         """Return which cells of a window have a live obstacle."""
@@ -219,23 +221,23 @@ class ObstacleLayer:
         return len(set(self._scanned_cells.tolist())) if self._heights is None else int(np.count_nonzero(self.marked()))
 
     def on_scan(self, base: Pose2, scan: Scan, walls: Squared | None) -> CellIndices:
-        """Clear marks that beams cross or that are under the robot, then mark the hits. Return the changed cells.
+        """Clear marks that beams cross or that are under the robot. Then mark the hits. Return the changed cells.
 
-        `walls` (rows, columns) are the squared distances to mapped walls; None without walls.
+        `walls` (rows, columns) are squared distances in cells to mapped walls; None without walls.
         """
         spec, frame, scanned = self._spec, self._frame, self._scanned.reshape(-1)
         points, lidar = hit_points(scan, base, spec.obstacle_min_range, spec.obstacle_max_range)
         hits = frame.indices_of(points, lidar, spec.obstacle_max_range)
         if not len(self._scanned_cells):
-            new, cleared = self._without_walls(walls, hits), NO_CELLS
+            marked, cleared = self._without_walls(walls, hits), NO_CELLS
         else:
             was_marked = scanned.take(hits)
-            new, cleared = self._without_walls(walls, hits[~was_marked]), self._clear(base, scan, hits[was_marked])
-        if not len(new):
+            marked, cleared = self._without_walls(walls, hits[~was_marked]), self._clear(base, scan, hits[was_marked])
+        if not len(marked):
             return cleared
-        scanned[new] = True
-        self._scanned_cells = np.concatenate((self._scanned_cells, new))
-        return np.concatenate((cleared, new)) if len(cleared) else new
+        scanned[marked] = True
+        self._scanned_cells = np.concatenate((self._scanned_cells, marked))
+        return np.concatenate((cleared, marked)) if len(cleared) else marked
 
     def _without_walls(self, walls: Squared | None, cells: CellIndices) -> CellIndices:
         """Return the `cells` that are neither on nor next to a wall."""
@@ -247,7 +249,7 @@ class ObstacleLayer:
         return remaining
 
     def _clear(self, base: Pose2, scan: Scan, hits: CellIndices) -> CellIndices:
-        """Clear the marked cells that beams cross, except for `hits`, and those under the robot. Return them."""
+        """Clear marked cells that beams cross, except `hits`, or that are under the robot. Return the cleared cells."""
         marks, frame, scanned = self._scanned_cells, self._frame, self._scanned.reshape(-1)
         points = frame.points(marks)
         crossed, nearest = crossed_cells(points, frame.resolution, scan, base, self._spec)
@@ -267,8 +269,11 @@ class ObstacleLayer:
         return cleared
 
     def on_image(self, base: Pose2, image: Image, walls: Squared) -> Cells:
-        """Clear cells that the camera sees through or that are under the robot, then mark its obstacles elsewhere.
-        Return the changed cells (n, 2)."""
+        """Clear cells that the camera sees through or that are under the robot. Then mark the obstacles in the image.
+
+        Obstacles on or next to a mapped wall, or under the robot, are not marked. Return the changed cells (n, 2).
+        `walls` (rows, columns) are squared distances in cells to mapped walls.
+        """
         if self._heights is None:
             self._heights = np.full(self._frame.shape, np.nan, dtype=np.float32)
             self._ground = np.zeros(self._frame.shape, dtype=bool)
@@ -285,10 +290,10 @@ class ObstacleLayer:
         self._heights[cells[:, 0], cells[:, 1]] = heights[new]
         return np.concatenate((marked[is_cleared], cells))
 
-    def window_around_robot(self, base: Pose2, mount: float) -> Window:
-        """Return the cells in range of a sensor that is mounted at a distance of `mount` m from the base."""
+    def window_around_robot(self, base: Pose2, mount_distance: float) -> Window:
+        """Return the window in range of a sensor that is mounted `mount_distance` m away from the base."""
         center = self._frame.cell(base.x, base.y)
-        reach = max(self._spec.raytrace_max_range, self._spec.obstacle_max_range) + mount
+        reach = max(self._spec.raytrace_max_range, self._spec.obstacle_max_range) + mount_distance
         return self._frame.window(center, center, math.ceil(reach / self._frame.resolution) + 1)
 
     def _under_robot(self, points: Array, base: Pose2) -> Mask:
@@ -301,9 +306,9 @@ def _set_values(layer: npt.NDArray[np.generic], cells: Cells, value: float) -> N
 
 
 def remove_small_groups(marked: Mask, walls: Mask, spec: DenoiseLayer) -> Mask:
-    """Return the marked cells (rows, columns) without connected groups smaller than `minimal_group_size`.
+    """Return the marked cells (rows, columns) without connected groups of fewer than `minimal_group_size` cells.
 
-    Cells of walls count toward the size of a group, but are not returned.
+    Cells of walls count toward the size of a group, but are not part of the result.
     """
     from scipy.ndimage import label
 

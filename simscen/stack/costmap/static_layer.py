@@ -1,4 +1,4 @@
-"""Static layer of a costmap: the map (nav2_costmap_2d's static layer), and keepout zones and mask (keepout filter)."""
+"""Static layer of a costmap: map (nav2_costmap_2d's static layer), keepout zones, and keepout mask (keepout filter)."""
 
 from dataclasses import dataclass
 
@@ -19,11 +19,12 @@ from simscen.stack.protocols import Surroundings
 
 @dataclass(frozen=True, eq=False)
 class StaticLayer:
-    """Static part of a costmap. The arrays (rows, columns) belong to the cells of `frame`. Do not modify them.
+    """Static part of a costmap. The arrays (rows, columns) must not be modified.
 
+    frame:       grid of the cells
     squared:     squared distances in cells to the nearest lethal cell, exact up to a maximum distance
     has_lethal:  whether any cell is lethal
-    unknown:     unknown cells; None if unknown cells count as free
+    unknown:     mask of unknown cells; None if unknown cells count as free
     """
 
     frame: GridFrame
@@ -74,7 +75,7 @@ def _make_layer(frame: GridFrame, lethal: Mask, unknown: Mask | None, reach_cell
 
 
 def _unrotated_cells(grid: OccupancyGrid) -> tuple[GridFrame, npt.NDArray[np.int8]]:
-    """Return the cells (rows, columns) of a map and their frame. A rotated map is sampled into an unrotated frame."""
+    """Return the grid and the cells (rows, columns) of a map. A rotated map is sampled into an unrotated grid."""
     if abs(grid.origin.yaw) < 1e-9:
         return GridFrame((grid.origin.x, grid.origin.y), grid.resolution, grid.shape), grid.cells
     frame = _bounding_frame(grid)
@@ -82,7 +83,7 @@ def _unrotated_cells(grid: OccupancyGrid) -> tuple[GridFrame, npt.NDArray[np.int
 
 
 def _keepout_cells(frame: GridFrame, keepout: tuple[Polygon, ...], mask: OccupancyGrid | None) -> Mask:
-    """Return the cells (rows, columns) that keepout polygons or the keepout mask cover."""
+    """Return the mask (rows, columns) of the cells that keepout polygons or the keepout mask cover."""
     lethal = np.zeros(frame.shape, dtype=bool)
     if keepout:
         centers = _all_centers(frame)
@@ -102,7 +103,7 @@ def _all_centers(frame: GridFrame) -> Array:
 
 
 def _bounding_frame(grid: OccupancyGrid) -> GridFrame:
-    """Return the smallest unrotated frame that contains a rotated map."""
+    """Return the smallest unrotated grid that contains a rotated map."""
     height, width = grid.shape
     corners = np.array([[0, 0], [width, 0], [0, height], [width, height]]) * grid.resolution
     corners = grid.origin.apply(corners)

@@ -1,1 +1,1 @@
-"""Localizers: AMCL, an EKF, dead reckoning, and ground truth."""
+"""Localizers: AMCL, extended Kalman filter (EKF), dead reckoning, and ground truth."""

@@ -1,4 +1,4 @@
-"""AMCL localizer (nav2_amcl): updates a particle filter with scans, and moves the pose by odometry in between."""
+"""AMCL localizer (nav2_amcl): updates a particle filter with scans, and moves the pose by odometry between updates."""
 
 import math
 from dataclasses import dataclass, replace
@@ -64,10 +64,13 @@ class AmclLocalizer:
         self._odometry, self._has_odometry = OdometryHistory(self._tick_rate), False
         self._filter.reset(estimate)
         self._initial_estimate = estimate
-        self.__dict__.pop("_correction", None)  # it is then computed from the initial estimate when it is needed
-        self._last_update: Pose2 | None = None  # odometry at the last filter update
-        self._update_due: dict[str, bool] = {}  # by lidar
-        self._waiting: dict[str, Scan] = {}  # by lidar: scans without odometry at their tick
+        self.__dict__.pop("_correction", None)  # the next access computes it from the initial estimate
+        self._last_update: Pose2 | None = None
+        """Pose in the odom frame at the last filter update."""
+        self._update_due: dict[str, bool] = {}
+        """Whether the next scan updates the filter, by lidar."""
+        self._waiting: dict[str, Scan] = {}
+        """Newest scan that waits for the odometry of its tick, by lidar."""
         self._belief: Belief | None = None
 
     @cached_property
@@ -81,7 +84,7 @@ class AmclLocalizer:
         return Correction(pose, covariance, Pose2(0, 0, 0), 0)
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Store the odometry, and process the scans that waited for it."""
+        """Store the odometry, and process the scans that have waited for it."""
         if not self._odometry.add(odometry.tick, odometry.pose):
             return
         if not self._has_odometry:
@@ -106,21 +109,21 @@ class AmclLocalizer:
 
     @property
     def belief(self) -> Belief:
-        """The last correction, moved by the odometry since then."""
+        """The last correction, moved by the odometry since this correction."""
         if self._belief is None:
             last = self._correction
-            delta = last.base_from_odom.compose(self._odometry.now)
+            delta = last.base_from_odom.compose(self._odometry.latest_pose)
             covariance = self._propagated_covariance(last, delta)
             self._belief = Belief(self.pose, covariance, last.map_from_odom, self._filter.particles.table, last.tick)
         return self._belief
 
     @property
     def pose(self) -> Pose2:
-        """The pose of the belief. Faster than `belief`, because it needs no covariance."""
-        return self._correction.map_from_odom.compose(self._odometry.now)
+        """The pose of the belief, without the time to compute the covariance."""
+        return self._correction.map_from_odom.compose(self._odometry.latest_pose)
 
     def _process(self, scan: Scan) -> None:
-        """Update the filter if an update by this lidar is due. After enough motion, each lidar has one update due."""
+        """Update the filter if an update by this lidar is due. After enough motion, one update by each lidar is due."""
         odometry = self._odometry.at(scan.tick)
         if odometry is None or not scan.range_max > 0:
             return

@@ -27,10 +27,12 @@ class Field(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Beams:
-    """The b valid beams of a scan; m of them hit something.
+    """The b valid beams of a scan, of which m beams hit something.
 
-    `ranges` (b,) are in m; `range_max` means no hit. The `unit_vectors` (b,) along the beams and the position `origin`
-    of the lidar are in the base frame.
+    ranges:        ranges (b,) in m; `range_max` for beams without a hit
+    unit_vectors:  unit vectors (b,) along the beams in the base frame
+    origin:        position x + iy of the lidar in the base frame
+    range_max:     maximum range in m
     """
 
     ranges: Array
@@ -46,8 +48,8 @@ class Beams:
     @cached_property
     def ends(self) -> ComplexPoints:
         """Endpoints (m,) in the base frame of the beams that hit something."""
-        hit = (self.ranges < self.range_max).nonzero()[0]
-        return self.ranges.take(hit) * self.unit_vectors.take(hit) + self.origin
+        hits = (self.ranges < self.range_max).nonzero()[0]
+        return self.ranges.take(hits) * self.unit_vectors.take(hits) + self.origin
 
     def cells(self, field: Field, poses: Array) -> TableIndices:
         """Return the indices (n, m) of the endpoints in the table `field`, for each of the `poses` (n, 3). Cached."""
@@ -57,7 +59,7 @@ class Beams:
         return last[2]
 
     def with_hits(self, chosen: npt.NDArray[np.bool_]) -> "Beams":
-        """Return the beams whose hit is `chosen` (m,), and all beams that hit nothing."""
+        """Return the beams with the hits that the mask `chosen` (m,) selects, and all beams without a hit."""
         is_kept = self.ranges >= self.range_max
         is_kept[(~is_kept).nonzero()[0][chosen]] = True
         return Beams(self.ranges[is_kept], self.unit_vectors[is_kept], self.origin, self.range_max)
@@ -86,10 +88,10 @@ def _directions(first: float, increment: float, count: int, turn: float) -> Comp
 
 
 def select_beams(scan: Scan, count: int, min_range: float, max_range: float) -> Beams:
-    """Return at most `count` evenly spaced beams of a scan, without invalid (nan) ones.
+    """Return at most `count` evenly spaced beams of a scan, without beams that have an invalid range (nan).
 
-    Ranges are limited to the smaller of `max_range` and the lidar's maximum. As in nav2_amcl, ranges up to `min_range`
-    or the lidar's minimum are replaced by this maximum.
+    The maximum range is the smaller of `max_range` and the lidar's maximum. As in nav2_amcl, ranges up to `min_range`,
+    or up to the lidar's minimum, are replaced by the maximum range.
     """
     step = -(-len(scan.ranges) // count) or 1
     ranges, unit_vectors = scan.ranges[::step], directions(scan)[::step]

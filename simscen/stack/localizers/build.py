@@ -47,13 +47,13 @@ def ground_truth(_spec: model.GroundTruth, setting: Setting) -> Localizer:
 
 
 def odometry(_spec: model.OdometryOnly, setting: Setting) -> Localizer:
-    """Build a localizer that only adds up odometry (dead reckoning)."""
+    """Build a localizer that only integrates odometry (dead reckoning)."""
     return DeadReckoning(setting.estimate)
 
 
 @dataclass(frozen=True, eq=False)
 class MapModels:
-    """Sensor model and free space of a map, which all runs share."""
+    """Sensor model and free space of a map. All runs share them."""
 
     sensor: SensorModel
     free_space: FreeSpace
@@ -62,7 +62,7 @@ class MapModels:
 @cached_on_instance
 def map_models(grid: OccupancyGrid, spec: model.Amcl) -> MapModels:
     """Return the sensor model and the free space of a map. Cached in the map."""
-    grid = replace(grid)  # the cache belongs to the original, which must not be kept alive by its own cache
+    grid = replace(grid)  # a copy, so that the map is not kept alive by its own cache
     field = obstacle_field(grid, spec.laser_likelihood_max_dist)
     return MapModels(sensor_model(spec, grid, field), FreeSpace(grid))
 

@@ -1,6 +1,6 @@
 """Dead reckoning from odometry, and propagation of the covariance of a planar pose.
 
-Source: Probabilistic Robotics, section 5.4. The errors of motion steps are independent, so their covariances add up.
+Source: Probabilistic Robotics, section 5.4. The errors of motion steps are independent, so that covariances add up.
 """
 
 import math
@@ -65,20 +65,20 @@ def grow_covariance(
 
 
 _UNKNOWN_STD = (100.0, 100.0, np.pi / np.sqrt(3))
-"""Standard deviations of x, y, and yaw of an unknown pose: 100 m, 100 m, and that of a uniform distribution."""
-_NOISE = Ekf(type="ekf")
-"""Specification of the EKF, from which the default noise parameters are taken."""
+"""Standard deviations of x and y in m and of yaw in rad of an unknown pose. The yaw is uniformly distributed."""
+_EKF_DEFAULTS = Ekf(type="ekf")
+"""Specification of the EKF, whose default noise parameters dead reckoning uses."""
 
 
 def initial_pose(estimate: Estimate) -> tuple[Pose2, Array]:
-    """Return the initial pose and its covariance (3, 3): for an unknown pose, the origin with large variances."""
+    """Return the initial pose and its covariance (3, 3). An unknown pose is the origin with large variances."""
     if estimate.pose is None:
         return Pose2(0.0, 0.0, 0.0), np.diag(np.square(_UNKNOWN_STD))
     return estimate.pose, np.diag(np.square(estimate.std))
 
 
 class DeadReckoning:
-    """Localizer that adds odometry to the initial estimate. The covariance grows as with the defaults of the EKF."""
+    """Localizer that adds odometry to the initial estimate. The covariance grows with the EKF's default noise."""
 
     def __init__(self, estimate: Estimate) -> None:
         self.reset(estimate)
@@ -96,7 +96,7 @@ class DeadReckoning:
         last, self._odometry = self._odometry, odometry.pose
         belief, step = self._belief, (last or odometry.pose).between(odometry.pose)
         covariance = grow_covariance(
-            belief.covariance, belief.pose.yaw, step, _NOISE.translation_noise, _NOISE.rotation_noise
+            belief.covariance, belief.pose.yaw, step, _EKF_DEFAULTS.translation_noise, _EKF_DEFAULTS.rotation_noise
         )
         pose = belief.pose.compose(step)
         map_from_odom = pose.compose(odometry.pose.inverse()) if last is None else belief.map_from_odom

@@ -37,7 +37,7 @@ def evaluate_in_blocks(evaluate: Callable[[Array], Array], poses: Array) -> Arra
 class DistanceField:
     """Distances in m from cell centers to the nearest obstacle cell, as a flat table with a border of one cell.
 
-    Lookups outside the map return the value of the border.
+    A lookup outside the map returns the value of the nearest border cell.
     """
 
     def __init__(self, grid: OccupancyGrid, obstacles: npt.NDArray[np.bool_], limit: float, *, walled: bool) -> None:
@@ -65,19 +65,19 @@ class DistanceField:
         self._corner = np.array([[x], [y]]) / grid.resolution + 1
 
     def tabulate(self, function: Callable[[Float32], npt.NDArray[Kind]], kind: type[Kind]) -> npt.NDArray[Kind]:
-        """Return the values of a function of the distance, for all cells, as a flat table with elements of `kind`."""
+        """Return a flat table of the values of a function of the distance, for all cells, with elements of `kind`."""
         result = np.empty(len(self.table), kind)
         for begin in range(0, len(result), BLOCK_CELLS):
             result[begin : begin + BLOCK_CELLS] = function(self.table[begin : begin + BLOCK_CELLS])
         return result
 
     def coordinates(self, poses: Array) -> tuple[Float32, Float32]:
-        """Convert `poses` (n, 3) to table coordinates: positions (2, n) in cells (with the border), headings (n,)."""
+        """Convert `poses` (n, 3) to positions (2, n) in table cells, including the border, and headings (n,)."""
         positions = self._axes @ poses.T[:2] + self._corner
         return positions.astype(np.float32), (poses[:, 2] + self._turn).astype(np.float32)
 
     def cells(self, x: Float32, y: Float32) -> TableIndices:
-        """Return the table indices of points, given in table coordinates and possibly outside. Overwrites x and y."""
+        """Return the table indices of points in table coordinates, inside or outside the table. Overwrites x and y."""
         column = x.clip(0, self._width + 1, out=x).astype(np.int32)
         row = y.clip(0, self._height + 1, out=y).astype(np.int32)
         row *= self._width + 2

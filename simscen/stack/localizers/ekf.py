@@ -19,9 +19,9 @@ from simscen.stack.odometry_history import is_plausible
 X, Y, YAW, VX, VY, VYAW, BIAS = range(7)
 """Indices of the state: the pose in the map frame, the velocity in the base frame, and the bias of the gyroscope."""
 VELOCITY_VARIANCE = 1e6
-"""Process noise of the velocity in (m/s)² and (rad/s)²: large, so that earlier velocities have no effect."""
+"""Process noise of the velocity in (m/s)² and (rad/s)². The large value removes the effect of earlier velocities."""
 MIN_YAW_RATE_STD_RAD_S = 0.002
-"""Standard deviation of the yaw rate that wheels at rest measure."""
+"""Standard deviation of the yaw rate that is measured by wheels at rest."""
 MAX_YAW_RATE_RAD_S = 100.0
 """Absolute yaw rate above which gyroscope readings are ignored as invalid."""
 
@@ -34,15 +34,16 @@ _GYROSCOPE_MATRIX[0, [VYAW, BIAS]] = 1.0
 
 
 class EkfLocalizer:
-    """Localizer with a planar EKF of odometry and gyroscope. It does not use the map, so its error grows with time.
+    """Localizer with a planar EKF of odometry and gyroscope. The error grows with time, because no map is used.
 
     Each odometry reading measures the mean velocity since the previous reading, with noise that grows with the distance
     driven. The gyroscope measures the yaw rate plus a bias, which the filter estimates.
 
-    Subclasses may override `_advance`, with another state of seven values whose first three are the pose.
+    Subclasses may override `_advance`, and use another state of seven values. The first three values are the pose.
     """
 
     _bias_index: ClassVar[int] = BIAS
+    """Index of the gyroscope's bias in the state."""
 
     def __init__(self, spec: EkfParameters, estimate: Estimate, tick_rate: int) -> None:
         self._spec, self._tick_rate = spec, tick_rate
@@ -78,7 +79,7 @@ class EkfLocalizer:
         """Ignore scans."""
 
     def on_imu(self, imu: Imu) -> None:
-        """Store the yaw rate until the next odometry reading."""
+        """Store the yaw rate for the next odometry reading."""
         rate = imu.angular_velocity[2]
         if abs(rate) < MAX_YAW_RATE_RAD_S:
             self._yaw_rates.append(rate)
@@ -128,7 +129,7 @@ class EkfLocalizer:
         return noise
 
     def _move(self, seconds: float) -> None:
-        """Move the pose by the velocity, at the mean heading of the step."""
+        """Move the pose by the velocity for `seconds`, at the mean heading of the step."""
         state: Array = self._filter.x.copy()
         heading = float(state[YAW] + state[VYAW] * seconds / 2)
         c, s = math.cos(heading), math.sin(heading)
@@ -149,7 +150,7 @@ class EkfLocalizer:
         self._filter.predict(state)
 
     def _set_state(self, state: Array) -> None:
-        """Set the predicted state. Replaces filterpy's `predict_x`, which predicts linear motion."""
+        """Set the predicted state. Replaces filterpy's `predict_x`, which predicts only linear motion."""
         self._filter.x = state
 
     def _update(self, measurement: Array, matrix: Array, noise: Array) -> None:

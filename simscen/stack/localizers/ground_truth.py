@@ -12,11 +12,11 @@ TRUTH = "ground_truth"
 """Name of the sensor whose odometry readings are true poses in the map frame."""
 
 _COVARIANCE = np.diag([1e-6, 1e-6, 1e-6])
-"""Covariance of a true pose: standard deviations of 1 mm and 1 mrad, so that it can be inverted."""
+"""Covariance of a true pose: standard deviations of 1 mm and 1 mrad, so that the matrix can be inverted."""
 
 
 class GroundTruthLocalizer:
-    """Localizer without errors: reports the true pose, which the sensor TRUTH measures.
+    """Localizer that reports the true pose, which the sensor TRUTH measures.
 
     Between true poses, wheel odometry moves the pose. Without true poses, this localizer is dead reckoning.
     """
@@ -26,22 +26,22 @@ class GroundTruthLocalizer:
 
     def reset(self, estimate: Estimate) -> None:
         """Restart at an estimate, which the next true pose replaces."""
-        self._started = False
+        self._has_started = False
         self._pose, self._covariance = initial_pose(estimate)
         self._map_from_odom, self._odometry, self._updated = self._pose, Pose2(0.0, 0.0, 0.0), -1
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Store the true pose, or move it by wheel odometry."""
+        """Replace the pose by a true pose, or move the pose by wheel odometry."""
         if not is_plausible(odometry.pose):
             return
         if odometry.sensor == TRUTH:
             self._pose, self._covariance, self._updated = odometry.pose, _COVARIANCE, odometry.tick
         else:
             self._odometry = odometry.pose
-        if odometry.tick <= self._updated or not self._started:
+        if odometry.tick <= self._updated or not self._has_started:
             self._map_from_odom = self._pose.compose(self._odometry.inverse())
         self._pose = self._map_from_odom.compose(self._odometry)
-        self._started = True
+        self._has_started = True
 
     def on_scan(self, scan: Scan) -> None:
         """Ignore the reading."""
@@ -51,5 +51,5 @@ class GroundTruthLocalizer:
 
     @property
     def belief(self) -> Belief:
-        """The last true pose, moved by the odometry since then."""
+        """The last true pose, moved by the wheel odometry since this pose."""
         return Belief(self._pose, self._covariance, self._map_from_odom, updated=max(self._updated, 0))

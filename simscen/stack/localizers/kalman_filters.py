@@ -1,4 +1,4 @@
-"""The Kalman filters of filterpy, imported without scipy.stats, which takes half a second to import.
+"""The Kalman filters of filterpy, imported without scipy.stats, whose import takes half a second.
 
 filterpy needs scipy.stats only for the likelihood of a measurement, which simscen does not use.
 """
@@ -13,12 +13,12 @@ STATISTICS_MODULE = "filterpy.stats"
 
 
 def _logpdf(*arguments: Any, **keywords: Any) -> Any:
-    """Return the result of `filterpy.stats.logpdf`, which the first call imports."""
+    """Return the result of `filterpy.stats.logpdf`. The first call imports this function."""
     return import_module(STATISTICS_MODULE).logpdf(*arguments, **keywords)
 
 
 def _import_filters() -> ModuleType:
-    """Import filterpy.kalman with a substitute for `filterpy.stats` that imports the module when it is used."""
+    """Import filterpy.kalman with a substitute for `filterpy.stats`, which imports the real module when it is used."""
     if "filterpy" in sys.modules:
         return import_module("filterpy.kalman")
     substitute = ModuleType(STATISTICS_MODULE)
@@ -27,7 +27,7 @@ def _import_filters() -> ModuleType:
     try:
         return import_module("filterpy.kalman")
     finally:
-        # Code that imports `filterpy.stats` from now on gets the module itself. filterpy.kalman keeps the substitute.
+        # Later imports of `filterpy.stats` get the real module. filterpy.kalman keeps the substitute.
         del sys.modules[STATISTICS_MODULE]
         vars(substitute)["__getattr__"] = lambda name: getattr(import_module(STATISTICS_MODULE), name)
 

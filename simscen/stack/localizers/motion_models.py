@@ -14,24 +14,27 @@ from simscen.stack.localizers.dead_reckoning import propagate_covariance
 from simscen.stack.localizers.particles import empty_poses, wrap_headings
 
 MIN_BEARING_DISTANCE_M = 0.01
-"""Length of a translation below which its direction is ignored."""
+"""Minimum length of a translation from which its direction is used."""
 
 
 class MotionModel(Protocol):
     """Moves particles by odometry. `delta` is the measured motion, in the base frame before the motion."""
 
     def sample(self, poses: Array, delta: Pose2, rng: np.random.Generator) -> Array:
-        """Return `poses` (n, 3), each moved by `delta` with different random noise."""
+        """Return `poses` (n, 3), each moved by `delta` with its own random noise."""
         ...
 
     def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
-        """Return the covariance (3, 3) of a pose after `delta`, linearized. `yaw` is the heading before the motion."""
+        """Return the linearized covariance (3, 3) of a pose after `delta`. `yaw` is the heading before the motion."""
         ...
 
 
 @dataclass(frozen=True)
 class DifferentialMotionModel:
-    """Model of robots that cannot move sideways: rotation, translation, rotation. `alpha`: Nav2's alpha1 … alpha4."""
+    """Model of robots that cannot move sideways: a rotation, a translation, and a second rotation.
+
+    `alpha` are Nav2's parameters alpha1 … alpha4.
+    """
 
     alpha: tuple[float, float, float, float]
 
@@ -39,41 +42,43 @@ class DifferentialMotionModel:
         """Return the moved poses (n, 3)."""
         motion, variances = self._steps(delta)
         std = [math.sqrt(variance) for variance in variances]
-        turn, drive, turn_again = rng.standard_normal((3, len(poses))) * np.array([std]).T + np.array([motion]).T
+        turn, drive, second_turn = rng.standard_normal((3, len(poses))) * np.array([std]).T + np.array([motion]).T
         heading = poses[:, 2] + turn
         moved = empty_poses(len(poses))
         moved[:, 0] = poses[:, 0] + drive * np.cos(heading)
         moved[:, 1] = poses[:, 1] + drive * np.sin(heading)
-        moved[:, 2] = wrap_headings(heading + turn_again)
+        moved[:, 2] = wrap_headings(heading + second_turn)
         return moved
 
     def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
-        """Return the covariance (3, 3) after the motion, linearized."""
-        (turn, drive, _), (turned, driven, again) = self._steps(delta)
+        """Return the linearized covariance (3, 3) after the motion."""
+        (turn, drive, _), (turn_var, drive_var, second_turn_var) = self._steps(delta)
         c, s = math.cos(yaw + turn), math.sin(yaw + turn)
-        dx, dy, across = drive * c, drive * s, (driven - drive**2 * turned) * c * s
+        dx, dy, xy = drive * c, drive * s, (drive_var - drive**2 * turn_var) * c * s
         return propagate_covariance(covariance, dx, dy, (
-            dy * dy * turned + c * c * driven, across, -dy * turned,
-            dx * dx * turned + s * s * driven, dx * turned,
-            turned + again,
+            dy * dy * turn_var + c * c * drive_var, xy, -dy * turn_var,
+            dx * dx * turn_var + s * s * drive_var, dx * turn_var,
+            turn_var + second_turn_var,
         ))  # fmt: skip
 
     def _steps(self, delta: Pose2) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Return (first rotation, translation, second rotation), and the variances of their noise in the same order."""
         drive = math.hypot(delta.x, delta.y)
         turn = math.atan2(delta.y, delta.x) if drive >= MIN_BEARING_DISTANCE_M else 0.0
-        again = wrap(delta.yaw - turn)
-        turned, turned_again = _fold_backward(turn) ** 2, _fold_backward(again) ** 2
+        second_turn = wrap(delta.yaw - turn)
+        turn2, drive2, second_turn2 = _fold_backward(turn) ** 2, drive * drive, _fold_backward(second_turn) ** 2
         a1, a2, a3, a4 = self.alpha
-        driven = drive * drive
-        return (turn, drive, again), (
-            a1 * turned + a2 * driven, a3 * driven + a4 * (turned + turned_again), a1 * turned_again + a2 * driven,
+        return (turn, drive, second_turn), (
+            a1 * turn2 + a2 * drive2, a3 * drive2 + a4 * (turn2 + second_turn2), a1 * second_turn2 + a2 * drive2,
         )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class OmniMotionModel:
-    """Model of holonomic robots, which drive, strafe, and turn at once. `alpha`: Nav2's alpha1 … alpha5."""
+    """Model of holonomic robots, which drive, strafe, and turn at once.
+
+    `alpha` are Nav2's parameters alpha1 … alpha5.
+    """
 
     alpha: tuple[float, float, float, float, float]
 
@@ -90,22 +95,22 @@ class OmniMotionModel:
         return moved
 
     def propagate(self, covariance: Array, yaw: float, delta: Pose2) -> Array:
-        """Return the covariance (3, 3) after the motion, linearized."""
+        """Return the linearized covariance (3, 3) after the motion."""
         bearing = yaw + math.atan2(delta.y, delta.x)
         drive, c, s = math.hypot(delta.x, delta.y), math.cos(bearing), math.sin(bearing)
-        driven, strafed, turned = (std**2 for std in self._noise(delta))
+        drive_var, strafe_var, turn_var = (std**2 for std in self._noise(delta))
         return propagate_covariance(covariance, drive * c, drive * s, (
-            c * c * driven + s * s * strafed, c * s * (driven - strafed), 0.0,
-            s * s * driven + c * c * strafed, 0.0,
-            turned,
+            c * c * drive_var + s * s * strafe_var, c * s * (drive_var - strafe_var), 0.0,
+            s * s * drive_var + c * c * strafe_var, 0.0,
+            turn_var,
         ))  # fmt: skip
 
     def _noise(self, delta: Pose2) -> tuple[float, float, float]:
         """Return the standard deviations (drive, strafe, turn) of the noise."""
-        driven, turned = delta.x**2 + delta.y**2, delta.yaw**2
+        drive2, turn2 = delta.x**2 + delta.y**2, delta.yaw**2
         a1, a2, a3, a4, a5 = self.alpha
-        drive = math.sqrt(a3 * driven + a4 * turned)
-        return drive, math.sqrt(a4 * turned + a5 * driven), math.sqrt(a1 * turned + a2 * driven)
+        drive_std, strafe_std = math.sqrt(a3 * drive2 + a4 * turn2), math.sqrt(a4 * turn2 + a5 * drive2)
+        return drive_std, strafe_std, math.sqrt(a1 * turn2 + a2 * drive2)
 
 
 def _fold_backward(angle: float) -> float:

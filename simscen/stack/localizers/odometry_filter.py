@@ -36,10 +36,10 @@ _IDENTITIES = {size: np.eye(size) for size in (3, 4)}
 
 
 class OdometryFilter:
-    """Fuses wheel odometry and the yaw rate of a gyroscope; `fuse` returns the filtered odometry.
+    """Fuses wheel odometry and the yaw rate of a gyroscope. `fuse` returns the filtered odometry.
 
     Each update estimates the mean velocity since the previous update. The wheels measure this velocity. The gyroscope
-    measures the yaw rate plus a bias. The pose is the integral of the velocity, so that it does not jump (REP 105).
+    measures the yaw rate plus a bias. The pose is the integral of the velocity, and therefore does not jump (REP 105).
     """
 
     def __init__(self, spec: model.OdometryFilter, tick_rate: int) -> None:
@@ -52,14 +52,21 @@ class OdometryFilter:
         self._filter.inv = _inverse
         self._filter.x = np.zeros(4)
         self._filter.P = np.diag([0.0, 0.0, 0.0, spec.gyro_bias**2])
-        self._covariance = np.zeros((7, 7))  # of the pose and the state together
-        self._pose_covariance, self._cross_covariance = self._covariance[:3, :3], self._covariance[:3, 3:]  # views
-        self._jacobian = np.eye(3, 7)  # of the pose after a step with respect to the pose before it and the state
+        self._covariance = np.zeros((7, 7))
+        """Joint covariance of the pose and the state."""
+        self._pose_covariance, self._cross_covariance = self._covariance[:3, :3], self._covariance[:3, 3:]
+        """Views of `_covariance`: covariance of the pose, and covariance between pose and state."""
+        self._jacobian = np.eye(3, 7)
+        """Jacobian of the pose after a step, with respect to the pose before the step and the state."""
         self._pose = Pose2(0.0, 0.0)
-        self._last: Odometry | None = None  # reading of the last update
-        self._last_tick: int | None = None  # of the last reading
-        self._period = math.inf  # of the readings, in s
-        self._step_variances = (0.0, 0.0, 0.0)  # of the motion since the last update, in m², m², rad²
+        self._last_fused: Odometry | None = None
+        """Wheel odometry of the last update."""
+        self._last_tick: int | None = None
+        """Tick of the last wheel odometry."""
+        self._period = math.inf
+        """Shortest time in s between two readings of the wheels so far."""
+        self._step_variances = (0.0, 0.0, 0.0)
+        """Variances of the motion since the last update in m², m², rad²."""
 
     def on_imu(self, imu: Imu) -> None:
         """Add a yaw rate, which the next odometry reading uses."""
@@ -70,18 +77,18 @@ class OdometryFilter:
 
         The first reading is returned unchanged.
         """
-        last, last_tick = self._last, self._last_tick
+        last, last_tick = self._last_fused, self._last_tick
         if not is_plausible(odometry.pose) or (last_tick is not None and odometry.tick <= last_tick):
             return None
         self._last_tick = odometry.tick
         if last is None or last_tick is None:
-            self._last, self._pose = odometry, odometry.pose
+            self._last_fused, self._pose = odometry, odometry.pose
             self._gyro.turned_until(odometry.tick)
             return odometry
         self._add_variances(odometry, (odometry.tick - last_tick) / self._tick_rate)
         if odometry.tick - last.tick < self._min_ticks:
             return None
-        self._last = odometry
+        self._last_fused = odometry
         seconds = (odometry.tick - last.tick) / self._tick_rate
         wheels = mean_velocity(last.pose.between(odometry.pose), seconds)
         self._measure(wheels, self._gyro.turned_until(odometry.tick), seconds)
@@ -96,10 +103,10 @@ class OdometryFilter:
         )  # fmt: skip
 
     def _add_variances(self, odometry: Odometry, gap: float) -> None:
-        """Add the variances of a reading to those of the motion since the last update.
+        """Add the variances of a reading to the variances of the motion since the last update.
 
-        `gap` is the time in s since the previous reading. Readings lost in this time are assumed to have the same
-        variance, which is added, too.
+        `gap` is the time in s since the previous reading. Readings that were lost in this time are assumed to have the
+        same variances, and are included.
         """
         self._period = min(self._period, gap)
         (x, y, yaw), (vx, vy, wz), factor = self._step_variances, odometry.twist_variance, self._period * gap
@@ -125,14 +132,14 @@ class OdometryFilter:
                 measurement, matrix = [*wheels, rate], _WHEELS_AND_GYRO
                 variances.append(variance)
         self._filter.update(np.array(measurement), R=_diagonal_matrix(variances), H=matrix)
-        # The update corrects the state, but not the pose: only the covariance between both changes.
+        # The update corrects the state, but not the pose. Therefore, only the covariance between both changes.
         cross = self._cross_covariance
         cross -= cross.dot(self._filter.K.dot(matrix).T)
 
     def _wheels_slip(self, difference: float, variance: float) -> bool:
-        """Return whether the wheels slip, given how much their yaw rate differs from the gyroscope's (rad/s).
+        """Return whether the wheels slip, given the `difference` of their yaw rate from the gyroscope's in rad/s.
 
-        `variance` is the variance of the `difference` without slip.
+        `variance` is the variance of the difference without slip.
         """
         difference += self._filter.x.item(BIAS)
         limit = self._rejection_threshold**2 * (variance + self._filter.P.item(BIAS, BIAS))
@@ -176,19 +183,22 @@ class GyroscopeIntegral:
 
     def __init__(self, tick_rate: int) -> None:
         self._tick_rate, self._max_gap = tick_rate, MAX_GYRO_GAP_S * tick_rate
-        self._tick: int | None = None  # of the newest reading
+        self._tick: int | None = None
+        """Tick of the newest reading."""
         self._rate, self._angle = 0.0, 0.0
-        # Growth of the variance of the angle in rad²/s; unknown before the second reading, which shows the period.
+        """Yaw rate and integrated angle at the newest reading."""
         self._variance_per_s: float | None = None
-        self._read: tuple[int, float] | None = None  # tick and angle at the end of the last increment
+        """Growth of the variance of the angle in rad²/s; None before the second reading, which shows the period."""
+        self._last_call: tuple[int, float] | None = None
+        """Tick and angle of the last call of `turned_until`; None if readings are missing since this call."""
 
     def add(self, imu: Imu) -> None:
-        """Add the yaw rate of a reading. Ignore it if it is invalid or not newer."""
+        """Add the yaw rate of a reading. Ignore a reading that is invalid, or not newer than the last reading."""
         tick, rate = imu.tick, imu.angular_velocity[2]
         if not abs(rate) < MAX_YAW_RATE_RAD_S or (self._tick is not None and tick <= self._tick):
             return
         if self._tick is None or tick - self._tick > self._max_gap:
-            self._read = None
+            self._last_call = None
         else:
             seconds = (tick - self._tick) / self._tick_rate
             self._angle += (self._rate + rate) / 2 * seconds
@@ -196,12 +206,15 @@ class GyroscopeIntegral:
         self._tick, self._rate = tick, rate
 
     def turned_until(self, tick: int) -> tuple[float, float] | None:
-        """Return the angle in rad since the tick of the last call, and its variance; None if readings are missing."""
-        last, self._read = self._read, None
+        """Return the angle in rad turned from the tick of the last call to `tick`, and the variance of the angle.
+
+        Return None if readings are missing in this time.
+        """
+        last, self._last_call = self._last_call, None
         if self._tick is None or abs(tick - self._tick) > self._max_gap:
             return None
         angle = self._angle + self._rate * (tick - self._tick) / self._tick_rate
-        self._read = tick, angle
+        self._last_call = tick, angle
         if last is None or self._variance_per_s is None:
             return None
         return angle - last[1], self._variance_per_s * (tick - last[0]) / self._tick_rate

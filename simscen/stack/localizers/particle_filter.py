@@ -27,7 +27,8 @@ from simscen.stack.localizers.resampling import KldBound, kld_sampling, systemat
 from simscen.stack.localizers.sensor_models import SensorModel
 
 CONVERGENCE_DISTANCE_M = 0.5
-"""The filter has converged if no particle is farther from the mean along x or y (nav2_amcl's pf.dist_threshold)."""
+"""The filter has converged if all particles are within this distance of the mean, along x and along y (nav2_amcl's
+pf.dist_threshold)."""
 _DESCENDANT, _RANDOM = 1.0, 2.0
 """Marks in the fourth column of drawn particles: descendant of a random particle, and new random particle."""
 
@@ -55,9 +56,11 @@ class ParticleFilter:
         self._augmented_mcl = AugmentedMcl(
             self._spec.recovery_alpha_slow, self._spec.recovery_alpha_fast, self._sensor.max_random_fraction
         )
-        self._random: npt.NDArray[np.bool_] | None = None  # (n,) drawn at random after the last scan
-        self._descendants: npt.NDArray[np.bool_] | None = None  # (n,) these and descendants of earlier ones
-        self._corrections = 0
+        self._is_random: npt.NDArray[np.bool_] | None = None
+        """Which particles (n,) were drawn at random after the last scan."""
+        self._is_descendant: npt.NDArray[np.bool_] | None = None
+        """Which particles (n,) were drawn at random, or descend from such a particle."""
+        self._correction_count = 0
 
     def beams(self, scan: Scan) -> Beams:
         """Return the beams of a scan that are compared with the map."""
@@ -71,15 +74,16 @@ class ParticleFilter:
     def correct(self, scan: Scan) -> tuple[Pose2, Array] | None:
         """Weight the particles by a scan and resample. Return the estimated pose and its covariance (3, 3).
 
-        Return None if the scan fits all particles equally well, or none at all, or is not trusted. If it fits none, all
-        particles get the same weight. The estimate is computed before resampling, which only adds noise.
+        Return None if the scan fits all particles equally well, fits no particle at all, or is not trusted. If the scan
+        fits no particle, all particles get the same weight. The estimate is computed before resampling, because
+        resampling adds noise.
         """
         spec, poses = self._spec, self.particles.poses
         exponent, beams = self._trusted_beams(self.beams(scan))
         if exponent == 0:
             return None
-        converged = spec.do_beamskip and self.particles.are_within(CONVERGENCE_DISTANCE_M)
-        logarithm = exponent * self._sensor.log_likelihood(poses, beams, converged)
+        has_converged = spec.do_beamskip and self.particles.are_within(CONVERGENCE_DISTANCE_M)
+        logarithm = exponent * self._sensor.log_likelihood(poses, beams, has_converged)
         best, worst = logarithm.item(logarithm.argmax()), logarithm.item(logarithm.argmin())
         if best == worst and best > -np.inf:
             return None
@@ -95,61 +99,62 @@ class ParticleFilter:
         return estimate
 
     def _trusted_beams(self, beams: Beams) -> tuple[float, Beams]:
-        """Return an exponent for the likelihood of a scan (0 ignores it), and the beams to use; here 1 and all."""
+        """Return the exponent for the likelihood of a scan (0 ignores the scan), and the beams to use: 1, and all."""
         return 1.0, beams
 
     def _observe_likelihood(self, beams: Beams, weights: Array, shift: float, exponent: float) -> None:
-        """Pass the mean likelihood of a scan over the particles, except new random ones, to Augmented MCL.
+        """Pass the likelihoods of a scan at the particles and at random poses to Augmented MCL.
 
-        `weights` (n,) are not normalized. `shift` was subtracted from their logarithms.
+        `weights` (n,) are the new weights of the particles, not normalized. `shift` was subtracted from their
+        logarithms. New random particles do not count.
         """
-        tracked = slice(None) if self._random is None or self._random.all() else ~self._random
-        likelihood = float(weights[tracked].sum() / self.particles.weights[tracked].sum())
-        log_likelihood = math.log(likelihood) + shift if likelihood > 0 else -math.inf
-        probes = self._free_space.draw(PROBE_COUNT, self._rng)
-        anywhere = exponent * self._sensor.log_likelihood(probes, beams, False)
+        counted = slice(None) if self._is_random is None or self._is_random.all() else ~self._is_random
+        likelihood = float(weights[counted].sum() / self.particles.weights[counted].sum())
+        at_particles = math.log(likelihood) + shift if likelihood > 0 else -math.inf
+        random_poses = self._free_space.draw(PROBE_COUNT, self._rng)
+        at_random_poses = exponent * self._sensor.log_likelihood(random_poses, beams, False)
         scale = self._sensor.tempering_exponent(beams)
-        self._augmented_mcl.observe(log_likelihood * scale, anywhere * scale)
+        self._augmented_mcl.observe(at_particles * scale, at_random_poses * scale)
 
     def _resample(self) -> None:
-        """Resample at every `resample_interval`-th scan.
+        """Resample at every n-th scan, where n is `resample_interval`.
 
-        With `selective_resampling`, resample only if at most half of the particles are effective.
+        With `selective_resampling`, resample only if the effective number of particles is at most half of their number.
         """
-        self._corrections += 1
-        self._random = None
-        if self._corrections % self._spec.resample_interval:
+        self._correction_count += 1
+        self._is_random = None
+        if self._correction_count % self._spec.resample_interval:
             return
         if self._spec.selective_resampling and self.particles.effective_count > len(self.particles.weights) / 2:
             return
-        # Compact particles lie in so few bins that KLD sampling would draw the minimum number, too.
+        # Compact particles are in so few bins that KLD sampling, too, would draw the minimum number of particles.
         if self._compact_needs_minimum and self._augmented_mcl.random_fraction == 0 and are_compact(self.particles):
             chosen = systematic_resampling(self.particles.weights, self._bound.min_samples, self._rng)
             self.particles = Particles.with_equal_weights(self.particles.poses.T.take(chosen, axis=1).T)
-            self._descendants = None
+            self._is_descendant = None
             return
         if self._augmented_mcl.random_fraction == 0:
-            self._descendants = None
-        if self._descendants is not None:
+            self._is_descendant = None
+        if self._is_descendant is not None:
             weights = self.particles.weights.copy()
-            weights[self._descendants] *= self._augmented_mcl.kept_fraction(float(weights[self._descendants].sum()))
+            weights[self._is_descendant] *= self._augmented_mcl.kept_fraction(float(weights[self._is_descendant].sum()))
             self.particles = self.particles.with_weights(weights / weights.sum())
         drawn = kld_sampling(self._draw, self._bound).T.copy()
-        self._random, self._descendants = drawn[3] == _RANDOM, drawn[3] > 0
+        self._is_random, self._is_descendant = drawn[3] == _RANDOM, drawn[3] > 0
         self.particles = Particles.with_equal_weights(drawn[:3].T)
 
     def _draw(self, count: int) -> Array:
-        """Return random poses from the particles and, for Augmented MCL, from the free space, in random order.
+        """Draw poses from the particles and, for Augmented MCL, from the free space. Return them in random order.
 
         Rows (count, 4) are x, y, yaw, and the mark _RANDOM, _DESCENDANT, or 0.
         """
         drawn = np.zeros((count, 4))
         chosen = systematic_resampling(self.particles.weights, count, self._rng)
         drawn[:, :3] = self.particles.poses[chosen]
-        if self._descendants is not None:
-            drawn[self._descendants[chosen], 3] = _DESCENDANT
-        if (share := self._augmented_mcl.random_fraction) > 0:
-            is_random = self._rng.random(count) < share
+        if self._is_descendant is not None:
+            drawn[self._is_descendant[chosen], 3] = _DESCENDANT
+        if (random_fraction := self._augmented_mcl.random_fraction) > 0:
+            is_random = self._rng.random(count) < random_fraction
             drawn[is_random, :3] = self._free_space.draw(int(is_random.sum()), self._rng)
             drawn[is_random, 3] = _RANDOM
         return self._rng.permutation(drawn)

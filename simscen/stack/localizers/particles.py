@@ -15,9 +15,11 @@ from simscen.stack.localizers.resampling import BIN_SIZE_M, YAW_BINS, Integers, 
 
 @dataclass(frozen=True, eq=False)
 class Particles:
-    """Poses (n, 3) x, y, yaw in the map frame, and their weights (n,), which add up to one.
+    """Weighted particles.
 
-    Columns of `poses` should be contiguous (see `empty_poses`), which makes sums ten times as fast.
+    poses:    poses (n, 3) x, y, yaw in the map frame; sums are ten times as fast if columns are contiguous (see
+              `empty_poses`)
+    weights:  weights (n,), whose sum is 1
     """
 
     poses: Array
@@ -47,11 +49,11 @@ class Particles:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        """Extent of the poses along x and y in m, and in yaw in rad (across ±π if that is smaller)."""
-        dx, dy, turned = [highest - lowest for lowest, highest in self.bounds]
-        if turned > math.pi:
-            turned = min(turned, float(np.ptp(self.poses[:, 2] % (2 * math.pi))))
-        return dx, dy, turned
+        """Extent of the poses along x and y in m, and in yaw in rad (across ±π if this extent is smaller)."""
+        dx, dy, yaw_extent = [highest - lowest for lowest, highest in self.bounds]
+        if yaw_extent > math.pi:
+            yaw_extent = min(yaw_extent, float(np.ptp(self.poses[:, 2] % (2 * math.pi))))
+        return dx, dy, yaw_extent
 
     @cached_property
     def table(self) -> Array:
@@ -69,7 +71,7 @@ class Particles:
 
 
 def empty_poses(count: int) -> Array:
-    """Return an empty array for poses (count, 3) with contiguous columns."""
+    """Return an uninitialized array for poses (count, 3) with contiguous columns."""
     poses: Array = np.empty((3, count)).T
     return poses
 
@@ -113,7 +115,7 @@ class FreeSpace:
         return poses
 
     def initial_particles(self, estimate: Estimate, count: int, rng: np.random.Generator) -> Particles:
-        """Return normally distributed particles around the pose, or particles over all free space without a pose."""
+        """Return normally distributed particles around the estimated pose; without a pose, all over the free space."""
         if estimate.pose is None:
             return Particles.with_equal_weights(self.draw(count, rng))
         poses = empty_poses(count)
@@ -123,8 +125,9 @@ class FreeSpace:
 
 
 MAX_COMPACT_BINS = 8
-"""Maximum number of histogram bins over which compact particles (see `are_compact`) can be distributed."""
+"""Maximum number of histogram bins in which compact particles (see `are_compact`) can be."""
 _NEIGHBORS = np.array([(x, y, a) for x in (-1, 0, 1) for y in (-1, 0, 1) for a in (-1, 0, 1)])
+"""Offsets (27, 3) in x, y, and yaw from a bin to itself and all adjacent bins."""
 
 
 def cluster_labels(keys: Integers) -> Integers:
@@ -135,9 +138,9 @@ def cluster_labels(keys: Integers) -> Integers:
     occupied, bin_index = np.unique(keys, return_inverse=True)
     x, y, yaw = decode_bins(occupied)
     neighbor_keys = encode_bins(x + _NEIGHBORS[:, :1], y + _NEIGHBORS[:, 1:2], (yaw + _NEIGHBORS[:, 2:]) % YAW_BINS)
-    found = np.minimum(np.searchsorted(occupied, neighbor_keys), len(occupied) - 1)
-    own = np.arange(len(occupied))
-    neighbors, labels = np.where(occupied[found] == neighbor_keys, found, own), own
+    candidates = np.minimum(np.searchsorted(occupied, neighbor_keys), len(occupied) - 1)
+    labels = np.arange(len(occupied))
+    neighbors = np.where(occupied[candidates] == neighbor_keys, candidates, labels)
     while True:
         lowest = labels[neighbors].min(axis=0)
         if np.array_equal(lowest, labels):
@@ -148,16 +151,16 @@ def cluster_labels(keys: Integers) -> Integers:
 def summarize(particles: Particles, peak_power: float = 1.0) -> tuple[Pose2, Array]:
     """Return the mean pose of the heaviest cluster, and the covariance (3, 3) of all particles about this pose.
 
-    With `peak_power` 1, the mean is the plain one, as in nav2_amcl. Otherwise, it combines the plain mean with a second
-    mean, for which weights are raised to `peak_power` and which lags less behind a moving robot. The two are weighted
-    by the inverse of their variances (see docs/reference/localizers.md).
+    With `peak_power` 1, the result is the weighted mean, as in nav2_amcl. Otherwise, the weighted mean is combined with
+    a second mean, for which weights are raised to `peak_power`. The second mean lags less behind a moving robot. Both
+    means are weighted by the inverse of their variances (see docs/reference/localizers.md).
     """
     poses, weights = particles.poses, particles.weights
     if are_compact(particles):
         if peak_power == 1.0:
             return _summarize_compact(particles)
     elif _are_in_adjacent_bins(particles):
-        poses = np.ascontiguousarray(poses)  # so that sums are rounded like those of a selected cluster
+        poses = np.ascontiguousarray(poses)  # so that sums have the same rounding errors as for a selected cluster
     else:
         labels = cluster_labels(bin_keys(poses))
         heaviest = labels == np.bincount(labels, weights=weights).argmax()
@@ -196,7 +199,10 @@ def are_compact(particles: Particles) -> bool:
 
 
 def _are_in_adjacent_bins(particles: Particles) -> bool:
-    """Return whether all particles are in adjacent histogram bins, so that they are one cluster. Does not wrap yaw."""
+    """Return whether all particles are in adjacent histogram bins, so that they are one cluster.
+
+    Yaw is not wrapped: particles on both sides of ±180° count as not adjacent.
+    """
     bins_per_unit = (1 / BIN_SIZE_M, 1 / BIN_SIZE_M, YAW_BINS / (2 * math.pi))
     return all(
         math.floor(highest * scale) - math.floor(lowest * scale) <= 1

@@ -1,4 +1,4 @@
-"""Resampling of particles. KLD sampling adapts their number.
+"""Resampling of particles. KLD sampling adapts the number of particles.
 
 Source: Fox, Adapting the Sample Size in Particle Filters Through KLD-Sampling, IJRR 22 (2003), equation 7;
 Probabilistic Robotics, table 8.4. The histogram has the bins of nav2_amcl (pf_kdtree.c): 0.5 m x 0.5 m x 10°.
@@ -23,7 +23,7 @@ def systematic_resampling(weights: Array, count: int, rng: np.random.Generator) 
     cumulative = weights.cumsum()
     positions = (np.arange(count) + rng.random()) * (cumulative[-1] / count)
     drawn = cumulative.searchsorted(positions, side="right")
-    # The last position can be rounded up to the total; it then belongs to the last index with any weight.
+    # The last position can be rounded up to the total weight. It then belongs to the last index with a weight.
     clipped: Integers = np.minimum(drawn, cumulative.searchsorted(cumulative[-1]))
     return clipped
 
@@ -33,7 +33,7 @@ BIN_SIZE_M = 0.5
 YAW_BINS = 36
 """Number of histogram bins of the heading, 10° each."""
 _OFFSET = 1 << 21
-"""Number that is added to the coordinates x and y of a bin, so that both are positive in the key."""
+"""Number that is added to the coordinates x and y of a bin for its key, so that both are positive."""
 
 
 def bin_keys(poses: Array) -> Integers:
@@ -44,12 +44,12 @@ def bin_keys(poses: Array) -> Integers:
 
 
 def encode_bins(x: Integers, y: Integers, yaw: Integers) -> Integers:
-    """Return the keys of bins, which encode these integer coordinates."""
+    """Return the keys (n,) of bins with these integer coordinates (n,)."""
     return ((x + _OFFSET) * (2 * _OFFSET) + (y + _OFFSET)) * YAW_BINS + yaw
 
 
 def decode_bins(keys: Integers) -> tuple[Integers, Integers, Integers]:
-    """Return the integer coordinates x, y, yaw of bins."""
+    """Return the integer coordinates x, y, yaw (each (n,)) of bins with these keys (n,)."""
     cells, yaw = np.divmod(keys, YAW_BINS)
     x, y = np.divmod(cells, 2 * _OFFSET)
     return x - _OFFSET, y - _OFFSET, yaw
@@ -57,10 +57,11 @@ def decode_bins(keys: Integers) -> tuple[Integers, Integers, Integers]:
 
 @dataclass(frozen=True)
 class KldBound:
-    """KLD bound: number of samples for which the sampled distribution differs from the true one by at most `error`.
+    """Bound on the number of samples, so that their distribution differs from the true distribution by a limited error.
 
-    `z` is the quantile of the standard normal distribution for the required probability. As in nav2_amcl, the
-    parameter `pf_z` (default 0.99) is used as the quantile itself, not as the probability.
+    error:  maximum Kullback-Leibler divergence
+    z:      quantile of the standard normal distribution for the required probability; as in nav2_amcl, the parameter
+            `pf_z` (default 0.99) is the quantile itself, not the probability
     """
 
     error: float
@@ -69,9 +70,9 @@ class KldBound:
     max_samples: int
 
     def samples(self, occupied: npt.ArrayLike) -> Integers:
-        """Return the number of samples needed for each number of occupied bins.
+        """Return the required number of samples for each number of occupied bins.
 
-        The result is between `min_samples` and `max_samples`; `min_samples` for a single bin.
+        The result is between `min_samples` and `max_samples`. For a single bin, it is `min_samples`.
         """
         degrees = np.maximum(np.asarray(occupied, dtype=np.float64) - 1, 1e-9)
         spread = 2 / (9 * degrees)
@@ -92,7 +93,7 @@ class KldBound:
 def kld_sampling(draw: Callable[[int], Array], bound: KldBound) -> Array:
     """Draw poses (n, 3 or more) with `draw(count)` until their number satisfies the KLD bound.
 
-    Source: Fox (2003), table 3, but in blocks instead of one by one. `draw` must return poses in random order.
+    Source: Fox (2003), table 3. Here, poses are drawn in blocks. `draw` must return poses in random order.
     """
     poses = draw(bound.min_samples)
     while (count := bound.sufficient_count(bin_keys(poses))) is None:

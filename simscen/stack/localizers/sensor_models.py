@@ -20,9 +20,9 @@ from simscen.stack.localizers.beams import Beams
 from simscen.stack.localizers.distance_field import DistanceField, Float32, evaluate_in_blocks
 
 PEAK_POWER_OF_SUMS = 16.0
-"""`peak_power` of models with the weight 1 + Σ p³, which differs little between good and bad particles."""
+"""`peak_power` of models with the weight 1 + Σ p³. This weight differs little between good and bad particles."""
 MAX_RANDOM_FRACTION_OF_SUMS = 0.05
-"""`max_random_fraction` of models with the weight 1 + Σ p³, with which random particles survive many scans."""
+"""`max_random_fraction` of models with the weight 1 + Σ p³. With this weight, random particles survive many scans."""
 
 
 class SensorModel(Protocol):
@@ -38,10 +38,10 @@ class SensorModel(Protocol):
         """Maximum fraction of random particles that Augmented MCL may add with each scan."""
         ...
 
-    def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
+    def log_likelihood(self, poses: Array, beams: Beams, has_converged: bool) -> Array:
         """Return the log likelihoods (n,) of the beams at each of the `poses` (n, 3); -inf if impossible, never nan.
 
-        `converged`: the particles are one narrow cluster, so that beam skipping is allowed.
+        `has_converged`: the particles are one narrow cluster, so that beam skipping is allowed.
         """
         ...
 
@@ -51,9 +51,10 @@ class SensorModel(Protocol):
 
 
 def obstacle_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
-    """Return distances to the surfaces of occupied areas; outside the map the maximum, as in nav2_amcl.
+    """Return distances to the surfaces of occupied areas, at most `max_distance` m.
 
-    Cells inside walls are not obstacles, because beams cannot end there.
+    Outside the map, the distance is `max_distance`, as in nav2_amcl. Cells inside walls are not obstacles, because no
+    beam can end there.
     """
     return DistanceField(grid, surfaces(grid.cells == OCCUPIED), max_distance, walled=False)
 
@@ -68,7 +69,7 @@ def surfaces(solid: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
 class LikelihoodField:
     """Default model of nav2_amcl: the weight of a particle is 1 + Σ p³ over the likelihoods p of its beams.
 
-    It tolerates beams that hit obstacles that are not on the map.
+    This model tolerates beams that hit obstacles that are not on the map.
     """
 
     peak_power, max_random_fraction = PEAK_POWER_OF_SUMS, MAX_RANDOM_FRACTION_OF_SUMS
@@ -77,7 +78,7 @@ class LikelihoodField:
         self._field, self._z_rand = field, np.float32(z_rand)
         self._hit = _hit_likelihoods(field, z_hit, sigma_hit)
 
-    def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
+    def log_likelihood(self, poses: Array, beams: Beams, has_converged: bool) -> Array:
         """Return the logarithms (n,) of 1 + Σ p³."""
         z_rand = self._z_rand / np.float32(beams.range_max)
 
@@ -98,9 +99,9 @@ class LikelihoodField:
 class BeamSkipping:
     """Parameters of beam skipping, which ignores beams that hit people or other obstacles that are not on the map.
 
-    A beam fits a particle if it ends less than `distance` m from an obstacle. A beam is skipped if it fits at most the
-    fraction `threshold` of the particles. If at least the fraction `error_threshold` of the beams would be skipped, the
-    pose is assumed to be wrong, and no beam is skipped.
+    A beam fits a particle if the beam ends less than `distance` m from an obstacle of the map. A beam is skipped if it
+    fits at most the fraction `threshold` of the particles. If at least the fraction `error_threshold` of the beams
+    would be skipped, the pose is assumed to be wrong, and no beam is skipped.
     """
 
     distance: float
@@ -109,7 +110,7 @@ class BeamSkipping:
 
 
 class LikelihoodFieldProb:
-    """Model in which the weight of a particle is the product of its beams' likelihoods (table 6.3).
+    """Model in which the weight of a particle is the product of the likelihoods of its beams (table 6.3).
 
     Subclasses may set `exponent` and override `_hit_likelihoods`.
     """
@@ -126,15 +127,15 @@ class LikelihoodFieldProb:
         self._range_max, self._logarithm = math.nan, field.table
         self._exponents: Float32 = np.empty(0, dtype=np.float32)
 
-    def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
+    def log_likelihood(self, poses: Array, beams: Beams, has_converged: bool) -> Array:
         """Return the logarithms (n,) of the products."""
-        used = (
-            self._used_beams(poses, beams, self._skipping) if self._skipping is not None and converged else slice(None)
-        )
-        logarithms, exponents = self._logarithms(beams.range_max), self._beam_exponents(len(beams.ends))[used]
+        used_beams: npt.NDArray[np.bool_] | slice = slice(None)
+        if self._skipping is not None and has_converged:
+            used_beams = self._used_beams(poses, beams, self._skipping)
+        logarithms, exponents = self._logarithms(beams.range_max), self._beam_exponents(len(beams.ends))[used_beams]
 
         def weigh(block: Array) -> Array:
-            cells = beams.cells(self._field, block)[:, used]
+            cells = beams.cells(self._field, block)[:, used_beams]
             # All indices are valid; mode="wrap" skips the check.
             return (logarithms.take(cells, mode="wrap") @ exponents).astype(np.float64)
 
@@ -161,15 +162,15 @@ class LikelihoodFieldProb:
         return self._logarithm
 
     def _hit_likelihoods(self) -> Float32:
-        """Return the likelihood of a hit in each cell, without random ranges."""
+        """Return the likelihood of a hit for each cell, without the part of random ranges."""
         return _hit_likelihoods(self._field, self._z_hit, self._sigma_hit)
 
     def _used_beams(self, poses: Array, beams: Beams, skipping: BeamSkipping) -> npt.NDArray[np.bool_] | slice:
-        """Return which beams (m,) are not skipped."""
-        near = self._field.table.take(beams.cells(self._field, poses)) < skipping.distance
-        explained: npt.NDArray[np.bool_] = near.mean(axis=0) > skipping.threshold
-        is_pose_wrong = np.count_nonzero(~explained) >= len(explained) * skipping.error_threshold
-        return slice(None) if is_pose_wrong else explained
+        """Return which beams (m,) are not skipped; a slice for all beams."""
+        fits = self._field.table.take(beams.cells(self._field, poses)) < skipping.distance
+        is_used: npt.NDArray[np.bool_] = fits.mean(axis=0) > skipping.threshold
+        is_pose_wrong = np.count_nonzero(~is_used) >= len(is_used) * skipping.error_threshold
+        return slice(None) if is_pose_wrong else is_used
 
 
 def _hit_likelihoods(field: DistanceField, z_hit: float, sigma_hit: float) -> Float32:
@@ -185,7 +186,7 @@ def opaque_field(grid: OccupancyGrid, max_distance: float) -> DistanceField:
 
 
 def cast_rays(field: DistanceField, poses: Array, beams: Beams) -> Array:
-    """Return the ranges (n, b) in m that `beams` would have at `poses` (n, 3), to within half a cell."""
+    """Return the ranges (n, b) in m of `beams` at `poses` (n, 3), with errors up to half a cell."""
     positions, heading = (values.astype(np.float64)[..., None] for values in field.coordinates(poses))
     forward, left, c, s = beams.origin.real, beams.origin.imag, np.cos(heading), np.sin(heading)
     angle, cell = heading + beams.bearings, field.resolution
@@ -197,14 +198,14 @@ def cast_rays(field: DistanceField, poses: Array, beams: Beams) -> Array:
 
 
 def _march(field: DistanceField, x: Array, y: Array, angle: Array, limit: float) -> Array:
-    """Return the free lengths of rays (r,) from x, y (r,) along `angle` (r,), at most `limit`; all lengths in cells."""
+    """Return the free lengths (r,) of rays from x, y (r,) along `angle` (r,), at most `limit`. The unit is cells."""
     cos, sin, traveled, active = np.cos(angle), np.sin(angle), np.zeros_like(x), np.arange(x.size)
     while active.size:
         column = (x[active] + cos[active] * traveled[active]).astype(np.float32)
         row = (y[active] + sin[active] * traveled[active]).astype(np.float32)
         free = field.table.take(field.cells(column, row)) / field.resolution
         active, free = active[free > 0], free[free > 0]
-        # Distances are between centers: both the ray and the obstacle may be half a diagonal nearer.
+        # Distances are between cell centers. The ray and the edge of the obstacle may each be half a diagonal nearer.
         traveled[active] += np.maximum(free - np.sqrt(2), 0.5)
         active = active[traveled[active] < limit]
     return np.minimum(traveled, limit)
@@ -214,7 +215,8 @@ def _march(field: DistanceField, x: Array, y: Array, angle: Array, limit: float)
 class BeamModel:
     """Model with ray casting, in which the weight of a particle is 1 + Σ p³ over the likelihoods p of its beams.
 
-    The likelihood is a mixture of hit, short, maximum, and random ranges.
+    The likelihood is a mixture of hit, short, maximum, and random ranges, with the weights z_hit, z_short, z_max, and
+    z_rand.
     """
 
     peak_power: ClassVar[float] = PEAK_POWER_OF_SUMS
@@ -228,7 +230,7 @@ class BeamModel:
     sigma_hit: float
     lambda_short: float
 
-    def log_likelihood(self, poses: Array, beams: Beams, converged: bool) -> Array:
+    def log_likelihood(self, poses: Array, beams: Beams, has_converged: bool) -> Array:
         """Return the logarithms (n,) of 1 + Σ p³."""
         missed = beams.ranges >= beams.range_max
 

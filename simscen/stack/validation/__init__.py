@@ -1,1 +1,1 @@
-"""Validation of the results of stack components and of whole stacks, in particular of those from other packages."""
+"""Validation of the results of stacks and of their components from other packages."""

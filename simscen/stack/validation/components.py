@@ -26,34 +26,34 @@ S = TypeVar("S", bound=Component)
 
 
 def build_component(wrapper: Callable[[S, Setting], T], spec: S, setting: Setting) -> T:
-    """Build a component from its specification. If it comes from another package, return it inside `wrapper`."""
+    """Build a component from its specification. Components of other packages are wrapped in `wrapper`."""
     component: T = (spec.implementation() if spec.component.startswith("simscen.") else wrapper)(spec, setting)
     return component
 
 
 START_TOLERANCE_M = 0.05
-"""Largest distance between the requested start and the first point of a path."""
+"""Maximum distance between the requested start and the first point of a path."""
 
 
 class CheckedPlanner(CheckedPlugin):
-    """Calls the planner and checks its path."""
+    """Wrapper of a planner that validates the paths."""
 
     def __init__(self, spec: PlannerSpec, setting: Setting) -> None:
         super().__init__("planner", spec, setting, Planner)
         self._radius = setting.robot.circumscribed_radius
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        """Return the planner's path. Raises RunError if it is invalid or has a pose on a lethal cell.
+        """Return the planner's path. Raises RunError if the path is invalid or has a pose on a lethal cell.
 
-        Lethal cells within the circumscribed radius of the start are allowed, since the robot already stands there.
+        Lethal cells within the circumscribed radius of the start are allowed, because the robot already stands there.
         """
         path = self.checked_path(self.call(self.inner.plan, costmap, start, goal, seed), "returned")
         points = path.points
         if not len(points):
             self.raise_invalid("returned a path without points instead of failing with NO_VALID_PATH")
         if np.hypot(points[0, 0] - start.x, points[0, 1] - start.y) > START_TOLERANCE_M:
-            begin = _position_text(points[0])
-            self.raise_invalid(f"returned a path from {begin} instead of the start {_position_text(np.array(start))}")
+            first = _position_text(points[0])
+            self.raise_invalid(f"returned a path from {first} instead of the start {_position_text(np.array(start))}")
         outside = points[np.hypot(points[:, 0] - start.x, points[:, 1] - start.y) > self._radius]
         if len(outside) and (is_lethal := on_lethal_cells(costmap, outside)).any():
             position = _position_text(outside[is_lethal.argmax()])
@@ -75,7 +75,7 @@ def _position_text(point: Array) -> str:
 
 
 class CheckedController(CheckedPlugin):
-    """Calls the controller and checks its commands."""
+    """Wrapper of a controller that validates the commands."""
 
     def __init__(self, spec: ControllerSpec, setting: Setting) -> None:
         super().__init__("controller", spec, setting, Controller)
@@ -86,29 +86,29 @@ class CheckedController(CheckedPlugin):
 
     @property
     def full_speed(self) -> float:
-        """Speed in m/s without a speed limit."""
+        """Maximum speed in m/s while no speed limit is set."""
         speed = self.call(lambda: self.inner.full_speed)
         if not are_numbers((speed,)) or speed < 0:
             self.raise_invalid(f"returned {speed!r} as its full speed, which is not a finite number of at least 0")
         return float(speed)
 
     def set_speed_limit(self, limit: float | None) -> None:
-        """Set the speed limit in m/s; None removes it."""
+        """Set the speed limit in m/s; None removes the limit."""
         self.call(self.inner.set_speed_limit, limit)
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
-        """Return the controller's command. Raises RunError when it is invalid."""
+        """Return the controller's command. Raises RunError if the command is invalid."""
         return self.checked_twist(self.call(self.inner.command, pose, twist, costmap, goal))
 
     @property
     def local_plan(self) -> Path | None:
-        """Trajectory that the controller expects to drive; None if it has none."""
+        """Trajectory that the controller expects to drive; None if there is none."""
         plan = self.call(lambda: self.inner.local_plan)
         return None if plan is None else self.checked_path(plan, "returned as `local_plan`")
 
 
 class CheckedGoalChecker(CheckedPlugin):
-    """Calls the goal checker and checks that it returns a boolean."""
+    """Wrapper of a goal checker that validates that the result is a boolean."""
 
     may_fail = False
 
@@ -128,7 +128,10 @@ class CheckedGoalChecker(CheckedPlugin):
 
 
 class CheckedBehavior(CheckedPlugin):
-    """Calls the recovery behavior and checks its commands. `name` is the `type` in its specification, if any."""
+    """Wrapper of a recovery behavior that validates the commands.
+
+    `name` is the `type` in the specification, or the behavior's own name if the specification has no `type`.
+    """
 
     def __init__(self, spec: BehaviorSpec, setting: Setting) -> None:
         super().__init__("behavior", spec, setting, Behavior)
@@ -139,19 +142,19 @@ class CheckedBehavior(CheckedPlugin):
         self.call(self.inner.start, pose)
 
     def step(self, pose: Pose2, costmap: CostmapView, seconds: float) -> Twist | None:
-        """Return the behavior's command; None when it is done. Raises RunError when it is invalid."""
+        """Return the behavior's command; None when the behavior is done. Raises RunError if the command is invalid."""
         command = self.call(self.inner.step, pose, costmap, seconds)
         return None if command is None else self.checked_twist(command)
 
 
 class CheckedLocalizer(CheckedPlugin):
-    """Passes readings to the localizer and checks its belief."""
+    """Wrapper of a localizer that validates the belief."""
 
     may_fail = False
 
     def __init__(self, spec: LocalizerSpec, setting: Setting) -> None:
         super().__init__("localizer", spec, setting, Localizer)
-        self._last: Belief | None = None
+        self._last_belief: Belief | None = None
 
     def reset(self, estimate: Estimate) -> None:
         """Restart at an estimate."""
@@ -171,10 +174,10 @@ class CheckedLocalizer(CheckedPlugin):
 
     @property
     def belief(self) -> Belief:
-        """Belief of the localizer. Raises RunError when it is invalid."""
+        """Belief of the localizer. Raises RunError if the belief is invalid."""
         try:
             belief = self.inner.belief
         except Exception as error:  # as in `call`, without its overhead in every control period
             self.raise_as_run_error(error)
-        self._last = self.checked_belief(belief, self._last)
-        return self._last
+        self._last_belief = self.checked_belief(belief, self._last_belief)
+        return self._last_belief

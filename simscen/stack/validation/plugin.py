@@ -1,4 +1,4 @@
-"""Base class of the wrappers that call a component or a stack, and check what it returns."""
+"""Base class of wrappers that call a stack or a component of a stack, and validate the results."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -19,16 +19,16 @@ T = TypeVar("T")
 
 
 class CheckedPlugin:
-    """Base class of the wrappers. An invalid return value or an unexpected exception raises RunError.
+    """Wrapper that raises RunError if the wrapped object, `inner`, returns an invalid value or raises an exception.
 
     The parameter `prefix` of methods is the start of an error message, such as "returned".
     """
 
     may_fail: ClassVar[bool] = True
-    """Whether a component of this role may raise NavigationFailure."""
+    """Whether the wrapped object may raise NavigationFailure."""
 
     def __init__(self, role: str, spec: Component, setting: Setting, protocol: type) -> None:
-        """Build the component. Raises RunError if it lacks a method of `protocol`. `role` is for example "planner"."""
+        """Build the object. Raises RunError if a method of `protocol` is missing. `role` is for example "planner"."""
         self.role, self._spec = role, spec
         self.inner: Any = self.call(lambda: spec.implementation()(spec, setting))
         for name, value in vars(protocol).items():
@@ -43,7 +43,7 @@ class CheckedPlugin:
         return f"{self.role} `{kind}` ({self._spec.component})" if kind else f"{self.role} ({self._spec.component})"
 
     def call(self, method: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Call a method of the component, and return its result. Exceptions go through `raise_as_run_error`."""
+        """Call a method of the wrapped object, and return its result. See `raise_as_run_error` for exceptions."""
         try:
             return method(*args, **kwargs)
         except Exception as error:  # code of other packages can raise anything
@@ -93,9 +93,10 @@ class CheckedPlugin:
         return pose
 
     def checked_belief(self, belief: object, before: Belief | None) -> Belief:
-        """Return the belief if it is finite and has the right shapes; otherwise raise RunError.
+        """Return the belief if it is finite and its arrays have the right shapes; otherwise raise RunError.
 
-        `before` is the previous valid belief: shared `map_from_odom` and read-only particles are not checked again.
+        `before` is the previous valid belief. The objects that both beliefs share are not checked again:
+        `map_from_odom`, and particles if they are read-only.
         """
         if not isinstance(belief, Belief):
             self.raise_invalid(f"returned {type(belief).__name__} instead of a Belief")
@@ -113,7 +114,7 @@ class CheckedPlugin:
 
 
 def are_numbers(values: Iterable[object]) -> bool:
-    """Return whether all values are real numbers and finite."""
+    """Return whether all values are finite real numbers."""
     try:
         return math.isfinite(math.hypot(*values))  # type: ignore[arg-type]  # other types raise
     except (TypeError, OverflowError):
@@ -122,14 +123,17 @@ def are_numbers(values: Iterable[object]) -> bool:
 
 def all_finite(values: Array) -> bool:
     """Return whether all numbers of an array are finite."""
-    return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())  # the sum of squares is faster
+    # The sum of squares is faster to check. It can overflow for finite numbers.
+    return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
 
 
 def _shape_text(points: object) -> str:
+    """Return the shape of an array, or the name of another type, for a message."""
     return str(points.shape) if isinstance(points, np.ndarray) else type(points).__name__
 
 
 def _is_finite_table(value: object, columns: int) -> bool:
+    """Return whether a value is an array (n, `columns`) of finite numbers."""
     if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiu":
         return False
     return value.shape[1:] == (columns,) and all_finite(value)

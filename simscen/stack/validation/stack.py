@@ -1,4 +1,4 @@
-"""Wrapper that checks the decisions of a navigation stack: the reference stack, or a stack of another package."""
+"""Wrapper that validates the decisions of a navigation stack: the reference stack, or a stack of another package."""
 
 import numpy as np
 
@@ -17,16 +17,16 @@ from simscen.stack.validation.plugin import CheckedPlugin
 
 
 class CheckedStack(CheckedPlugin):
-    """Calls the stack and checks each new decision."""
+    """Wrapper of a stack that validates each new decision."""
 
     may_fail = False
     """A stack must not raise NavigationFailure."""
 
     def __init__(self, spec: InProcessStack, setting: Setting) -> None:
         super().__init__("stack", spec, setting, Stack)
-        self._last: Decision | None = None
-        self._belief: Belief | None = None
-        self._command: Twist | None = None
+        self._last_decision: Decision | None = None
+        self._last_belief: Belief | None = None
+        self._last_command: Twist | None = None
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
         """Initialize the localizer with the estimate, and drive to the goals in order."""
@@ -50,14 +50,14 @@ class CheckedStack(CheckedPlugin):
         self.call(self.inner.set_zones, tick, zones)
 
     def decide(self, tick: int, readings: Readings) -> Decision:
-        """Return the stack's decision. Raises RunError when it is invalid."""
+        """Return the stack's decision. Raises RunError if the decision is invalid."""
         try:
             decision = self.inner.decide(tick, readings)
         except Exception as error:  # as in `call`, without its overhead in every call
             self.raise_as_run_error(error)
-        if self._last is None or decision is not self._last:  # an unchanged decision is the same object
-            self._last = self._checked_decision(decision, tick)
-        return self._last
+        if self._last_decision is None or decision is not self._last_decision:  # the same object is not checked again
+            self._last_decision = self._checked_decision(decision, tick)
+        return self._last_decision
 
     @property
     def plan(self) -> Path | None:
@@ -67,19 +67,20 @@ class CheckedStack(CheckedPlugin):
 
     @property
     def goal(self) -> Goal | None:
-        """The goal being driven to; None when the task has ended."""
+        """The current goal; None when the task has ended."""
         goal = self.call(lambda: self.inner.goal)
         if goal is not None and not isinstance(goal, Goal):
             self.raise_invalid(f"returned {goal!r} as `goal`, which is not a Goal")
         return goal
 
     def _checked_decision(self, decision: object, tick: int) -> Decision:
+        """Return the decision if all parts are valid; otherwise raise RunError."""
         if not isinstance(decision, Decision):
             self.raise_invalid(f"returned {type(decision).__name__} instead of a Decision")
-        if decision.command is not self._command:
-            self._command = self.checked_twist(decision.command)
+        if decision.command is not self._last_command:
+            self._last_command = self.checked_twist(decision.command)
         if decision.belief is not None:
-            self._belief = self.checked_belief(decision.belief, self._belief)
+            self._last_belief = self.checked_belief(decision.belief, self._last_belief)
         if decision.plan is not None:
             self.checked_path(decision.plan, "returned in `Decision.plan`")
         if decision.local_plan is not None:
@@ -88,6 +89,7 @@ class CheckedStack(CheckedPlugin):
         return decision
 
     def _check_messages(self, decision: Decision, tick: int) -> None:
+        """Raise RunError if events, lines, costmaps, or odometry of the decision are invalid."""
         for name in ("events", "lines", "costmaps", "odometry"):
             if not isinstance(value := getattr(decision, name), tuple | list):
                 self.raise_invalid(f"returned {type(value).__name__} as `Decision.{name}` instead of a tuple")

@@ -97,10 +97,10 @@ def test_recoveries_alternate_until_the_retries_are_used_up() -> None:
             self.name = name
 
     robin = BehaviorSequence([Named("a"), Named("b"), Named("c")], Recovery(number_of_retries=4))
-    assert [b.name for b in iter(lambda: robin.next(5.0), None)] == ["a", "b", "c", "a"]
+    assert [b.name for b in iter(lambda: robin.next_behavior(5.0), None)] == ["a", "b", "c", "a"]
     robin.reset()
-    assert robin.next(5.0).name == "b"
-    assert BehaviorSequence([], Recovery(number_of_retries=3)).next(5.0) is None
+    assert robin.next_behavior(5.0).name == "b"
+    assert BehaviorSequence([], Recovery(number_of_retries=3)).next_behavior(5.0) is None
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_progress_of_a_meter_resets_the_retries(anew: bool, there_are: list[bool
     robin = BehaviorSequence(
         [Wait(WaitSpec(), setting(round_robot()))], Recovery(number_of_retries=2, retries_since_progress=anew)
     )
-    assert [robin.next(to_go) is not None for to_go in (5.0, 6.0, 4.5, 3.4, 8.0, 3.4)] == there_are
+    assert [robin.next_behavior(to_go) is not None for to_go in (5.0, 6.0, 4.5, 3.4, 8.0, 3.4)] == there_are
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,7 @@ def test_past_poses_are_in_the_current_frame() -> None:
 def test_pose_before_any_reading_is_the_origin() -> None:
     nothing = history()
     assert not nothing.has_pose
-    assert nothing.latest_until(5) == nothing.now == Pose2(0.0, 0.0)
+    assert nothing.latest_until(5) == nothing.latest_pose == Pose2(0.0, 0.0)
     assert nothing.past_pose(Pose2(1, 2, 0.3), 5) == pytest.approx(Pose2(1, 2, 0.3))
     assert nothing.at(0) is None
     assert not nothing.reaches(0)
@@ -66,7 +66,7 @@ def test_readings_older_than_the_tf_buffer_are_dropped() -> None:
 def test_a_reading_that_is_not_newer_is_refused(tick: int) -> None:
     given = history((10, Pose2(1, 1, 0)))
     assert not given.add(tick, Pose2(9, 9, 9))
-    assert given.now == given.latest_until(99) == Pose2(1, 1, 0)
+    assert given.latest_pose == given.latest_until(99) == Pose2(1, 1, 0)
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf"), 1e200])
@@ -81,7 +81,7 @@ def test_path_is_longer_than_the_lookup_buffer_and_restarts_with_new_odometry() 
     for tick in range(0, 1000, 10):
         kept.add(tick, Pose2(0.1 * tick, 0.0, 0.0))
     assert 990 - 61 * RATE <= kept.trail()[0].x / 0.1 <= 990 - 60 * RATE
-    assert kept.trail()[-1] == kept.now
+    assert kept.trail()[-1] == kept.latest_pose
     assert kept.at(990 - HISTORY_S * RATE - 1) is None
     kept.clear()
     assert not kept.trail()

@@ -29,7 +29,7 @@ PLAN_LENGTH_RATIO, PLAN_MARGIN_M = 1.2, 0.5
 
 
 class DynamicWindowController(PathFollower):
-    """Samples the velocities that can be reached within `sim_time`, and selects the one with the best score."""
+    """Samples velocities that can be reached within `sim_time`, and commands the velocity with the best score."""
 
     def __init__(self, spec: DwbSpec, setting: Setting) -> None:
         robot = setting.robot
@@ -45,7 +45,7 @@ class DynamicWindowController(PathFollower):
         self._oscillation = OscillationCritic(
             spec.oscillation_reset_dist, spec.oscillation_reset_angle, spec.x_only_threshold
         )
-        self._best: Array | None = None
+        self._best_trajectory: Array | None = None
 
     def reset_for_goal(self) -> None:
         """Reset goal rotation and critics for another goal."""
@@ -56,7 +56,7 @@ class DynamicWindowController(PathFollower):
     @property
     def local_plan(self) -> Path | None:
         """The trajectory with the best score; None before the first command."""
-        return None if self._best is None else Path(self._best)
+        return None if self._best_trajectory is None else Path(self._best_trajectory)
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
         """Return the velocity command. Raises NO_VALID_CONTROL if no sampled trajectory is legal."""
@@ -72,20 +72,20 @@ class DynamicWindowController(PathFollower):
             pose, twist, velocities, kinematics, spec.sim_time, spec.linear_granularity, spec.angular_granularity
         )
         ends = trajectories.ends
-        driven = (abs(twist.vx) + abs(twist.vy)) * spec.sim_time
-        plan_length = max(spec.prune_distance, PLAN_LENGTH_RATIO * driven + PLAN_MARGIN_M)
+        driven_distance = (abs(twist.vx) + abs(twist.vy)) * spec.sim_time
+        plan_length = max(spec.prune_distance, PLAN_LENGTH_RATIO * driven_distance + PLAN_MARGIN_M)
         plan = upcoming_path(tracker, plan_length, costmap.resolution).points[:, :2]
         scores = score_trajectories(spec, costmap, pose, goal.pose, plan, velocities, ends)
-        legal, total = self._oscillation.legal(velocities), scores.total
+        is_legal, total = self._oscillation.is_legal(velocities), scores.total
         if is_reached and spec.rotate_to_goal_scale > 0.0:
-            rotation, allowed = self._rotate_to_goal.scores(twist, goal.pose.yaw, velocities, ends[:, 2])
-            legal, total = legal & allowed, total + spec.rotate_to_goal_scale * rotation
-        order = np.argsort(np.where(legal, total, np.inf), kind="stable")
-        order = order[: int(np.count_nonzero(legal & np.isfinite(total)))]
+            rotation, may_rotate = self._rotate_to_goal.scores(twist, goal.pose.yaw, velocities, ends[:, 2])
+            is_legal, total = is_legal & may_rotate, total + spec.rotate_to_goal_scale * rotation
+        order = np.argsort(np.where(is_legal, total, np.inf), kind="stable")
+        order = order[: int(np.count_nonzero(is_legal & np.isfinite(total)))]
         best = self._obstacle_critic.first_free(costmap, pose, trajectories, order)
         command = STOP if best is None else Twist(*velocities[best].tolist())
         self._oscillation.record(pose, command)
         if best is None:
             raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "no trajectory is legal")
-        self._best = trajectories.poses(np.array([best]))[:, 0]
+        self._best_trajectory = trajectories.poses(np.array([best]))[:, 0]
         return command

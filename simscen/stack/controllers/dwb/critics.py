@@ -26,7 +26,12 @@ BATCH_TRAJECTORIES = 50
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Scores of n trajectories: `raw` scores (n,) and `scale` by critic. `legal` (n,) is False for rejected ones."""
+    """Scores of n trajectories.
+
+    raw:    raw scores (n,) by critic
+    scale:  factor of the raw scores by critic
+    legal:  whether each trajectory (n,) is legal, or rejected
+    """
 
     raw: dict[str, Array]
     scale: dict[str, float]
@@ -46,8 +51,8 @@ def score_trajectories(
 ) -> Scores:
     """Return the scores of trajectories with these velocities (n, 3) and final poses `ends` (n, 3).
 
-    `pose` is that of the robot. `plan` (m, 2) is not empty. A trajectory is rejected if its end, or the point ahead
-    of it for the alignment critics, is outside the costmap.
+    `pose` is the pose of the robot. `plan` (m, 2) is not empty. A trajectory is rejected if its end is outside the
+    costmap. If an alignment critic is enabled, the point `forward_point_distance` ahead of the end counts as well.
     """
     forward_distance = spec.forward_point_distance
     forward = ends[:, :2] + forward_distance * np.column_stack((np.cos(ends[:, 2]), np.sin(ends[:, 2])))
@@ -87,7 +92,7 @@ def _extend_beyond_goal(plan: Array, pose: Pose2, goal: Pose2, distance: float) 
 
 
 def cells_of(costmap: CostmapView, points: Array) -> tuple[Cells, Mask]:
-    """Return the cells (n, 2) as (row, column) at points (n, 2), and which of them are on the costmap."""
+    """Return the cells (n, 2) as (row, column) at points (n, 2), and which of the cells are on the costmap."""
     cells = np.floor((points[:, ::-1] - np.array(costmap.origin)[::-1]) / costmap.resolution).astype(np.int64)
     on_map: Mask = np.asarray(((cells >= 0) & (cells < np.array(costmap.costs.shape))).all(axis=1))
     return cells, on_map
@@ -117,7 +122,7 @@ def manhattan_distances(cells: Cells, sources: Cells) -> Array:
 
 
 class RotateToGoalCritic:
-    """Critic at the goal, which scores the heading error. The robot must slow down to a stop, then rotate in place."""
+    """Critic at the goal, which scores the heading error. The robot must slow down to a stop, and rotate in place."""
 
     def __init__(self, stopped_velocity: float, slowing_factor: float) -> None:
         """Take Nav2's trans_stopped_velocity in m/s and slowing_factor."""
@@ -128,12 +133,12 @@ class RotateToGoalCritic:
         """Prepare for a new goal."""
         self._is_rotating = False
 
-    def scores(self, now: Twist, goal_yaw: float, velocities: Array, end_yaws: Array) -> tuple[Array, Mask]:
-        """Return the scores (n,) of velocities (n, 3) that lead to the headings `end_yaws` (n,), and which are legal.
+    def scores(self, current: Twist, goal_yaw: float, velocities: Array, end_yaws: Array) -> tuple[Array, Mask]:
+        """Return the scores (n,) of velocities (n, 3), and whether each velocity is legal.
 
-        `now` is the current velocity.
+        The velocities lead to the headings `end_yaws` (n,). `current` is the current velocity.
         """
-        speed = math.hypot(now.vx, now.vy)
+        speed = math.hypot(current.vx, current.vy)
         self._is_rotating |= speed <= self._stopped_velocity
         squared_speed = velocities[:, 0] ** 2 + velocities[:, 1] ** 2
         angle = np.abs(wrap_array(end_yaws - goal_yaw))
@@ -143,7 +148,7 @@ class RotateToGoalCritic:
 
 
 class ObstacleCritic:
-    """Selects a trajectory free of collisions with static and moving obstacles (dwb_critics' ObstacleFootprint)."""
+    """Critic that selects a trajectory free of static and moving obstacles (dwb_critics' ObstacleFootprint)."""
 
     def __init__(self, footprint: Footprint, preferred_clearance: float) -> None:
         """Take the footprint, and the clearance in m that trajectories should have if possible."""
@@ -152,10 +157,11 @@ class ObstacleCritic:
     def first_free(
         self, costmap: CostmapView, pose: Pose2, trajectories: Trajectories, order: npt.NDArray[np.intp]
     ) -> int | None:
-        """Return the index of the best free trajectory among those in `order` (k,); None if none is free.
+        """Return the index of the best free trajectory among the indices in `order` (k,); None if none is free.
 
-        Trajectories with the preferred clearance come first, then those that meet moving obstacles later or never, then
-        those earlier in `order`. If the robot is in collision and none is free, a trajectory that leads out is free.
+        A trajectory with the preferred clearance is better than one without. Among these, a trajectory is better the
+        later it meets a moving obstacle, and then the earlier it is in `order`. If the robot is in collision, and if no
+        trajectory is free, a trajectory that leads out of the collision counts as free.
         """
         if len(costmap.moving):
             meeting_times = self._meeting_times(costmap.moving, trajectories, order)
@@ -192,10 +198,10 @@ class DirectionHistory:
         self.reset()
 
     def reset(self) -> None:
-        """Allow both signs."""
+        """Allow both directions."""
         self._sign = 0.0
         self.allowed_sign = 0.0
-        """1 or -1 if only this sign is allowed; 0 if both are."""
+        """1 or -1 if only this sign is allowed; 0 if both signs are allowed."""
 
     def update(self, velocity: float) -> bool:
         """Record a commanded velocity. Return whether it reverses the direction."""
@@ -224,8 +230,8 @@ class OscillationCritic:
         for direction in self._directions:
             direction.reset()
 
-    def legal(self, velocities: Array) -> Mask:
-        """Return which of the velocities (n, 3) are allowed."""
+    def is_legal(self, velocities: Array) -> Mask:
+        """Return which of the velocities (n, 3) are legal."""
         legal: Mask = np.ones(len(velocities), dtype=bool)
         for direction, velocity in zip(self._directions, velocities.T, strict=True):
             legal &= velocity * direction.allowed_sign >= 0.0

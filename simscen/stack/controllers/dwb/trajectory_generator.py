@@ -12,10 +12,10 @@ from simscen.model.controllers import DynamicWindow as DwbSpec
 from simscen.stack.kinematics import VelocityLimits, accumulate_rows, velocity_limits
 from simscen.stack.protocols import RobotModel
 
-SAME_VELOCITY_M_S = 1e-5
-"""Width of a velocity range below which only one velocity is sampled (EPSILON in Nav2)."""
+MIN_VELOCITY_RANGE_M_S = 1e-5
+"""Minimum width of a velocity range from which more than one velocity is sampled (EPSILON in Nav2)."""
 SQUARED_SPEED_TOLERANCE = float(np.finfo(np.float32).eps)
-"""Rounding error allowed for squared speeds and for turn rates."""
+"""Rounding error allowed for squared speeds in m²/s², and for turn rates in rad/s."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class KinematicParameters(VelocityLimits):
         """Return limits with `low`, `high`, and `max_speed_xy` multiplied by `ratio`, at most by 1."""
         return replace(super().scaled(ratio), max_speed_xy=self.max_speed_xy * min(ratio, 1.0))
 
-    def valid(self, velocities: Array) -> Array:
-        """Return the valid ones (m, 3) of the `velocities` (n, 3): within the limits, and not zero."""
+    def valid_velocities(self, velocities: Array) -> Array:
+        """Return the velocities (m, 3) among `velocities` (n, 3) that are within the limits and not zero."""
         squared_speed = velocities[:, 0] ** 2 + velocities[:, 1] ** 2
         turn_rate = np.abs(velocities[:, 2])
         is_slow = (squared_speed + SQUARED_SPEED_TOLERANCE < self.min_speed_xy**2) & (
@@ -65,55 +65,61 @@ def kinematic_parameters(spec: DwbSpec, robot: RobotModel, full_speed: float) ->
     )
 
 
-def project_velocity(now: float, acceleration: float, deceleration: float, seconds: float, target: float) -> float:
-    """Return the velocity `seconds` after the base starts to change it from `now` to `target`.
+def project_velocity(current: float, acceleration: float, deceleration: float, seconds: float, target: float) -> float:
+    """Return the velocity after `seconds` of accelerating or decelerating from `current` to `target`.
 
     `deceleration` is negative.
     """
-    if now < target:
-        return min(target, now + acceleration * seconds)
-    return max(target, now + deceleration * seconds)
+    if current < target:
+        return min(target, current + acceleration * seconds)
+    return max(target, current + deceleration * seconds)
 
 
 def velocity_samples(
-    now: float, low: float, high: float, acceleration: float, deceleration: float, seconds: float, count: int
+    current: float, low: float, high: float, acceleration: float, deceleration: float, seconds: float, count: int
 ) -> list[float]:
-    """Return velocities of one axis that can be reached within `seconds`: `count` (at least 2) at equal distances.
+    """Return `count` (at least 2) evenly spaced velocities of one axis that can be reached within `seconds`.
 
-    0 is added if it lies between two of them.
+    If 0 lies between two samples, 0 is added.
     """
-    now = min(max(now, low), high)
-    highest = project_velocity(now, acceleration, deceleration, seconds, high)
-    lowest = project_velocity(now, acceleration, deceleration, seconds, low)
-    if abs(highest - lowest) < SAME_VELOCITY_M_S:
+    current = min(max(current, low), high)
+    highest = project_velocity(current, acceleration, deceleration, seconds, high)
+    lowest = project_velocity(current, acceleration, deceleration, seconds, low)
+    if abs(highest - lowest) < MIN_VELOCITY_RANGE_M_S:
         return [lowest]
     step = (highest - lowest) / (max(2, count) - 1)
     samples = []
     velocity = lowest
-    while velocity <= highest + SAME_VELOCITY_M_S:
+    while velocity <= highest + MIN_VELOCITY_RANGE_M_S:
         samples.append(velocity)
-        if velocity < 0.0 < velocity + step <= highest + SAME_VELOCITY_M_S:
+        if velocity < 0.0 < velocity + step <= highest + MIN_VELOCITY_RANGE_M_S:
             samples.append(0.0)
         velocity += step
     return samples
 
 
-def velocity_window(limits: KinematicParameters, now: Twist, seconds: float, counts: tuple[int, int, int]) -> Array:
-    """Return valid velocities (n, 3) that can be reached within `seconds`. `counts` are the samples per axis."""
+def velocity_window(limits: KinematicParameters, current: Twist, seconds: float, counts: tuple[int, int, int]) -> Array:
+    """Return valid velocities (n, 3) that can be reached from `current` within `seconds`.
+
+    `counts` are the numbers of samples for vx, vy, and turn rate.
+    """
     axes = [
         velocity_samples(velocity, low, high, acceleration, deceleration, seconds, count)
         for velocity, low, high, acceleration, deceleration, count in zip(
-            now, limits.low, limits.high, limits.acceleration, limits.deceleration, counts, strict=True
+            current, limits.low, limits.high, limits.acceleration, limits.deceleration, counts, strict=True
         )
     ]
-    return limits.valid(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3))
+    return limits.valid_velocities(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3))
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """Positions `x` and `y` (steps, n) of n trajectories, and headings `yaw` (steps, m) at `times` in s (steps, m).
+    """Poses of n trajectories. Several trajectories can share the same headings.
 
-    Trajectories can share headings: `yaw_index` (n,) is the column of each trajectory in `yaw` and `times`.
+    x, y:       positions (steps, n) in m
+    yaw:        headings (steps, m) in rad
+    yaw_index:  column (n,) of each trajectory in `yaw` and `times`
+    times:      times (steps, m) of the poses in s
     """
 
     x: Array
@@ -137,17 +143,17 @@ class Trajectories:
 
 def generate_trajectories(
     pose: Pose2,
-    now: Twist,
+    current: Twist,
     velocities: Array,
     limits: KinematicParameters,
     seconds: float,
     max_step_m: float,
     max_step_rad: float,
 ) -> Trajectories:
-    """Return trajectories of `seconds` from `pose`, in which the base accelerates from `now` to the velocities (n, 3).
+    """Return trajectories from `pose`, in which the base accelerates from `current` to each of the velocities (n, 3).
 
-    Steps are at most `max_step_m` and `max_step_rad` long. The heading is constant within a step. Trajectories with
-    fewer steps than others are padded with their final pose.
+    A trajectory takes `seconds`. Steps are at most `max_step_m` and `max_step_rad` long. The heading is constant within
+    a step. Trajectories with fewer steps than others are padded with their final pose.
     """
     distance_steps = np.hypot(velocities[:, 0], velocities[:, 1]) * seconds / max_step_m
     turn_steps = np.abs(velocities[:, 2]) * seconds / max_step_rad
@@ -157,7 +163,7 @@ def generate_trajectories(
     step = np.arange(math.ceil(step_counts.max()) + 1)[:, None]
     times, step = np.minimum(step, count) * dt, step[1:]
     yaw_times, durations = times[1:], np.where(step <= count, dt, 0.0)
-    axes = list(zip(now, limits.acceleration, limits.deceleration, strict=True))
+    axes = list(zip(current, limits.acceleration, limits.deceleration, strict=True))
     wz = _ramp(velocities[first, 2], *axes[2], yaw_times)
     yaw = _accumulate(pose.yaw, wz * durations)
     cosine = (np.cos(yaw[:-1]) * durations).take(yaw_index, axis=1)
@@ -165,7 +171,7 @@ def generate_trajectories(
     step_times = yaw_times.take(yaw_index, axis=1)
     vx = _ramp(velocities[:, 0], *axes[0], step_times)
     dx, dy = vx * cosine, vx * sine
-    if now.vy != 0.0 or velocities[:, 1].any():
+    if current.vy != 0.0 or velocities[:, 1].any():
         vy = _ramp(velocities[:, 1], *axes[1], step_times)
         dx, dy = dx - vy * sine, dy + vy * cosine
     return Trajectories(_accumulate(pose.x, dx), _accumulate(pose.y, dy), yaw, yaw_index, times)

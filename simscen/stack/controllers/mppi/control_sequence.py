@@ -1,4 +1,4 @@
-"""Control sequences of MPPI: weights of noisy copies, smoothing, limits, and advance in time.
+"""Control sequences of MPPI: weights of samples (noisy copies), smoothing, limits, and shift in time.
 
 A control sequence is an array (axes, steps) of velocities. The axes are vx, wz, and for a holonomic base vy.
 """
@@ -25,10 +25,11 @@ PAST_COMMANDS = 4
 def sample_weights(
     costs: Array, sequence: Floats, noise: Floats, deviations: Sequence[float], gamma: float, temperature: float
 ) -> Floats:
-    """Return the weights (n,) of samples with these costs (n,), proportional to exp(-cost / temperature).
+    """Return the weights (n,) of samples, proportional to exp(-total cost / temperature).
 
     `noise` (axes, steps, n) was added to the sequence. `deviations` are the standard deviations of the noise by axis.
-    Each cost includes the control cost: `gamma` times the product of sequence and noise, divided by the variance.
+    The total cost is the cost in `costs` (n,) plus the control cost: `gamma` times the product of sequence and noise,
+    divided by the variance.
     """
     total = costs.copy()
     for axis, deviation in enumerate(deviations):
@@ -39,7 +40,7 @@ def sample_weights(
 
 
 def smooth_sequence(sequence: Floats, past: Floats, order: int) -> Floats:
-    """Return the sequence, smoothed except for its last step. `past` (axes, 4) are the commands before the sequence.
+    """Return the sequence, smoothed except for the last step. `past` (axes, 4) are the commands before the sequence.
 
     `order` is a key of SMOOTHING_KERNELS.
     """
@@ -52,8 +53,8 @@ def smooth_sequence(sequence: Floats, past: Floats, order: int) -> Floats:
     return result
 
 
-def apply_limits(sequence: Floats, now: Floats, limits: VelocityLimits, dt: float) -> Floats:
-    """Return the sequence within the velocity and acceleration limits. Its first step is the velocity `now` (axes,).
+def apply_limits(sequence: Floats, current: Floats, limits: VelocityLimits, dt: float) -> Floats:
+    """Return the sequence within velocity and acceleration limits. The first step is the velocity `current` (axes,).
 
     Modifies `sequence`. `dt` is the time step in s.
     """
@@ -64,18 +65,18 @@ def apply_limits(sequence: Floats, now: Floats, limits: VelocityLimits, dt: floa
     result = np.empty_like(sequence)
     for axis in range(len(sequence)):
         result[axis] = _limit_axis(
-            sequence[axis].tolist(), float(now[axis]), (low[axis], high[axis]), (increase[axis], decrease[axis])
+            sequence[axis].tolist(), float(current[axis]), (low[axis], high[axis]), (increase[axis], decrease[axis])
         )
     _limit_curvature(result, limits)
     return result
 
 
 def _limit_axis(
-    requested: list[float], now: float, bounds: tuple[float, float], changes: tuple[float, float]
+    requested: list[float], current: float, bounds: tuple[float, float], changes: tuple[float, float]
 ) -> list[float]:
-    """Return the velocities of one axis within `bounds` (low, high), with limited `changes` per step (up, down)."""
+    """Return the velocities of one axis within `bounds` (low, high), with at most `changes` (up, down) per step."""
     (low, high), (up, down) = bounds, changes
-    limited, last = [now], now
+    limited, last = [current], current
     for velocity in requested[1:]:
         target = low if velocity < low else min(velocity, high)
         lowest, highest = (last + down, last + up) if last >= 0.0 else (last - up, last - down)
@@ -92,6 +93,6 @@ def _limit_curvature(sequence: Floats, limits: VelocityLimits) -> None:
 
 
 def shift_sequence(sequence: Floats, steps: float) -> Floats:
-    """Return the sequence, advanced by `steps` with linear interpolation. The last value is repeated."""
+    """Return the sequence, shifted by `steps` with linear interpolation. The last value is repeated."""
     index = np.arange(sequence.shape[1], dtype=np.float64)
     return np.stack([np.interp(index + steps, index, row) for row in sequence]).astype(np.float32)

@@ -51,7 +51,7 @@ SPEED_STD_RATIO = 0.5
 
 
 class MppiController(PathFollower):
-    """Controller that optimizes a control sequence in each control period, starting from the previous one."""
+    """Controller that optimizes a control sequence in each control period, starting from the previous sequence."""
 
     def __init__(self, spec: MppiSpec, setting: Setting) -> None:
         robot = setting.robot
@@ -68,7 +68,7 @@ class MppiController(PathFollower):
         self._std = np.array(deviations[: self._axes], np.float32)
         delays = (spec.model_delay_vx, spec.model_delay_wz, spec.model_delay_vy)
         self._delay_steps = tuple(math.floor(delay / spec.model_dt + 0.5) for delay in delays[: self._axes])
-        self._critics = CriticManager(spec, omni=model == "Omni")
+        self._critics = CriticManager(spec, is_omni=model == "Omni")
         self._period, self._shift_steps = setting.control_period, setting.control_period / spec.model_dt
         self._goal_rotation = GoalRotation(
             robot, spec.wz_max, robot.angular_acceleration, setting.control_period, spec.goal_tolerance_ratio
@@ -76,14 +76,14 @@ class MppiController(PathFollower):
         self._collision_checker = CollisionChecker(setting.footprint, spec.min_slowed_speed)
         reach = self._full_speed * spec.time_steps * spec.model_dt
         self._plan_length = max(spec.prune_distance, reach + PLAN_MARGIN_M)
-        self._pose, self._optimal_from = Pose2(0.0, 0.0), Pose2(0.0, 0.0)
+        self._pose, self._optimal_start = Pose2(0.0, 0.0), Pose2(0.0, 0.0)
         self._reset()
 
     def _reset(self) -> None:
         """Restart with a zero sequence and new noise."""
         axes, steps = self._axes, self._spec.time_steps
         self._sequence = np.zeros((axes, steps), np.float32)
-        self._sent = np.zeros((axes, max(PAST_COMMANDS, *self._delay_steps)), np.float32)
+        self._sent_commands = np.zeros((axes, max(PAST_COMMANDS, *self._delay_steps)), np.float32)
         self._draw_noise()
         self._optimal: Rollouts | None = None
 
@@ -98,21 +98,23 @@ class MppiController(PathFollower):
 
     @property
     def _limits(self) -> VelocityLimits:
+        """Velocity limits with the current speed limit."""
         return self._full_limits.scaled(self._speed_ratio)
 
     @property
     def local_plan(self) -> Path | None:
-        """Trajectory of the optimized control sequence; None before the first one and at the goal."""
+        """Trajectory of the optimized control sequence; None before the first sequence and at the goal."""
         if self._optimal is None:
             return None
-        optimal, start = self._optimal, self._optimal_from
+        optimal, start = self._optimal, self._optimal_start
         columns = (optimal.x[:, 0] + start.x, optimal.y[:, 0] + start.y, optimal.yaw[:, 0])
         return Path(np.column_stack(columns).astype(np.float64))
 
     def command(self, pose: Pose2, twist: Twist, costmap: CostmapView, goal: Goal) -> Twist:
         """Return the velocity command, slowed down if a collision is near.
 
-        Raises NO_VALID_CONTROL if all samples or their average collide, or if the slowed-down command is too slow.
+        Raises NO_VALID_CONTROL if all samples collide, if the optimized trajectory collides, or if the slowed-down
+        command is too slow.
         """
         tracker, self._pose = self._locate(pose), pose
         if self._goal_rotation.is_position_reached(pose, twist, goal, tracker.remaining()):
@@ -141,7 +143,7 @@ class MppiController(PathFollower):
                 is_free = self._iterate(velocity, critic_data)
             optimal = integrate_velocities(self._sequence[:, :, None], self._pose.yaw, self._spec.model_dt)
             if is_free and self._is_valid(critic_data(optimal)):
-                self._optimal, self._optimal_from = optimal, self._pose
+                self._optimal, self._optimal_start = optimal, self._pose
                 return self._next_command()
             self._reset()
         raise NavigationFailure(ErrorCode.NO_VALID_CONTROL, "every trajectory of the optimizer collides")
@@ -149,10 +151,10 @@ class MppiController(PathFollower):
     def _initial_velocity(self, twist: Twist) -> Floats:
         """Return the velocity (axes,) at the start of the new sequence.
 
-        With `open_loop`, it is the last command. Otherwise, it is the velocity nearest to the last command that the
-        base can reach within one period from its measured velocity.
+        With `open_loop`, this is the last command. Otherwise, this is the velocity nearest to the last command that the
+        base can reach within one period from the measured velocity.
         """
-        last_command: Floats = self._sent[:, -1]
+        last_command: Floats = self._sent_commands[:, -1]
         if self._spec.open_loop:
             return last_command
         measured, limits = np.array((twist.vx, twist.wz, twist.vy)), self._limits
@@ -169,13 +171,13 @@ class MppiController(PathFollower):
             self._draw_noise()
         controls = self._sequence[:, :, None] + self._noise
         velocities = predict_velocities(velocity, controls, limits, dt)
-        apply_model_delay(velocities, self._sent, self._delay_steps)
+        apply_model_delay(velocities, self._sent_commands, self._delay_steps)
         costs, all_collide = self._critics.costs(critic_data(integrate_velocities(velocities, self._pose.yaw, dt)))
         deviations: list[float] = self._std.tolist()
         average = controls @ sample_weights(
             costs, self._sequence, self._noise, deviations, spec.gamma, spec.temperature
         )
-        average = smooth_sequence(average, self._sent[:, -PAST_COMMANDS:], spec.sgf_order)
+        average = smooth_sequence(average, self._sent_commands[:, -PAST_COMMANDS:], spec.sgf_order)
         self._sequence = apply_limits(average, velocity, limits, dt)
         return not all_collide
 
@@ -194,6 +196,6 @@ class MppiController(PathFollower):
         """Shift the sequence by one control period, and return its first command."""
         self._sequence = shift_sequence(self._sequence, self._shift_steps)
         first = self._sequence[:, :1]
-        self._sent = np.concatenate((self._sent[:, 1:], first), axis=1)
+        self._sent_commands = np.concatenate((self._sent_commands[:, 1:], first), axis=1)
         vx, wz = float(first[VX, 0]), float(first[WZ, 0])
         return Twist(vx, float(first[VY, 0]) if self._axes > VY else 0.0, wz)

@@ -25,9 +25,11 @@ ESCAPE_TOLERANCE_M = 0.01
 
 
 class CellLookup(NamedTuple):
-    """Points x and y (…,) in the frame of the rollouts, with the flat index of the costmap cell at each point.
+    """Points in the frame of the rollouts, with the costmap cell at each point.
 
-    `on_map` marks the points that are on the costmap; None if all points are.
+    x, y:    coordinates (…,) in m
+    cell:    flat index (…,) of the cell
+    on_map:  mask (…,) of the points on the costmap; None if all points are on the costmap
     """
 
     x: Floats
@@ -40,9 +42,15 @@ class CellLookup(NamedTuple):
 class CriticData:
     """Input of the critics for n rollouts.
 
-    `plan`, `pose` (of the robot), and `goal_yaw` are in the frame of the costmap. `rollouts` and `path` are relative to
-    the position of the robot, without rotation: the frame of the rollouts. `dt` is the time step in s, `tolerance` the
-    position tolerance of the goal in m.
+    The origin of the frame of the rollouts is the position of the robot. Its axes are those of the costmap's frame.
+
+    rollouts:   rollouts, in the frame of the rollouts
+    plan:       plan ahead of the robot, in the costmap's frame
+    pose:       pose of the robot in the costmap's frame
+    goal_yaw:   heading of the goal in the costmap's frame
+    limits:     velocity limits with the current speed limit
+    dt:         time step in s
+    tolerance:  position tolerance of the goal in m
     """
 
     rollouts: Rollouts
@@ -57,7 +65,7 @@ class CriticData:
 
     @cached_property
     def path(self) -> tuple[Floats, Floats, Floats]:
-        """x, y, and yaw, each (m,), of the plan in the frame of the rollouts."""
+        """x, y, and yaw (each (m,)) of the plan in the frame of the rollouts."""
         x, y, yaw = self.plan.points.T
         return (x - self.pose.x).astype(np.float32), (y - self.pose.y).astype(np.float32), yaw.astype(np.float32)
 
@@ -65,8 +73,7 @@ class CriticData:
     def furthest_point(self) -> int:
         """Index of the furthest point of the plan that any rollout reaches (Nav2's findPathFurthestReachedPoint).
 
-        A rollout reaches the point nearest to its end. Points farther along the plan than the rollout is long are
-        ignored.
+        A rollout reaches the point nearest to its end, but no point beyond its own length along the plan.
         """
         x, y, _ = self.path
         length = self.rollouts.speed[1:].sum(axis=0) * np.float32(self.dt)
@@ -94,8 +101,8 @@ class CriticData:
             return moving
         farthest, times = np.sqrt((rollouts.x * rollouts.x + rollouts.y * rollouts.y).max(axis=1)), self.times
         reach, speed = self.footprint.circumscribed + MAX_INFLATION_M, float((farthest / times).max())
-        near = moving.near(self.pose.x, self.pose.y, reach, speed, float(times[-1]))
-        return near.in_frame(Pose2(self.pose.x, self.pose.y, 0.0)) if len(near) else near
+        nearby = moving.near(self.pose.x, self.pose.y, reach, speed, float(times[-1]))
+        return nearby.in_frame(Pose2(self.pose.x, self.pose.y, 0.0)) if len(nearby) else nearby
 
     @cached_property
     def times(self) -> Array:
@@ -105,20 +112,21 @@ class CriticData:
 
     @cached_property
     def moving_obstacle_costs(self) -> tuple[Floats, Floats]:
-        """Two costs of each rollout (n,): nearness to moving obstacles, and contact with a moving obstacle.
+        """Proximity costs (n,) and collision costs (n,) of the rollouts because of moving obstacles.
 
-        The first is the weighted mean of the squared nearness, which is 1 at contact and 0 at MOVING_CLEARANCE_M. The
-        second is the weight of the first contact; 0 without contact. Weights decay exponentially with time.
+        The proximity cost is the weighted mean of the squared nearness, which is 1 at contact and 0 at
+        MOVING_CLEARANCE_M plus one standard deviation. The collision cost is the weight of the first contact; 0 without
+        contact. Weights decay exponentially with time.
         """
         rollouts, times = self.rollouts, self.times.astype(np.float32)[:, None]
-        nearness, touches = self.footprint.discs.nearness(
+        nearness, is_contact = self.footprint.discs.nearness(
             self.moving, rollouts.x, rollouts.y, rollouts.yaw, times, MOVING_CLEARANCE_M
         )
         decay = np.exp(-times / np.float32(COLLISION_DECAY_S))
         squared = np.clip(nearness, 0.0, 2.0)
         squared *= squared
         proximity: Floats = (squared * decay).mean(axis=0)
-        collision: Floats = (touches * decay).max(axis=0)
+        collision: Floats = (is_contact * decay).max(axis=0)
         return proximity, collision
 
     @cached_property
@@ -161,7 +169,7 @@ class CriticData:
 
     @cached_property
     def _current_clearance(self) -> tuple[float, float]:
-        """Clearance in m of the inscribed circle and of the footprint at the current pose of the robot."""
+        """Clearance in m at the current pose: of the inscribed circle (index False), and of the footprint (True)."""
         origin, yaw = np.zeros((1, 1), np.float32), np.full((1, 1), self.pose.yaw, np.float32)
         points = self.lookup(origin, origin)
         inscribed, footprint = self.clearance(points, yaw, False), self.clearance(points, yaw, True)
@@ -176,7 +184,7 @@ class CriticData:
         discs: CoveringDiscs = self.footprint.discs
         if not consider_footprint:
             return np.asarray(self._distance(points) - np.float32(self.footprint.inscribed))
-        if discs.centered:
+        if discs.is_centered:
             return np.asarray(self._distance(points) - np.float32(discs.radius))
         cosine, sine = np.cos(yaw), np.sin(yaw)
         nearest = np.full(points.x.shape, np.inf, np.float32)
@@ -186,6 +194,7 @@ class CriticData:
         return np.asarray(nearest - np.float32(discs.radius))
 
     def _distance(self, points: CellLookup) -> Floats:
+        """Return the distances (…,) in m from points to the nearest lethal cell; inf off the costmap."""
         distance = self._flat_distances.take(points.cell)
         return distance if points.on_map is None else np.where(points.on_map, distance, np.float32(np.inf))
 
@@ -196,7 +205,7 @@ def considers_footprint(spec: MppiCostCritic | MppiObstaclesCritic | MppiTraject
 
 
 def hypot_in_place(dx: Floats, dy: Floats) -> Floats:
-    """Return the lengths of vectors (dx, dy). Overwrites the arguments. Much faster than np.hypot."""
+    """Return the lengths of vectors (dx, dy), much faster than np.hypot. Overwrites the arguments."""
     dx *= dx
     dy *= dy
     dx += dy

@@ -1,7 +1,7 @@
 """Critics of MPPI, which compute costs of rollouts (nav2_mppi_controller), and the manager that adds up the costs.
 
-A critic is a function of its parameters and the critic data. It returns the cost of each rollout (n,): the value that
-its docstring describes, times its weight.
+A critic is a function of its parameters and the critic data. A critic returns the costs (n,) of the rollouts: the value
+that its docstring describes, times the weight of the critic.
 """
 
 from typing import get_args
@@ -16,10 +16,10 @@ from simscen.stack.kinematics import accumulate_rows
 from simscen.stack.moving_obstacles import Mask
 
 MIN_TURN_RATE_RAD_S = np.float32(1e-6)
-"""Minimum turn rate in the computation of turning radii, so that these stay finite."""
+"""Minimum turn rate in the computation of turning radii, so that radii stay finite."""
 HALF_TURN_RAD = np.float32(np.pi)
 MAX_COST = 254.0
-"""Highest cost of a known cell, by which CostCritic divides."""
+"""Maximum cost of a known cell. CostCritic divides costs by this value."""
 OPTIONAL_CRITICS = ("ObstaclesCritic", "TwirlingCritic", "VelocityDeadbandCritic")
 """Critics that Nav2 does not enable by default."""
 DEFAULT_CRITICS: tuple[model.CriticName, ...] = tuple(
@@ -29,17 +29,17 @@ DEFAULT_CRITICS: tuple[model.CriticName, ...] = tuple(
 
 
 class CriticManager:
-    """Evaluates the enabled critics in order and adds up their costs."""
+    """Evaluates the enabled critics in order, and adds up their costs."""
 
-    def __init__(self, spec: model.Mppi, omni: bool) -> None:
-        """Take the specification. `omni`: the base is holonomic, so that TwirlingCritic is a default critic, too."""
-        default = (*DEFAULT_CRITICS, "TwirlingCritic") if omni else DEFAULT_CRITICS
+    def __init__(self, spec: model.Mppi, is_omni: bool) -> None:
+        """Take the specification. For a holonomic base (`is_omni`), TwirlingCritic is also a default critic."""
+        default = (*DEFAULT_CRITICS, "TwirlingCritic") if is_omni else DEFAULT_CRITICS
         names: tuple[model.CriticName, ...] = default if spec.critics is None else tuple(spec.critics)
         self._spec = spec
         self._names = [name for name in names if getattr(spec, name).enabled]
 
     def costs(self, data: CriticData) -> tuple[Array, bool]:
-        """Return the costs (n,) of the rollouts, and whether all of them collide according to any critic."""
+        """Return the costs (n,) of the rollouts, and whether any critic finds that all rollouts collide."""
         total = np.zeros(data.rollouts.x.shape[1])
         all_collide = False
         for name in self._names:
@@ -52,7 +52,7 @@ class CriticManager:
         return total, all_collide
 
     def _evaluate(self, name: model.CriticName, data: CriticData) -> tuple[Floats | None, Mask | None]:
-        """Return the costs (n,) of a critic, and which rollouts (n,) collide; None for what it does not determine."""
+        """Return the costs (n,) of a critic, and which rollouts (n,) collide; None for values it does not compute."""
         spec, length = self._spec, data.plan.length
         costs: Floats | None = None
         match name:
@@ -84,7 +84,7 @@ class CriticManager:
 def constraint_critic(spec: model.MppiConstraintCritic, data: CriticData) -> Floats:
     """Return the integral over time of the amount by which velocities exceed their limits.
 
-    For a car, the amount in m by which the turning radius is too small is added.
+    For a car, the excess includes the amount in m by which the turning radius is too small.
     """
     velocities, limits = data.rollouts.velocities, data.limits
     vx, (low, *_), (high, lateral, _) = velocities[VX], limits.low, limits.high
@@ -101,7 +101,8 @@ def constraint_critic(spec: model.MppiConstraintCritic, data: CriticData) -> Flo
 def cost_critic(spec: model.MppiCostCritic, data: CriticData) -> tuple[Floats, Mask]:
     """Return the mean costmap cost along each rollout, relative to MAX_COST, and which rollouts collide.
 
-    Near obstacles and in collisions, higher costs apply. Moving obstacles add costs.
+    Near obstacles, `critical_cost` replaces the cost of a cell. In a collision, `collision_cost` replaces the sum of
+    costs. Moving obstacles add costs.
     """
     steps = slice(None, None, spec.trajectory_point_step)
     x, y, yaw = data.rollouts.x[steps], data.rollouts.y[steps], data.rollouts.yaw[steps]
@@ -118,10 +119,10 @@ def cost_critic(spec: model.MppiCostCritic, data: CriticData) -> tuple[Floats, M
 
 
 def obstacles_critic(spec: model.MppiObstaclesCritic, data: CriticData) -> tuple[Floats, Mask]:
-    """Return costs for the nearness of obstacles, and which rollouts collide.
+    """Return costs for small distances to obstacles, and which rollouts collide.
 
-    Within the collision margin, the cost increases linearly with the nearness. Within the inflation radius, a smaller
-    cost is added, from which its minimum over all rollouts is subtracted.
+    Within the collision margin, the cost increases linearly as the distance decreases. Within the inflation radius, a
+    repulsion cost is added: its excess over the minimum of all rollouts.
     """
     x, y, yaw = data.rollouts.x, data.rollouts.y, data.rollouts.yaw
     points, consider_footprint = data.lookup(x, y), considers_footprint(spec)
@@ -208,8 +209,8 @@ def path_align_critic(spec: model.MppiPathAlignCritic, data: CriticData) -> Floa
     if not occupied:
         return np.asarray(spec.cost_weight * distance.mean(axis=0))
     is_free = free.take(point)
-    compared = np.maximum(is_free.sum(axis=0), 1)
-    return np.asarray(spec.cost_weight * (distance * is_free).sum(axis=0) / compared)
+    free_count = np.maximum(is_free.sum(axis=0), 1)
+    return np.asarray(spec.cost_weight * (distance * is_free).sum(axis=0) / free_count)
 
 
 def path_follow_critic(spec: model.MppiPathFollowCritic, data: CriticData) -> Floats:
@@ -225,8 +226,8 @@ def path_follow_critic(spec: model.MppiPathFollowCritic, data: CriticData) -> Fl
 def path_angle_critic(spec: model.MppiPathAngleCritic, data: CriticData) -> Floats | None:
     """Return the angle in rad between the final heading of each rollout and the direction to a point of the plan.
 
-    The point is beyond all rollouts. Return None if its direction from the robot differs by less than
-    `max_angle_to_furthest` from the current heading.
+    The point is beyond all rollouts. Return None if the direction from the robot to the point differs from the current
+    heading by less than `max_angle_to_furthest`.
     """
     path_x, path_y, path_yaw = data.path
     index = min(data.furthest_point + spec.offset_from_furthest, len(path_x) - 1)

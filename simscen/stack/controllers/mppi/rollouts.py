@@ -17,15 +17,18 @@ from simscen.stack.kinematics import Axes, VelocityLimits, accumulate_rows, velo
 from simscen.stack.protocols import RobotModel
 
 Floats = npt.NDArray[np.float32]
+"""Array of 32-bit floats."""
 VX, WZ, VY = 0, 1, 2
 """Indices of the axes of a control sequence: forward, turn rate, and sideways."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rollouts:
-    """Simulated trajectories: positions (steps, n) in m, headings (steps, n), and velocities (axes, steps, n).
+    """Simulated trajectories of n control sequences.
 
-    Positions are relative to the position of the robot, along the axes of the costmap's frame.
+    x, y:        positions (steps, n) in m, relative to the position of the robot, along the axes of the costmap's frame
+    yaw:         headings (steps, n) in rad in the costmap's frame
+    velocities:  velocities (axes, steps, n)
     """
 
     x: Floats
@@ -41,13 +44,13 @@ class Rollouts:
         return np.asarray(np.hypot(self.velocities[VX], self.velocities[VY]))
 
 
-def predict_velocities(now: Floats, controls: Floats, limits: VelocityLimits, dt: float) -> Floats:
-    """Return the velocities of the base: `now` (axes,) at the first step, then the control of the previous step.
+def predict_velocities(current: Floats, controls: Floats, limits: VelocityLimits, dt: float) -> Floats:
+    """Return the velocities of the base: `current` (axes,) at the first step, then the control of the previous step.
 
-    Accelerations are limited, but speeds are not: as in Nav2, ConstraintCritic penalizes speeds beyond the limits.
+    Only accelerations are limited. As in Nav2, ConstraintCritic penalizes velocities beyond the limits.
     """
     velocities = np.empty_like(controls)
-    velocities[:, 0] = now[:, None]
+    velocities[:, 0] = current[:, None]
     increase, decrease = in_sequence_order(limits.acceleration) * dt, in_sequence_order(limits.deceleration) * dt
     changes = zip(increase.astype(np.float32), decrease.astype(np.float32), strict=True)
     for axis, requested, (up, down) in zip(velocities, controls, changes, strict=False):
@@ -67,7 +70,7 @@ def _limit_changes(velocities: Floats, requested: Floats, change: np.float32) ->
 
 
 def _limit_asymmetric_changes(velocities: Floats, requested: Floats, up: np.float32, down: np.float32) -> None:
-    """Do the same as `_limit_changes` for an axis whose deceleration `down` differs from its acceleration `up`."""
+    """Do the same as `_limit_changes`, if acceleration (`up`) and deceleration (`down`) have different limits."""
     bound, forward = np.empty_like(velocities[0]), np.empty(velocities[0].shape, np.bool_)
     lowest, highest = np.array((-up, down)), np.array((-down, up))
     for (last, now), target in zip(pairwise(velocities), requested, strict=False):
@@ -82,8 +85,8 @@ def integrate_velocities(velocities: Floats, yaw: float, dt: float) -> Rollouts:
     """Return the rollouts of these velocities, with the initial heading `yaw`. Headings are constant within a step."""
     step, (steps, count) = np.float32(dt), velocities.shape[1:]
     headings = np.empty((steps + 1, count), np.float32)
-    headings[0], later = 0.0, headings[1:]
-    accumulate_rows(np.multiply(velocities[WZ], step, out=later))
+    headings[0], end_headings = 0.0, headings[1:]
+    accumulate_rows(np.multiply(velocities[WZ], step, out=end_headings))
     headings += np.float32(yaw)
     cosine, sine = np.cos(headings[:-1]), np.sin(headings[:-1])
     dx, dy = velocities[VX] * cosine, velocities[VX] * sine
@@ -92,13 +95,14 @@ def integrate_velocities(velocities: Floats, yaw: float, dt: float) -> Rollouts:
         dy += velocities[VY] * cosine
     dx *= step
     dy *= step
-    return Rollouts(accumulate_rows(dx), accumulate_rows(dy), later, velocities)
+    return Rollouts(accumulate_rows(dx), accumulate_rows(dy), end_headings, velocities)
 
 
 def apply_model_delay(velocities: Floats, sent: Floats, steps: tuple[int, ...]) -> None:
-    """Delay velocities in place: at step k, an axis follows control k - `steps` instead of k - 1.
+    """Delay velocities in place. `steps` is the delay of each axis in time steps.
 
-    The last commands `sent` (axes, m) fill the gap.
+    At time step k, an axis with the delay d follows control k - d instead of k - 1. For k < d, the axis follows the
+    previous commands `sent` (axes, m).
     """
     for axis, earlier, delay in zip(velocities, sent, steps, strict=False):
         if delay:

@@ -53,9 +53,9 @@ def test_sampled_combinations_equal_those_of_dwb(case: dict[str, Any]) -> None:
 def test_trajectory_of_a_velocity(case: dict[str, Any]) -> None:
     given = case["given"]
     base = kinematics(given.get("acceleration", AT_ONCE), given.get("deceleration", -AT_ONCE))
-    pose, now = Pose2(*given.get("pose", (0, 0, 0))), Twist(*given.get("now", (0, 0, 0)))
+    pose, current = Pose2(*given.get("pose", (0, 0, 0))), Twist(*given.get("current", (0, 0, 0)))
     velocities = np.array([given["velocity"]])
-    found = generate_trajectories(pose, now, velocities, base, given["seconds"], given["meters"], given["radians"])
+    found = generate_trajectories(pose, current, velocities, base, given["seconds"], given["meters"], given["radians"])
     assert found.poses(np.array([0]))[:, 0] == pytest.approx(np.array(case["expect"]), abs=1e-9)
 
 
@@ -85,7 +85,7 @@ def test_rotate_to_goal_critic_scores_stopping_and_turning(case: dict[str, Any])
     given, expect = case["given"], case["expect"]
     critic = RotateToGoalCritic(stopped_velocity=0.25, slowing_factor=5.0)
     found, legal = critic.scores(
-        Twist(*given["now"]), given["goal_yaw"], np.array(given["velocities"]), np.array(given["end_yaws"])
+        Twist(*given["current"]), given["goal_yaw"], np.array(given["velocities"]), np.array(given["end_yaws"])
     )
     assert found == pytest.approx(expect["scores"], abs=1e-9)
     assert legal.tolist() == expect["legal"]
@@ -97,7 +97,7 @@ def test_oscillation_critic_forbids_reversals(case: dict[str, Any]) -> None:
     for command, moved in zip(case["given"]["commands"], case["given"]["moved"], strict=True):
         critic.record(Pose2(moved, 0.0), Twist(*command))
     tried = {"forward": (0.2, 0, 0), "backward": (-0.2, 0, 0), "left": (0, 0, 0.3), "right": (0, 0, -0.3)}
-    legal = dict(zip(tried, critic.legal(np.array(list(tried.values()))).tolist(), strict=True))
+    legal = dict(zip(tried, critic.is_legal(np.array(list(tried.values()))).tolist(), strict=True))
     assert {name: legal[name] for name in case["expect"]} == case["expect"]
 
 

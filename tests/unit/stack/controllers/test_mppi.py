@@ -308,4 +308,4 @@ def test_rollouts_collide_if_any_critic_says_so(order: tuple[model.CriticName, .
     data = replace(scene(along(0.8), view_of((0.5, 0.2, 1.0, 0.4))), footprint=Footprint(box_robot(width=0.36), 0.05))
     assert not critics.obstacles_critic(circle, data)[1].any()
     assert critics.cost_critic(spec.CostCritic, data)[1].all()
-    assert critics.CriticManager(spec, omni=False).costs(data)[1]
+    assert critics.CriticManager(spec, is_omni=False).costs(data)[1]

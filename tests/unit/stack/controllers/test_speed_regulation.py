@@ -76,7 +76,7 @@ def test_speed_is_reduced_before_a_curve() -> None:
 def test_curvature_of_a_circle_is_one_over_its_radius(radius: float) -> None:
     track = PathTracker(Path(bent(radius)))
     track.locate(Pose2(0.0, 0.0, 0.0))
-    track.index = int(np.searchsorted(track.along, 3.2))
+    track.index = int(np.searchsorted(track.path_lengths, 3.2))
     meters, places, bends = zip(*track.samples_ahead(0.1, radius * math.pi / 2 - 0.6), strict=True)
     assert bends == pytest.approx([1.0 / radius] * len(bends), rel=0.03)
     assert np.diff(meters) == pytest.approx(0.1, abs=0.051)
