@@ -20,7 +20,9 @@ SlipRatio = Annotated[float, Field(ge=0, lt=1), Quantity("ratio")]
 GainFactor = Annotated[float, Field(ge=-10, le=10), Quantity("ratio")]
 """Ratio of driven to commanded velocity."""
 SpeedLimit = Annotated[float, Field(ge=0, le=100), Quantity("speed")]
+"""Maximum speed in m/s; 0 blocks the motion."""
 TurnRateLimit = Annotated[float, Field(ge=0, le=100), Quantity("angular speed")]
+"""Maximum turn rate in rad/s; 0 blocks the rotation."""
 
 
 def side_speeds(motion: Twist, wheel_separation: float) -> tuple[float, float]:
@@ -169,6 +171,7 @@ class _LimitedCommands(FaultEffect):
         return self._previous
 
     def _limit_speeds(self, command: Twist) -> Twist:
+        """Return the command with limited speeds of the base and of each side."""
         spec, separation = self._spec, self._setting.separation
         vx, vy = _limit_length((command.vx, command.vy), spec.linear)
         (wz,) = _limit_length((command.wz,), spec.angular)
@@ -180,6 +183,7 @@ class _LimitedCommands(FaultEffect):
         return twist_from_sides(left, right, limited.vy, separation)
 
     def _limit_accelerations(self, previous: Twist, command: Twist, seconds: float) -> Twist:
+        """Return the command with a limited change from the `previous` one, `seconds` earlier."""
         spec = self._spec
         vx, vy = _limit_length((command.vx - previous.vx, command.vy - previous.vy), spec.linear_acceleration, seconds)
         (wz,) = _limit_length((command.wz - previous.wz,), spec.angular_acceleration, seconds)

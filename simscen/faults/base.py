@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class SensorSimulator(Protocol):
-    """Simulates what the target of a fault, a lidar or camera, would measure with another pose or without objects."""
+    """Simulates measurements of a lidar or camera with another pose of the sensor, or without some objects."""
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
         """Return the true distances (n,) in meters along the beams of a scan of the current tick.
@@ -50,7 +50,7 @@ class FaultSetting:
     separation:  distance between left and right wheels in m; 0 for a drive without left and right wheels
     clock:       conversion between ticks (physics steps) and seconds
     now:         returns the current tick
-    kind:        kind of the target, one of the fault's `affects`
+    kind:        kind of the target; see `Fault.affects`
     simulator:   simulator of the target; None if the target is not a lidar or camera
     command:     command that the base executed when the fault began
     """

@@ -27,7 +27,7 @@ def apply_pose_error(belief: Belief, error: Pose2) -> Belief:
 
 
 def change_distances(reading: Reading, change: Callable[[Array], Array]) -> Reading:
-    """Return a scan or image with changed ranges or depths. Values that are not finite, and other readings, stay as is.
+    """Return a scan or image with changed finite ranges or depths. Other readings are returned unchanged.
 
     `change` maps an array of distances in m to the changed distances. Ranges outside the limits of the lidar become inf
     or -inf (REP 117). Negative depths become 0.

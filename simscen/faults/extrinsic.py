@@ -16,6 +16,7 @@ from simscen.spec.base import Spec
 from simscen.spec.quantities import Angle, Length
 
 ROTATION_KEYS = ("roll", "pitch", "yaw")
+"""Keys of the rotation. The position of an IMU is ignored."""
 
 
 class Extrinsic(Spec, Fault):

@@ -23,11 +23,11 @@ REFERENCE_REFLECTIVITY = 0.9
 
 
 class Glass(Spec, Fault):
-    """Beams pass through the named objects, such as glass doors, and measure the surfaces behind them.
+    """Beams pass through the named objects, such as glass doors, and measure the surfaces behind the objects.
 
     A real beam is reflected if it is nearly perpendicular to the pane (Foster, Sun, Park and Kuipers, VisAGGE: Visible
-    angle grid for glass environments, 2013); this fault ignores the angle. The robot still collides with the objects,
-    and its map still shows them.
+    angle grid for glass environments, 2013). This fault ignores the angle. The robot still collides with the objects,
+    and the map still shows the objects.
 
     Example: `{sensor: lidar, glass: {of: [east wall]}}`
     """

@@ -26,8 +26,8 @@ Rings = Annotated[list[Ring], Field(max_length=100)]
 class Jump(Spec, Fault):
     """The estimated pose jumps, as when a localizer mistakes one aisle for another.
 
-    The jump is given in the frame of the estimated pose at the start of the fault. The estimated pose keeps this error
-    until the fault ends, and then jumps back. The fault does not disturb the localizer itself.
+    The keys are the displacement in the frame of the estimated pose at the start of the fault. The estimated pose keeps
+    this error until the fault ends, and then jumps back. The fault does not disturb the localizer itself.
 
     Example: `{sensor: localizer, jump: {x: 1 m, yaw: 10 deg}, when: {time: 5 s}, for: 3 s}`
     """

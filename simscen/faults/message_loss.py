@@ -58,9 +58,9 @@ class Off(Spec, Fault):
 
 
 class Dropout(Spec, Fault):
-    """Each message is lost with a fixed probability, independently of the others, as over a bad radio link.
+    """Each message is lost with a fixed probability, independently of other messages, as on a bad radio link.
 
-    A base that receives no command keeps the last one and stops after its `command_timeout`.
+    A base that receives no command keeps the last command, and stops after its `command_timeout`.
 
     Example: `{sensor: lidar, dropout: {probability: 30 %}}`
     """
@@ -113,8 +113,8 @@ class _GilbertChannel:
 class Slow(Spec, Fault):
     """Messages arrive at a lower rate than normal: an overloaded computer, a sensor in its energy-saving mode.
 
-    Only the first message in each period of 1 / `rate` arrives. All other messages are lost. Without a new velocity
-    command, the base keeps the last one and stops after its `command_timeout`.
+    Only the first message in each period of 1 / `rate` arrives. All other messages are lost. A base that receives no
+    command keeps the last command, and stops after its `command_timeout`.
 
     Example: `{sensor: lidar, slow: {rate: 2 Hz}}`
     """

@@ -56,9 +56,9 @@ class Bias(Spec, Fault):
     range: Length = 0.0
     """Added to each range or depth."""
     gyro: AngularSpeed = 0.0
-    """Added to the angular velocity about the vertical axis."""
+    """Added to the angular velocity about the z axis of the IMU."""
     accelerometer: Acceleration = 0.0
-    """Added to the forward acceleration."""
+    """Added to the acceleration along the x axis of the IMU."""
     brightness: Annotated[float, Field(ge=-1, le=1), Quantity("ratio")] = 0.0
     """Added to red, green, and blue of each pixel; 1 is the full scale."""
 
@@ -88,7 +88,7 @@ class Scale(Spec, Fault):
     """All values of a sensor are too large or too small by a factor. Of a camera, only the depths change.
 
     Possible causes are a lidar clock that runs fast or slow, low tire pressure (odometry), and a wrong full-scale
-    setting of an IMU. The acceleration that the factor scales in an IMU includes gravity.
+    setting of an IMU. The acceleration of an IMU is scaled including gravity.
 
     Example: `{sensor: odom, scale: {factor: 105 %}}`
     """
@@ -139,7 +139,7 @@ class Drift(Spec, Fault):
     angular: AngularSpeed = 0.0
     """Angular velocity error of the odometry or of the estimated pose."""
     gyro: AngularAcceleration = 0.0
-    """Growth rate of the error of the angular velocity about the vertical axis."""
+    """Growth rate of the error of the angular velocity about the z axis of the IMU."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         if setting.kind != "Odometry":

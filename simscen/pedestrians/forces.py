@@ -15,6 +15,7 @@ import numpy.typing as npt
 from simscen.core.geometry import Array
 
 Indices = npt.NDArray[np.int64]
+"""Indices (n,) into arrays or lists."""
 
 RELAXATION_TIME_S = 0.54
 """Time constant with which pedestrians reach their intended velocity, τ [M09: 0.54 ± 0.05]."""
@@ -84,7 +85,7 @@ def wall_forces(directions: Array, gaps: Array) -> Array:
 def group_forces(positions: Array, velocities: Array) -> Array:
     """Return the forces (n, 2) that keep the members of one group together.
 
-    `positions` (n, 2) in m and `velocities` (n, 2) in m/s are those of the at least two members.
+    `positions` (n, 2) are in m, `velocities` (n, 2) in m/s. There must be at least two members.
     """
     # Python floats are faster than arrays for small groups.
     points, point_velocities = positions.tolist(), velocities.tolist()

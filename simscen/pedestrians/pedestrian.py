@@ -1,4 +1,4 @@
-"""One pedestrian: its state, its goals, and its reaction to robots."""
+"""State of a pedestrian, with goals and the reaction to robots."""
 
 import math
 from dataclasses import dataclass, field
@@ -58,7 +58,7 @@ class Pedestrian:
     pose: Pose2
     """Position and heading."""
     velocity: tuple[float, float] = (0.0, 0.0)
-    """In m/s along x and y."""
+    """Velocity in m/s along x and y."""
     goal_index: int = 0
     """Index of the current goal in `spec.goals`."""
     is_forward: bool = True

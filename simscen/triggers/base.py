@@ -88,7 +88,7 @@ class AnyCondition(Choice):
             yield from operand.walk()
 
     def situation_of_robot(self, now: Situation) -> Situation:
-        """Return the situation of the robot `self.robot`; `now` itself if it is None."""
+        """Return the situation of the robot that `robot` names; `now` itself if `robot` is None."""
         return now if self.robot is None else now.of(self.robot)
 
     def holds(self, now: Situation) -> bool:
@@ -113,7 +113,7 @@ class AnyCondition(Choice):
 
 
 class Trigger(AnyCondition):
-    """Condition that starts an event or a fault, with the number, delay, and probability of the starts."""
+    """Condition that starts an event or a fault when it becomes true; with `edge: falling`, when it becomes false."""
 
     modifiers: ClassVar[frozenset[str]] = frozenset({"for_", "robot", "edge", "delay", "times", "probability"})
 

@@ -56,7 +56,8 @@ class TurningAbove(Value[PositiveAngularSpeed], Condition):
 class TurningBelow(Value[PositiveAngularSpeed], Condition):
     """True while the true turn rate of the robot, in either direction, is less than the given one (rad/s).
 
-    Combine it with `for` to detect the end of a turn. The condition is also true for a robot that stands still.
+    Combine the condition with `for` to detect the end of a turn. The condition is also true for a robot that stands
+    still.
 
     Example: `when: {turning_below: 5 deg/s, for: 1 s}`
     """

@@ -101,8 +101,8 @@ class GridFrame:
         return (first // width, int(lowest(columns))), (last // width, int(highest(columns)))
 
     def covers(self, x: float, y: float) -> bool:
-        """Return whether the point (x, y) lies on the grid."""
-        column, row = (x - self.origin[0]) / self.resolution, (y - self.origin[1]) / self.resolution
+        """Return whether the cell at the point (x, y) is on the grid."""
+        row, column = self.cell(x, y)
         return 0 <= row < self.shape[0] and 0 <= column < self.shape[1]
 
     def from_window(self, window: tuple[slice, slice], indices: CellIndices) -> CellIndices:

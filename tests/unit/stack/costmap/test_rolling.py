@@ -1,8 +1,10 @@
+import math
+
 import numpy as np
 import pytest
 
 from simscen.core.geometry import Pose2
-from simscen.stack.costmap.grid_frame import clip_goal, shift_layer, should_roll, window_around
+from simscen.stack.costmap.grid_frame import GridFrame, clip_goal, shift_layer, should_roll, window_around
 
 
 def test_windows_around_different_points_share_their_cells() -> None:
@@ -40,3 +42,9 @@ def test_disjoint_window_starts_empty(to: Pose2) -> None:
 def test_goal_beyond_the_window_is_projected_into_it(goal: tuple[float, float], aim: tuple[float, float]) -> None:
     frame = window_around(Pose2(0, 0), (8.0, 8.0), 0.05)
     assert clip_goal(frame, Pose2(0, 0), Pose2(*goal))[:2] == pytest.approx(aim)
+
+
+def test_point_whose_cell_is_rounded_off_the_grid_is_not_covered() -> None:
+    frame, y = GridFrame((0.0, 0.0), 0.03, (9, 9)), math.nextafter(9 * 0.03, 0.0)
+    assert frame.cell(0.1, y)[0] == 9
+    assert not frame.covers(0.1, y)
