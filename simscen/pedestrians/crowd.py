@@ -47,7 +47,7 @@ class Crowd:
         self._steps = 0
 
     def add(self, spec: WalkingPedestrian) -> None:
-        """Add a pedestrian at its initial pose, or replace the one with the same name."""
+        """Add a pedestrian at its initial pose. Replaces a pedestrian with the same name."""
         self._people[spec.name] = Pedestrian(spec, spec.pose, has_arrived=not spec.goals)
         self._people = dict(sorted(self._people.items()))
 

@@ -30,7 +30,7 @@ class MoveLimits(NamedTuple):
 def move_limits(
     people: Sequence[Pedestrian], positions: Array, surroundings: Surroundings, walls: NearestPoints
 ) -> list[MoveLimits]:
-    """Return limits of the moves of one step. `positions` (n, 2) in m are those of the `people`.
+    """Return limits of the moves of one step. `positions` (n, 2) are the positions of the `people` in m.
 
     A pedestrian may use the entire gap to a wall, but only half of the gap to an object, robot, or pedestrian.
     """

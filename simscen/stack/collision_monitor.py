@@ -54,8 +54,12 @@ class CollisionMonitor:
         """For each lidar, the tick at which its latest message arrived and the tick of the scan."""
         self.hold_ticks = spec.hold_timeout * tick_rate or math.inf
         """Time in ticks after which stopping the robot counts as a failure; inf if disabled."""
-        self._scan_ticks, self._oldest, self._start_tick = dict.fromkeys(lidars, -math.inf), -math.inf, 0
+        self._scan_ticks = dict.fromkeys(lidars, -math.inf)
+        """Tick of the latest usable scan of each lidar."""
+        self._oldest, self._start_tick = -math.inf, 0
+        """Minimum of `_scan_ticks`, and the tick at which the task started."""
         self._scans: dict[str, RecordedScan] = {}
+        """Latest usable scan of each lidar."""
         self._moving, self._has_moving = NO_MOVING_OBSTACLES, False
         corners = np.array(robot.footprint, dtype=np.float64)
         ends = np.roll(corners, -1, axis=0)
@@ -64,9 +68,11 @@ class CollisionMonitor:
         if spec.simulation_time_step is not None:
             steps = math.ceil(spec.time_before_collision / spec.simulation_time_step - STEP_TOLERANCE)
         self._times = np.linspace(0.0, spec.time_before_collision, min(MAX_STEPS, steps) + 1)
+        """Times in s from now at which the motion is simulated."""
         self._stop_radius = robot.circumscribed_radius + spec.stop_margin
         self._normal = normal / np.hypot(normal[:, 0], normal[:, 1])[:, None]
         self._offset = np.sum(self._normal * corners, axis=1)
+        """Outward unit normals (n, 2) of the footprint's edges, and distances (n,) of the edges from the base."""
         self._max_edge_distance, self._miter_factor = float(self._offset.max()), _miter_factor(self._normal)
         if robot.radius is not None:
             self._max_edge_distance, self._miter_factor = robot.radius, 1.0

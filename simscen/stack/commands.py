@@ -63,7 +63,7 @@ class VelocitySmoother:
         return Twist(vx, vy, wz)
 
     def _accelerated(self, current: float, target: float, periods: int) -> float:
-        """Return the speed along one axis after `periods`. To change its sign, the speed reaches zero first."""
+        """Return the speed along one axis after `periods`. A change of direction first stops at zero."""
         if current * target < 0.0:
             target = 0.0
         step = periods * (self._speed_up_step if abs(target) > abs(current) else self._slow_down_step)

@@ -171,7 +171,7 @@ class CoveringDiscs:
     def nearness(
         self, moving: MovingObstacles, x: Reals, y: Reals, yaw: Reals, times: Reals, margin: float
     ) -> tuple[Reals, Mask]:
-        """Return the nearness (…,) of the nearest moving obstacle at `times` in s, and whether it is in contact.
+        """Return the nearness (…,) of the nearest moving obstacle at `times` in s, and whether any touches a disc.
 
         The nearness is 1 at contact, and 0 at a distance of `margin` m plus one standard deviation of the position.
         """

@@ -28,8 +28,8 @@ Reals = npt.NDArray[np.floating]
 class MovingObstacle(NamedTuple):
     """A moving upright cylinder: position of its axis in m, velocity in m/s, and radius in m.
 
-    The uncertainty is the same along x and y. The variances are those along one axis. `covariance` is the covariance
-    of position and velocity along one axis.
+    The uncertainty is the same along x and y. The variances, and the `covariance` of position and velocity, are along
+    one axis.
     """
 
     position: complex

@@ -46,7 +46,7 @@ class Publisher:
         self.belief_due = 0
         """Tick from which the belief is published even without a scan."""
         self._local_plan_due = self._local_plan_period
-        self._arcs = controller if isinstance(controller, SupportsArc) else None
+        self._arc_controller = controller if isinstance(controller, SupportsArc) else None
         self._plan: Path | None = None
         self._global_costmap = _CostmapPublisher("global", "map")
         self._local_costmap = _CostmapPublisher("local", local_frame)
@@ -74,8 +74,8 @@ class Publisher:
     def _map_local_plan(self, tick: int, frames: Frames) -> Path | None:
         """Return the controller's local plan in the map frame."""
         self._local_plan_due = tick + self._local_plan_period
-        if self._arcs is not None:
-            arc = self._arcs.arc
+        if self._arc_controller is not None:
+            arc = self._arc_controller.arc
             if arc is None:
                 return None
             return Path(arc_poses(frames.map_from_odom.compose(arc[0]), arc[1], LOCAL_PLAN_TIMES_S))

@@ -62,7 +62,7 @@ class ReferenceStack:
         """
         self._speed_filter = SpeedFilter(surroundings)
         self._localizer, self._costmaps, self._controller = localizer, costmaps, controller
-        self._pose_source = localizer if isinstance(localizer, SupportsPose) else None
+        self._pose_localizer = localizer if isinstance(localizer, SupportsPose) else None
         self._navigator, self._task, self._commands, self._monitor = navigator, task, commands, monitor
         self._tick_rate, self._lidars = surroundings.tick_rate, frozenset(surroundings.lidars)
         self._control_period = control_period
@@ -74,11 +74,15 @@ class ReferenceStack:
         self._events: list[Event] = []
         self._tick = 0
         self._twist = STOP
+        """Latest measured velocity."""
         self._odometry, self._wheel_sensor, self._imu_sensor = odometry, "", ""
+        """Odometry history, and the names of the wheel odometry and the IMU that are used ("" before a reading)."""
         self._zones: Zones | None = None
+        """Zones for the next update of the global costmap; None without a change."""
         self._standstill = StandstillReporter(surroundings.tick_rate)
         self._last_decision = Decision(STOP)
         self._pending: Readings = ()
+        """Readings that will be processed later (see `_can_wait`)."""
 
     def start(self, estimate: Estimate, goals: tuple[Goal, ...]) -> None:
         """Initialize the localizer with the estimate, and drive to the goals in order."""
@@ -280,8 +284,8 @@ class ReferenceStack:
 
     def _believed_pose(self) -> Pose2:
         """Return the localizer's estimate of the pose in the map frame."""
-        source = self._pose_source
-        return self._localizer.belief.pose if source is None else source.pose
+        localizer = self._pose_localizer
+        return self._localizer.belief.pose if localizer is None else localizer.pose
 
     # Control ----------------------------------------------------------------------------------------------------------
 

@@ -74,12 +74,14 @@ class LayeredCostmap:
         self._frame = self._static.frame
         rows, columns = self._frame.shape
         self._whole: tuple[Cell, Cell] = (0, 0), (rows - 1, columns - 1)
+        """Lowest and highest cell of the costmap."""
         # A change of a small costmap affects most cells. Recomputing all cells is then faster.
         self._recomputes_all = max(rows, columns) <= 4 * self._inflation.reach_cells
         self._live = ObstacleLayer(spec, self._inscribed, self._frame)
         self._unknown = None if self._static.unknown is None else self._static.unknown.copy()
-        self._scans = 0
+        self._scan_count = 0
         self._latest_readings: dict[str, tuple[Pose2, Scan | Image]] = {}
+        """Newest reading of each sensor, with the pose of the robot. The newest of all readings is the last item."""
         self._revision, self._added_keepout_cells = 0, 0
         self._changes = deque[CellIndices | None](maxlen=MAX_REVISIONS)
         """Cells with changed obstacles for each of the last revisions; None if all cells may have changed."""
@@ -238,8 +240,8 @@ class LayeredCostmap:
 
     def _update_unknown(self, base: Pose2, scan: Scan, unknown: Mask) -> None:
         """With every n-th scan, remove the cells that beams cross from the mask `unknown`."""
-        self._scans += 1
-        if self._scans % SCANS_PER_UNKNOWN_UPDATE != 1:
+        self._scan_count += 1
+        if self._scan_count % SCANS_PER_UNKNOWN_UPDATE != 1:
             return
         frame = self._frame
         window = self._live.window_around_robot(base, math.hypot(scan.mount.x, scan.mount.y))

@@ -28,7 +28,7 @@ PLANNERS: dict[str, Callable[[Any], Any]] = {
 }
 """Constructors of OMPL's planners by the `type` in the specification. The argument is OMPL's SpaceInformation."""
 FIRST_PATH_PLANNERS = frozenset(("rrt_connect", "kpiece"))
-"""Types of planners that stop at their first path. All others continue to improve the path."""
+"""Types of planners that stop at their first path. All other planners continue to improve the path."""
 DEFAULT_RANGE_M = 1.0
 """Default of the parameter `range`: the maximum length of a motion in the search tree."""
 DEFAULT_BIT_STAR_REWIRE_FACTOR = 1.3

@@ -48,7 +48,7 @@ class KinematicParameters(VelocityLimits):
 
 
 def kinematic_parameters(spec: DwbSpec, robot: RobotModel, full_speed: float) -> KinematicParameters:
-    """Return the limits of the specification, bounded by those of the robot. `full_speed` is the maximum vx in m/s."""
+    """Return the limits of the specification, bounded by the robot's limits. `full_speed` is the maximum vx in m/s."""
     lateral = full_speed if spec.max_vel_y is None else spec.max_vel_y
     limits = velocity_limits(
         robot,

@@ -77,6 +77,7 @@ class MppiController(PathFollower):
         reach = self._full_speed * spec.time_steps * spec.model_dt
         self._plan_length = max(spec.prune_distance, reach + PLAN_MARGIN_M)
         self._pose, self._optimal_start = Pose2(0.0, 0.0), Pose2(0.0, 0.0)
+        """Current pose of the robot, and pose at which the trajectory `_optimal` starts."""
         self._reset()
 
     def _reset(self) -> None:
@@ -84,6 +85,7 @@ class MppiController(PathFollower):
         axes, steps = self._axes, self._spec.time_steps
         self._sequence = np.zeros((axes, steps), np.float32)
         self._sent_commands = np.zeros((axes, max(PAST_COMMANDS, *self._delay_steps)), np.float32)
+        """Last commands, the latest one at the end."""
         self._draw_noise()
         self._optimal: Rollouts | None = None
 

@@ -42,7 +42,7 @@ class CellLookup(NamedTuple):
 class CriticData:
     """Input of the critics for n rollouts.
 
-    The origin of the frame of the rollouts is the position of the robot. Its axes are those of the costmap's frame.
+    The frame of the rollouts has its origin at the position of the robot, and the orientation of the costmap's frame.
 
     rollouts:   rollouts, in the frame of the rollouts
     plan:       plan ahead of the robot, in the costmap's frame

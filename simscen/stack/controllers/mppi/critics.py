@@ -122,7 +122,7 @@ def obstacles_critic(spec: model.MppiObstaclesCritic, data: CriticData) -> tuple
     """Return costs for small distances to obstacles, and which rollouts collide.
 
     Within the collision margin, the cost increases linearly as the distance decreases. Within the inflation radius, a
-    repulsion cost is added: its excess over the minimum of all rollouts.
+    repulsion cost is added, reduced by the minimum over all rollouts.
     """
     x, y, yaw = data.rollouts.x, data.rollouts.y, data.rollouts.yaw
     points, consider_footprint = data.lookup(x, y), considers_footprint(spec)

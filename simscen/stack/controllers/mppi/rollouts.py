@@ -111,7 +111,7 @@ def apply_model_delay(velocities: Floats, sent: Floats, steps: tuple[int, ...]) 
 
 
 def mppi_limits(spec: MppiSpec, robot: RobotModel, full_speed: float) -> VelocityLimits:
-    """Return the limits of the specification, bounded by those of the robot. `full_speed` is the maximum vx in m/s."""
+    """Return the limits of the specification, bounded by the robot's limits. `full_speed` is the maximum vx in m/s."""
     lateral = DEFAULT_SPEED_M_S if spec.vy_max is None else spec.vy_max
     return velocity_limits(
         robot,
