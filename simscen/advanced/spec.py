@@ -42,8 +42,9 @@ class ScanMatchingAmcl(AmclParameters):
     """A scan is ignored if at most this share of its beams fits the map. This applies only while the particles are one
     narrow cluster. The pose is then probably right, and the surroundings have changed."""
     map_trust_full: Probability = 0.8
-    """A scan has its full weight if at least 80 % of its beams end on the mapped area, and at least this share of those
-    fits the map. 0 = full weight of all scans, as in Nav2; `sure_update_interval` then has no effect."""
+    """A scan has its full weight if at least 80 % of its beams end on the mapped area, and at least this share of the
+    beams that end there fits the map. 0 = full weight of all scans, as in Nav2; `sure_update_interval` then has no
+    effect."""
     settling_distance: NonNegativeLength = 4.0
     """The weight of scans after a given initial pose starts at a fifth, and grows by 1 / `settling_distance` per meter
     up to its full value. Meanwhile, the pose is also searched near the initial one. Early scans count less
@@ -56,8 +57,8 @@ class ScanMatchingAmcl(AmclParameters):
     """While map, scan matching and odometry agree, only every n-th scan is compared with the map. The others are only
     matched with earlier scans. With `covariance: scatter`, every scan is compared with the map."""
     covariance: Literal["particles", "scatter"] = "particles"
-    """Covariance of the pose. `particles`: the covariance of the particles, as in Nav2. `scatter`: the same, scaled by
-    the residuals of the beams and the scatter of recent poses. `scatter` needs `match_scans`."""
+    """Covariance of the pose. `particles`: the covariance of the particles, as in Nav2. `scatter`: this covariance,
+    scaled by the residuals of the beams and the scatter of recent poses. `scatter` needs `match_scans`."""
 
     @model_validator(mode="before")
     @classmethod
@@ -112,5 +113,5 @@ class Retrace(BehaviorSpec):
     backup_speed: PositiveSpeed = 0.15
     """Speed of driving back."""
     time_allowance: PositiveDuration = 10.0
-    """Time after which the behavior fails with BACKUP_TIMEOUT. If 1.5 times the duration of driving `retrace_dist` at
-    `backup_speed` is longer, that time applies."""
+    """Time after which the behavior fails with BACKUP_TIMEOUT, but at least 1.5 times the duration of driving
+    `retrace_dist` at `backup_speed`."""

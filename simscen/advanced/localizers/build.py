@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass, replace
 
-from simscen.advanced import spec as model
 from simscen.advanced.localizers.covariance_estimator import MapResiduals
 from simscen.advanced.localizers.global_search import GlobalSearch
 from simscen.advanced.localizers.map_trust import FIT_DISTANCE_M, MapTrust, unmapped_cells
 from simscen.advanced.localizers.particle_filter import ScanMatchingParticleFilter, TemperedLikelihoodField
 from simscen.advanced.localizers.scan_matching_amcl import ScanMatchingAmclLocalizer
+from simscen.advanced.spec import ScanMatchingAmcl, SlipEkf
 from simscen.core.decorators import cached_on_instance
 from simscen.core.environment.occupancy_grid import OccupancyGrid
 from simscen.stack.localizers.build import beam_skipping, motion_model, sensor_model
@@ -18,7 +18,7 @@ from simscen.stack.protocols import Localizer
 from simscen.stack.setting import Setting
 
 
-def scan_matching_amcl(spec: model.ScanMatchingAmcl, setting: Setting) -> Localizer:
+def scan_matching_amcl(spec: ScanMatchingAmcl, setting: Setting) -> Localizer:
     """Return a scan-matching AMCL, or dead reckoning if there is no map."""
     if setting.map is None:
         return DeadReckoning(setting.estimate)
@@ -31,7 +31,7 @@ def scan_matching_amcl(spec: model.ScanMatchingAmcl, setting: Setting) -> Locali
     return ScanMatchingAmclLocalizer(spec, particles, motion, setting.estimate, tick_rate, search, residuals)
 
 
-def slip_ekf(spec: model.SlipEkf, setting: Setting) -> Localizer:
+def slip_ekf(spec: SlipEkf, setting: Setting) -> Localizer:
     """Return an extended Kalman filter of odometry and gyroscope that detects wheel slip."""
     from simscen.advanced.localizers.slip_ekf import SlipEkfLocalizer
 
@@ -57,7 +57,7 @@ class MapModels:
 
 
 @cached_on_instance
-def map_models(grid: OccupancyGrid, spec: model.ScanMatchingAmcl) -> MapModels:
+def map_models(grid: OccupancyGrid, spec: ScanMatchingAmcl) -> MapModels:
     """Return the models of a map, which are cached with the map."""
     grid = replace(grid)  # the cache belongs to the original, which must not be kept alive by its own cache
     field, unmapped = obstacle_field(grid, spec.laser_likelihood_max_dist), unmapped_cells(grid).ravel()
@@ -78,6 +78,6 @@ def map_models(grid: OccupancyGrid, spec: model.ScanMatchingAmcl) -> MapModels:
     )
 
 
-def precompute(spec: model.ScanMatchingAmcl, grid: OccupancyGrid) -> None:
+def precompute(spec: ScanMatchingAmcl, grid: OccupancyGrid) -> None:
     """Compute the models of a map in the parent process, so that all worker processes forked from it share them."""
     map_models(grid, spec).search.precompute()

@@ -67,10 +67,10 @@ CORRELATION_LENGTHS_M = np.array((2.0, 2.0, 1.1))
 DRIFT_VARIANCE_PER_M = np.square((0.002, 0.002, 0.0016))
 """Variance (m², m², rad²) of the drift of scan matching per meter, where scans show walls in all directions."""
 FORGETTING_FACTOR = 0.99
-"""Factor on the weight of a learned value each time it is updated."""
+"""Factor on the weight of a learned value at each update of the value."""
 PRIOR_RATIO, PRIOR_WEIGHT = np.array((1.7, 1.7, 1.0)), 20.0
-"""Initial ratio of the true standard deviations (longitudinal, lateral, yaw) to those of the particles, if the RMS of
-the residuals is `sigma_hit`. PRIOR_WEIGHT is its weight as a number of corrections."""
+"""Initial ratio of the true errors (longitudinal, lateral, yaw) to the standard deviations of the particles, if the RMS
+of the residuals is `sigma_hit`, and weight of this ratio as a number of corrections."""
 EXPECTED_WEIGHT = 0.05
 """Weight of the expected ratio in `_scatter_ratio`, as a number of independent corrections."""
 DEGREES_OF_FREEDOM = 6.0
@@ -102,16 +102,23 @@ class CovarianceEstimator:
     def __init__(self) -> None:
         weight = ODOMETRY_STD_WEIGHT
         self._ratio_sum, self._ratio_weight = PRIOR_RATIO * PRIOR_WEIGHT, PRIOR_WEIGHT
+        """Weighted sum (3,) of the ratios of pose errors to residuals, and sum of the weights."""
         self._odometry_square, self._yaw_square = ODOMETRY_STD[0] ** 2 * weight, ODOMETRY_STD[1] ** 2 * weight
+        """Weighted sums of the squared errors of odometry: translation along each axis in m², and yaw in rad²."""
         self._step_square = weight
+        """Weighted sum of the squared step lengths in m²."""
         self.forget_poses()
 
     def forget_poses(self) -> None:
         """Forget the stored poses but keep all learned values. Call this when the robot was found elsewhere."""
         self._poses: Array = np.empty((0, 3))
+        """Corrected poses (n, 3) in the map frame."""
         self._bases: Array = np.empty((0, 3))
-        self._drifts: Array = np.empty((0, 3, 3))  # since each pose, in the frame of the bases
+        """Poses (n, 3) of the robot at these corrections, in the frame of the scan matcher."""
+        self._drifts: Array = np.empty((0, 3, 3))
+        """Covariances (n, 3, 3) of the drift since each correction, in the frame of the scan matcher."""
         self._distances, self._weights = np.empty(0), np.empty(0)
+        """Distance driven in m since each correction (n,), and inverse variances of the particles (n,)."""
         self._residuals: deque[ScanResiduals] = deque(maxlen=WINDOW_SIZE)
         self._base: Pose2 | None = None
 
@@ -135,7 +142,7 @@ class CovarianceEstimator:
     def propagate_poses(self, base: Pose2, step_covariance: Array | None) -> None:
         """Propagate all stored poses to `base`, the robot's present pose in the frame of the scan matcher.
 
-        `step_covariance` (3, 3) belongs to the step since the last call, in the base frame at its start; None if
+        `step_covariance` (3, 3) belongs to the step since the last call, in the base frame before the step; None if
         odometry and not scan matching measured the step.
         """
         last, self._base = self._base or base, base
@@ -162,20 +169,20 @@ class CovarianceEstimator:
         `covariance` is the covariance of the particles. `residuals` belong to the scan of the correction; None if the
         map explains none of its beams.
         """
-        own = covariance + MIN_COVARIANCE
-        self._add(pose, 1.0 / float(own[0, 0] + own[1, 1]))
+        particle_covariance = covariance + MIN_COVARIANCE
+        self._add(pose, 1.0 / float(particle_covariance[0, 0] + particle_covariance[1, 1]))
         if residuals is not None:
             self._residuals.append(residuals)
         explained, residual = self._mean_residuals()
         axes = rotation_matrix(pose.yaw).T
-        rotated = axes @ own @ axes.T
+        rotated = axes @ particle_covariance @ axes.T
         learned = self._ratio_sum / self._ratio_weight
         scatter = self._scatter_ratio(np.diag(rotated), np.square(learned * residual))
         self._ratio_sum = FORGETTING_FACTOR * self._ratio_sum + scatter / residual
         self._ratio_weight = FORGETTING_FACTOR * self._ratio_weight + 1.0
         expected = residual * self._ratio_sum / self._ratio_weight
-        student = math.sqrt(DEGREES_OF_FREEDOM / (DEGREES_OF_FREEDOM - 2.0))
-        ratio = (scatter + expected) / 2.0 / explained * student
+        student_std = math.sqrt(DEGREES_OF_FREEDOM / (DEGREES_OF_FREEDOM - 2.0))
+        ratio = (scatter + expected) / 2.0 / explained * student_std
         scaled: Array = axes.T @ (rotated * np.outer(ratio, ratio)) @ axes
         return scaled
 
@@ -196,11 +203,11 @@ class CovarianceEstimator:
         explained, square = (sum(values) / len(self._residuals) for values in zip(*self._residuals, strict=True))
         return explained, math.sqrt(max(square / explained, 1e-3))
 
-    def _scatter_ratio(self, own: Array, expected: Array) -> Array:
+    def _scatter_ratio(self, variances: Array, expected: Array) -> Array:
         """Return the ratio (3,) of the scatter of poses to the standard deviations of the particles.
 
-        The axes are longitudinal, lateral, and yaw. `own` (3,) are the variances of the particles. `expected` (3,) are
-        the squared ratios that are assumed if no poses with independent errors are stored.
+        The axes are longitudinal, lateral, and yaw. `variances` (3,) are the variances of the particles. `expected`
+        (3,) are the squared ratios that are assumed if no poses with independent errors are stored.
         """
         x, y, yaw = self._poses[-1]
         rotations = self._poses[:, 2] - self._bases[:, 2]
@@ -212,9 +219,9 @@ class CovarianceEstimator:
         drift = np.column_stack(
             (c * c * xx + 2 * c * s * xy + s * s * yy, s * s * xx - 2 * c * s * xy + c * c * yy, aa)
         )
-        weights = np.square(own / (own + drift)) * (self._weights / self._weights.sum())[:, np.newaxis]
+        weights = np.square(variances / (variances + drift)) * (self._weights / self._weights.sum())[:, np.newaxis]
         lengths = self._distances[:, np.newaxis] / CORRELATION_LENGTHS_M
         independent = 2.0 * (1.0 - (1.0 + lengths) * np.exp(-lengths))  # by Matérn's correlation of smooth errors
-        squares = (weights * np.square(errors)).sum(axis=0) / own + EXPECTED_WEIGHT * expected
+        squares = (weights * np.square(errors)).sum(axis=0) / variances + EXPECTED_WEIGHT * expected
         ratio: Array = np.sqrt(squares / ((weights * independent).sum(axis=0) + EXPECTED_WEIGHT))
         return ratio

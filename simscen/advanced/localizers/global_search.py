@@ -27,8 +27,7 @@ MAX_DISTANCE_M = 4 * ENDPOINT_STD_M
 COARSE_CELL_M, HEADING_COUNT = 0.2, 180
 """Cell size and number of headings of the coarse grid."""
 COARSE_POINTS, FINAL_POINTS = 80, 240
-"""Maximum number of endpoints, and maximum number of points along beams: COARSE_POINTS in the search, FINAL_POINTS for
-the final scores."""
+"""Maximum number of endpoints, and of points along beams, in the search and for the final scores."""
 MAX_RANGE_M = 15.0
 """Range beyond which points are ignored, because the headings of the coarse grid are too far apart for them."""
 COARSE_POSES, REFINED_POSES, MAX_RESULTS = 3000, 250, 40
@@ -73,12 +72,12 @@ class View:
 
 
 class GlobalSearch:
-    """Finds the poses on a map at which the points of a view fit the map best."""
+    """Finds the poses at which the points of a view fit a map best."""
 
     def __init__(self, grid: OccupancyGrid, field: DistanceField | None = None) -> None:
-        """Prepare searches on the map `grid`. `field` is its field of distances from obstacles, if already computed.
+        """Prepare searches on the map `grid`. `field` is the map's field of distances from obstacles.
 
-        The field is computed anew if its distances do not reach MAX_DISTANCE_M.
+        The field is computed if `field` is None, or if its distances do not reach MAX_DISTANCE_M.
         """
         if field is None or field.limit < MAX_DISTANCE_M:
             field = obstacle_field(grid, MAX_DISTANCE_M)
@@ -117,11 +116,11 @@ class GlobalSearch:
         """Return the scores (n,) in 0 … 1 of `poses` (n, 3) for a view."""
         parts = [(self._nearness_table, view.ends, 1.0), (self._free_table, view.passed, FREE_WEIGHT)]
         nonempty = [(table, points, weight) for table, points, weight in parts if len(points)]
-        total = sum(weight * self._mean(table, poses, points) for table, points, weight in nonempty)
+        total = sum(weight * self._mean_level(table, poses, points) for table, points, weight in nonempty)
         scores: Array = np.asarray(total) / sum(weight for _, _, weight in nonempty)
         return scores
 
-    def _mean(self, table: Levels, poses: Array, points: ComplexPoints) -> Array:
+    def _mean_level(self, table: Levels, poses: Array, points: ComplexPoints) -> Array:
         """Return for each of `poses` (n, 3) the mean (n,), 0 … 1, of the table values at the `points` of a view."""
         return evaluate_in_blocks(
             lambda block: table.take(self._field.endpoint_cells(block, points)).mean(axis=1) / 255, poses
@@ -139,10 +138,10 @@ class GlobalSearch:
         return levels
 
     @cached_property
-    def _coarse(self) -> tuple[int, Levels, Levels]:
+    def _coarse_grid(self) -> tuple[int, Levels, Levels]:
         """Factor, nearness table, and free table of the coarse grid.
 
-        A coarse cell consists of `factor` x `factor` map cells, and has the largest of their values.
+        A coarse cell consists of `factor` x `factor` map cells, and has the largest value of these cells.
         """
         factor = max(1, round(COARSE_CELL_M / self._grid.resolution))
         rows, columns = self._grid.shape
@@ -153,7 +152,7 @@ class GlobalSearch:
 
     def _search_coarse_grid(self, view: View) -> Array:
         """Return the best poses of the coarse grid, unordered."""
-        factor, nearness, free = self._coarse
+        factor, nearness, free = self._coarse_grid
         cell = factor * self._grid.resolution
         rows, columns = nearness.shape
         border = int(MAX_RANGE_M / cell) + 2

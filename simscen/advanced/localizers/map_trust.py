@@ -29,16 +29,16 @@ def unmapped_cells(grid: OccupancyGrid) -> npt.NDArray[np.bool_]:
     unknown = np.pad(grid.cells == UNKNOWN, 1, constant_values=True)
     if unknown.all():
         return unknown
-    border_only = np.count_nonzero(unknown) == unknown.size - grid.cells.size
-    if border_only and math.sqrt(2) * grid.resolution <= MAX_WALL_THICKNESS_M:
+    is_only_border_unknown = np.count_nonzero(unknown) == unknown.size - grid.cells.size
+    if is_only_border_unknown and math.sqrt(2) * grid.resolution <= MAX_WALL_THICKNESS_M:
         next_to_free: npt.NDArray[np.bool_] = np.pad(grid.cells == FREE, 1, mode="edge")
         return unknown & next_to_free
     reach = min(MAX_REACH_CELLS, math.ceil(MAX_WALL_THICKNESS_M / grid.resolution))
-    known = squared_distances_within(~unknown, reach)
-    beyond: npt.NDArray[np.bool_] = squared_distances_within(np.pad(grid.cells == FREE, 1), reach) == known
-    beyond |= known > (MAX_WALL_THICKNESS_M / grid.resolution) ** 2
-    beyond &= unknown
-    return beyond
+    to_known = squared_distances_within(~unknown, reach)
+    unmapped: npt.NDArray[np.bool_] = squared_distances_within(np.pad(grid.cells == FREE, 1), reach) == to_known
+    unmapped |= to_known > (MAX_WALL_THICKNESS_M / grid.resolution) ** 2
+    unmapped &= unknown
+    return unmapped
 
 
 FIT_DISTANCE_M = 0.3
@@ -49,7 +49,7 @@ SAMPLED_PARTICLES = 50
 """Approximate number of particles at which beams are compared with the map."""
 MAPPED_SHARE = 0.1, 0.8
 """Limits of the share of beams that end on the mapped area. Up to the first limit, a scan is ignored. From the second
-one on, it has its full weight."""
+limit on, a scan has its full weight."""
 MIN_PARTICLE_SHARE = 0.5
 """A beam is used if it ends on the mapped area for more than this share of the particles."""
 _UNMAPPED, _FITS, _MISSES = 0, 1, 2
@@ -89,25 +89,25 @@ class MapTrust:
         """Return the weight of a scan.
 
         For a narrow cluster, only beams that end on the mapped area for most particles are used. The other beams would
-        draw the particles to the edge of the map, or push them away from it.
+        draw the particles to the edge of the map, or push them away from this edge.
         """
         classes = self._classes(self._endpoint_cells(particles.poses, beams))
-        known_share, fitting = _shares(classes)
-        exponent = _ramp(known_share, *MAPPED_SHARE)
+        mapped_share, fitting = _shares(classes)
+        exponent = _ramp(mapped_share, *MAPPED_SHARE)
         if not particles.are_within(CLUSTER_RADIUS_M):
             return ScanWeight(exponent, fitting, None)
-        used = None
-        if known_share < 1.0:
-            used = np.add.reduce(classes != _UNMAPPED, axis=0) > MIN_PARTICLE_SHARE * len(classes)
-        return ScanWeight(exponent * _ramp(fitting, self._zero, self._full), fitting, used)
+        used_hits = None
+        if mapped_share < 1.0:
+            used_hits = np.add.reduce(classes != _UNMAPPED, axis=0) > MIN_PARTICLE_SHARE * len(classes)
+        return ScanWeight(exponent * _ramp(fitting, self._zero, self._full), fitting, used_hits)
 
     def fitting_share(self, poses: Array, ends: ComplexPoints, min_mapped: float) -> float | None:
         """Return the share of fitting beams at `poses` (n, 3), among the beams that end on the mapped area.
 
         `ends` are the endpoints in the base frame. None if less than the share `min_mapped` ends on the mapped area.
         """
-        known_share, fitting = _shares(self._classes(self._field.endpoint_cells(poses, ends)))
-        return fitting if known_share and known_share >= min_mapped else None
+        mapped_share, fitting = _shares(self._classes(self._field.endpoint_cells(poses, ends)))
+        return fitting if mapped_share and mapped_share >= min_mapped else None
 
     def _endpoint_cells(self, poses: Array, beams: Beams) -> TableIndices:
         """Return the cells of the endpoints for about SAMPLED_PARTICLES of the `poses` (n, 3)."""

@@ -33,15 +33,15 @@ class MatchedMotion:
 
 def sample_motion(poses: Array, step: MatchedMotion, rng: np.random.Generator) -> Array:
     """Return `poses` (n, 3), each moved by its own random sample of a motion."""
-    ahead, left, turn = np.dot(_cholesky_factor(step.covariance), rng.standard_normal((3, len(poses))))
-    ahead += step.delta.x
+    forward, left, turn = np.dot(_cholesky_factor(step.covariance), rng.standard_normal((3, len(poses))))
+    forward += step.delta.x
     left += step.delta.y
     turn += step.delta.yaw
     x, y, heading = poses.T
     c, s = np.cos(heading), np.sin(heading)
     after = empty_poses(len(poses))
-    after[:, 0] = x + c * ahead - s * left
-    after[:, 1] = y + s * ahead + c * left
+    after[:, 0] = x + c * forward - s * left
+    after[:, 1] = y + s * forward + c * left
     after[:, 2] = wrap_headings(heading + turn)
     return after
 

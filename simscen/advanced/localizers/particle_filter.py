@@ -47,7 +47,7 @@ ODOMETRY_SHARE = 0.2
 FIRST_SCAN_WEIGHT = 0.2
 """Weight (exponent of the likelihood) of the first scan after an initial pose. It grows to 1 with the driven distance,
 because early scans of a single room fit many poses."""
-CERTAIN_FIT = 0.9
+MIN_CERTAIN_FIT = 0.9
 """Minimum share of a scan's beams that fit the map for the filter to be certain."""
 
 
@@ -60,7 +60,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
         self, spec: ScanMatchingAmcl, motion: MotionModel, sensor: SensorModel, free_space: FreeSpace,
         rng: np.random.Generator, trust: MapTrust | None = None,
     ) -> None:  # fmt: skip
-        """Create the filter. `trust` determines the weight of scans; with None, all have their full weight."""
+        """Create the filter. `trust` determines the weight of scans; if None, all scans have their full weight."""
         self._trust = trust
         super().__init__(spec, motion, sensor, free_space, rng)
 
@@ -78,7 +78,7 @@ class ScanMatchingParticleFilter(ParticleFilter):
     @property
     def is_certain(self) -> bool:
         """Whether nearly all beams of the last scan fit the map, and the particles are compact (see `are_compact`)."""
-        is_mapped = self._map_weight == 1.0 and self.fitting_share >= CERTAIN_FIT
+        is_mapped = self._map_weight == 1.0 and self.fitting_share >= MIN_CERTAIN_FIT
         return is_mapped and self._were_compact and self._augmented_mcl.random_fraction == 0
 
     def move(self, delta: Pose2) -> None:

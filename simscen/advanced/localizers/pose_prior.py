@@ -26,9 +26,9 @@ ODOMETRY_DRIFT = (0.03, 0.01)
 MAX_SLIP_DIFFERENCE = 0.1, 0.5
 """Largest difference that wheel slip can cause between motions by scan matching and by odometry: in m, and as a share
 of the motion by odometry. If both limits are exceeded, the scans show people who walk next to the robot."""
-KNOWN_STEP_STD_M = 0.012
-"""If the standard deviation of a motion by scan matching is larger, as in a uniform corridor, odometry and not the
-scans determined the motion. The excess counts as a systematic error."""
+MAX_MATCHED_STEP_STD_M = 0.012
+"""Maximum standard deviation of a motion that the scans determine. If the standard deviation is larger, as in a uniform
+corridor, odometry determined the motion, and the excess counts as a systematic error."""
 NO_NOISE: CovarianceTriangle = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """Process noise of zero for `propagate_covariance`."""
 
@@ -63,20 +63,20 @@ class ObservedMotion:
         """Whether scans and wheels differ by more than MAX_SLIP_DIFFERENCE, because the scans show moving objects."""
         if self.odometry is None:
             return False
-        apart = math.hypot(self.disagreement.x, self.disagreement.y)
+        difference = math.hypot(self.disagreement.x, self.disagreement.y)
         driven = math.hypot(self.odometry.x, self.odometry.y)
-        return apart >= MAX_SLIP_DIFFERENCE[0] and apart > MAX_SLIP_DIFFERENCE[1] * driven
+        return difference >= MAX_SLIP_DIFFERENCE[0] and difference > MAX_SLIP_DIFFERENCE[1] * driven
 
     def systematic_error(self, meters: float) -> tuple[float, float]:
         """Return the systematic errors of this motion in m and rad, which can add up over many motions.
 
-        `meters` is the distance driven by `scan_memory.distance_driven`.
+        `meters` is the distance driven, as `scan_memory.distance_driven` returns it.
         """
         if self.step is None:
             return ODOMETRY_DRIFT[0] * meters, ODOMETRY_DRIFT[1] * meters
         (xx, _, _), (_, yy, _), _ = self.step.covariance.tolist()
-        unknown = max(0.0, math.sqrt(max(xx, yy)) - KNOWN_STEP_STD_M)
-        return unknown + math.hypot(self.disagreement.x, self.disagreement.y), abs(self.disagreement.yaw)
+        excess = max(0.0, math.sqrt(max(xx, yy)) - MAX_MATCHED_STEP_STD_M)
+        return excess + math.hypot(self.disagreement.x, self.disagreement.y), abs(self.disagreement.yaw)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,16 +101,16 @@ class PosePrior:
         """Return the prior of a `pose` (3,) that is certain now, with standard deviations `std` in m, m and rad."""
         return cls(Pose2(*pose.tolist()), base, np.array(std), np.zeros((3, 3)))
 
-    def after(self, before: Pose2, base: Pose2, meters: float, motion: ObservedMotion) -> "PosePrior":
+    def propagate(self, before: Pose2, base: Pose2, meters: float, motion: ObservedMotion) -> "PosePrior":
         """Return the prior after `motion` from the pose `before` to the pose `base` in the drifting frame.
 
-        `meters` is the distance driven by `scan_memory.distance_driven`.
+        `meters` is the distance driven, as `scan_memory.distance_driven` returns it.
         """
-        meter, rad = motion.systematic_error(meters)
-        meter, rad = self.systematic_error[0] + meter, self.systematic_error[1] + rad
+        distance_error, angle_error = motion.systematic_error(meters)
+        total_error = self.systematic_error[0] + distance_error, self.systematic_error[1] + angle_error
         noise = NO_NOISE if motion.step is None else rotate_covariance(motion.step.covariance, before.yaw)
         covariance = propagate_covariance(self.covariance, base.x - before.x, base.y - before.y, noise)
-        return replace(self, covariance=covariance, systematic_error=(meter, rad))
+        return replace(self, covariance=covariance, systematic_error=total_error)
 
     def expected(self, base: Pose2) -> Array:
         """Return the pose (3,) in the map frame, without drift, of a robot at `base` in the drifting frame."""
@@ -122,9 +122,9 @@ class PosePrior:
         The value at the expected pose is 0.
         """
         frame = rotation_matrix(self.pose.yaw - self.base.yaw)
-        meter, rad = self.systematic_error
-        std = np.square(self.std + np.array((meter, meter, rad)))
+        distance_error, angle_error = self.systematic_error
+        variances = np.square(self.std + np.array((distance_error, distance_error, angle_error)))
         errors = pose_errors(self.expected(base), poses)
-        information = np.linalg.inv(frame @ self.covariance @ frame.T + np.diag(std))
+        information = np.linalg.inv(frame @ self.covariance @ frame.T + np.diag(variances))
         negative: Array = 0.5 * np.einsum("ni,ij,nj->n", errors, information, errors)
         return negative

@@ -45,7 +45,7 @@ AGREEMENT_LENGTH_M = 2.0
 """Minimum distance driven between two searches that agree."""
 UNMAPPED_DISTANCE_M, RETURN_SCORE, RETURN_LEAD = 5.0, 0.9, 0.1
 """Distance driven outside the mapped area after which the map is searched, and minimum score and lead of a pose found
-in this search. They are higher because unmapped rooms often resemble mapped ones."""
+in this search. Both are higher because unmapped rooms often resemble mapped rooms."""
 SCORE_SCALE = 0.02
 """Difference of scores for which one pose is e times as likely as the other, and gets e times as many particles."""
 UNOBSERVED_MOTION = ObservedMotion()
@@ -55,24 +55,27 @@ PoseHypotheses = tuple[Array, Array]
 
 
 class Relocalizer:
-    """Compares scans with the map at the estimated pose, and searches the whole map if they do not fit.
+    """Compares scans with the map at the estimated pose, and searches the whole map if the scans do not fit.
 
     The search uses the scans of the last meters together. A robot without initial pose has particles at all fitting
-    poses until one of these poses is clearly the best. A robot with a pose gets another pose only if it is clearly
-    better.
+    poses until one of these poses is clearly the best. A robot with a pose gets another pose only if the other
+    pose is clearly better.
     """
 
     def __init__(self, search: GlobalSearch, trust: MapTrust, estimate: Estimate, settling: float) -> None:
-        """Create the relocalizer. For the first `settling` m driven, it also searches near the pose of `estimate`."""
+        """Create the relocalizer. The pose of `estimate` is also considered for the first `settling` m driven."""
         self._search, self._trust, self._memory = search, trust, ScanMemory()
         self._has_pose, self._estimate, self._settling = estimate.pose is not None, estimate, settling
         self._initial: PosePrior | None = None
+        """Prior from the pose of `estimate`."""
         self._certain: PosePrior | None = None
+        """Prior from the last certain pose."""
         self._fitting_shares: deque[float] = deque(maxlen=RECENT_SCANS)
         self._driven = self._searched_at = self._checked_at = self._mapped_at = 0.0  # distances driven
         self._interval, self._was_in_doubt, self._knows_overlap = 0.0, False, False
         self._last: Pose2 | None = None
-        self._candidate: tuple[Pose2, Pose2, float] | None = None  # pose of the last search, base, distance driven
+        self._candidate: tuple[Pose2, Pose2, float] | None = None
+        """Best pose of the last search, with the pose in the drifting frame and the distance driven at that time."""
 
     def update(
         self, scan: Scan, base: Pose2, estimated: Pose2, limits: tuple[float, float],
@@ -127,11 +130,11 @@ class Relocalizer:
             self._memory.forget(0)
         if motion.was_carried:
             self._initial = self._certain = None
-        self._initial = self._initial and self._initial.after(last, base, distance, motion)
-        self._certain = self._certain and self._certain.after(last, base, distance, motion)
+        self._initial = self._initial and self._initial.propagate(last, base, distance, motion)
+        self._certain = self._certain and self._certain.propagate(last, base, distance, motion)
 
     def _search_by_initial_pose(self, initial: PosePrior, base: Pose2, current: Array) -> PoseHypotheses | None:
-        """Return the most likely pose by initial pose and stored scans; None if `current` is nearly as good.
+        """Return the most likely pose, given the initial pose and stored scans; None if `current` is nearly as likely.
 
         If few beams end on the mapped area, many poses fit by chance, and only the pose that odometry and scan matching
         predict is considered.
@@ -139,17 +142,18 @@ class Relocalizer:
         if not self._memory.length:
             return None
         view, expected = self._memory.view_from(base), initial.expected(base)[None]
-        if not len(view.ends) or (score := self._search.score(current, view))[0] > CERTAIN_SCORE:
+        if not len(view.ends) or (current_score := self._search.score(current, view)[0]) > CERTAIN_SCORE:
             return None
         is_mapped = self._trust.fitting_share(expected, view.ends, MIN_MAPPED_SHARE) is not None
         poses, scores = (
             self._search.search_near(view, expected[0]) if is_mapped else (expected, self._search.score(expected, view))
         )
-        likelihoods = scores / SCORE_SCALE - initial.negative_log_likelihood(poses, base)
-        own = score[0] / SCORE_SCALE - initial.negative_log_likelihood(current, base)[0]
-        best = likelihoods.argmax()
+        log_likelihoods = scores / SCORE_SCALE - initial.negative_log_likelihood(poses, base)
+        current_log_likelihood = current_score / SCORE_SCALE - initial.negative_log_likelihood(current, base)[0]
+        best = log_likelihoods.argmax()
         found = poses[best : best + 1]
-        if likelihoods[best] - own < MIN_LOG_RATIO or not are_distinct(current[0], found)[0]:
+        log_ratio = log_likelihoods[best] - current_log_likelihood
+        if log_ratio < MIN_LOG_RATIO or not are_distinct(current[0], found)[0]:
             return None
         self._fitting_shares.clear()
         return found, np.ones(1)
@@ -192,8 +196,8 @@ class Relocalizer:
     def _update_doubt(self) -> bool:
         """Return whether recent scans do not fit the map.
 
-        If they fitted before, make the next search due at once, and forget older scans. Older scans are kept if scan
-        matching knows whether the robot was carried.
+        If recent scans fitted before, make the next search due at once, and forget older scans. Older scans are kept if
+        scan matching knows whether the robot was carried.
         """
         is_in_doubt = (
             len(self._fitting_shares) == RECENT_SCANS and sum(self._fitting_shares) < RECENT_SCANS * MIN_FITTING_SHARE
@@ -227,10 +231,10 @@ class Relocalizer:
                 self._certain = PosePrior.at(poses[0], base)
             shares = np.exp((scores - scores[0]) / SCORE_SCALE)
             return poses, shares / shares.sum()
-        min_score, lead = (RETURN_SCORE, RETURN_LEAD) if self._has_left_map else (MIN_SCORE, MIN_LEAD)
+        min_score, min_lead = (RETURN_SCORE, RETURN_LEAD) if self._has_left_map else (MIN_SCORE, MIN_LEAD)
         poses, scores = self._sort_by_score(poses, scores, base)
-        own = self._reduce_scores(self._search.score(current, view), current, base)[0]
-        if _leads(scores, lead) and scores[0] > min_score and scores[0] > own + MIN_GAIN:
+        current_score = self._reduce_scores(self._search.score(current, view), current, base)[0]
+        if _leads(scores, min_lead) and scores[0] > min_score and scores[0] > current_score + MIN_GAIN:
             found = Pose2(*poses[0].tolist())
             if self._candidate is None or not _agree(*self._candidate[:2], found, base):
                 self._candidate = found, base, self._driven
@@ -243,9 +247,9 @@ class Relocalizer:
         return None
 
 
-def _leads(scores: Array, lead: float) -> bool:
-    """Return whether the first of the scores (n,) exceeds the second by `lead`."""
-    return len(scores) == 1 or bool(scores[0] - scores[1] > lead)
+def _leads(scores: Array, min_lead: float) -> bool:
+    """Return whether the first of the scores (n,) exceeds the second score by more than `min_lead`."""
+    return len(scores) == 1 or bool(scores[0] - scores[1] > min_lead)
 
 
 def _agree(first: Pose2, first_base: Pose2, second: Pose2, second_base: Pose2) -> bool:

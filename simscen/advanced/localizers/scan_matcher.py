@@ -23,7 +23,8 @@ BASELINE_M = 0.15
 MAX_BEND_M = 0.05
 """Maximum distance of the point from the line between its neighbors."""
 MAX_LINE_M = 0.5
-"""Maximum length of the line (or four beam spacings, if longer). Otherwise, the points are on different surfaces."""
+"""Maximum length of the line, or four beam spacings if these are longer. The ends of a longer line are on different
+surfaces."""
 MAX_RANGE_M = 20.0
 """Range beyond which points are ignored."""
 _NO_POINTS: ComplexPoints = np.empty(0, dtype=np.complex128)
@@ -57,15 +58,15 @@ def extract_surface(scan: Scan) -> Surface:
         return Surface(_NO_POINTS, _NO_POINTS)
     ranges, gap = ranges.take(hit), abs(scan.angle_increment)
     points: ComplexPoints = ranges * directions(scan).take(hit)
-    apart = np.ceil((BASELINE_M / 2 / gap) / np.maximum(ranges, 1e-3 / gap)).astype(np.int64)
-    row = np.arange(len(hit))
-    before = points.take(row - apart, mode="clip")
-    along = points.take(row + apart, mode="clip") - before
-    length = np.abs(along)
-    bent = np.abs(((points - before).conj() * along).imag)
-    # A line of length 0 fails the second comparison.
-    flat = ((length < np.maximum(MAX_LINE_M, 4 * gap * ranges)) & (bent < MAX_BEND_M * length)).nonzero()[0]
-    normals = along.take(flat) * -1j / length.take(flat)
+    neighbor_offset = np.ceil((BASELINE_M / 2 / gap) / np.maximum(ranges, 1e-3 / gap)).astype(np.int64)
+    index = np.arange(len(hit))
+    before = points.take(index - neighbor_offset, mode="clip")
+    line = points.take(index + neighbor_offset, mode="clip") - before
+    length = np.abs(line)
+    bend_times_length = np.abs(((points - before).conj() * line).imag)
+    is_flat = (length < np.maximum(MAX_LINE_M, 4 * gap * ranges)) & (bend_times_length < MAX_BEND_M * length)
+    flat = is_flat.nonzero()[0]  # excludes lines of length 0, because of `<`
+    normals = line.take(flat) * -1j / length.take(flat)
     return Surface(points.take(flat) + complex(scan.mount.x, scan.mount.y), normals)
 
 
@@ -102,7 +103,8 @@ COVARIANCE_SCALE, COVARIANCE_FLOOR = 0.5, (0.004**2, 0.003**2, 0.0015**2)
 
 
 Equations = tuple[tuple[float, float, float, float], ...]
-"""Normal equations of x, y and yaw, right-hand side last, in units of 1 / POINT_STD_M²."""
+"""Rows (4, 4) of the normal equations of x, y, and yaw, with the right-hand side as last column, in units of
+1 / POINT_STD_M²."""
 
 
 class _ReferenceScans:
@@ -117,40 +119,40 @@ class _ReferenceScans:
         """Share of the points of the last scan that have a neighbor in the earlier scans."""
         self._middle, around = middle, self._points - middle
         # All pairs in one product, faster than a k-d tree here: the b nearest to a has the greatest a·b - b²/2.
-        self._compared = np.empty((3, len(around)))
-        self._compared[0], self._compared[1] = around.real, around.imag
-        self._compared[2] = (around * around.conj()).real * -0.5
+        self._neighbor_terms = np.empty((3, len(around)))
+        self._neighbor_terms[0], self._neighbor_terms[1] = around.real, around.imag
+        self._neighbor_terms[2] = (around * around.conj()).real * -0.5
 
-    def equations(self, own: Surface, pose: Pose2, gate: float) -> Equations | None:
-        """Return the normal equations of the scan `own` in the base frame, for a base at `pose`.
+    def equations(self, surface: Surface, pose: Pose2, gate: float) -> Equations | None:
+        """Return the normal equations of the new scan's `surface` in the base frame, for a base at `pose`.
 
         None if too few points have a neighbor within `gate` m with a similar normal.
         """
         turn = cmath.rect(1.0, pose.yaw)
-        rotated = own.points * turn
-        ends = rotated + complex(pose.x, pose.y)
-        compared = np.ones((len(ends), 3))
-        compared[:, :2] = (ends - self._middle).view(np.float64).reshape(-1, 2)
-        nearest = (compared @ self._compared).argmax(axis=1)
-        gap = self._points.take(nearest)
-        gap -= ends
-        against = self._normals.take(nearest).conj()
-        matched = (own.normals * turn * against).real > MIN_NORMAL_COSINE
-        squares = (gap * gap.conj()).real
-        matched &= squares < gate * gate
-        count = int(np.count_nonzero(matched))
-        self.overlap = count / len(ends)
+        rotated = surface.points * turn
+        points = rotated + complex(pose.x, pose.y)
+        point_terms = np.ones((len(points), 3))
+        point_terms[:, :2] = (points - self._middle).view(np.float64).reshape(-1, 2)
+        nearest = (point_terms @ self._neighbor_terms).argmax(axis=1)
+        offsets = self._points.take(nearest)
+        offsets -= points
+        normals = self._normals.take(nearest).conj()
+        is_matched = (surface.normals * turn * normals).real > MIN_NORMAL_COSINE
+        squares = (offsets * offsets.conj()).real
+        is_matched &= squares < gate * gate
+        count = int(np.count_nonzero(is_matched))
+        self.overlap = count / len(points)
         if count < MIN_MATCHED_POINTS:
             return None
-        squares /= max(OUTLIER_DISTANCE_M**2, OUTLIER_RATIO**2 * squares.dot(matched).item() / count)
+        squares /= max(OUTLIER_DISTANCE_M**2, OUTLIER_RATIO**2 * squares.dot(is_matched).item() / count)
         squares += 1.0
-        against *= matched / squares
-        slope = np.empty((4, len(ends)))
-        slope[0] = against.real
-        np.negative(against.imag, out=slope[1])
-        np.negative((rotated * against).imag, out=slope[2])
-        slope[3] = (gap * against).real
-        equations: Equations = tuple(map(tuple, (slope @ slope.T).tolist()))
+        normals *= is_matched / squares  # the square root of the weight of each point
+        jacobian = np.empty((4, len(points)))  # derivatives by x, y, and yaw, and the residual of each point
+        jacobian[0] = normals.real
+        np.negative(normals.imag, out=jacobian[1])
+        np.negative((rotated * normals).imag, out=jacobian[2])
+        jacobian[3] = (offsets * normals).real
+        equations: Equations = tuple(map(tuple, (jacobian @ jacobian.T).tolist()))
         return equations
 
 
@@ -180,33 +182,34 @@ class ScanMatcher:
         if abs(scan.angle_increment) > MAX_BEAM_ANGLE_RAD:
             self.pose = self.pose.compose(guess)
             return None
-        seen = extract_surface(scan)
-        is_possible = len(seen.points) and any(len(surface.points) for surface in self._surfaces)
-        found = self._match(seen, guess) if is_possible else None
+        surface = extract_surface(scan)
+        is_possible = len(surface.points) and any(len(earlier.points) for earlier in self._surfaces)
+        found = self._match(surface, guess) if is_possible else None
         if math.hypot(guess.x, guess.y) > MAX_OVERLAP_STEP[0] or abs(guess.yaw) > MAX_OVERLAP_STEP[1]:
             self.overlap = None
         last, self.pose = self.pose, found[0] if found else self.pose.compose(guess)
-        self._surfaces.append(seen.thinned(REFERENCE_POINTS).to_parent_frame(self.pose))
+        self._surfaces.append(surface.thinned(REFERENCE_POINTS).to_parent_frame(self.pose))
         return MatchedMotion(last.between(self.pose), _step_covariance(last.yaw, found[1])) if found else None
 
-    def _match(self, seen: Surface, guess: Pose2) -> tuple[Pose2, CovarianceTriangle] | None:
+    def _match(self, surface: Surface, guess: Pose2) -> tuple[Pose2, CovarianceTriangle] | None:
         """Return the new value of `pose`, and its covariance in units of POINT_STD_M²; None on failure."""
         guessed = pose = self.pose.compose(guess)
-        reference, own = _ReferenceScans(self._surfaces, complex(pose.x, pose.y)), seen.thinned(SCAN_POINTS)
-        (place, heading), gate, last = _prior_information(guess), 0, len(GATES_M) - 1
+        reference, thinned = _ReferenceScans(self._surfaces, complex(pose.x, pose.y)), surface.thinned(SCAN_POINTS)
+        (position_information, yaw_information), gate, last = _prior_information(guess), 0, len(GATES_M) - 1
         for _ in range(MAX_ITERATIONS):
-            if (equations := reference.equations(own, pose, GATES_M[gate])) is None:
+            if (equations := reference.equations(thinned, pose, GATES_M[gate])) is None:
                 self.overlap = 0.0
                 return None
-            (xx, xy, xa, right), (_, yy, ya, up), (_, _, aa, around), _ = equations
-            inverse = _inverse((xx + place, xy, xa, yy + place, ya, aa + heading))
-            right += place * (guessed.x - pose.x)
-            up += place * (guessed.y - pose.y)
-            around += heading * wrap(guessed.yaw - pose.yaw)
+            # The letter a stands for the yaw. The column r is the right-hand side, to which the prior is added.
+            (xx, xy, xa, xr), (_, yy, ya, yr), (_, _, aa, ar), _ = equations
+            inverse = _inverse((xx + position_information, xy, xa, yy + position_information, ya, aa + yaw_information))
+            xr += position_information * (guessed.x - pose.x)
+            yr += position_information * (guessed.y - pose.y)
+            ar += yaw_information * wrap(guessed.yaw - pose.yaw)
             xx, xy, xa, yy, ya, aa = inverse
-            dx = xx * right + xy * up + xa * around
-            dy = xy * right + yy * up + ya * around
-            turn = xa * right + ya * up + aa * around
+            dx = xx * xr + xy * yr + xa * ar
+            dy = xy * xr + yy * yr + ya * ar
+            turn = xa * xr + ya * yr + aa * ar
             pose = Pose2(pose.x + dx, pose.y + dy, pose.yaw + turn)
             step = math.hypot(dx, dy), abs(turn)
             if gate == last and _is_within(step, CONVERGED_STEP):
@@ -226,10 +229,10 @@ def _prior_information(guess: Pose2) -> tuple[float, float]:
 def _inverse(matrix: CovarianceTriangle) -> CovarianceTriangle:
     """Return the inverse of a positive definite matrix (3, 3)."""
     xx, xy, xa, yy, ya, aa = matrix
-    of_xx, of_xy, of_xa = yy * aa - ya * ya, xa * ya - xy * aa, xy * ya - xa * yy
-    each = 1 / (xx * of_xx + xy * of_xy + xa * of_xa)
-    rest = (xx * aa - xa * xa) * each, (xy * xa - xx * ya) * each, (xx * yy - xy * xy) * each
-    return of_xx * each, of_xy * each, of_xa * each, *rest
+    cofactor_xx, cofactor_xy, cofactor_xa = yy * aa - ya * ya, xa * ya - xy * aa, xy * ya - xa * yy
+    factor = 1 / (xx * cofactor_xx + xy * cofactor_xy + xa * cofactor_xa)
+    lower = (xx * aa - xa * xa) * factor, (xy * xa - xx * ya) * factor, (xx * yy - xy * xy) * factor
+    return cofactor_xx * factor, cofactor_xy * factor, cofactor_xa * factor, *lower
 
 
 def _step_covariance(yaw: float, inverse: CovarianceTriangle) -> Array:

@@ -106,7 +106,7 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
             estimator.propagate_poses(self._base(odometry), None if matched is None else matched.covariance)
 
     def _match(self, matcher: ScanMatcher, scan: Scan, odometry: Pose2) -> MatchedMotion | None:
-        """Return the motion since the last update, from scans of the first lidar only; None if it cannot be matched."""
+        """Return the motion since the last update, from scans of the first lidar only; None if the match fails."""
         sensor, previous = self._matched or (scan.sensor, odometry)
         if scan.sensor != sensor:
             return None
@@ -121,9 +121,9 @@ class ScanMatchingAmclLocalizer(AmclLocalizer):
         if self._skipped:
             relocalizer.add_scan(scan, base, range_limits, self._observed_motion)
             return
-        believed = self._correction.map_from_odom.compose(odometry)
+        estimated = self._correction.map_from_odom.compose(odometry)
         fitting_share = self._filter.fitting_share if self._consistent_updates else None
-        found = relocalizer.update(scan, base, believed, range_limits, self._observed_motion, fitting_share)
+        found = relocalizer.update(scan, base, estimated, range_limits, self._observed_motion, fitting_share)
         if found is not None:
             self._correction = Correction(*self._filter.redistribute(*found), odometry, scan.tick)
             self._last_update, self._belief, self._consistent_updates = odometry, None, 0

@@ -70,9 +70,9 @@ class ScanMemory:
             self._scans.popleft()
         return ends
 
-    def forget(self, keep: int) -> None:
-        """Forget all but the newest `keep` scans."""
-        while len(self._scans) > keep:
+    def forget(self, kept_count: int) -> None:
+        """Forget all but the newest `kept_count` scans."""
+        while len(self._scans) > kept_count:
             self._scans.popleft()
 
     def view_from(self, base: Pose2) -> View:

@@ -36,7 +36,9 @@ class ScanMatchingCorrection:
         self._matcher = ScanMatcher()
         self._dead_reckoning = OdometryHistory(tick_rate)
         self._x = self._y = 0.0
+        """Sum of all corrections in m, in the map frame."""
         self._previous: tuple[str, Pose2] | None = None
+        """Name of the lidar, and pose by dead reckoning at the last scan of this lidar."""
 
     def add_pose(self, tick: int, pose: Pose2) -> None:
         """Add a pose of dead reckoning in the map frame, which includes all corrections so far."""
@@ -83,12 +85,15 @@ class SlipEkfLocalizer(EkfLocalizer):
         """Restart at an estimate, with the initial uncertainty of the gyroscope's bias."""
         super().reset(estimate)
         self._filter.P[SLIP_X, SLIP_X] = self._spec.wheel_slip**2
-        self._speed, self._slipped = 0.0, False
+        self._speed = 0.0
+        """Speed in m/s in the last step without slip."""
+        self._slipped = False
+        """Whether the wheels slipped in the last step."""
         self._slip_detector = SlipDetector()
         self._scan_correction = ScanMatchingCorrection(self._tick_rate) if self._spec.match_scans else None
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Estimate the turn rate, and move the pose up to an odometry reading."""
+        """Estimate the turn rate, and propagate the pose to the time of an odometry reading."""
         super().on_odometry(odometry)
         if self._scan_correction is not None and self._last is odometry:
             self._scan_correction.add_pose(odometry.tick, self.pose)
@@ -103,31 +108,31 @@ class SlipEkfLocalizer(EkfLocalizer):
         self._map_from_odom = self.pose.compose(self._last.pose.inverse())
 
     def _advance(self, step: Pose2, seconds: float) -> None:
-        """Estimate the turn rate, and move the pose by `step`, the motion by the wheels in the last `seconds`."""
+        """Estimate the turn rate, and propagate the pose by `step`, which the wheels measured in the last `seconds`."""
         wheels = self._wheel_step(step, seconds)
         self._measure(wheels)
         self._predict(predict_state(self._filter.x, wheels), *pose_model(self._spec, self._filter.x, wheels))
 
-    def _wheel_step(self, pose: Pose2, seconds: float) -> WheelStep:
-        """Return the step in which the wheels measure the motion `pose` in `seconds`, with the detected slip."""
-        speed = math.hypot(pose.x, pose.y) / seconds
-        without_slip = WheelStep(pose, seconds, speed)
+    def _wheel_step(self, motion: Pose2, seconds: float) -> WheelStep:
+        """Return the step of `seconds` in which the wheels measure `motion`, with the slip that is detected."""
+        speed = math.hypot(motion.x, motion.y) / seconds
+        without_slip = WheelStep(motion, seconds, speed)
         if not self._yaw_rates:
             return without_slip
         turn = self._turn_rate - float(self._filter.x[BIAS])
-        innovation, noise = turn - pose.yaw / seconds, self._turn_rate_noise(without_slip) + self._gyro_noise
+        innovation, noise = turn - motion.yaw / seconds, self._turn_rate_noise(without_slip) + self._gyro_noise
         undetected = self._slip_detector.update(innovation, noise, float(self._filter.P[BIAS, BIAS]), seconds)
         if undetected == 0.0:
             return without_slip
-        pushed_speed = PUSHED_SPEED_M_S if abs(turn) > abs(pose.yaw / seconds) else 0.0
+        pushed_speed = PUSHED_SPEED_M_S if abs(turn) > abs(motion.yaw / seconds) else 0.0
         possible_speed = max(self._speed, speed, SLIP_LEVER_M * abs(innovation), pushed_speed)
-        return WheelStep(pose, seconds, possible_speed, slips=True, undetected_slip=undetected)
+        return WheelStep(motion, seconds, possible_speed, slips=True, undetected_slip=undetected)
 
     def _measure(self, step: WheelStep) -> None:
         """Update the turn rate with the wheels, unless they slip, and with the gyroscope."""
         jacobian, noise = rate_model(self._spec, step, self._turn_rate_noise(step), self._slipped)
         predicted = jacobian @ self._filter.x
-        predicted[RATE] = step.pose.yaw / step.seconds
+        predicted[RATE] = step.motion.yaw / step.seconds
         self._predict(predicted, jacobian, noise)
         if self._yaw_rates:
             self._update(np.array([self._turn_rate]), _GYRO_MEASUREMENT, np.array([[self._gyro_noise]]))
@@ -137,7 +142,7 @@ class SlipEkfLocalizer(EkfLocalizer):
 
     def _turn_rate_noise(self, step: WheelStep) -> float:
         """Return the variance of the turn rate of the wheels in (rad/s)²."""
-        turned = step.length + abs(step.pose.yaw)
+        turned = step.length + abs(step.motion.yaw)
         return self._spec.rotation_noise**2 * turned / step.seconds**2 + MIN_YAW_RATE_STD_RAD_S**2
 
     @property

@@ -22,34 +22,39 @@ class SlipDetector:
     """Detects wheel slip by the innovation: the turn rate of the gyroscope minus the turn rate of the wheels."""
 
     def __init__(self) -> None:
-        self._recent: deque[tuple[float, float, float]] = deque()  # rad, rad², seconds of each step
+        self._recent: deque[tuple[float, float, float]] = deque()
+        """Innovation in rad, its variance in rad², and duration in s of each step in the window."""
         self._slips_slowly = self._slips = False
 
-    def update(self, innovation: float, noise: float, bias: float, seconds: float) -> float:
+    def update(self, innovation: float, noise: float, bias_variance: float, seconds: float) -> float:
         """Return the duration in s of slip that earlier calls have not returned; 0 without slip.
 
-        innovation:  in rad/s
-        noise:       variance of this step's innovation, in (rad/s)²
-        bias:        variance of the gyroscope's bias, in (rad/s)², the same for all steps
-        seconds:     duration of the step, which is the time since the last call
+        innovation:     in rad/s
+        noise:          variance of this step's innovation, in (rad/s)²
+        bias_variance:  variance of the gyroscope's bias, in (rad/s)², the same for all steps
+        seconds:        duration of the step, which is the time since the last call
         """
-        lasted, known = self._slow_slip(innovation * seconds, noise * seconds**2, bias, seconds), self._slips
-        self._slips_slowly = lasted > 0.0
-        self._slips = self._slips_slowly or innovation**2 > FAST_SLIP_GATE * (noise + bias)
+        slow_slip_s = self._slow_slip(innovation * seconds, noise * seconds**2, bias_variance, seconds)
+        slipped_before = self._slips
+        self._slips_slowly = slow_slip_s > 0.0
+        self._slips = self._slips_slowly or innovation**2 > FAST_SLIP_GATE * (noise + bias_variance)
         if not self._slips:
             return 0.0
-        return seconds if known else max(seconds, lasted)
+        return seconds if slipped_before else max(seconds, slow_slip_s)
 
-    def _slow_slip(self, innovation: float, noise: float, bias: float, seconds: float) -> float:
-        """Return the length in s of the present window if the sum of its innovations exceeds the gate, else 0."""
+    def _slow_slip(self, innovation: float, noise: float, bias_variance: float, seconds: float) -> float:
+        """Return the duration in s of the present window if the sum of its innovations exceeds the gate, else 0.
+
+        `innovation` is in rad, `noise` in rad², and `bias_variance` in (rad/s)².
+        """
         self._recent.append((innovation, noise, seconds))
         window, gate = (
             (SLIP_END_WINDOW_S, SLIP_END_GATE) if self._slips_slowly else (SLOW_SLIP_WINDOW_S, SLOW_SLIP_GATE)
         )
         while len(self._recent) > 1 and sum(step[2] for step in self._recent) > window + 1e-9:
             self._recent.popleft()
-        total, variance, lasted = map(sum, zip(*self._recent, strict=True))
-        return lasted if total**2 > gate * (variance + bias * lasted**2) else 0.0
+        total, variance, duration = map(sum, zip(*self._recent, strict=True))
+        return duration if total**2 > gate * (variance + bias_variance * duration**2) else 0.0
 
 
 X, Y, YAW, RATE, BIAS, SLIP_X, SLIP_Y = range(7)
@@ -73,14 +78,14 @@ PUSHED_SPEED_M_S = 0.3
 class WheelStep:
     """Motion between two odometry readings, as measured by the wheels.
 
-    pose:             motion, in the base frame at its start
+    motion:           motion of the base, in the base frame at the start of the step
     seconds:          duration
     speed:            possible speed: the highest plausible speed of the robot in m/s
     slips:            whether the wheels slip
     undetected_slip:  duration in s of slip that earlier steps do not include, from SlipDetector.update
     """
 
-    pose: Pose2
+    motion: Pose2
     seconds: float
     speed: float
     slips: bool = False
@@ -89,7 +94,7 @@ class WheelStep:
     @property
     def length(self) -> float:
         """Distance driven in m."""
-        return math.hypot(self.pose.x, self.pose.y)
+        return math.hypot(self.motion.x, self.motion.y)
 
 
 def rate_model(spec: SlipEkf, step: WheelStep, noise: float, slipped_before: bool) -> tuple[Array, Array]:
@@ -121,7 +126,8 @@ def predict_state(state: Array, step: WheelStep) -> Array:
 def pose_model(spec: SlipEkf, state: Array, step: WheelStep) -> tuple[Array, Array]:
     """Return the Jacobian (7, 7) of `predict_state` for a step from `state` (7,), and the process noise (7, 7).
 
-    The columns of slip are for a step of `undetected_slip` seconds, so that the uncertainty includes earlier slip.
+    The slip columns of the Jacobian are for a step of `undetected_slip` seconds, so that the uncertainty includes
+    earlier slip.
     """
     dx, dy = _translation(state, step)
     c, s = _direction(state, step)
@@ -131,14 +137,14 @@ def pose_model(spec: SlipEkf, state: Array, step: WheelStep) -> tuple[Array, Arr
     slid = step.speed * (step.undetected_slip or step.seconds)
     f[:2, SLIP_X], f[:2, SLIP_Y] = (c * slid, s * slid), (-s * slid, c * slid)
     if step.length > 0:
-        wheels = c * step.pose.x - s * step.pose.y, s * step.pose.x + c * step.pose.y
+        wheels = c * step.motion.x - s * step.motion.y, s * step.motion.x + c * step.motion.y
         q[:2, :2] = spec.translation_noise**2 / step.length * np.outer(wheels, wheels)
     return f, q
 
 
 def _direction(state: Array, step: WheelStep) -> tuple[float, float]:
     """Return the cosine and sine of the heading in the map frame along which a step is added."""
-    along = float(state[YAW] + (state[RATE] * step.seconds - step.pose.yaw) / 2)
+    along = float(state[YAW] + (state[RATE] * step.seconds - step.motion.yaw) / 2)
     return math.cos(along), math.sin(along)
 
 
@@ -146,5 +152,5 @@ def _translation(state: Array, step: WheelStep) -> tuple[float, float]:
     """Return the translation of a step along x and y of the map in m."""
     c, s = _direction(state, step)
     slid = step.speed * step.seconds
-    x, y = step.pose.x + float(state[SLIP_X]) * slid, step.pose.y + float(state[SLIP_Y]) * slid
+    x, y = step.motion.x + float(state[SLIP_X]) * slid, step.motion.y + float(state[SLIP_Y]) * slid
     return c * x - s * y, s * x + c * y

@@ -89,19 +89,22 @@ def _corridor_legs(costs: TraversalCosts, ends: Endpoints, informed: InformedSet
     """
     waypoints = informed.waypoints(costs.costmap) if slack < 1.0 else []
     leg_start, distance_before = ends.start, 0.0
-    for waypoint, along in [*waypoints, (ends.goal, np.inf)]:
-        informed.restrict(slack, (distance_before, along))
+    for waypoint, distance in [*waypoints, (ends.goal, np.inf)]:
+        informed.restrict(slack, (distance_before, distance))
         yield Leg(Problem(leg_start, waypoint, informed.bounds(), _motion_cost_within(costs.between, informed)))
-        leg_start, distance_before = waypoint, along
+        leg_start, distance_before = waypoint, distance
 
 
 def _motion_cost_within(motion_cost: MotionCost, informed: InformedSet) -> MotionCost:
-    """Return a cost function of motions: `motion_cost` within the informed set, otherwise inf."""
+    """Return a cost function of motions: `motion_cost` within the informed set, otherwise inf.
+
+    Only both ends and the middle of a motion are tested.
+    """
     contains = informed.contains
 
     def confined_cost(ax: float, ay: float, bx: float, by: float) -> float:
-        inside = contains(0.5 * (ax + bx), 0.5 * (ay + by)) and contains(bx, by) and contains(ax, ay)
-        return motion_cost(ax, ay, bx, by) if inside else np.inf
+        is_inside = contains(0.5 * (ax + bx), 0.5 * (ay + by)) and contains(bx, by) and contains(ax, ay)
+        return motion_cost(ax, ay, bx, by) if is_inside else np.inf
 
     return confined_cost
 

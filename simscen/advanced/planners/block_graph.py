@@ -28,11 +28,11 @@ def block_graph(costs: TraversalCosts, factor: int, by_cost: bool) -> csr_matrix
     to_block = from_block + offsets[move]
     if by_cost:
         costs_per_meter = _block_costs(costs, factor)
-        length = (0.5 * lengths).astype(np.float32)[move] * (costs_per_meter[from_block] + costs_per_meter[to_block])
+        weights = (0.5 * lengths).astype(np.float32)[move] * (costs_per_meter[from_block] + costs_per_meter[to_block])
     else:
-        length = lengths[move]
+        weights = lengths[move]
     row_starts = np.concatenate(([0], possible.sum(axis=1).cumsum()))
-    return csr_matrix((length, to_block, row_starts), shape=(height * width, height * width))
+    return csr_matrix((weights, to_block, row_starts), shape=(height * width, height * width))
 
 
 def _as_blocks(free: Mask, factor: int) -> Mask:

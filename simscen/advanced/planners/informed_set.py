@@ -32,9 +32,8 @@ MAX_LEG_M = 30.0
 class InformedSet:
     """Points on near-shortest paths from start to goal; the entire map before `restrict` is called.
 
-    `length` is the length of the shortest path in m.
-
-    Paths move from block to block in 16 directions, like a king or a knight in chess. They are up to 2.8 % too long.
+    `length` is the length of the shortest path in m; inf without a path. Paths move from block to block in 16
+    directions, like a king or a knight in chess, and are up to 2.8 % too long.
     """
 
     def __init__(self, costs: TraversalCosts, start: Point, goal: Point, by_cost: bool = False) -> None:
@@ -50,11 +49,14 @@ class InformedSet:
         graph = costs.cache.get((self._factor, by_cost))
         if graph is None:
             costs.cache[self._factor, by_cost] = graph = block_graph(costs, self._factor, by_cost)
-        lengths, self._before = dijkstra(graph, directed=False, indices=end_blocks, return_predecessors=True)
+        lengths, self._predecessors = dijkstra(graph, directed=False, indices=end_blocks, return_predecessors=True)
         distances: Array = lengths * self._size
-        self._from_start, self._through, self._end = distances[0], distances[0] + distances[1], end_blocks[1]
-        self.length = float(distances[0][end_blocks[1]])
-        self._inside = b"\1" * len(self._through)
+        self._from_start, self._lengths_through = distances[0], distances[0] + distances[1]
+        """For each block, the lengths of the shortest path from the start, and through the block to the goal."""
+        self._goal_block = end_blocks[1]
+        self.length = float(distances[0][self._goal_block])
+        self._contained = b"\1" * len(self._lengths_through)
+        """For each block, 1 if the block is in the set, else 0; as bytes, because `contains` is called very often."""
 
     def restrict(self, slack: float, section: tuple[float, float] = (0.0, math.inf)) -> None:
         """Restrict the set to paths that are longer than the shortest path by at most the ratio `slack`.
@@ -63,20 +65,20 @@ class InformedSet:
         Earlier restrictions no longer apply.
         """
         tolerance = 2 * math.sqrt(2.0) * self._size
-        is_inside = self._through <= self.length * (1.0 + slack) + tolerance
+        is_inside = self._lengths_through <= self.length * (1.0 + slack) + tolerance
         low, high = section
         if low > 0.0 or high < self.length:
             is_inside &= (self._from_start >= low - tolerance) & (self._from_start <= high * (1.0 + slack) + tolerance)
-        self._inside = is_inside.tobytes()
+        self._contained = is_inside.tobytes()
 
     def contains_points(self, points: Array) -> Mask:
         """Return which of the points (n, 2) are in the set."""
-        inside: Mask = np.frombuffer(self._inside, dtype=bool)[self._blocks(points)]
+        inside: Mask = np.frombuffer(self._contained, dtype=bool)[self._blocks(points)]
         return inside
 
     def lengths_through(self, points: Array) -> Array:
         """Return the lengths (n,) in m of the shortest paths from start to goal through points (n, 2)."""
-        return np.asarray(self._through[self._blocks(points)])
+        return np.asarray(self._lengths_through[self._blocks(points)])
 
     def _blocks(self, points: Array) -> npt.NDArray[np.int64]:
         """Return the indices (n,) of the blocks that contain points (n, 2)."""
@@ -88,9 +90,9 @@ class InformedSet:
 
         Where the clearance is at least `ample_clearance` m, only points PATH_SPACING_M apart are returned.
         """
-        blocks = [int(self._before[0, self._end])]
+        blocks = [int(self._predecessors[0, self._goal_block])]
         while blocks[-1] >= 0:
-            blocks.append(int(self._before[0, blocks[-1]]))
+            blocks.append(int(self._predecessors[0, blocks[-1]]))
         inner = np.array(blocks[:-2], dtype=np.int64)
         rows, columns = self._cells_with_most_clearance(costmap, inner)
         stride = max(1, round(PATH_SPACING_M / self._size))
@@ -104,16 +106,17 @@ class InformedSet:
         A tree planner needs far fewer samples for several short legs than for one long path.
         """
         legs = math.ceil(self.length / MAX_LEG_M) if math.isfinite(self.length) else 1
-        return [self._point_with_most_clearance(costmap, self.length * number / legs) for number in range(1, legs)]
+        distances = [self.length * number / legs for number in range(1, legs)]
+        return [(self._point_with_most_clearance(costmap, distance), distance) for distance in distances]
 
-    def _point_with_most_clearance(self, costmap: CostmapView, along: float) -> tuple[Point, float]:
-        """Return the point with the most clearance on near-shortest paths, `along` m from the start, and `along`."""
-        near_shortest = self._through <= self.length + 2 * self._size
-        blocks = np.flatnonzero(near_shortest & (np.abs(self._from_start - along) <= self._size))
+    def _point_with_most_clearance(self, costmap: CostmapView, distance: float) -> Point:
+        """Return the point with the most clearance on near-shortest paths, `distance` m from the start."""
+        is_near_shortest = self._lengths_through <= self.length + 2 * self._size
+        blocks = np.flatnonzero(is_near_shortest & (np.abs(self._from_start - distance) <= self._size))
         rows, columns = self._cells_with_most_clearance(costmap, blocks)
         best = np.lexsort((columns, rows, costmap.distance[rows, columns]))[-1]
         x = self._origin[0] + (int(columns[best]) + 0.5) * costmap.resolution
-        return (x, self._origin[1] + (int(rows[best]) + 0.5) * costmap.resolution), along
+        return x, self._origin[1] + (int(rows[best]) + 0.5) * costmap.resolution
 
     def _cells_with_most_clearance(
         self, costmap: CostmapView, blocks: npt.NDArray[np.int64]
@@ -125,7 +128,7 @@ class InformedSet:
 
     def bounds(self) -> tuple[float, float, float, float]:
         """Return (min x, min y, max x, max y) of the set in m."""
-        rows, columns = np.nonzero(np.frombuffer(self._inside, dtype=bool).reshape(self._height, self._width))
+        rows, columns = np.nonzero(np.frombuffer(self._contained, dtype=bool).reshape(self._height, self._width))
         x, y, size = self._origin[0], self._origin[1], self._size
         return (
             float(x + columns.min() * size),
@@ -136,7 +139,7 @@ class InformedSet:
 
     def contains(self, x: float, y: float) -> bool:
         """Return whether a point is in the set."""
-        return bool(self._inside[self._index(x, y)])
+        return bool(self._contained[self._index(x, y)])
 
     def _index(self, x: float, y: float) -> int:
         """Return the index of the block that contains a point, or of the nearest block."""

@@ -101,7 +101,7 @@ class MedialAxisPlanner:
 
 
 def _postprocessed(costs: TraversalCosts, points: Array) -> Array | None:
-    """Return the path, refined and led around corners of blocked cells; None if it crosses a blocked cell."""
+    """Return the path, refined and led around corners of blocked cells; None if the path crosses a blocked cell."""
     path = avoid_cell_corners(costs, densify(refine(costs, points), SPACING_M))
     return path if path is not None else avoid_cell_corners(costs, densify(points, SPACING_M))
 
@@ -115,8 +115,8 @@ ATTEMPTS = (
     (2.0, 0.0, 0.4, POSE_SPACING_M),
     (2.0, 0.0, 0.4, POSE_SPACING_M / 10),
 )
-"""Successive attempts: slack of the informed set (`InformedSet.restrict`), ratio of the clearance to `hull_clearance`,
-share of the iterations, and spacing of collision checks in m."""
+"""Successive attempts, each with the slack of the informed set (see `InformedSet.restrict`), the ratio of the clearance
+to `hull_clearance`, the share of the iterations, and the spacing of collision checks in m."""
 
 
 class ConfinedPosePlanner(PosePlanner):
@@ -124,7 +124,7 @@ class ConfinedPosePlanner(PosePlanner):
 
     def _attempts(self, costs: TraversalCosts, ends: Endpoints, free_start: Pose2, goal: Pose2) -> Iterator[Attempt]:
         informed = InformedSet(costs, (free_start.x, free_start.y), (goal.x, goal.y))
-        for slack, part, fraction, spacing in ATTEMPTS:
+        for slack, clearance_ratio, iteration_share, spacing in ATTEMPTS:
             informed.restrict(slack)
-            clearance = part * self._spec.hull_clearance
-            yield Attempt(informed.bounds(), informed.contains, clearance, fraction, spacing)
+            clearance = clearance_ratio * self._spec.hull_clearance
+            yield Attempt(informed.bounds(), informed.contains, clearance, iteration_share, spacing)

@@ -72,5 +72,5 @@ def _thinned(mask: Mask, spacing: float, rng: np.random.Generator) -> npt.NDArra
         (columns + column_offset) / spacing
     ).astype(np.int64)
     chosen = np.full(int(square.max(initial=0)) + 1, -1)
-    chosen[square] = cells  # the last one of each square
+    chosen[square] = cells  # the last cell of each square stays
     return np.column_stack(np.divmod(chosen[chosen >= 0], mask.shape[1]))

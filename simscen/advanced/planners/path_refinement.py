@@ -1,7 +1,8 @@
 """Optimization of a path on traversal costs.
 
-It places stations along the path, and several points to the left and right of each station. Viterbi's algorithm finds
-the cheapest path through one point per station. The path usually stays on the same side of each obstacle.
+The optimization places stations along the path, and several points to the left and right of each station. Viterbi's
+algorithm finds the cheapest path through one point per station. The path usually stays on the same side of each
+obstacle.
 """
 
 import math
@@ -20,6 +21,7 @@ REFINEMENT_ROUNDS = ((0.3, 0.4, 9), (0.3, 0.2, 9), (0.25, 0.12, 7), (0.2, 0.06, 
 MIN_SEGMENTS = 2
 """Minimum number of segments of a path, so that there is a station between its ends."""
 Costs = npt.NDArray[np.float32]
+"""Array of traversal costs."""
 
 
 def refine(costs: TraversalCosts, points: Array) -> Array:
@@ -28,21 +30,21 @@ def refine(costs: TraversalCosts, points: Array) -> Array:
     cost = costs.along(points)
     for spacing, max_offset, count in REFINEMENT_ROUNDS:
         for stride in (costs.stride, SAMPLE_SPACING_CELLS * costs.resolution):
-            other = _cheapest_through(
+            candidate = _cheapest_through(
                 costs,
                 resample_polyline(points, spacing, MIN_SEGMENTS),
                 np.linspace(-max_offset, max_offset, count),
                 stride,
             )
-            if math.isfinite(new_cost := costs.along(other)):
+            if math.isfinite(new_cost := costs.along(candidate)):
                 break
         if new_cost < cost:
-            points, cost = other, new_cost
+            points, cost = candidate, new_cost
     return smooth_path(costs, points)
 
 
 def _with_shortcuts(costs: TraversalCosts, points: Array) -> Array:
-    """Return the path with straight shortcuts where they are not more expensive."""
+    """Return the path with straight shortcuts wherever a shortcut is not more expensive."""
     resampled = resample_polyline(points, REFINEMENT_ROUNDS[0][0], MIN_SEGMENTS)
     rows = resampled.tolist()
     cost = [0.0]

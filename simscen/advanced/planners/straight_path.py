@@ -48,8 +48,8 @@ def straight_path(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float
 def costly_distance(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float) -> float:
     """Return the distance in m from the start to the end of the last costly cell on the straight line to the goal.
 
-    Cells are costly if they are not free or within `radius` m of an obstacle. 0 without such cells, inf if the line
-    leaves the costmap.
+    Cells are costly if they are not free or within `radius` m of an obstacle. Returns 0 without such cells, and inf if
+    the line leaves the costmap.
     """
     columns, rows, leaving_ratios = _cells_on_line(costmap, start, goal)
     height, width = costmap.costs.shape
@@ -62,7 +62,10 @@ def costly_distance(costmap: CostmapView, start: Pose2, goal: Pose2, radius: flo
 def _cells_on_line(
     costmap: CostmapView, start: Pose2, goal: Pose2
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.float64]]:
-    """Return columns and rows of the cells on a straight line, and where it leaves each cell (0 start … 1 goal)."""
+    """Return columns and rows of the cells on a straight line, and where the line leaves each cell (0 start … 1 goal).
+
+    All three have the shape (n,).
+    """
     crossings = [np.array((0.0, 1.0))]
     origin, direction = np.empty(2), np.empty(2)
     for axis, (start_coordinate, end) in enumerate(((start.x, goal.x), (start.y, goal.y))):

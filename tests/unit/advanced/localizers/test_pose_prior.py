@@ -6,7 +6,7 @@ import pytest
 from simscen.advanced.localizers.matched_motion import MatchedMotion, sample_motion
 from simscen.advanced.localizers.pose_prior import (
     CERTAIN_STD,
-    KNOWN_STEP_STD_M,
+    MAX_MATCHED_STEP_STD_M,
     ODOMETRY_DRIFT,
     ObservedMotion,
     PosePrior,
@@ -41,7 +41,7 @@ def test_step_errors_accumulate_as_in_simulation(error: tuple[float, ...]) -> No
     robots = np.tile(np.array(prior.pose), (20_000, 1))
     for _ in range(20):
         robots, before, base = sample_motion(robots, STEP, rng), base, base.compose(STEP.delta)
-        prior = prior.after(before, base, 0.3, ObservedMotion(step=STEP))
+        prior = prior.propagate(before, base, 0.3, ObservedMotion(step=STEP))
     errors = pose_errors(prior.expected(base), robots)
     delta, covariance = np.array(error), errors.T @ errors / len(robots)
     assert cost_of_error(prior, base, delta) == pytest.approx(0.5 * delta @ np.linalg.inv(covariance) @ delta, rel=0.05)
@@ -57,8 +57,8 @@ def test_step_errors_accumulate_as_in_simulation(error: tuple[float, ...]) -> No
             (0.5, 0.5, 0.2),
         ),
         (
-            ObservedMotion(step=MatchedMotion(STEP.delta, np.diag([(4 * KNOWN_STEP_STD_M) ** 2, 0.0, 0.0]))),
-            (3 * KNOWN_STEP_STD_M, 3 * KNOWN_STEP_STD_M, 0.0),
+            ObservedMotion(step=MatchedMotion(STEP.delta, np.diag([(4 * MAX_MATCHED_STEP_STD_M) ** 2, 0.0, 0.0]))),
+            (3 * MAX_MATCHED_STEP_STD_M, 3 * MAX_MATCHED_STEP_STD_M, 0.0),
         ),
     ],
     ids=["no scans", "scans and odometry disagree", "endless corridor"],
@@ -67,7 +67,7 @@ def test_step_errors_are_correlated_without_scan_matches(
     axis: int, motion: ObservedMotion, drift: tuple[float, float, float]
 ) -> None:
     """Systematic errors double with the distance, random errors grow by √2, and errors of a step are added."""
-    prior = PRIOR.after(START, START, 10.0, motion).after(START, START, 10.0, motion)
+    prior = PRIOR.propagate(START, START, 10.0, motion).propagate(START, START, 10.0, motion)
     variance = 0.0 if motion.step is None else 2 * motion.step.covariance[axis, axis]
     error = np.eye(3)[axis] * 2 * np.sqrt((CERTAIN_STD[axis] + 2 * drift[axis]) ** 2 + variance)
     assert cost_of_error(prior, START, error) == pytest.approx(2.0)
