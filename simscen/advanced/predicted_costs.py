@@ -21,8 +21,8 @@ BLOCK_SIZE_M = 0.2
 def add_predicted_costs(costmap: CostmapView, robot: Pose2, speed: float, radius: float) -> CostmapView:
     """Return the costmap with costs, up to MAX_NON_OBSTACLE, in cells where the robot would meet moving obstacles.
 
-    The robot drives to each cell in a straight line from the pose `robot` at `speed` m/s; its `radius` is in m. The
-    obstacles are predicted for the time of its arrival.
+    The robot is assumed to drive straight from the pose `robot` to each cell at `speed` m/s. The obstacles are
+    predicted for the time of arrival. `radius` is the radius of the robot in m.
     """
     if not len(costmap.moving):
         return costmap
@@ -37,8 +37,8 @@ def add_predicted_costs(costmap: CostmapView, robot: Pose2, speed: float, radius
         centers.append(corner + size * (first + factor * (np.arange(-(-max(0, last - first) // factor)) + 0.5)))
     x, y = np.meshgrid(centers[1], centers[0])
     times = np.hypot(x - robot.x, y - robot.y) / speed
-    near, _ = costmap.moving.nearness(x, y, times, radius, MIN_DISTANCE_M)
-    cost = MAX_NON_OBSTACLE * np.clip(near, 0.0, 1.0) * np.exp(-times / DECAY_TIME_S)
+    nearness, _ = costmap.moving.nearness(x, y, times, radius, MIN_DISTANCE_M)
+    cost = MAX_NON_OBSTACLE * np.clip(nearness, 0.0, 1.0) * np.exp(-times / DECAY_TIME_S)
     predicted = np.where(times > HORIZON_S, 0.0, cost).astype(np.uint8)
     if not predicted.any():
         return costmap

@@ -36,7 +36,7 @@ CLEARANCE_HORIZON_M = 4.0
 
 
 class ClearancePlan(FollowedPlan):
-    """Followed plan that compares its present clearance with its clearance when it was made."""
+    """Followed plan that compares its present clearance with its clearance at the time of planning."""
 
     def __init__(self, path: Path, radius: float, costmap: CostmapView) -> None:
         self._initial_clearance = np.minimum(distances(costmap, path.points[:, :2]), np.float32(WATCH_DISTANCE_M))

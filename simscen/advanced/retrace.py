@@ -24,13 +24,13 @@ TIMES: Array = np.linspace(0.0, HORIZON_S, 11)
 MIN_FREE_STEPS = 3
 """If no command is free of collisions at all TIMES, a command must be free at this number of TIMES after 0."""
 SLACK_CELLS = 0.3
-"""Distance in cells by which the robot may come closer to an obstacle than on its trail."""
+"""Distance in cells by which the robot may come closer to an obstacle than it was on the trail."""
 DEVIATION_WEIGHT = 2.0
 """Weight of the deviation from the trail relative to the progress along the trail."""
 MIN_GAIN_M = 0.01
 """Minimum score of a command, in m above the score of standing still."""
 WINDOW_M = 0.5
-"""Length of the part of the trail after the robot's last position that is searched for its present position."""
+"""Length of the part of the trail, after the last position, that is searched for the robot's present position."""
 SPEED_RATIOS = (-1.0, -0.5, 0.0, 0.5)
 """Candidate speeds relative to the maximum. The robot also drives forward, because a trail can have cusps."""
 TURN_RATES_RAD_S = (0.0, 0.07, -0.07, 0.15, -0.15, 0.3, -0.3, 0.5, -0.5, 0.8, -0.8)
@@ -48,23 +48,29 @@ class TrailFollower:
 
     def __init__(self, setting: Setting, speed: float) -> None:
         """Take the setting of the behavior and the maximum speed in m/s."""
-        self._footprint, self._recorded, self._limit_command = setting.footprint, setting.trail, setting.limit_command
+        self._footprint, self._recorded_trail, self._limit_command = (
+            setting.footprint,
+            setting.trail,
+            setting.limit_command,
+        )
         self.speed = min(speed, setting.robot.max_reverse)
         """Speed in m/s; 0 for a robot that cannot reverse."""
         self._last: Pose2 | None = None
+        """Pose at the last call of `start` or `locate`."""
         self._commands = _candidate_commands(setting.robot, self.speed)
 
     def start(self, pose: Pose2, length: float) -> None:
         """Start at a pose in the odom frame. The straight part of the trail is `length` m long."""
         horizon = np.array([HORIZON_S])
         self._ends = np.stack([poses_along(Pose2(0.0, 0.0), each, horizon)[0] for each in (*self._commands, STOP)])
-        lever = self._footprint.circumscribed
-        self._trail, self._index = Trail(self._remaining_trail(), pose, lever, length + self.speed * HORIZON_S), 0
+        """Poses (n, 3) in the base frame after HORIZON_S of each command and, last, of a stop."""
+        radius, extension = self._footprint.circumscribed, length + self.speed * HORIZON_S
+        self._trail, self._index = Trail(self._remaining_trail(), pose, radius, extension), 0
         self._last = pose
 
     def _remaining_trail(self) -> Sequence[Pose2]:
         """Return the recorded poses, without the part that the robot has already driven back."""
-        poses = self._recorded()
+        poses = self._recorded_trail()
         if self._last is None or self._last not in poses:
             return poses
         first_new = len(poses) - poses[::-1].index(self._last)
@@ -79,23 +85,23 @@ class TrailFollower:
     @property
     def driven(self) -> float:
         """Distance in m that the base has driven back."""
-        return float(self._trail.driven[self._index])
+        return float(self._trail.base_distances[self._index])
 
     @property
     def footprint_moved(self) -> float:
         """Distance in m that the footprint has moved, by `Trail.footprint_distance`."""
-        return float(self._trail.along[self._index])
+        return float(self._trail.footprint_distances[self._index])
 
     def _window(self) -> slice:
         """Return the slice of the trail from the last position of the robot to WINDOW_M after it."""
-        along = self._trail.along
-        return slice(self._index, int(np.searchsorted(along, along[self._index] + WINDOW_M, side="right")))
+        distances = self._trail.footprint_distances
+        return slice(self._index, int(np.searchsorted(distances, distances[self._index] + WINDOW_M, side="right")))
 
     def command(self, pose: Pose2, costmap: CostmapView) -> Twist | None:
-        """Return the best command without collisions in HORIZON_S, otherwise the best one without early collisions.
+        """Return the best command without collisions in HORIZON_S, or else the best command without early collisions.
 
-        None if no such command is better than standing still. After a veto of the collision monitor, other backward
-        commands are tried, better or not.
+        None if no such command is better than standing still. If the collision monitor stops a command, other backward
+        commands are tried, even if they are not better than standing still.
         """
         *scores, stop_score = self._scores(pose).tolist()
         has_strafed, is_vetoed = self._trail.has_strafed, False
@@ -122,26 +128,26 @@ class TrailFollower:
     def _blocked(self, pose: Pose2, poses: Array, costmap: CostmapView) -> Mask:
         """Return which of the poses (n, 3) collide with obstacle cells.
 
-        Cells are ignored, as errors of the costmap, if the robot is or was (on its trail) about as near to them.
+        An obstacle cell is ignored if the robot is about as near to the cell now, or was on its trail. Such a cell is
+        an error of the costmap.
         """
         blocked: Mask = ~self._footprint.free(costmap, poses)
         if not blocked.any():
             return blocked
-        edge = costmap.resolution
-        cells = lethal_cells_near(
-            costmap, pose.x, pose.y, self._footprint.circumscribed + self.speed * HORIZON_S + edge
-        )
+        cell_size = costmap.resolution
+        reach = self._footprint.circumscribed + self.speed * HORIZON_S + cell_size
+        cells = lethal_cells_near(costmap, pose.x, pose.y, reach)
         known_poses = self._trail.poses[self._window()][: max(0, self._trail.known_count - self._index)]
-        passed = self._footprint.point_distances(cells, known_poses).min(axis=0, initial=edge)
+        on_trail = self._footprint.point_distances(cells, known_poses).min(axis=0, initial=cell_size)
         current = self._footprint.point_distances(cells, np.array([pose]))[0]
-        limits = np.minimum(np.where(passed < -edge, edge, passed), np.maximum(current, -edge / 2))
+        limits = np.minimum(np.where(on_trail < -cell_size, cell_size, on_trail), np.maximum(current, -cell_size / 2))
         is_nearer = self._footprint.point_distances(cells, poses) < np.minimum(
-            limits - SLACK_CELLS * edge, edge / math.sqrt(2.0)
+            limits - SLACK_CELLS * cell_size, cell_size / math.sqrt(2.0)
         )
         return np.asarray(blocked & is_nearer.any(axis=1))
 
     def _scores(self, pose: Pose2) -> Array:
-        """Return the scores in m of all commands and, last, of a stop: progress minus weighted deviation."""
+        """Return the scores (n,) in m of all commands and, last, of a stop: progress minus weighted deviation."""
         cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
         ends = np.column_stack((
             pose.x + cosine * self._ends[:, 0] - sine * self._ends[:, 1],
@@ -150,7 +156,7 @@ class TrailFollower:
         ))  # fmt: skip
         window = self._window()
         deviation = self._trail.footprint_distance(ends[:, None], self._trail.poses[None, window])
-        scores: Array = (self._trail.along[window] - DEVIATION_WEIGHT * deviation).max(axis=1)
+        scores: Array = (self._trail.footprint_distances[window] - DEVIATION_WEIGHT * deviation).max(axis=1)
         return scores
 
 
@@ -169,7 +175,7 @@ def _candidate_commands(robot: RobotModel, speed: float) -> list[Twist]:
 
 
 TIME_ALLOWANCE_RATIO = 1.5
-"""Minimum time limit of the behavior, relative to the time that the distance takes at full speed."""
+"""Minimum time limit of the behavior, relative to the time that `retrace_dist` takes at the maximum speed."""
 
 
 class Retrace:
@@ -189,7 +195,7 @@ class Retrace:
         """Return the command, `seconds` after the start; None if the robot has driven back far enough or cannot go on.
 
         Raises NavigationFailure: BACKUP_INVALID_INPUT if the robot cannot reverse, BACKUP_TIMEOUT, or
-        BACKUP_COLLISION_AHEAD if it could not move by a single cell.
+        BACKUP_COLLISION_AHEAD if the robot could not move by a single cell.
         """
         follower = self._follower
         if follower.speed <= 0.0:
@@ -207,4 +213,5 @@ class Retrace:
         return command
 
     def _can_turn(self, pose: Pose2, costmap: CostmapView) -> bool:
+        """Return whether there is room to turn in place at a pose."""
         return distance_at(costmap, pose.x, pose.y) > self._footprint.circumscribed + costmap.resolution

@@ -1,4 +1,4 @@
-"""The advanced stack and its builder: motion prediction, turn slip, tilt, and its own clearing policy."""
+"""The advanced stack and its builder: the reference stack with motion prediction and compensation of slip and tilt."""
 
 import math
 from typing import Any
@@ -22,9 +22,8 @@ ROBOT_IN_BASE_FRAME = Pose2(0.0, 0.0)
 class AdvancedStack(ReferenceStack):
     """Reference stack that predicts moving obstacles and avoids them, also while the robot has no goal.
 
-    It also ignores lidar hits on the floor while the robot is tilted.
-
-    The private methods are hooks that ReferenceStack calls.
+    The stack also ignores lidar hits on the floor while the robot is tilted, and compensates turn slip. The private
+    methods are hooks that ReferenceStack calls.
     """
 
     def __init__(
@@ -94,7 +93,7 @@ class AdvancedStack(ReferenceStack):
         return command if self._turn_slip is None else self._turn_slip.compensate(command)
 
     def _on_idle(self, tick: int, pose: Pose2) -> None:
-        """Make the standing robot step aside for moving obstacles, and drive back to its position afterward."""
+        """Let the standing robot step aside for moving obstacles, and drive back to the old position afterward."""
         costmap = self._costmaps.global_costmap.view
         command = self._prediction.stand(tick, pose, self._twist, costmap, self._max_speed(pose))
         if command == STOP or self._monitor.is_silent(tick):
@@ -104,7 +103,7 @@ class AdvancedStack(ReferenceStack):
 
 
 FIRST_CLEARING_WAIT_S = 10.0
-"""Time after clearing the entire costmap until this may happen again; doubled each time."""
+"""Minimum time between the first two clearings of the entire costmap; doubled after each clearing."""
 CLEARING_PROGRESS_M = 1.0
 """Decrease of the distance to the goal that resets the time between two clearings to FIRST_CLEARING_WAIT_S."""
 
@@ -117,10 +116,15 @@ class ClearingBackoff(ClearingPolicy):
 
     def reset(self) -> None:
         """Prepare for a new goal."""
-        self._wait, self._due, self._nearest = FIRST_CLEARING_WAIT_S, 0.0, float("inf")
+        self._wait = FIRST_CLEARING_WAIT_S
+        """Minimum time in s from the next clearing of the entire costmap to the following one."""
+        self._due = 0.0
+        """Time in s from which on the entire costmap may be cleared."""
+        self._nearest = math.inf
+        """Smallest distance in m to the goal at a clearing of the entire costmap."""
 
     def clears_entirely(self, now: float, goal_distance: float) -> bool:
-        """Return whether to clear the entire costmap (see ClearingPolicy). Call it once per clearing."""
+        """Return whether to clear the entire costmap (see ClearingPolicy). Call this method once per clearing."""
         if goal_distance <= self._nearest - CLEARING_PROGRESS_M:
             self._wait, self._due = FIRST_CLEARING_WAIT_S, now
         if now < self._due:
@@ -136,7 +140,7 @@ class AdvancedStackBuilder(StackBuilder):
     plan_manager = AdvancedPlanManager
 
     def make_clearing_policy(self) -> ClearingPolicy:
-        """Make the policy for clearing the global costmap: all of it if `recovery.clear_entirely`."""
+        """Make the policy for clearing the global costmap: always entirely if `recovery.clear_entirely`."""
         return ClearingPolicy() if self.spec.recovery.clear_entirely else ClearingBackoff()
 
     def make_stack(self, *parts: Any) -> AdvancedStack:

@@ -14,9 +14,9 @@ from simscen.core.messages.sensor_data import Imu, Odometry, Scan
 CORRECTION_TIME_S = 1.0
 """Time constant with which the measured acceleration corrects the direction that the gyroscope yields."""
 MAX_GAP_S = 0.5
-"""Time between two readings above which their difference is ignored."""
+"""Maximum time between two readings that are compared."""
 MAX_ACCELERATION_ERROR_M_S2 = 1.0
-"""Difference between the magnitudes of measured acceleration and gravity above which the former is not used."""
+"""Maximum difference between the magnitudes of the measured acceleration and of gravity, for a correction."""
 MIN_SLOPE = 0.05
 """Slope of a beam below which its hit counts as an obstacle, because the tilt is not known more precisely."""
 MIN_LIDAR_HEIGHT_M = 0.1
@@ -58,18 +58,22 @@ class TiltEstimator:
         ax, ay = ax - self._acceleration[0], ay - self._acceleration[1]
         if abs(math.hypot(ax, ay, az) - GRAVITY_M_S2) < MAX_ACCELERATION_ERROR_M_S2:
             share = min(1.0, seconds / CORRECTION_TIME_S)
-            x, y, z = (one + share * (measured / GRAVITY_M_S2 - one) for one, measured in ((x, ax), (y, ay), (z, az)))
+            pairs = ((x, ax), (y, ay), (z, az))
+            x, y, z = (up + share * (acceleration / GRAVITY_M_S2 - up) for up, acceleration in pairs)
         length = math.hypot(x, y, z)
         if 0.0 < length < math.inf:
             self.up = x / length, y / length, z / length
 
     def _seconds(self, before: int, now: int) -> float:
-        """Return the time between two ticks in s; 0 if it is negative or longer than MAX_GAP_S."""
+        """Return the time between two ticks in s; 0 if this time is negative or longer than MAX_GAP_S."""
         seconds = (now - before) / self._tick_rate
         return seconds if 0.0 < seconds <= MAX_GAP_S else 0.0
 
     def without_floor(self, scan: Scan) -> Scan:
-        """Return a scan in which possible hits on the floor are nan. The floor is level, or lower than the robot."""
+        """Return a scan in which possible hits on the floor are nan: hits far enough below the lidar.
+
+        A scan of a tilted lidar is returned unchanged.
+        """
         x, y, _ = self.up
         if math.hypot(x, y) < MIN_SLOPE or scan.tilted_mount is not None:
             return scan

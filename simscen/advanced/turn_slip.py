@@ -19,21 +19,23 @@ class TurnSlipObserver:
 
     def __init__(self) -> None:
         self._curvature = 0.0
+        """Estimated turn slip in rad/m."""
         self._before: tuple[Pose2, Pose2] | None = None
+        """Last poses of wheel odometry and fused odometry."""
 
     def update(self, wheels: Pose2, fused: Pose2) -> None:
-        """Update the estimate with poses of wheel odometry and fused odometry. Ignore them if they are not finite."""
+        """Update the estimate with poses of wheel odometry and fused odometry. Ignores poses that are not finite."""
         if not math.isfinite(wheels.x + wheels.y + wheels.yaw + fused.yaw):
             return
         before, self._before = self._before, (wheels, fused)
         if before is None:
             return
         c, s = math.cos(before[0].yaw), math.sin(before[0].yaw)
-        ahead = c * (wheels.x - before[0].x) + s * (wheels.y - before[0].y)
-        turned = math.remainder((fused.yaw - before[1].yaw) - (wheels.yaw - before[0].yaw), math.tau)
-        gain = min(1.0, abs(ahead) / DECAY_DISTANCE_M)
-        if ahead != 0.0:
-            curvature = self._curvature + gain * (turned / ahead - self._curvature)
+        driven = c * (wheels.x - before[0].x) + s * (wheels.y - before[0].y)
+        slip_turn = math.remainder((fused.yaw - before[1].yaw) - (wheels.yaw - before[0].yaw), math.tau)
+        gain = min(1.0, abs(driven) / DECAY_DISTANCE_M)
+        if driven != 0.0:
+            curvature = self._curvature + gain * (slip_turn / driven - self._curvature)
             self._curvature = min(max(curvature, -MAX_TURN_SLIP_RAD_PER_M), MAX_TURN_SLIP_RAD_PER_M)
 
     def compensate(self, command: Twist) -> Twist:

@@ -113,7 +113,10 @@ class Simulation:
             self._scene.actors.remove(name)
 
     def move(self, name: str, path: MotionPath) -> None:
-        """Let a body follow a path from now on. Nothing can push it any more. Raises KeyError for an unknown name."""
+        """Let a body follow a path from now on; the body cannot be pushed any more.
+
+        Raises KeyError for an unknown name.
+        """
         with self._stepper.change():
             self._scene.actors.move(name, path, self.tick)
 

@@ -34,48 +34,49 @@ class ScanClusters:
 def associate(tracks: list[Track], current: ScanClusters) -> set[int]:
     """Update each track with a nearby cluster, nearest pairs first. Return the indices of the used clusters."""
     lidar = current.lidar
-    possible: list[tuple[float, int, int]] = []
-    for number, track in enumerate(tracks):
+    candidates: list[tuple[float, int, int]] = []  # distance in m, index of the track, index of the cluster
+    for track_index, track in enumerate(tracks):
         expected, gate = lidar.to_lidar(track.position), GATE_M + GATE_SIGMAS * track.position_std
-        for index, cluster in enumerate(current.clusters):
-            # The center of a partly hidden obstacle can be off by its radius.
-            distance, hidden = abs(expected - cluster.center), 0.0 if cluster.is_fully_visible else track.radius
-            if distance > gate + hidden:
+        for cluster_index, cluster in enumerate(current.clusters):
+            # The center of a partly hidden obstacle can be off by the obstacle's radius.
+            distance, center_error = abs(expected - cluster.center), 0.0 if cluster.is_fully_visible else track.radius
+            if distance > gate + center_error:
                 continue
-            # A static cluster updates only a track whose last update was there.
+            # A static cluster updates only a track whose last update was at the cluster.
             last = track.updates[-1].position
-            if not cluster.is_static or abs(lidar.to_lidar(last) - cluster.center) <= GATE_M + hidden:
-                possible.append((distance, number, index))
-    updated, used = set[int](), set[int]()
-    for _, number, index in sorted(possible):
-        if number not in updated and index not in used:
-            updated.add(number)
-            used.add(index)
-            _update(tracks[number], current.clusters[index], current)
-    return used
+            if not cluster.is_static or abs(lidar.to_lidar(last) - cluster.center) <= GATE_M + center_error:
+                candidates.append((distance, track_index, cluster_index))
+    updated_tracks, used_clusters = set[int](), set[int]()
+    for _, track_index, cluster_index in sorted(candidates):
+        if track_index not in updated_tracks and cluster_index not in used_clusters:
+            updated_tracks.add(track_index)
+            used_clusters.add(cluster_index)
+            _update(tracks[track_index], current.clusters[cluster_index], current)
+    return used_clusters
 
 
 def _update(track: Track, cluster: Cluster, current: ScanClusters) -> None:
+    """Update a track with a cluster."""
     if cluster.is_fully_visible:
         track.radius += RADIUS_GAIN * (cluster.radius - track.radius)
-        guess, hidden = cluster.center, 0.0
+        guess, hidden_std = cluster.center, 0.0
     else:
-        guess, hidden = current.lidar.to_lidar(track.position), HIDDEN_STD_M
+        guess, hidden_std = current.lidar.to_lidar(track.position), HIDDEN_STD_M
     center = fit_circle(current.points[cluster.first : cluster.last + 1].tolist(), track.radius, guess)
-    track.correct(current.lidar.to_parent(center), CENTER_STD_M + CENTER_STD_PER_M * abs(center) + hidden)
+    track.correct(current.lidar.to_parent(center), CENTER_STD_M + CENTER_STD_PER_M * abs(center) + hidden_std)
     track.record_update(current.tick, cluster.appeared, cluster.was_occupied, cluster.edges, track.position_std)
 
 
-def start_tracks(tracks: list[Track], current: ScanClusters, used: set[int]) -> None:
-    """Start tracks for clusters that are not in `used`, if they are in formerly free space.
+def start_tracks(tracks: list[Track], current: ScanClusters, used_clusters: set[int]) -> None:
+    """Start tracks for clusters that are not in `used_clusters`, if they are in formerly free space.
 
-    While something moves, clusters of at least MIN_START_RADIUS_M also start tracks where no earlier scan hit
+    While an obstacle moves, clusters of at least MIN_START_RADIUS_M also start tracks where no earlier scan hit
     something.
     """
-    # While something moves, it may have hidden the free space in which another obstacle appears.
+    # A moving obstacle may have hidden the free space in which another obstacle appears.
     min_radius = MIN_START_RADIUS_M if any(track.is_moving for track in tracks) else math.inf
     for index, cluster in enumerate(current.clusters):
-        if index in used or cluster.is_static or not (cluster.appeared or cluster.radius >= min_radius):
+        if index in used_clusters or cluster.is_static or not (cluster.appeared or cluster.radius >= min_radius):
             continue
         radius, noise = cluster.radius, CENTER_STD_M + CENTER_STD_PER_M * abs(cluster.center)
         std = noise + INITIAL_STD_M

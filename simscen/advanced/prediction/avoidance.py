@@ -95,8 +95,10 @@ class Avoidance:
         if self._is_safe(command, pose, twist, near, followed):
             self._last = None
             return command
-        own = self._controller_rollouts(command, pose, twist, followed, SPEED_FRACTIONS)
-        self._last = self._best_command(own, pose, twist, near, costmap, self._goal(pose, path, home), max_speed)
+        rollouts = self._controller_rollouts(command, pose, twist, followed, SPEED_FRACTIONS)
+        self._last = self._best_command(
+            rollouts, pose, twist, near, costmap, self._position_to_approach(pose, path, home), max_speed
+        )
         return self._last
 
     def _is_safe(
@@ -112,12 +114,12 @@ class Avoidance:
             position, speed, deviation = followed.position_over_time(pose, twist, command, self._robot)
             if moving.is_surely_clear(position, speed, self._discs.reach + deviation, MIN_DISTANCE_M, HORIZON_S):
                 return True
-        own = self._controller_rollouts(command, pose, twist, followed, SPEED_FRACTIONS[:1])
-        return bool(self._risk(own, moving)[0] <= (SAFE_RISK if self._last is None else RESUME_RISK))
+        rollouts = self._controller_rollouts(command, pose, twist, followed, SPEED_FRACTIONS[:1])
+        return bool(self._risk(rollouts, moving)[0] <= (SAFE_RISK if self._last is None else RESUME_RISK))
 
     def _best_command(
         self,
-        own: Rollouts,
+        controller_rollouts: Rollouts,
         pose: Pose2,
         twist: Twist,
         moving: MovingObstacles,
@@ -125,37 +127,38 @@ class Avoidance:
         goal: tuple[float, float],
         max_speed: float,
     ) -> Twist:
-        """Return the first command of the cheapest trajectory, among the controller's (`own`) and the sampled ones.
+        """Return the first command of the cheapest of all trajectories: `controller_rollouts` and sampled trajectories.
 
         Risk and static costs take long to compute. Sampled trajectories are therefore evaluated in the order of their
-        other costs, until these alone exceed the lowest total cost. At equal costs, `own` comes first.
+        other costs, until these alone exceed the lowest total cost. At equal costs, `controller_rollouts` comes first.
         """
         fan = self._sampler.sample(pose, twist)
         all_indices = np.arange(len(fan.commands))
-        # Less than STATIC_DISTANCE_M if no trajectory keeps it after 0.2 s, so that the robot can leave a wall.
+        # If no trajectory keeps STATIC_DISTANCE_M after 0.2 s, less is required, so that the robot can leave a wall.
         second_step = np.s_[:, 1]
         clearance = max(
-            self._clearance(each, costmap, second_step).max() for each in (own, fan.rollouts(all_indices, 2))
+            self._clearance(each, costmap, second_step).max()
+            for each in (controller_rollouts, fan.rollouts(all_indices, 2))
         )
         min_clearance = min(STATIC_DISTANCE_M, float(clearance))
-        cost = self._cost(own, pose, goal, moving, costmap, min_clearance, 0.0)
-        number = int(cost.argmin())
-        best, first_command = (float(cost[number]), -1), own.commands[number]
-        base = (
+        cost = self._cost(controller_rollouts, pose, goal, moving, costmap, min_clearance, 0.0)
+        index = int(cost.argmin())
+        best, first_command = (float(cost[index]), -1), controller_rollouts.commands[index]
+        cheap_costs = (
             DEVIATION_COST + self._change_costs(fan.commands) - PROGRESS_WEIGHT * self._progress(*fan.ends, pose, goal)
         )
-        base += BACKWARD_WEIGHT * self._backward(fan.vx)[fan.speed_profile]
-        order = base.argsort(kind="stable")
+        cheap_costs += BACKWARD_WEIGHT * self._backward_speed(fan.vx)[fan.speed_profile]
+        order = cheap_costs.argsort(kind="stable")
         order = order[np.abs(fan.commands[order, 0]) <= max_speed]
         for begin in range(0, len(order), BATCH_SIZE):
             batch = order[begin : begin + BATCH_SIZE]
-            if base[batch[0]] > best[0] + ROUNDING_TOLERANCE:
+            if cheap_costs[batch[0]] > best[0] + ROUNDING_TOLERANCE:
                 break
             cost = self._cost(fan.rollouts(batch), pose, goal, moving, costmap, min_clearance, DEVIATION_COST)
             lowest = float(cost.min())
-            number = int(batch[cost == lowest].min())
-            if (lowest, number) < best:
-                best, first_command = (lowest, number), fan.commands[number]
+            index = int(batch[cost == lowest].min())
+            if (lowest, index) < best:
+                best, first_command = (lowest, index), fan.commands[index]
         return Twist(*first_command.tolist())
 
     def _cost(
@@ -168,11 +171,11 @@ class Avoidance:
         min_clearance: float,
         extra: float,
     ) -> Array:
-        """Return the costs (n,) of trajectories, plus `extra`. `min_clearance` is described in `_static_costs`."""
+        """Return the costs (n,) of trajectories, plus `extra`. `min_clearance` is the same as in `_static_costs`."""
         cost = self._risk(rollouts, moving)
         progress = self._progress(rollouts.x[:, -1], rollouts.y[:, -1], pose, goal)
         cost += self._static_costs(rollouts, costmap, min_clearance) - PROGRESS_WEIGHT * progress
-        cost += BACKWARD_WEIGHT * self._backward(rollouts.vx)
+        cost += BACKWARD_WEIGHT * self._backward_speed(rollouts.vx)
         cost += extra
         cost += self._change_costs(rollouts.commands)
         return cost
@@ -206,10 +209,10 @@ class Avoidance:
         """Return the distances in m from static obstacles of the poses that `index` selects from arrays (n, times)."""
         return np.asarray(self._discs.clearance(costmap, rollouts.x[index], rollouts.y[index], rollouts.yaw[index]))
 
-    def _goal(self, pose: Pose2, path: FollowedPath | None, home: Pose2 | None) -> tuple[float, float]:
+    def _position_to_approach(self, pose: Pose2, path: FollowedPath | None, home: Pose2 | None) -> tuple[float, float]:
         """Return the position (x, y) that the robot should approach."""
         if path is not None:
-            return path.ahead(pose, self._speed * HORIZON_S)
+            return path.point_ahead(pose, self._speed * HORIZON_S)
         return (pose.x, pose.y) if home is None else (home.x, home.y)
 
     def _progress(self, x: Array, y: Array, pose: Pose2, goal: tuple[float, float]) -> Array:
@@ -218,7 +221,7 @@ class Avoidance:
         gain: Array = (before - np.hypot(x - goal[0], y - goal[1])) / (self._speed * HORIZON_S)
         return gain
 
-    def _backward(self, vx: Array) -> Array:
+    def _backward_speed(self, vx: Array) -> Array:
         """Return the mean backward speed (n,) for speeds `vx` (n, times), relative to full speed."""
         return np.asarray(np.maximum(-vx / self._speed, 0.0).mean(axis=1))
 

@@ -28,7 +28,7 @@ MAX_HALF_ANGLE_RAD = math.radians(80.0)
 MIN_HITS = 3
 """Minimum number of hits of a cluster."""
 MAX_ITERATIONS, CONVERGED_STEP_M = 4, 3e-3
-"""Maximum number of Gauss-Newton iterations of `fit_circle`, and the step below which they end."""
+"""Maximum number of Gauss-Newton iterations of `fit_circle`, and the step below which the iterations end."""
 
 Indices = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
@@ -50,7 +50,7 @@ class Segments:
     last: Indices
 
     def has_segment_with(self, count: int, mask: Mask) -> bool:
-        """Return whether one segment contains at least `count` of the hits in the mask (m,); `count` is at least 2."""
+        """Return whether any segment contains at least `count` of the hits in the mask (m,); `count` is at least 2."""
         numbers = self.first.searchsorted(mask.nonzero()[0], side="right")
         return bool((numbers[count - 1 :] == numbers[: 1 - count]).any())
 
@@ -110,11 +110,11 @@ def find_clusters(segments: Segments, ranges: Array, start: float, step: float, 
     found: list[Cluster] = []
     for first, last in _split_segments(segments):
         first_beam, last_beam = segments.beams.item(first), segments.beams.item(last)
-        near = segments.ranges[first : last + 1].min().item()
+        nearest = segments.ranges[first : last + 1].min().item()
         sine = math.sin(min((last_beam - first_beam + 1) * (0.5 * spacing), MAX_HALF_ANGLE_RAD))
-        radius = near * sine / (1.0 - sine)
+        radius = nearest * sine / (1.0 - sine)
         if radius <= max_radius:
-            center = cmath.rect(near + radius, start + (0.5 * step) * (first_beam + last_beam))
+            center = cmath.rect(nearest + radius, start + (0.5 * step) * (first_beam + last_beam))
             edges = _has_edge(ranges, first_beam, first_beam - 1, is_full_circle) + _has_edge(
                 ranges, last_beam, last_beam + 1, is_full_circle
             )
@@ -162,10 +162,10 @@ def fit_circle(arc: list[complex], radius: float, center: complex) -> complex:
         for point in arc:
             offset = center - point
             distance = abs(offset)
-            towards = offset / max(distance, 1e-6)
+            direction = offset / max(distance, 1e-6)
             # The squares of unit vectors x + iy sum up to x² - y² + 2ixy, their squared lengths to their number.
-            squares += towards * towards
-            residual += towards * (distance - radius)
+            squares += direction * direction
+            residual += direction * (distance - radius)
         square = squares / 2
         change = (half * residual - square * residual.conjugate()) / (half * half - abs(square) ** 2)
         center -= change

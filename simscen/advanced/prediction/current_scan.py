@@ -1,4 +1,4 @@
-"""A scan that updates tracks, and what it shows at the positions of a track."""
+"""A scan that updates tracks, and tests of the scan at the present and earlier positions of a track."""
 
 import cmath
 import math
@@ -53,15 +53,15 @@ class CurrentScan:
 
     def sees_past(self, track: Track) -> bool:
         """Return whether the lidar sees past the predicted center of a track."""
-        off = self.lidar.to_lidar(track.position)
-        beam = self._beam_toward(off)
-        return beam is not None and bool(self.scan.ranges[beam] > abs(off))
+        center = self.lidar.to_lidar(track.position)
+        beam = self._beam_toward(center)
+        return beam is not None and bool(self.scan.ranges[beam] > abs(center))
 
     def has_left(self, track: Track) -> bool:
         """Return whether at least half of the earlier positions of a track are no longer occupied.
 
-        A position is still occupied if both this scan and the earlier scan hit something there. False
-        tracks that jump from post to post do not leave their positions.
+        A position is still occupied if both this scan and the earlier scan hit something there. A false track that
+        jumps from post to post does not leave its positions.
         """
         current, radius = self.lidar.to_lidar(track.position), track.radius
         positions = [update.position for update in track.updates if abs(update.position - track.position) > radius]
@@ -76,14 +76,14 @@ class CurrentScan:
         return 2 * int(np.count_nonzero(was_occupied)) <= len(positions)
 
     def _hit_near(self, point: complex, current: complex, reach: float) -> complex | None:
-        """Return the endpoint of the beam toward `point` if it is within `reach` of `point`, but not of `current`."""
+        """Return the endpoint of the beam toward `point`, if it is within `reach` m of `point` but not of `current`."""
         beam = self._beam_toward(point)
         end = None if beam is None else complex(self.ends[beam])
         return end if end is not None and abs(end - point) <= reach < abs(end - current) else None
 
     def _beam_toward(self, point: complex) -> int | None:
         """Return the index of the beam toward a point in the lidar frame; None outside the field of view."""
-        scan, turn = self.scan, 2 * math.pi
-        beams = (cmath.phase(point) - scan.angle_min) % turn / scan.angle_increment
-        beam = round(beams) if beams < turn / scan.angle_increment - 0.5 else 0
+        scan = self.scan
+        beams = (cmath.phase(point) - scan.angle_min) % math.tau / scan.angle_increment
+        beam = round(beams) if beams < math.tau / scan.angle_increment - 0.5 else 0
         return beam if beam < len(scan.ranges) else None

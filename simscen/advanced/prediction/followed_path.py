@@ -23,8 +23,9 @@ class FollowedPath:
         """Take the points (n, 2 or more) of the path."""
         self._x, self._y = np.ascontiguousarray(path[:, 0]), np.ascontiguousarray(path[:, 1])
         steps = np.hypot(np.diff(self._x), np.diff(self._y))
-        self._along = np.concatenate(([0.0], np.cumsum(steps)))
-        self._lengths: list[float] = self._along.tolist()
+        self._arc_lengths = np.concatenate(([0.0], np.cumsum(steps)))
+        self._lengths: list[float] = self._arc_lengths.tolist()
+        """The same arc lengths in m as floats, which are faster one by one than an array."""
         self._points: list[complex] = (self._x + 1j * self._y).tolist()
 
     def __len__(self) -> int:
@@ -38,12 +39,15 @@ class FollowedPath:
         dx += dy
         return int(dx.argmin())
 
-    def ahead(self, pose: Pose2, reach: float) -> tuple[float, float]:
-        """Return the first point (x, y) at least `reach` m from a pose, starting at the nearest one; else the last."""
+    def point_ahead(self, pose: Pose2, distance: float) -> tuple[float, float]:
+        """Return the first point (x, y) after the nearest point that is at least `distance` m from a pose.
+
+        Returns the last point of the path if no point is so far away.
+        """
         nearest = self.nearest(pose)
-        beyond = np.hypot(self._x[nearest:] - pose.x, self._y[nearest:] - pose.y) >= reach
-        number = nearest + int(beyond.argmax()) if beyond.any() else -1
-        return float(self._x[number]), float(self._y[number])
+        is_beyond = np.hypot(self._x[nearest:] - pose.x, self._y[nearest:] - pose.y) >= distance
+        index = nearest + int(is_beyond.argmax()) if is_beyond.any() else -1
+        return float(self._x[index]), float(self._y[index])
 
     def rollouts(
         self,
@@ -58,7 +62,7 @@ class FollowedPath:
 
         Without `with_headings`, the headings are 0, which saves time.
         """
-        nearest, along = self.nearest(pose), self._along
+        nearest, along = self.nearest(pose), self._arc_lengths
         scale = np.array(fractions)[:, None]
         speeds = scale * command.vx
         rate = np.where(np.abs(speeds) >= abs(twist.vx), robot.linear_acceleration, robot.linear_deceleration) * TIMES
@@ -80,25 +84,25 @@ class FollowedPath:
         Also return the maximum speed in m/s, and an upper bound in m of the deviation from the positions of `rollouts`,
         which are integrated in time steps.
         """
-        nearest, now, then = self.nearest(pose), twist.vx, command.vx
-        rate = robot.linear_acceleration if abs(then) >= abs(now) else robot.linear_deceleration
-        ramp, rate = abs(then - now) / rate, math.copysign(rate, then - now)
+        nearest, speed, target = self.nearest(pose), twist.vx, command.vx
+        rate = robot.linear_acceleration if abs(target) >= abs(speed) else robot.linear_deceleration
+        ramp_s, rate = abs(target - speed) / rate, math.copysign(rate, target - speed)
         start, end = self._lengths[nearest], self._lengths[-1]
-        offset, decay_distance = complex(pose.x, pose.y) - self._points[nearest], max(RETURN_TIME_S * abs(then), 0.2)
+        offset, decay_distance = complex(pose.x, pose.y) - self._points[nearest], max(RETURN_TIME_S * abs(target), 0.2)
         sign = -1.0 if self._is_backward(pose, command, nearest) else 1.0
 
         def position(seconds: float) -> complex:
-            ramped_for = min(seconds, ramp)
-            driven = sign * ((now + 0.5 * rate * ramped_for) * ramped_for + then * (seconds - ramped_for))
+            ramped_s = min(seconds, ramp_s)
+            driven = sign * ((speed + 0.5 * rate * ramped_s) * ramped_s + target * (seconds - ramped_s))
             return self._point_at(min(max(driven, 0.0) + start, end)) + offset * math.exp(-abs(driven) / decay_distance)
 
         factor = 1.0 + abs(offset) / decay_distance
-        return position, max(abs(now), abs(then)) * factor, 0.5 * STEP_S * abs(then - now) * factor
+        return position, max(abs(speed), abs(target)) * factor, 0.5 * STEP_S * abs(target - speed) * factor
 
     def _is_backward(self, pose: Pose2, command: Twist, nearest: int) -> bool:
         """Return whether the robot drives backward toward the end of the path, as a car does on a Reeds-Shepp path.
 
-        Its heading is then opposite to the direction of the path at the point with the index `nearest`.
+        The heading of the robot is then opposite to the direction of the path at the point with the index `nearest`.
         """
         index = min(nearest, len(self) - 2)
         direction = self._points[index + 1] - self._points[index]
@@ -109,12 +113,12 @@ class FollowedPath:
         lengths, points = self._lengths, self._points
         after = min(max(bisect_right(lengths, length), 1), len(lengths) - 1)
         before, segment = lengths[after - 1], lengths[after] - lengths[after - 1]
-        part = (length - before) / segment if segment > 0.0 else 0.0
-        return points[after - 1] + part * (points[after] - points[after - 1])
+        ratio = (length - before) / segment if segment > 0.0 else 0.0
+        return points[after - 1] + ratio * (points[after] - points[after - 1])
 
     def _headings(self, arc_lengths: Array, nearest: int, is_backward: bool) -> Array:
         """Return the headings (…,) of the robot at arc lengths in m. Path points before `nearest` are ignored."""
-        along, x, y = self._along, self._x, self._y
+        along, x, y = self._arc_lengths, self._x, self._y
         later = np.minimum(arc_lengths + 0.1, along[-1])
         before = np.maximum(later - 0.2, along[nearest])
         yaw: Array = np.arctan2(

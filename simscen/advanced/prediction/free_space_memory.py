@@ -31,7 +31,7 @@ MIN_INTERVAL_S = 0.19
 MIN_BEAMS = 3
 """Minimum number of beams of a stored scan."""
 HEADING_ERROR_RAD = 0.02
-"""Angle on each side of a free point within which the earlier beams must also have passed beyond it."""
+"""Angle on each side of a free point within which the earlier beams must also have passed beyond the point."""
 SAME_DISTANCE_M, SAME_DISTANCE_RATIO = 0.12, 0.01
 """Maximum difference of the distances of the same obstacle in two scans: a constant, and a share of the range."""
 MAX_SCANS = 64
@@ -115,7 +115,10 @@ def _sliding_minimum(values: Array, width: int) -> Array:
 
 @fast_dataclass(eq=False)
 class EarlierScan:
-    """Free space of an earlier scan, and the pose of its lidar in the odom frame."""
+    """Free space of an earlier scan.
+
+    `lidar` is the pose of the lidar in the odom frame. ScanGeometry describes `padded_ranges` and `free_distances`.
+    """
 
     tick: int
     lidar: Pose2
@@ -193,7 +196,7 @@ class FreeSpaceMemory:
         self._geometry = ScanGeometry(0, 0.0, 0.0)
 
     def add(self, scan: Scan, lidar: Pose2) -> None:
-        """Store a scan taken with the lidar at a pose in the odom frame, unless the last one is too recent."""
+        """Store a scan taken with the lidar at a pose in the odom frame, unless the last stored scan is too recent."""
         if self._scans and 0 <= scan.tick - self._scans[-1].tick < self._min_interval:
             return
         geometry, count = self._geometry, len(scan.ranges)
@@ -206,7 +209,7 @@ class FreeSpaceMemory:
         self._scans.append(EarlierScan(scan.tick, lidar, geometry, padded, free))
 
     def scan_before(self, tick: int) -> EarlierScan | None:
-        """Return the scan that is about PREFERRED_AGE_S older than a tick; None if none is MIN_AGE_S older."""
+        """Return the scan about PREFERRED_AGE_S before a tick; None if no scan is at least MIN_AGE_S before it."""
         scans, latest = self._scans, tick - self._preferred_age
         while len(scans) > 1 and scans[1].tick <= latest:
             scans.popleft()

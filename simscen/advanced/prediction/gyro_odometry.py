@@ -29,6 +29,7 @@ class GyroOdometry:
         self._yaw = 0.0  # heading of the latest pose, not wrapped
         self._last: Odometry | None = None
         self._rate_sum, self._rate_count = 0.0, 0
+        """Sum in rad/s and number of the gyroscope's turn rates since the last wheel reading."""
         self._pending: deque[Odometry | Imu] = deque(maxlen=MAX_PENDING)
         self.add: Callable[[Odometry | Imu], None] = self._pending.append
         """Add a reading."""

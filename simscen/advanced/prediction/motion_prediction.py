@@ -24,8 +24,8 @@ WARM_UP_S, WARM_UP_SPEED_M_S = 0.7, 0.5
 class MotionPrediction:
     """Moving obstacles around the robot, and commands that avoid them.
 
-    While the robot drives, `steer` changes its commands. While the robot stands, `stand` lets it step aside and drive
-    back to its position, unless `hold` was called. `on_drive` must be called when the robot drives again.
+    While the robot drives, `steer` changes the commands. While the robot stands, `stand` lets it step aside and drive
+    back to the old position, unless `hold` was called. `on_drive` must be called when the robot drives again.
     """
 
     def __init__(
@@ -40,9 +40,12 @@ class MotionPrediction:
         self._max_age_ticks = HIDDEN_TIMEOUT_S * tick_rate
         self._odometry = GyroOdometry(tick_rate)
         self._no_obstacles = MovingObstacles((), spec.acceleration)
-        self._active: list[Tracker] = []  # trackers with moving obstacles whose lidar has not failed
+        self._active: list[Tracker] = []
+        """Trackers with moving obstacles whose lidar has not failed."""
         self._predicted: tuple[int, MovingObstacles] | None = None
+        """Cache of `_moving_obstacles`: tick and result."""
         self._transformed: tuple[MovingObstacles, Pose2, Pose2, MovingObstacles] | None = None
+        """Cache of `moving_obstacles_in_frame`: obstacles, pose by odometry, `pose`, and result."""
         self._plan: Path | None = None
         self._followed: FollowedPath | None = None
         self.add_reading = self._odometry.add
@@ -89,7 +92,7 @@ class MotionPrediction:
         return self._predicted[1]
 
     def moving_obstacles_in_frame(self, tick: int, pose: Pose2) -> MovingObstacles:
-        """Return the moving obstacles at a tick in a frame in which the robot is at `pose` now."""
+        """Return the moving obstacles at a tick in the frame in which the robot is at `pose` now."""
         moving = self._moving_obstacles(tick)
         if not moving.obstacles:
             return moving

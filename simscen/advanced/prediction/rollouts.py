@@ -10,7 +10,7 @@ from simscen.core.geometry.kinematics import Twist
 from simscen.stack.protocols import RobotModel
 
 STEP_S, HORIZON_S = 0.1, 3.0
-"""Time step and horizon."""
+"""Time step and duration of a trajectory."""
 FIRST_DURATIONS_S = (0.5, 1.2)
 """Durations of the first velocity of a sequence."""
 SPEED_RATIOS = (-0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
@@ -28,9 +28,9 @@ TIMES: Array = np.arange(1, round(HORIZON_S / STEP_S) + 1, dtype=np.float64) * S
 
 @dataclass(frozen=True, eq=False)
 class Rollouts:
-    """Trajectories: positions, headings, and forward speeds `vx` at TIMES, each (n, times), and first commands.
+    """Trajectories: positions, headings, and forward speeds `vx` at TIMES, each (n, times).
 
-    `commands` (n, 3) are vx, vy, wz.
+    `commands` (n, 3) are the first commands (vx, vy, wz).
     """
 
     x: Array
@@ -47,15 +47,15 @@ class TrajectorySampler:
         """Take the robot and its full speed in m/s."""
         self._robot = robot
         max_turn = min(robot.max_angular, MAX_TURN_RATE_RAD_S)
-        turns = [0.0, *(sign * part * max_turn for part in TURN_RATIOS[1:] for sign in (1.0, -1.0))]
-        rows = []
-        for part in SPEED_RATIOS:
-            first = part * full_speed if part >= 0 else max(part * full_speed, -robot.max_reverse)
+        turns = [0.0, *(sign * ratio * max_turn for ratio in TURN_RATIOS[1:] for sign in (1.0, -1.0))]
+        rows = []  # first speed, first turn rate, duration of both, second speed, second turn rate
+        for ratio in SPEED_RATIOS:
+            vx = ratio * full_speed if ratio >= 0 else max(ratio * full_speed, -robot.max_reverse)
             for wz in turns:
                 for duration in FIRST_DURATIONS_S:
-                    for then in SECOND_SPEED_RATIOS:
-                        for back in (0.0, -1.0) if wz else (0.0,):
-                            rows.append((first, wz, duration, then * full_speed, back * wz))
+                    for second_ratio in SECOND_SPEED_RATIOS:
+                        for second_wz in (0.0, -wz) if wz else (0.0,):
+                            rows.append((vx, wz, duration, second_ratio * full_speed, second_wz))
         sequences = np.array(sorted(set(rows)))
         if robot.turning_radius > 0.0:
             is_possible = (np.abs(sequences[:, 0]) >= np.abs(sequences[:, 1]) * robot.turning_radius) & (
@@ -70,10 +70,10 @@ class TrajectorySampler:
     def sample(self, pose: Pose2, twist: Twist) -> "TrajectoryFan":
         """Return all trajectories that start at this pose and velocity."""
         robot, speeds, turns = self._robot, self._speeds, self._turns
-        first, duration, then = (speeds[:, k : k + 1] for k in range(3))
-        vx = _ramp(twist.vx, first, duration, then, robot.linear_acceleration, robot.linear_deceleration)
-        first, duration, then = (turns[:, k : k + 1] for k in range(3))
-        wz = _ramp(twist.wz, first, duration, then, robot.angular_acceleration, robot.angular_acceleration)
+        first, duration, second = (speeds[:, k : k + 1] for k in range(3))
+        vx = _ramp(twist.vx, first, duration, second, robot.linear_acceleration, robot.linear_deceleration)
+        first, duration, second = (turns[:, k : k + 1] for k in range(3))
+        wz = _ramp(twist.wz, first, duration, second, robot.angular_acceleration, robot.angular_acceleration)
         yaw = pose.yaw + np.cumsum(wz, axis=1) * STEP_S
         middle = yaw - 0.5 * STEP_S * wz
         profiles = self._speed_profile, self._turn_profile
@@ -116,15 +116,17 @@ class TrajectoryFan:
         return Rollouts(x, y, self.yaw[window][turn], vx, self.commands[indices])
 
 
-def _ramp(now: float, first: Array, duration: Array, then: Array, acceleration: float, deceleration: float) -> Array:
-    """Return velocities (n, times) that change from `now` to `first` (n, 1), and after `duration` in s to `then`.
+def _ramp(
+    start: float, first: Array, duration: Array, second: Array, acceleration: float, deceleration: float
+) -> Array:
+    """Return velocities (n, times) that change from `start` to `first` (n, 1), and after `duration` in s to `second`.
 
     The rates of change are limited by `acceleration` and `deceleration`.
     """
-    change = np.where(np.abs(first) >= abs(now), acceleration, deceleration) * np.minimum(TIMES, duration)
-    before = now + np.clip(first - now, -change, change)
-    change = np.where(np.abs(then) >= np.abs(before), acceleration, deceleration) * np.maximum(TIMES - duration, 0.0)
-    ramped: Array = before + np.clip(then - before, -change, change)
+    change = np.where(np.abs(first) >= abs(start), acceleration, deceleration) * np.minimum(TIMES, duration)
+    before = start + np.clip(first - start, -change, change)
+    change = np.where(np.abs(second) >= np.abs(before), acceleration, deceleration) * np.maximum(TIMES - duration, 0.0)
+    ramped: Array = before + np.clip(second - before, -change, change)
     return ramped
 
 

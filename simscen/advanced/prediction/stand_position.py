@@ -7,13 +7,13 @@ from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.stack.protocols import RobotModel
 
 ARRIVED_M, ARRIVED_RAD = 0.08, 0.15
-"""Distance and angle within which the robot has returned to its stand position."""
+"""Maximum distance and angle to the stand position at which the robot has returned."""
 RETURN_DISTANCE_M = 0.15
-"""Distance from its stand position at which the robot starts to return."""
+"""Distance from the stand position at which the robot starts to return."""
 RETURN_SPEED_RATIO, RETURN_GAIN_PER_S = 0.3, 1.0
 """Maximum speed of returning relative to full speed, and ratio of the speed in m/s to the distance in m."""
-RETURN_TURN_RATE_RAD_S = 1.0
-"""Maximum turn rate of returning."""
+RETURN_TURN_RATE_RAD_S, TURN_GAIN_PER_S = 1.0, 2.0
+"""Maximum turn rate of returning, and ratio of the turn rate in rad/s to the angle in rad."""
 MAX_BEARING_RAD = 0.4
 """Angle between the heading and the direction of return above which the robot turns in place first."""
 
@@ -54,13 +54,13 @@ class StandPosition:
             turn = wrap(home.yaw - pose.yaw)
             return Twist(0.0, 0.0, self._turn_rate(turn)) if abs(turn) > ARRIVED_RAD else STOP
         bearing = wrap(math.atan2(home.y - pose.y, home.x - pose.x) - pose.yaw)
-        backward = abs(bearing) > math.pi / 2 and self._reverse_speed > 0.0
-        deviation = wrap(bearing + math.pi) if backward else bearing
+        is_backward = abs(bearing) > math.pi / 2 and self._reverse_speed > 0.0
+        deviation = wrap(bearing + math.pi) if is_backward else bearing
         if abs(deviation) >= MAX_BEARING_RAD:
             return Twist(0.0, 0.0, self._turn_rate(deviation))
-        speed = min(self._reverse_speed if backward else self._speed, RETURN_GAIN_PER_S * distance)
-        return Twist(-speed if backward else speed, 0.0, self._turn_rate(deviation))
+        speed = min(self._reverse_speed if is_backward else self._speed, RETURN_GAIN_PER_S * distance)
+        return Twist(-speed if is_backward else speed, 0.0, self._turn_rate(deviation))
 
     def _turn_rate(self, angle: float) -> float:
         """Return the turn rate in rad/s for turning by an angle in rad."""
-        return math.copysign(min(self._max_turn_rate, 2.0 * abs(angle)), angle)
+        return math.copysign(min(self._max_turn_rate, TURN_GAIN_PER_S * abs(angle)), angle)

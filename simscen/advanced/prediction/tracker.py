@@ -103,7 +103,7 @@ class Tracker:
         if not tracks and not self._starts_track(segments, new_hits):
             return
         clusters = [
-            _compared(cluster, new_hits, occupied_hits)
+            _compare_cluster(cluster, new_hits, occupied_hits)
             for cluster in find_clusters(
                 segments, scan.ranges, scan.angle_min, scan.angle_increment, self._spec.max_radius
             )
@@ -125,6 +125,7 @@ class Tracker:
         return segments.has_segment_with(MIN_NEW_HITS, new_hits) and bool(is_checked.any())
 
     def _update_moving(self, moving: list[Track], current: CurrentScan) -> None:
+        """Set `moving` and `moving_hits` from the moving tracks."""
         scan, ends, lidar = current.scan, current.ends, current.lidar
         obstacles = [
             MovingObstacle(
@@ -156,8 +157,8 @@ def _ends(ranges: Array, directions: Points) -> Points:
     return ends
 
 
-def _compared(cluster: Cluster, new_hits: Mask, occupied_hits: Mask) -> Cluster:
-    """Return the cluster with `appeared` and `was_occupied`, by masks (m,) of the hits of the scan."""
+def _compare_cluster(cluster: Cluster, new_hits: Mask, occupied_hits: Mask) -> Cluster:
+    """Return the cluster with `appeared` and `was_occupied`, from masks (m,) of the hits of the scan."""
     hits, count = slice(cluster.first, cluster.last + 1), cluster.last + 1 - cluster.first
     appeared = int(np.count_nonzero(new_hits[hits])) >= max(MIN_NEW_HITS, MIN_NEW_SHARE * count)
     was_occupied = int(np.count_nonzero(occupied_hits[hits])) > STATIC_SHARE * count

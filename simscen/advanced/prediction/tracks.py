@@ -52,7 +52,8 @@ INITIAL_SPEED_STD_M_S = 1.5
 class Update(NamedTuple):
     """Update of a track with a cluster of hits.
 
-    std:           standard deviation in m of the position (x + iy) along any axis
+    position:      position of the track after the update, as x + iy in m
+    std:           standard deviation in m of the position along any axis
     appeared:      whether enough hits are in formerly free space, through which beams of an earlier scan passed
     was_occupied:  whether most hits are where the earlier scan also hit something; possible together with `appeared`
     edges:         number of visible edges of the cluster
@@ -132,7 +133,7 @@ MAX_SPEED_M_S = 4.0
 """Speed above which a track ends, because it has changed from one obstacle to another."""
 OCCLUDED_MIN_VISIBLE_UPDATES = 5
 """The OCCLUDED constants are conditions for a moving track if another moving obstacle may have hidden the formerly free
-space. This one is the minimum number of updates with a completely visible cluster."""
+space. This constant is the minimum number of updates with a completely visible cluster."""
 OCCLUDED_MIN_TRAVEL_M = 0.4
 """Minimum distance from the oldest stored position."""
 OCCLUDED_SPEED_RATIO = 1.6
@@ -171,8 +172,10 @@ class TrackLifecycle:
         elif speed <= min_speed:
             return
         elif track.has_moved and speed > track.speed_std and track.last_update_tick == tick:
-            track.is_moving = not track.updates[-1].was_occupied  # it may return over positions that it has just left
-        elif self._is_moving(track, tick, speed, tracks) and has_left(track):
+            track.is_moving = not track.updates[
+                -1
+            ].was_occupied  # the obstacle may return over positions that it has just left
+        elif self._is_surely_moving(track, tick, speed, tracks) and has_left(track):
             track.is_moving = track.has_moved = True
 
     def has_ended(self, track: Track, tick: int, tracks: list[Track], sees_past: Callable[[Track], bool]) -> bool:
@@ -190,24 +193,26 @@ class TrackLifecycle:
             or (not track.has_moved and (track.static_updates >= MIN_UPDATES or _is_sliding(track, tracks)))
         )
 
-    def _is_moving(self, track: Track, tick: int, speed: float, tracks: list[Track]) -> bool:
+    def _is_surely_moving(self, track: Track, tick: int, speed: float, tracks: list[Track]) -> bool:
         """Return whether the speed is neither noise nor caused by a static obstacle that comes into view."""
         min_speed, updates, first = self._spec.min_speed, track.updates, track.updates[0]
         displacement = track.position - first.position
         if (displacement.conjugate() * track.velocity).real <= 0.0:
             return False
         distance, seconds = abs(displacement), (tick - first.tick) / self._rate
-        significant = speed > MIN_SIGNIFICANCE * track.speed_std
+        is_significant = speed > MIN_SIGNIFICANCE * track.speed_std
         # Both ends of the recent path have errors, and more of a partly visible obstacle may come into view.
         has_traveled = distance > max(min_speed * seconds, MIN_SIGNIFICANCE * math.hypot(first.std, track.position_std))
-        if not (significant or has_traveled):
+        if not (is_significant or has_traveled):
             return False
-        fully_visible = sum(each.edges == BOTH_EDGES for each in updates)
+        fully_visible_count = sum(each.edges == BOTH_EDGES for each in updates)
         min_appeared = max(MIN_UPDATES, MIN_FREE_SHARE * len(updates))
-        if (significant or 2 * fully_visible > len(updates)) and sum(each.appeared for each in updates) >= min_appeared:
+        if (is_significant or 2 * fully_visible_count > len(updates)) and sum(
+            each.appeared for each in updates
+        ) >= min_appeared:
             return distance > MIN_TRAVEL_M and updates[-1].appeared
-        # Otherwise only near another moving obstacle, which may have hidden the free space.
-        if not significant or speed < OCCLUDED_SPEED_RATIO * min_speed or not any(each.is_moving for each in tracks):
+        # Otherwise, a track counts as moving only while another obstacle moves, which may have hidden the free space.
+        if not is_significant or speed < OCCLUDED_SPEED_RATIO * min_speed or not any(each.is_moving for each in tracks):
             return False
         if sum(each.was_occupied for each in updates) > OCCLUDED_MAX_OCCUPIED_SHARE * len(updates):
             return False
@@ -218,7 +223,7 @@ class TrackLifecycle:
             and sum(each.edges > 0 for each in updates) >= MIN_FREE_SHARE * MAX_UPDATES
         ):
             return True
-        return fully_visible >= OCCLUDED_MIN_VISIBLE_UPDATES and distance > OCCLUDED_MIN_TRAVEL_M
+        return fully_visible_count >= OCCLUDED_MIN_VISIBLE_UPDATES and distance > OCCLUDED_MIN_TRAVEL_M
 
 
 def _is_sliding(track: Track, tracks: list[Track]) -> bool:

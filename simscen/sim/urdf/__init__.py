@@ -1,1 +1,1 @@
-"""Robots from URDF files. Bullet's own reader is not used: it opens any file that a URDF names and can crash."""
+"""Robots from URDF files. Bullet's own reader opens any file that a URDF names, and can crash, so it is not used."""

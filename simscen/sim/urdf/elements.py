@@ -58,8 +58,8 @@ class Joint:
 class MeshSource:
     """Finds and reads the meshes of a URDF.
 
-    `folder` is the folder of the URDF, and `folders` are the folders that may be read. `read` reads a mesh file; it is
-    None if meshes are not supported. Absolute paths are allowed if the URDF `is_from_xacro`.
+    `folder` is the folder of the URDF, and `folders` are the folders that may be read. `read` reads a mesh file (None:
+    meshes are not supported). Absolute paths are allowed if the URDF `is_from_xacro`.
     """
 
     folder: Path

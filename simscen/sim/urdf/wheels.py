@@ -105,7 +105,7 @@ def _stands_on_ground(wheel: WheelJoint, ground: float) -> bool:
 
 
 def _reason_for_no_wheel(tree: LinkTree, joint: Joint, wheel: WheelJoint | None) -> str:
-    """Return the reason why a joint has no wheel, or "" if it has one. `wheel` is the result of `_measure_wheel`."""
+    """Return the reason why a joint has no wheel, or "" for a wheel. `wheel` is the result of `_measure_wheel`."""
     if joint.type not in ROTARY_JOINT_TYPES:
         return f"{joint.type} joint"
     if joint.limits.upper - joint.limits.lower < MIN_WHEEL_RANGE_RAD:

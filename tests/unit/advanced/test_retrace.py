@@ -159,9 +159,9 @@ def test_retrace_continues_from_a_pose_next_to_the_trail() -> None:
 def test_trail_has_small_steps_without_oscillations() -> None:
     oscillation = driven((Twist(0.5, 0, 0), 2.0), (Twist(-0.2, 0, 0), 1.0), (STOP, 5.0), (Twist(0.2, 0, 0), 1.0))
     trail = Trail(oscillation, oscillation[-1], 0.3, 2.0)
-    assert trail.driven[-1] == pytest.approx(trail.poses[0, 0] - trail.poses[-1, 0], abs=0.01)
+    assert trail.base_distances[-1] == pytest.approx(trail.poses[0, 0] - trail.poses[-1, 0], abs=0.01)
     assert np.diff(trail.poses[:, 0]).max() < 0.0
-    assert np.diff(trail.along).max() < 0.1
+    assert np.diff(trail.footprint_distances).max() < 0.1
 
 
 def test_round_robot_retraces() -> None:

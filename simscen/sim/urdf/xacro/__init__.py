@@ -1,1 +1,1 @@
-"""Expansion of xacro files. Unlike xacro itself, it does not execute Python code from the files."""
+"""Expansion of xacro files. Unlike xacro itself, simscen does not execute Python code from the files."""

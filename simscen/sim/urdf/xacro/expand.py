@@ -35,8 +35,8 @@ def expand(
 ) -> Element:
     """Return the expansion of the element `robot` of a xacro `file`; `arguments` override defaults of `<xacro:arg>`.
 
-    `read` reads included files; they must be in `folders`. Raises InvalidInput, or UnknownArgument for an argument that
-    is not declared.
+    `read` reads included files, which must be in `folders`. Raises InvalidInput, or UnknownArgument for an argument
+    that is not declared.
     """
     container = replace(robot, tag="", attributes={}, children=[])
     expansion = _Expansion(file, folders, read, arguments or {})
