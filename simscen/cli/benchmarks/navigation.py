@@ -9,7 +9,7 @@ import typer
 
 from simscen.cli.benchmarks.results import FormatOption
 from simscen.cli.diagnostics import as_text as problems_as_text
-from simscen.cli.diagnostics import escaped, print_text, relative_to_working_folder
+from simscen.cli.diagnostics import escaped, paths_from_working_folder, print_text, relative_to_working_folder
 from simscen.cli.shared_options import ResumeOption, TextOrJson
 from simscen.core.errors import Exit, NothingSelected
 from simscen.report.display_text import detect_style
@@ -151,7 +151,8 @@ def experiments_with_stack(
     from simscen.bench.navigation.experiments import with_stack_parameters
     from simscen.loading.stacks.stack_files import load_stack_file
 
-    choice = load_stack_file(file.name.split(".")[0], str(file), file, project)
+    with paths_from_working_folder(project):
+        choice = load_stack_file(file.name.split(".")[0], str(file), file, project)
     if choice.notes:
         print_text(problems_as_text(relative_to_working_folder(choice.notes, project)), sys.stderr)
     parameters = choice.section.plain if choice.section else {}

@@ -13,6 +13,7 @@ from simscen.bench.navigation.summary import Trial
 from simscen.cli.benchmarks import navigation_runs
 from simscen.cli.benchmarks.navigation import experiments_with_stack
 from simscen.cli.benchmarks.navigation_runs import _plan_jobs, summarize_experiment
+from simscen.core.errors import InvalidInput
 from simscen.core.records.run_result import Outcome, RunKey, RunResult
 from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.testing.synthetic_trace import synthetic_trace
@@ -30,6 +31,18 @@ def test_runs_with_another_stack_have_different_keys(tmp_path: Path) -> None:
     jobs, owners = _plan_jobs(changed, tmp_path / "out")
     assert [owners[job.key][0] for job in jobs] == [0, 0, 1, 1]
     assert len({job.folder for job in jobs}) == 4
+
+
+def test_problems_of_a_stack_file_have_paths_from_the_working_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project = tmp_path / "project"
+    project.mkdir()
+    (project / "bad.stack.yaml").write_text("simscen: 1\nstack: {planer: {}}\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InvalidInput) as error:
+        experiments_with_stack(Path("project/bad.stack.yaml"), [], tmp_path / "made", Path("project"))
+    assert [problem.path for problem in error.value.problems] == ["project/bad.stack.yaml"]
 
 
 def test_interval_of_the_anees_counts_only_the_runs_that_have_not_ended(monkeypatch: pytest.MonkeyPatch) -> None:
