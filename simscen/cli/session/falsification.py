@@ -13,7 +13,7 @@ from simscen.cli.session.backends import backend_of, interrupt_on_signals
 from simscen.cli.session.file_checks import FileChecker
 from simscen.cli.session.output_files import Reports, require_writable_junit
 from simscen.cli.session.pending_runs import plan_runs
-from simscen.cli.session.scenario_session import finish_session, start_session
+from simscen.cli.session.scenario_session import finish_session, plugins_and_stacks, start_session
 from simscen.cli.session.stacks import parse_stacks
 from simscen.cli.session.terminal import Screen, open_screen
 from simscen.cli.session.user_files import require_writable
@@ -157,6 +157,8 @@ class Falsification:
             valid = [job for job in jobs if job is not None]
             empty_batches = 0 if valid else empty_batches + 1
             self._plan(journal, valid)
+            if not self.finished_runs:
+                reports.add_entries(plugins_and_stacks([job.scenario for job in valid]))
             with interrupt_on_signals():
                 finished_runs, stopped = run_session(valid, self._request.options, backend, listener)
             by_key = {finished.key: finished for finished in finished_runs}

@@ -90,6 +90,10 @@ class Reports:
     def _past_sessions(self) -> Sequence[PastSession]:
         return past_sessions(self.folder)
 
+    def add_entries(self, entries: Mapping[str, object]) -> None:
+        """Add entries to run.json. `write_duration` writes the file."""
+        self._extra_entries = {**self._extra_entries, **entries}
+
     def write_duration(self, wall: float) -> bool:
         """Write run.json again with the duration of the session in seconds, and return whether it was written."""
         return _write(self.folder / "run.json", _session_info_json(self._extra_entries, wall))

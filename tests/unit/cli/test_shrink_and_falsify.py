@@ -188,6 +188,7 @@ def test_a_found_failure_is_written_as_a_scenario_that_fails(
     assert verdicts_of(rerun) in [verdicts_of(run) for run in runs_of(tmp_path / "out")]
     assert "smaller: simscen shrink a.failure-1.scenario.yaml" in done.out
     assert {run["again"] for run in runs_of(tmp_path / "out")} == {""}
+    assert json.loads((tmp_path / "out/run.json").read_text()).keys() >= {"plugins", "stacks"}
     assert "--variation" not in done.out
     if method == "tpe":  # the method that depends on the order of the results
         simscen("falsify", "a.scenario.yaml", "--method", method, "--out", "out1", "-j", 1)
