@@ -73,8 +73,8 @@ class Building:
     """An office floor. All lengths are in m.
 
     size:      length along x and depth along y
-    middle:    x of the border between the left and the right half. The corridor crosses the border; in a few
-               buildings, a gap behind the back wall of a room crosses it as well
+    middle:    x of the border between the left and the right half. The corridor crosses the border. In a few
+               buildings, a gap behind the back wall of a room also leads from one half to the other
     walls:     boxes (n, 4), as in box_array
     glass:     boxes (n, 4) of the glass walls
     furniture: boxes (n, 4)

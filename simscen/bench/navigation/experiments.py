@@ -54,10 +54,10 @@ def write_text(file: Path, text: str) -> Path:
 
 
 def with_stack_parameters(experiment: Experiment, name: str, stack: Mapping[str, Any], folder: Path) -> Experiment:
-    """Write a copy of an experiment whose scenarios have the further parameters `stack`. `name` is its name.
+    """Write a copy of an experiment with other stack parameters. `name` is the name of the copy.
 
-    The new scenarios are written to `folder`, and extend the original scenarios. `stack` is the value of their key
-    `stack`. Its key `localizer` is ignored for mapless drives.
+    The new scenarios are written to `folder`, and extend the original scenarios. `stack` is the value of the key
+    `stack` in the new scenarios. For mapless drives, `stack.localizer` is ignored.
     """
     drives = []
     stack = {key: value for key, value in stack.items() if not (experiment.is_mapless and key == "localizer")}

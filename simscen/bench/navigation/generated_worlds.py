@@ -16,7 +16,7 @@ from simscen.core.random_streams import Streams
 FINE_CELL_M = 0.05
 """Cell size of the image on which a floor is drawn, before the image is reduced to the resolution of the map."""
 RESOLUTIONS_M = (0.05, 0.05, 0.10, 0.15, 0.20, 0.25)
-"""Resolutions of maps. Consecutive floor numbers use them in turn."""
+"""Resolutions of maps. Consecutive floor numbers use the resolutions in turn."""
 FLOOR_WIDTH_RANGE_M, FLOOR_DEPTH_RANGE_M = (20.0, 45.0), (12.0, 28.0)
 CORRIDOR_WIDTH_RANGE_M, DOOR_WIDTH_RANGE_M = (1.7, 2.6), (0.9, 1.3)
 FREE, WALL, UNKNOWN = 254, 0, 205
@@ -33,7 +33,7 @@ class _Floor:
     wall_thickness: float
 
     def draw_wall(self, x0: float, y0: float, x1: float, y1: float, thickness: float | None = None) -> None:
-        """Draw an axis-aligned wall between two points in m. If they differ in x and y, draw a filled box."""
+        """Draw an axis-aligned wall between two points in m. If the points differ in x and y, draw a filled box."""
         half = (self.wall_thickness if thickness is None else thickness) / 2
         rows = slice(max(0, int((min(y0, y1) - half) / FINE_CELL_M)), int((max(y0, y1) + half) / FINE_CELL_M) + 1)
         columns = slice(max(0, int((min(x0, x1) - half) / FINE_CELL_M)), int((max(x0, x1) + half) / FINE_CELL_M) + 1)
@@ -144,7 +144,7 @@ def write_ramps(folder: Path, numbers: Iterable[int]) -> Experiment:
 def _numbered_drives(
     name: str, folder: Path, stem: str, scenario_yaml: Callable[[int], str], numbers: Iterable[int]
 ) -> Experiment:
-    """Write the scenario `scenario_yaml(number)` for each number. Its file is `<stem>_<number>.scenario.yaml`."""
+    """Write `scenario_yaml(number)` to the file `<stem>_<number>.scenario.yaml` for each number."""
     files = {number: folder / f"{stem}_{number}.scenario.yaml" for number in numbers}
     drives = (Drive(write_text(file, scenario_yaml(number)), [number]) for number, file in files.items())
     return Experiment(name, tuple(drives), folder)

@@ -36,8 +36,8 @@ def as_text(
 ) -> str:
     """Return the table of results, the localization accuracy, the comparisons, and the published figures of BARN.
 
-    `comparisons` are those of the experiments without and with --stack. `columns` is the width of the terminal in
-    characters; None stands for unlimited width.
+    `comparisons` has the comparison of each experiment without --stack and with --stack. `columns` is the width of the
+    terminal in characters; None stands for unlimited width.
     """
     table = [TABLE_HEAD, *(_cells(result.tally) for result in rows)]
     lines = align_columns(table)

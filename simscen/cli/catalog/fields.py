@@ -37,7 +37,7 @@ _DEFAULT_TYPES = frozenset(
     for mark in get_args(union)[1:]
     if isinstance(mark, ExtensibleUnion)
 )
-"""Types of components for which the key `type` is optional, because they are the default."""
+"""Default types of components. For these types, the key `type` is optional."""
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
 

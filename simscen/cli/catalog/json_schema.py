@@ -105,7 +105,7 @@ _EXTENDS: Schema = {
 class _Generator(GenerateJsonSchema):
     """Schema generator that also requires exactly one main key of a Choice, and describes models of single values.
 
-    It adds simscen's types that are registered as entry points.
+    The generator adds simscen's types that are registered as entry points.
     """
 
     with_plugins = False

@@ -66,7 +66,7 @@ def command(
     Runs are paired by scenario, variation, seed, and stack. Runs whose outcome changed are listed first, with the
     replay of the failure. Nothing is simulated again.
 
-    Exit code 0: not worse; 1: worse, see --fail-on; 2: a folder cannot be read, or its scenarios differ; 3: the
+    Exit code 0: not worse; 1: worse, see --fail-on; 2: a folder cannot be read, or scenarios differ; 3: the
     candidate has runs that could not be completed, or every pair has such a run, so that nothing was compared.
     """
     folders = {BASELINE: baseline, CANDIDATE: candidate}

@@ -94,7 +94,7 @@ def _lines(runs: list[tuple[str, RunFinished]], has_same_criteria: bool) -> list
 def _document(runs: list[RunFinished], options: list[str]) -> str:
     """Return the JSON text: result.json for one log, results.json for several logs.
 
-    The value of `again` is the command that evaluates the log again; `options` are its options.
+    The value of `again` is the command that evaluates the log again. `options` are the options of this command.
     """
     document = {**result_data(runs[0].result)} if len(runs) == 1 else results_document(runs)
     logs = [run.artifacts.mcap for run in in_order(runs)]

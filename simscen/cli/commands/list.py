@@ -29,8 +29,8 @@ def command(
 ) -> None:
     """List the scenarios that a selection matches.
 
-    Prints one line for each scenario and variation: id, name, tags, external stack, and why it is skipped or expected
-    to fail. Exit code 0: listed; 2: a scenario is invalid; 5: nothing is selected.
+    Prints one line for each scenario and variation: id, name, tags, external stack, and the reason if the scenario is
+    skipped or expected to fail. Exit code 0: listed; 2: a scenario is invalid; 5: nothing is selected.
     """
     root_folder = root or default_root(paths)
     results = [try_variations(file, root_folder, world_path or ()) for file in discover(paths, root_folder)]

@@ -76,10 +76,10 @@ def command(
 ) -> None:
     """Write a commented scenario to start from.
 
-    The scenario is valid and passes. With --like, it is a copy of another scenario; worlds, maps, and robots outside of
-    the project are copied into a folder beside it. A name that ends in .base.yaml, or defaults.yaml, creates a base
-    file for scenarios to extend. If the project has a folder `schemas`, the file refers to the schema for editors.
-    Existing files are never overwritten.
+    The scenario is valid and passes. With --like, the scenario is a copy of another one; worlds, maps, and robots
+    outside of the project are copied into a folder beside the new file. A name that ends in .base.yaml, or
+    defaults.yaml, creates a base file for scenarios to extend. If the project has a folder `schemas`, the file refers
+    to the schema for editors. Existing files are never overwritten.
 
     With --from-log, the scenario is reconstructed from a recorded drive of simscen or of a real robot (MCAP, or a
     rosbag2 folder). It contains the goals, unmapped objects, faults of sensors, and criteria that the drive met or

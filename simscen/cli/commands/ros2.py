@@ -120,13 +120,13 @@ def command(
 ) -> None:
     """Connect a ROS 2 graph, such as Nav2, as the stack of a run.
 
-    Use it as `simscen run SCENARIO --stack mine='simscen ros2 --launch "ros2 launch …"'`. The adapter runs
+    Use this command as `simscen run SCENARIO --stack mine='simscen ros2 --launch "ros2 launch …"'`. The adapter runs
     with the Python of your ROS installation, of any distribution and with any RMW, and needs only rclpy there. It
     publishes sensors, /tf, /map, and /clock, receives commands, and sends goals to Nav2's actions or to /goal_pose. If
     something that the run needs is missing in the graph, the run ends with an error that names it.
 
     Without a run, `simscen ros2 nav2 --params FILE` only checks the parameter file. Exit code 0: Nav2 can work with
-    these parameters; 2: it cannot, or the command line is invalid.
+    these parameters; 2: Nav2 cannot work with them, or the command line is invalid.
     """
     try:
         base_frames = FrameNames(frame or [], base_frame).base_frames

@@ -79,8 +79,8 @@ def command(
 
     Removes parts of the scenario, such as events, faults, people, obstacles, and goals, in groups and one by one. The
     same criterion must still fail, with at least the fraction --keep of its violation. Then numbers are rounded. The
-    result is a normal scenario file in which unchanged parts keep their comments. It does not depend on the number of
-    parallel runs.
+    result is a normal scenario file in which unchanged parts keep their comments. The result does not depend on the
+    number of parallel runs.
 
     Exit code 0: the file was written; 1: it was written, but --runs did not suffice; 2: invalid options, or the run did
     not fail; 3: the run could not be completed; 129, 130, and 143: interrupted.

@@ -55,7 +55,7 @@ def inspect(
 ) -> None:
     """Print the content of a world: solids, bodies, extents, triangles, places, regions, and warnings.
 
-    Exit code 0: printed; 2: the file or something in it is unusable.
+    Exit code 0: printed; 2: the file, or a file that it uses, is unusable.
     """
     from simscen.worlds.built_world import inspect_world
     from simscen.worlds.maps.map_size import MAP_RESOLUTION_M
@@ -118,7 +118,7 @@ def convert(
     """Convert a world to a *.world.yaml file.
 
     Upright boxes, cylinders, and prisms are kept; meshes and all other shapes become upright prisms over their
-    cross-section at lidar height. Each change is printed. A ROS map is not copied; the world refers to its file.
+    cross-section at lidar height. Each change is printed. A ROS map is not copied; the world refers to the map file.
 
     Exit code 0: written; 2: the world is unusable or cannot be written.
     """

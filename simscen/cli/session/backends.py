@@ -61,8 +61,8 @@ def _exit_at_once(number: int) -> None:
 def workers_and_cluster(jobs: int | None, backend: BackendName, address: str | None) -> tuple[int, str]:
     """Return the number of parallel runs, and the address of the Ray cluster ("" for local processes).
 
-    The parameters are the values of --jobs, --backend, and --address. Raises UsageError if they contradict each other,
-    or if Ray is not installed.
+    The parameters are the values of --jobs, --backend, and --address. Raises UsageError if the options contradict each
+    other, or if Ray is not installed.
     """
     if backend is BackendName.LOCAL:
         if address is not None:
@@ -77,9 +77,9 @@ def workers_and_cluster(jobs: int | None, backend: BackendName, address: str | N
 
 
 def backend_of(options: SessionOptions, unused_server: ForkServerProcess | None = None) -> Backend:
-    """Return the backend that the options select. It starts its processes when they are needed.
+    """Return the backend that the options select. The backend starts its processes when they are needed.
 
-    On this machine, it first uses `unused_server`, a fork server that was started before.
+    A local backend first uses `unused_server`, a fork server that was started before.
     """
     if not options.cluster:
         return Supervisor(options.workers, fork_server_start.FORK_SERVER, unused_server)

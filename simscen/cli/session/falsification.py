@@ -226,7 +226,7 @@ class Falsification:
         return jobs
 
     def _load(self, name: str, point: Point) -> LoadedScenario | None:
-        """Return the scenario with the values of a point, as variation `name`; None if it is invalid."""
+        """Return the scenario with the values of a point, as variation `name`; None for an invalid scenario."""
         try:
             variation = self._space.variation(name, point)
         except ConditionError as error:

@@ -1,7 +1,7 @@
 """Main module of the fork server, which prepares scenarios and forks a worker for each run.
 
-The command starts it as `python -I -m simscen.cli.session.fork_server_main FD`, where FD is the file descriptor for
-replies.
+The command starts the server as `python -I -m simscen.cli.session.fork_server_main FD`, where FD is the file
+descriptor for replies.
 """
 
 import gc

@@ -110,7 +110,7 @@ def log_file(run: Path) -> Path:
 
 
 def recorded_result(log: Log, file: Path) -> RunResult:
-    """Return the result that is recorded in a log. An incomplete log has none; then evaluate its criteria.
+    """Return the result that is recorded in a log. For an incomplete log, which has none, evaluate the criteria.
 
     Raises InvalidInput for an invalid result.
     """

@@ -137,7 +137,7 @@ def reusable_results(past: JournaledSession | None) -> dict[PlannedRun, RunFinis
 
 
 def warn_of_dropped_runs(folder: Path, past: JournaledSession | None, planned: Sequence[PlannedRun]) -> None:
-    """Print a warning if runs of the earlier session in a folder are not planned again: reports will omit them."""
+    """Print a warning if reports will omit runs of the earlier session in a folder, which are not planned again."""
     earlier = () if past is None else past.planned
     now = {run.key for run in planned}
     dropped = [run.key for run in earlier if run.key not in now]

@@ -241,7 +241,7 @@ def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
     """Return the failure of a run in a criterion, named by ID or kind; "" for the first failed criterion.
 
     `share` (0 to 1) is the fraction of the violation that a smaller scenario must still have. Raises UsageError if the
-    run did not fail in this criterion, and RunError if it could not be completed.
+    run did not fail in this criterion, and RunError if the run could not be completed.
     """
     if result.error is not None:
         if result.error.by_stack and not criterion:
