@@ -75,12 +75,14 @@ class _SlippingWheels(OdometryDistortion):
     def __init__(self, slip: Slip, separation: float) -> None:
         self._left_ratio, self._right_ratio, self._separation = 1 - slip.left, 1 - slip.right, separation
         inverse = 1 / self._left_ratio, 1 / self._right_ratio
-        super().__init__(lambda step, velocity, _: (self._scaled(step, *inverse), self._scaled(velocity, *inverse)))
+        super().__init__(
+            lambda step, velocity, _: (self._scale_sides(step, *inverse), self._scale_sides(velocity, *inverse))
+        )
 
     def command(self, command: Twist) -> Twist | None:
-        return command if self._has_ended else self._scaled(command, self._left_ratio, self._right_ratio)
+        return command if self._has_ended else self._scale_sides(command, self._left_ratio, self._right_ratio)
 
-    def _scaled(self, motion: Twist, left: float, right: float) -> Twist:
+    def _scale_sides(self, motion: Twist, left: float, right: float) -> Twist:
         """Return the motion with the speeds of the left and right wheels multiplied by `left` and `right`."""
         left_speed, right_speed = side_speeds(motion, self._separation)
         left_speed, right_speed = left_speed * left, right_speed * right
@@ -114,14 +116,14 @@ class Gain(Spec, Fault):
         return inapplicable_side(self, target)
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        def scaled(command: Twist) -> Twist:
+        def scale(command: Twist) -> Twist:
             twist = Twist(self.linear * command.vx, self.linear * command.vy, self.angular * command.wz)
             if not setting.separation or self.left == self.right == 1:
                 return twist
             left, right = side_speeds(twist, setting.separation)
             return twist_from_sides(self.left * left, self.right * right, twist.vy, setting.separation)
 
-        return ChangedCommands(scaled)
+        return ChangedCommands(scale)
 
 
 class Saturation(Spec, Fault):
@@ -225,9 +227,9 @@ class LowBattery(Spec, Fault):
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         start_tick = setting.now()
 
-        def limited(command: Twist) -> Twist:
+        def limit_speed(command: Twist) -> Twist:
             drained_ratio = min(1.0, setting.seconds_since(start_tick) / self.drain) if self.drain > 0 else 1.0
             speed, max_speed = math.hypot(command.vx, command.vy), self.start + (self.end - self.start) * drained_ratio
             return command if speed <= max_speed else Twist(*(value * max_speed / speed for value in command))
 
-        return ChangedCommands(limited)
+        return ChangedCommands(limit_speed)

@@ -52,9 +52,9 @@ class Garbage(Spec, Fault):
         return "value", f"its messages cannot be {self.value}: they have a fixed number of values"
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        return ChangedReadings(lambda reading: self._garbage(rng, reading))
+        return ChangedReadings(lambda reading: self._replace_content(rng, reading))
 
-    def _garbage(self, rng: np.random.Generator, reading: Reading) -> Reading:
+    def _replace_content(self, rng: np.random.Generator, reading: Reading) -> Reading:
         has_variable_size = isinstance(reading, Scan | Image)
         contents = (*GARBAGE_NUMBERS, *(WRONG_SIZES if has_variable_size else ()))
         draw, random_content = rng.random(), contents[int(rng.integers(len(contents)))]

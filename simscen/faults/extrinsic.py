@@ -53,7 +53,7 @@ class Extrinsic(Spec, Fault):
         error = Pose3.from_rpy(self.x, self.y, self.z, self.roll, self.pitch, self.yaw)
         simulator = setting.simulator
 
-        def measured(reading: Reading) -> Reading:
+        def measure_again(reading: Reading) -> Reading:
             match reading:
                 case Scan() if simulator is not None:
                     nominal, displaced = simulator.distances(reading), simulator.distances(reading, error)
@@ -68,4 +68,4 @@ class Extrinsic(Spec, Fault):
                 case _:
                     return reading
 
-        return ChangedReadings(measured)
+        return ChangedReadings(measure_again)

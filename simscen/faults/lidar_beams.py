@@ -83,9 +83,9 @@ class RangeLimit(Spec, Fault):
         return "max", f"{self.max:g} m is no limit: the range of the sensor is {sensor_range:g} m"
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        return ChangedReadings(self._limited)
+        return ChangedReadings(self._limit_reading)
 
-    def _limited(self, reading: Reading) -> Reading:
+    def _limit_reading(self, reading: Reading) -> Reading:
         match reading:
             case Scan(ranges=ranges):
                 with np.errstate(invalid="ignore"):

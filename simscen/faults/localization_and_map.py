@@ -94,9 +94,9 @@ class Outdated(Spec, Fault):
     """Polygons, each a list of corners [x, y], in which the map shows an obstacle."""
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
-        return _ChangedMap(self._edited)
+        return _ChangedMap(self._edit_map)
 
-    def _edited(self, grid: OccupancyGrid) -> OccupancyGrid:
+    def _edit_map(self, grid: OccupancyGrid) -> OccupancyGrid:
         rows, columns = np.indices(grid.shape)
         centers = grid.center_of(np.column_stack((rows.ravel(), columns.ravel())))
         cells = grid.cells.copy()

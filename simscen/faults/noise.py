@@ -63,7 +63,7 @@ class Noise(Spec, Fault):
         if setting.kind != "Odometry":
             return _NoisyValues(rng, self)
 
-        def noisy(step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
+        def add_noise(step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
             forward_draw, turn_draw = rng.standard_normal(2).tolist()
             forward = step.vx + self.linear * math.sqrt(math.hypot(step.vx, step.vy)) * forward_draw
             turn = step.wz + self.angular * math.sqrt(abs(step.wz)) * turn_draw
@@ -73,7 +73,7 @@ class Noise(Spec, Fault):
                 velocity = Twist(vx, velocity.vy, wz)
             return Twist(forward, step.vy, turn), velocity
 
-        return OdometryDistortion(noisy)
+        return OdometryDistortion(add_noise)
 
 
 class _NoisyValues(FaultEffect):

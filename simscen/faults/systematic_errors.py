@@ -64,14 +64,14 @@ class Bias(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         if setting.kind == "Odometry":
-            return OdometryDistortion(lambda step, velocity, _: (self._distorted(step), self._distorted(velocity)))
-        return ChangedReadings(self._biased_reading)
+            return OdometryDistortion(lambda step, velocity, _: (self._distort(step), self._distort(velocity)))
+        return ChangedReadings(self._add_bias)
 
-    def _distorted(self, twist: Twist) -> Twist:
+    def _distort(self, twist: Twist) -> Twist:
         turn = twist.wz * self.angular_scale + twist.vx * self.turn_per_metre
         return Twist(twist.vx * self.linear_scale, twist.vy * self.linear_scale, turn)
 
-    def _biased_reading(self, reading: Reading) -> Reading:
+    def _add_bias(self, reading: Reading) -> Reading:
         if isinstance(reading, Imu):
             x, y, z = reading.angular_velocity
             a, b, c = reading.linear_acceleration
@@ -100,13 +100,13 @@ class Scale(Spec, Fault):
 
     def begin(self, rng: np.random.Generator, setting: FaultSetting) -> FaultEffect:
         if setting.kind == "Odometry":
-            return OdometryDistortion(lambda step, velocity, _: (self._distorted(step), self._distorted(velocity)))
-        return ChangedReadings(self._scaled_reading)
+            return OdometryDistortion(lambda step, velocity, _: (self._distort(step), self._distort(velocity)))
+        return ChangedReadings(self._scale_reading)
 
-    def _distorted(self, twist: Twist) -> Twist:
+    def _distort(self, twist: Twist) -> Twist:
         return Twist(*(self.factor * value for value in twist))
 
-    def _scaled_reading(self, reading: Reading) -> Reading:
+    def _scale_reading(self, reading: Reading) -> Reading:
         if isinstance(reading, Imu):
             x, y, z = (self.factor * value for value in reading.angular_velocity)
             a, b, c = (self.factor * value for value in reading.linear_acceleration)
@@ -145,14 +145,14 @@ class Drift(Spec, Fault):
         if setting.kind != "Odometry":
             return _DriftingValues(self, setting)
 
-        def drifted(step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
+        def add_drift(step: Twist, velocity: Twist, ticks: int) -> tuple[Twist, Twist]:
             seconds = setting.clock.seconds(ticks)
             return (
                 Twist(step.vx + self.linear * seconds, step.vy, step.wz + self.angular * seconds),
                 Twist(velocity.vx + self.linear, velocity.vy, velocity.wz + self.angular),
             )
 
-        return OdometryDistortion(drifted)
+        return OdometryDistortion(add_drift)
 
 
 class _DriftingValues(FaultEffect):

@@ -37,10 +37,10 @@ class VelocitySmoother:
         """Return the velocity to send, `periods` controller periods after the previous velocity."""
         if not self._is_enabled:
             return command
-        target_x, target_y, wz = self._limited(command)
+        target_x, target_y, wz = self._limit_speed(command)
         last_x, last_y, last_wz = self._last
-        vx = target_x if target_x == last_x else self._accelerated(last_x, target_x, periods)
-        vy = target_y if target_y == last_y else self._accelerated(last_y, target_y, periods)
+        vx = target_x if target_x == last_x else self._accelerate(last_x, target_x, periods)
+        vy = target_y if target_y == last_y else self._accelerate(last_y, target_y, periods)
         if self._is_steered and target_x != 0.0:
             wz = vx * wz / target_x  # a car keeps its curvature while it accelerates (Nav2: scale_velocities)
         else:
@@ -49,7 +49,7 @@ class VelocitySmoother:
         self._last = Twist(vx, vy, wz)
         return self._last
 
-    def _limited(self, command: Twist) -> Twist:
+    def _limit_speed(self, command: Twist) -> Twist:
         """Return the command within the speed limits; for a car, with the same curvature."""
         if not self._has_limits or (
             max(abs(command.vx), abs(command.vy)) <= self._max_speed and abs(command.wz) <= self._max_yaw_rate
@@ -62,7 +62,7 @@ class VelocitySmoother:
             return Twist(command.vx * scale, vy, command.wz * scale)
         return Twist(vx, vy, wz)
 
-    def _accelerated(self, current: float, target: float, periods: int) -> float:
+    def _accelerate(self, current: float, target: float, periods: int) -> float:
         """Return the speed along one axis after `periods`. A change of direction first stops at zero."""
         if current * target < 0.0:
             target = 0.0

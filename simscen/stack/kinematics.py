@@ -129,15 +129,15 @@ def velocity_limits(
     increase, decrease = robot.linear_acceleration, -robot.linear_deceleration
     angular_change = robot.angular_acceleration
     return VelocityLimits(
-        low=_bounded(max, low, (-robot.max_reverse, -lateral, -angular)),
-        high=_bounded(min, high, (linear, lateral, angular)),
-        acceleration=_bounded(min, acceleration, (increase, increase, angular_change)),
-        deceleration=_bounded(max, deceleration, (decrease, decrease, -angular_change)),
+        low=_apply_bound(max, low, (-robot.max_reverse, -lateral, -angular)),
+        high=_apply_bound(min, high, (linear, lateral, angular)),
+        acceleration=_apply_bound(min, acceleration, (increase, increase, angular_change)),
+        deceleration=_apply_bound(max, deceleration, (decrease, decrease, -angular_change)),
         turning_radius=max(turning_radius or 0.0, robot.turning_radius),
     )
 
 
-def _bounded(bound: Callable[[float, float], float], requested: OptionalAxes, limits: Axes) -> Axes:
+def _apply_bound(bound: Callable[[float, float], float], requested: OptionalAxes, limits: Axes) -> Axes:
     """Return `bound(value, limit)` for each requested value; `limit` for None. `bound` is min or max."""
     x, y, turn = (
         limit if value is None else bound(value, limit) for value, limit in zip(requested, limits, strict=True)

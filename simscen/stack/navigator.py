@@ -115,7 +115,7 @@ class Navigator:
         """Remove the goal, so that `step` returns a stop. Return the event that ends the active behavior, if any."""
         behavior, self.goal, self.via = self._behavior, None, ()
         self._reset()
-        return () if behavior is None else (_recovery_ended(tick, behavior, {"outcome": "canceled"}),)
+        return () if behavior is None else (_recovery_end_event(tick, behavior, {"outcome": "canceled"}),)
 
     def step(self, tick: int, frames: Frames, twist: Twist, is_held: bool = False, periods: int = 1) -> StepResult:
         """Run one step, `periods` controller periods after the previous step. `twist` is the measured velocity.
@@ -129,7 +129,7 @@ class Navigator:
         if self._behavior is not None:
             return self._recover(tick, frames, self._behavior)
         if any(self._velocity_thresholds):
-            twist = _above_thresholds(twist, self._velocity_thresholds)
+            twist = _apply_thresholds(twist, self._velocity_thresholds)
         if not self.via and self._goal_checker.reached(goal, frames.pose, twist):
             return StepResult(reached=True)
         events: tuple[Event, ...] = ()
@@ -170,7 +170,7 @@ class Navigator:
             if failure.code != ErrorCode.FAILED_TO_MAKE_PROGRESS:
                 if self._is_tolerated():
                     return StepResult()
-                failure = self._with_patience_exceeded(failure)
+                failure = self._apply_patience(failure)
             self.plans.report_control_failure()
             should_retry, self._has_retried_control = not self._has_retried_control, True
         if should_retry:
@@ -201,7 +201,7 @@ class Navigator:
         tolerance = self._failure_tolerance
         return tolerance < 0.0 or self._now - self._first_control_failure < tolerance
 
-    def _with_patience_exceeded(self, failure: NavigationFailure) -> NavigationFailure:
+    def _apply_patience(self, failure: NavigationFailure) -> NavigationFailure:
         """Return the failure; PATIENCE_EXCEEDED instead of NO_VALID_CONTROL if `failure_tolerance` is positive."""
         if self._failure_tolerance <= 0.0 or failure.code != ErrorCode.NO_VALID_CONTROL:
             return failure
@@ -225,15 +225,15 @@ class Navigator:
             return StepResult(command)
         self._behavior = None
         self._progress.reset()
-        return StepResult(events=(_recovery_ended(tick, behavior, result),))
+        return StepResult(events=(_recovery_end_event(tick, behavior, result),))
 
 
-def _above_thresholds(velocity: Twist, thresholds: Twist) -> Twist:
+def _apply_thresholds(velocity: Twist, thresholds: Twist) -> Twist:
     """Return the velocity; components up to their threshold become 0 (getThresholdedTwist of nav2_controller)."""
     return Twist(*(0.0 if abs(value) <= limit else value for value, limit in zip(velocity, thresholds, strict=True)))
 
 
-def _recovery_ended(tick: int, behavior: Behavior, result: dict[str, Value]) -> Event:
+def _recovery_end_event(tick: int, behavior: Behavior, result: dict[str, Value]) -> Event:
     """Return the event that ends a behavior."""
     return Event(tick, EventKind.RECOVERY_ENDED, behavior.name, result)
 

@@ -120,7 +120,7 @@ class RegulatedPurePursuit(PathFollower):
                 rotation = bearing
                 break
             command = self._drive(tracker, curvature_carrot, is_backward, pose, costmap)
-            arc = self._checked_arc(command, pose, costmap, self._checked_distance(tracker, carrot))
+            arc = self._check_arc(command, pose, costmap, self._checked_distance(tracker, carrot))
             if arc.free_time >= arc.horizon:
                 return self._slow_down_for_moving(command, pose, costmap, arc.horizon)
             arcs.append(arc)
@@ -149,7 +149,7 @@ class RegulatedPurePursuit(PathFollower):
         if not self._spec.use_rotate_to_heading or self._robot.radius is None or abs(angle) < MIN_ROTATION_RAD:
             return False
         rotated = Pose2(pose.x, pose.y, pose.yaw + angle)
-        arc = self._checked_arc(Twist(command.vx, 0.0, 0.0), rotated, costmap, carrot.distance)
+        arc = self._check_arc(Twist(command.vx, 0.0, 0.0), rotated, costmap, carrot.distance)
         return arc.free_time >= arc.horizon
 
     def _checked_distance(self, tracker: PathTracker, carrot: Carrot) -> float:
@@ -213,7 +213,7 @@ class RegulatedPurePursuit(PathFollower):
         braking = math.sqrt(BRAKING_FACTOR * self._robot.linear_deceleration * remaining)
         return min(speed, max(braking, spec.min_approach_linear_velocity))
 
-    def _checked_arc(self, command: Twist, pose: Pose2, costmap: CostmapView, distance: float) -> CheckedArc:
+    def _check_arc(self, command: Twist, pose: Pose2, costmap: CostmapView, distance: float) -> CheckedArc:
         """Return the command as a CheckedArc. Its horizon is the time to drive `distance` m, limited as in Nav2."""
         max_time = self._spec.max_allowed_time_to_collision_up_to_carrot
         if not self._spec.use_collision_detection:

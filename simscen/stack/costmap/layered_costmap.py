@@ -165,7 +165,7 @@ class LayeredCostmap:
         latest = list(self._latest_readings.values())
         scans = [(base, reading) for base, reading in latest if isinstance(reading, Scan)]
         radius = self._surroundings.robot.circumscribed_radius + unseen_margin
-        out_of_view = self._live.out_of_view(scans[-1][0], radius, scans) if scans else None
+        out_of_view = self._live.cells_out_of_view(scans[-1][0], radius, scans) if scans else None
         if latest and math.isfinite(clear_within):
             self._live.clear_around(latest[-1][0], clear_within)
         else:

@@ -176,7 +176,7 @@ class ObstacleLayer:
         if self._heights is not None:
             self._heights[window] = np.nan
 
-    def out_of_view(self, base: Pose2, meters: float, scans: list[tuple[Pose2, Scan]]) -> Cells:
+    def cells_out_of_view(self, base: Pose2, meters: float, scans: list[tuple[Pose2, Scan]]) -> Cells:
         """Return the cells (n, 2) with marks of a lidar that are outside the field of view of all `scans`.
 
         The result contains only cells within `meters` of the robot along x and y. `scans` are pairs (pose of the robot,
@@ -280,12 +280,12 @@ class ObstacleLayer:
         marked = np.argwhere(~np.isnan(self._heights))
         heights = self._heights[marked[:, 0], marked[:, 1]]
         is_cleared = is_seen_through(marked, heights, self._frame, image, base, self._spec)
-        is_cleared |= self._under_robot(self._frame.centers(marked), base)
+        is_cleared |= self._is_under_robot(self._frame.centers(marked), base)
         _set_values(self._heights, marked[is_cleared], np.nan)
         cells, heights, ground = project_depth_image(image, base, self._frame, self._spec, self._ground)
         _set_values(self._ground, ground, True)
         is_off_walls = walls[cells[:, 0], cells[:, 1]] > WALL_DISTANCE_SQUARED_CELLS
-        new = is_off_walls & ~self._under_robot(self._frame.centers(cells), base)
+        new = is_off_walls & ~self._is_under_robot(self._frame.centers(cells), base)
         cells = cells[new]
         self._heights[cells[:, 0], cells[:, 1]] = heights[new]
         return np.concatenate((marked[is_cleared], cells))
@@ -296,7 +296,7 @@ class ObstacleLayer:
         reach = max(self._spec.raytrace_max_range, self._spec.obstacle_max_range) + mount_distance
         return self._frame.window(center, center, math.ceil(reach / self._frame.resolution) + 1)
 
-    def _under_robot(self, points: Array, base: Pose2) -> Mask:
+    def _is_under_robot(self, points: Array, base: Pose2) -> Mask:
         """Return which points (n, 2) are in the inscribed circle of the robot."""
         return np.asarray(np.hypot(points[:, 0] - base.x, points[:, 1] - base.y) < self._inscribed)
 

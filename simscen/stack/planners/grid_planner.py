@@ -73,10 +73,10 @@ class GridPlanner:
         """Return the path on a costmap or on a window of it."""
         costs = TraversalCosts(costmap, self._robot, self._multiplier, self._allow_unknown)
         ends = find_endpoints(costs, start, goal, self._tolerance)
-        path = self._postprocessed(costs, ends, self._search(costs, ends))
+        path = self._postprocess(costs, ends, self._search(costs, ends))
         return Path(with_headings(densify(np.vstack(((start.x, start.y), path)), SPACING_M), goal))
 
-    def _postprocessed(self, costs: TraversalCosts, ends: Endpoints, cells: Array) -> Array:
+    def _postprocess(self, costs: TraversalCosts, ends: Endpoints, cells: Array) -> Array:
         """Return a path (n, 2) from start to goal that cuts no corners of blocked cells, smoothed if requested.
 
         `cells` (n, 2) are the centers of the cells on the path.
