@@ -44,7 +44,7 @@ def grip_angle(body: RobotBody, friction: float) -> float:
     """Return the slope θ in rad above which the wheels spin: tan θ = μ · (weight on driven wheels / total weight).
 
     The ratio includes the weight that shifts to a caster behind the axle on a slope. Returns 0 for a robot whose center
-    of mass is beyond a caster, because it tips over.
+    of mass is beyond a caster, because such a robot tips over.
     """
     x, z = (float(body.chassis.center[axis]) for axis in (0, 2))
     ground_casters = [caster.pose.x for caster in body.casters if not caster_gap(caster)]
@@ -69,7 +69,7 @@ def _driven_weight_ratio(body: RobotBody) -> float:
 
 
 def approach_angle(body: RobotBody) -> float:
-    """Return the slope in rad of the flattest ramp that touches the hull when the front wheels are at its foot.
+    """Return the slope in rad of the flattest ramp that touches the hull when the front wheels reach the ramp.
 
     Raised casters count as hull. Returns the steepest examined slope if no ramp touches the hull.
     """

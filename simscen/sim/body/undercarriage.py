@@ -106,9 +106,10 @@ def add_motors(wheels: tuple[Wheel, ...], drive: Drive, mass: float) -> tuple[Wh
 
 
 def wheel_guards(wheels: Iterable[Wheel], parts: Iterable[Solid]) -> tuple[Solid, ...]:
-    """Return a box around each wheel that collides with obstacles, except for wheels that one of the `parts` covers.
+    """Return boxes around the wheels, which collide with obstacles instead of the wheels.
 
-    The boxes do not touch the ground. `parts` are the solids of the hull.
+    The boxes do not touch the ground. `parts` are the solids of the hull. A wheel that a part covers, seen from
+    above, gets no box.
     """
     outlines = [footprint([part]) for part in parts]
     boxes = (

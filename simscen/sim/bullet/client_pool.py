@@ -3,7 +3,7 @@
 from simscen.sim.bullet import engine, pybullet
 
 MAX_FREE_CLIENTS = 2
-"""Largest number of clients in the pool. A run with one robot on flat ground uses two."""
+"""Largest number of clients in the pool. A run with one robot on flat ground uses two clients."""
 
 
 class ClientPool:

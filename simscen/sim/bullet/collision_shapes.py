@@ -48,7 +48,7 @@ def create_concave_shapes(client: int, vertices: Array, faces: Faces) -> list[in
 
 
 def create_concave_shape(client: int, mesh: Mesh) -> int:
-    """Create the shape of a triangle mesh, which can be concave. It is hollow: a body inside it does not touch it."""
+    """Create the shape of a triangle mesh, which can be concave. The shape is hollow: it touches no body inside."""
     vertices, indices = mesh.vertices.tolist(), mesh.faces.ravel().tolist()
     shape: int = pybullet.createCollisionShape(
         pybullet.GEOM_MESH,

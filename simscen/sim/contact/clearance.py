@@ -1,4 +1,4 @@
-"""Clearance of a robot (distance to the nearest object), and the tick before which it cannot touch anything."""
+"""Clearance of a robot (distance to the nearest object), and the tick before which no contact is possible."""
 
 import itertools
 import math

@@ -119,7 +119,7 @@ class Actors:
             self._update_lists()
 
     def move(self, name: str, path: MotionPath, tick: int) -> None:
-        """Let a body follow a path from `tick` on. Nothing can push it any more."""
+        """Let a body follow a path from `tick` on; the body cannot be pushed any more."""
         actor = self._actors[name]
         self.add(replace(actor.body, pose=self.poses.at(tick)[name], mass=0.0, path=path), tick)
 

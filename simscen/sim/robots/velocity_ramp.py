@@ -22,7 +22,7 @@ class VelocityRamp:
         self.velocity = STOP
 
     def command(self, twist: Twist) -> None:
-        """Set the target velocity; the limits of speed are applied to it."""
+        """Set the target velocity to `twist`, reduced to the limits of speed."""
         if twist == self._command:
             return
         limits, self._command = self._limits, twist

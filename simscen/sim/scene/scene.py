@@ -1,4 +1,4 @@
-"""Everything in a simulation except its robots, and the current tick."""
+"""Everything that the robots of a simulation share: the world, the movable objects, and the current tick."""
 
 from dataclasses import dataclass, field
 
