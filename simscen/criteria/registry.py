@@ -58,7 +58,7 @@ class AnyCriterion(Choice):
     @model_validator(mode="after")
     def _check_whenever_and_then(self) -> "AnyCriterion":
         if (self.whenever is None) != (self.then is None):
-            raise ValueError("`whenever` and `then` belong together")
+            raise ValueError("`whenever` and `then` must be given together")
         return self
 
     @property

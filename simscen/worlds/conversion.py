@@ -92,7 +92,7 @@ def _add_body(body: Body, height: float, conversion: Conversion) -> None:
     if len(shapes) > 1:
         moves = "moved" if body.path else "could be pushed" if body.mass else "could be moved"
         conversion.changes.append(
-            f"{body.name}: it {moves} and has {len(shapes)} shapes, but an object can have only one; it is made static"
+            f"{body.name}: it {moves} and has {len(shapes)} shapes, but an object has only one shape; it is made static"
         )
         for shape in shapes:
             conversion.add(Obstacle, conversion.obstacles, {"name": body.name, **shape.fields})

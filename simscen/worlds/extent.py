@@ -61,4 +61,4 @@ def oversize_hint(world: World) -> str:
 
     # Only a model at an edge of the world can make the world larger.
     edges = [choose(extents, key=lambda name: extents[name][side]) for side, choose in enumerate((min, min, max, max))]
-    return f'"{min(edges, key=area_without)}" makes it large; move or remove it'
+    return f'"{min(edges, key=area_without)}" makes the map large; move or remove this model'

@@ -91,7 +91,7 @@ class Condition(Spec):
         if len(given) > 1:
             raise ValueError(f"only one of {', '.join(given)} may be given here")
         if (self.whenever is None) != (self.then is None):
-            raise ValueError("`whenever` and `then` belong together")
+            raise ValueError("`whenever` and `then` must be given together")
         if self.signal is None:
             wrong = [name for name in ("op", "value", "scale", *ARGUMENT_KEYS) if getattr(self, name) is not None]
             if wrong:

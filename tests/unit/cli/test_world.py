@@ -176,7 +176,7 @@ def test_a_map_that_would_be_too_large_is_an_error_of_the_file(simscen, room: Pa
     ended = simscen("world", *arguments)
     assert ended.code == 2
     assert ended.err.startswith("vast.world: error[SC330] map too large: 12")
-    assert " ".join(ended.err.split()).endswith(f'"m" makes it large; move or remove it, or {alternative}')
+    assert " ".join(ended.err.split()).endswith(f'"m" makes the map large; move or remove this model, or {alternative}')
 
 
 def test_a_world_with_a_large_map_is_exported_with_larger_cells(simscen, room: Path) -> None:

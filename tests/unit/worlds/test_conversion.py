@@ -146,7 +146,7 @@ def test_unsupported_motions_and_shapes_are_reported():
     world, changes = converted(bodies=(moving, table))
     assert changes == [
         "beside: it moves, but its shape is not at its origin; it is made static",
-        "table: it could be pushed and has 2 shapes, but an object can have only one; it is made static",
+        "table: it could be pushed and has 2 shapes, but an object has only one shape; it is made static",
     ]
     assert world.bodies[0].path is None
     assert [solid.name for solid in world.solids] == ["table", "table-2"]

@@ -100,7 +100,7 @@ STAGE = box("a", 2, (0.5, 0.5, 1)) + box("stage", 2, (500, 500, 0.4), z=1)
 def test_message_about_a_too_large_map_names_the_model(tmp_path):
     [problem] = errors(load(tmp_path, GROUND + STAGE))
     assert problem.code == "SC330"
-    assert '"stage" makes it large' in problem.hint
+    assert '"stage" makes the map large' in problem.hint
 
 
 @pytest.mark.parametrize("floor", [GROUND, box("asphalt", 0, (500, 500, 0.1))], ids=["plane", "slab"])
