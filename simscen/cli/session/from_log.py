@@ -70,7 +70,7 @@ def _verify(reconstruction: Reconstruction) -> None:
         print_text(escaped(f"only in the run: {new.kind} at {new.time:.2f} s ({new.detail})"))
     if not verified.incidents and not verified.new_incidents:
         print_text("neither the log nor the run has an incident")
-    failed = ", ".join(verified.failed)
+    failed = ", ".join(verified.failed_criteria)
     print_text(escaped(f"criteria that fail in the run: {failed}" if failed else "all criteria hold in the run"))
     page = reconstruction.file.with_name(f"{name}.verified.html")
     text = verification_page(

@@ -29,12 +29,12 @@ MIN_TIMEOUT_S, TIMEOUT_FACTOR = 30.0, 2.0
 """Minimum timeout of a goal, and ratio of the timeout to the recorded time."""
 UNFINISHED_TIMEOUT_FACTOR = 1.1
 """Ratio of the timeout to the recorded time, for a goal that was active when the log ended."""
-MAX_TIME_LIMIT_S = 8000.0
-"""Maximum time limit of the scenario."""
+MIN_TIME_LIMIT_S, MAX_TIME_LIMIT_S = 60.0, 8000.0
+"""Minimum and maximum time limit of the scenario."""
 RADIUS_STEP_M = 0.05
-"""The distance at which goals count as passed is rounded up to a multiple of this step."""
-NEAR_TRUTH_M, NEAR_TRUTH_RAD = 0.15, math.radians(6)
-"""If the first belief is at most this far from the true start, the scenario has the default initial estimate."""
+"""Step to whose multiples the distance at which goals count as passed is rounded up."""
+MAX_DEFAULT_ERROR_M, MAX_DEFAULT_ERROR_RAD = 0.15, math.radians(6)
+"""Maximum error of the first belief with which the scenario has the default initial estimate."""
 UNKNOWN_START_STD_M = 1.5
 """Standard deviation of the first belief above which the localizer did not know where the robot started."""
 
@@ -43,8 +43,12 @@ UNKNOWN_START_STD_M = 1.5
 class EstimatedParts:
     """Parts of the scenario that the estimators found in a drive.
 
-    `kidnaps` are the time in s, the new pose in the map frame, and the reason of each kidnapping. `unknowns` are
-    phrases about information that the log does not contain.
+    Attributes:
+        incidents: What went wrong in the drive.
+        objects: Objects that are not on the map.
+        faults: Faults of sensors, actuators, and localizer.
+        kidnaps: Time in s, new pose in the map frame, and reason of each kidnapping.
+        unknowns: Phrases that complete the sentence "The log does not show …".
     """
 
     incidents: Sequence[Incident]
@@ -56,9 +60,16 @@ class EstimatedParts:
 
 @dataclass(frozen=True)
 class GivenParts:
-    """Parts of the scenario that are not estimated: values of the keys `world`, `map`, `robot`, `seed`, and `stack`.
+    """Parts of the scenario that are not estimated.
 
-    `reasons` are the reasons by key. `unknowns` are phrases about information that the log does not contain.
+    Attributes:
+        world: Value of the key `world`.
+        map: Value of the key `map`; "" if the scenario does not have this key.
+        robot: Name of a shipped robot, or path of a robot file.
+        seed: Seed of the run.
+        stack: Value of the key `stack`; empty if the scenario does not have this key.
+        reasons: Reasons for the values, by key.
+        unknowns: Phrases that complete the sentence "The log does not show …".
     """
 
     world: str | Mapping[str, Any]
@@ -72,9 +83,15 @@ class GivenParts:
 
 @dataclass(frozen=True)
 class ScenarioGoal:
-    """Goal of the reconstructed scenario: pose in the map frame, timeout in s, and wait at the goal in s.
+    """Goal of the reconstructed scenario.
 
-    `expect` is the name of the error code with which the goal must fail; "" if the robot must reach the goal.
+    Attributes:
+        name: Unique name.
+        pose: Pose in the map frame.
+        timeout: Timeout in s.
+        reason: Reason for the goal.
+        expect: Name of the error code with which the goal must fail; "" if the robot must reach the goal.
+        wait: Time in s that the robot waits at the goal.
     """
 
     name: str
@@ -90,6 +107,7 @@ class ScenarioContents:
     """Contents of a scenario file.
 
     Attributes:
+        name: Name of the scenario.
         source: Name of the log.
         summary: Sentences about the drive.
         given: Parts that are not estimated.
@@ -100,8 +118,10 @@ class ScenarioContents:
         passing_radius: Distance in m at which goals count as passed; None if the robot stops at each goal.
         goals: Goals in the order in which they are sent.
         stops_at_failure: Whether the run ends at the first failed goal.
+        time_limit: Time limit of the scenario in s.
+        criteria: Proposed criteria.
         reasons: Reasons for world, map, robot, start, estimate, stack, and navigation, by key.
-        unknowns: Phrases about information that the log does not contain, for all parts.
+        unknowns: Phrases of all parts that complete the sentence "The log does not show …".
     """
 
     name: str
@@ -125,8 +145,8 @@ def scenario_contents(
 ) -> ScenarioContents:
     """Return the contents of the scenario file of the scenario `name`. `source` is the name of the log."""
     start = Pose2(*drive.poses.poses_at(np.zeros(1))[0].tolist())
-    estimate, estimate_reason = _estimate(drive, start, given.map == "none")
-    goals = [*_goals(drive)]
+    estimate, estimate_reason = _initial_estimate(drive, start, given.map == "none")
+    goals = [*_scenario_goals(drive)]
     is_refusal_expected = bool(goals) and all(goal.expect for goal in goals)
     reasons = dict(given.reasons)
     reasons["start"] = Reason(f"first pose of the drive, from {drive.pose_source}", 0.0)
@@ -136,8 +156,8 @@ def scenario_contents(
     if passing is not None:
         text = f"goals were passed without a stop, at a distance of at most {passing:g} m"
         reasons["navigation"] = Reason(text, None, None, "medium")
-    slowest = max((goal.timeout for goal in goals), default=MIN_TIMEOUT_S)
-    time_limit = min(MAX_TIME_LIMIT_S, max(60.0, 2 * drive.duration, drive.duration + slowest))
+    max_timeout = max((goal.timeout for goal in goals), default=MIN_TIMEOUT_S)
+    time_limit = min(MAX_TIME_LIMIT_S, max(MIN_TIME_LIMIT_S, 2 * drive.duration, drive.duration + max_timeout))
     return ScenarioContents(
         name=name,
         source=source,
@@ -159,23 +179,26 @@ def scenario_contents(
 def passing_radius(drive: RecordedDrive) -> float | None:
     """Return the distance in m at which goals counted as passed; None if the robot passed no goal without a stop.
 
-    The result is the largest distance between a passed goal and the estimated pose at this time, rounded up.
+    It is the largest distance between a goal and the estimated pose when the goal was passed, rounded up.
     """
-    passed = [goal for goal in drive.goals if goal.status == "passed" and goal.end_time is not None]
-    distances = [_believed_pose(drive, goal.end_time or 0.0).distance(goal.pose) for goal in passed]
+    distances = [
+        _estimated_pose(drive, goal.end_time).distance(goal.pose)
+        for goal in drive.goals
+        if goal.status == "passed" and goal.end_time is not None
+    ]
     return round(math.ceil(max(distances) / RADIUS_STEP_M) * RADIUS_STEP_M, 2) if distances else None
 
 
-def _believed_pose(drive: RecordedDrive, time: float) -> Pose2:
+def _estimated_pose(drive: RecordedDrive, time: float) -> Pose2:
     """Return the robot's estimate of its pose at a time in s; the best known pose if the log has no estimates."""
-    at = np.array([time])
+    times = np.array([time])
     if not len(drive.corrections) or not len(drive.odometry):
-        return Pose2(*drive.poses.poses_at(at)[0].tolist())
-    correction, odometry = drive.corrections.values_at(at)[0], drive.odometry.poses_at(at)[0]
+        return Pose2(*drive.poses.poses_at(times)[0].tolist())
+    correction, odometry = drive.corrections.values_at(times)[0], drive.odometry.poses_at(times)[0]
     return Pose2(*correction.tolist()).compose(Pose2(*odometry.tolist()))
 
 
-def _estimate(
+def _initial_estimate(
     drive: RecordedDrive, start: Pose2, is_mapless: bool
 ) -> tuple[tuple[Pose2, tuple[float, float, float]] | str | None, Reason | None]:
     """Return the initial estimate of the localizer and its reason; (None, None) for the default estimate.
@@ -191,29 +214,29 @@ def _estimate(
     if max(std[:2]) > UNKNOWN_START_STD_M:
         text = f"the first belief has a standard deviation of {max(std[:2]):.1f} m, so the start was unknown"
         return "unknown", Reason(text, time, None, "medium")
-    if pose.distance(start) <= NEAR_TRUTH_M and abs(wrap(pose.yaw - start.yaw)) <= NEAR_TRUTH_RAD:
+    if pose.distance(start) <= MAX_DEFAULT_ERROR_M and abs(wrap(pose.yaw - start.yaw)) <= MAX_DEFAULT_ERROR_RAD:
         return None, None
     text = f"the first belief was {pose.distance(start):.2f} m from the start"
     return (pose, (max(std[0], 0.1), max(std[1], 0.1), max(std[2], 0.05))), Reason(text, time, None, "medium")
 
 
-def _goals(drive: RecordedDrive) -> Iterator[ScenarioGoal]:
+def _scenario_goals(drive: RecordedDrive) -> Iterator[ScenarioGoal]:
     """Yield the goals of the scenario with unique names."""
-    taken: set[str] = set()
-    for number, goal in enumerate(drive.goals):
-        name = unique_name(goal.name.replace("#", " loop "), taken, "-")
-        following = drive.goals[number + 1] if number + 1 < len(drive.goals) else None
-        refused = goal.end_time is not None and goal.end_time - goal.sent_time < MAX_REFUSAL_S
-        expect = goal.error if refused and goal.error in INVALID_GOAL_CODES else ""
+    used_names: set[str] = set()
+    for index, goal in enumerate(drive.goals):
+        name = unique_name(goal.name.replace("#", " loop "), used_names, "-")
+        next_goal = drive.goals[index + 1] if index + 1 < len(drive.goals) else None
+        was_refused = goal.end_time is not None and goal.end_time - goal.sent_time < MAX_REFUSAL_S
+        expect = goal.error if was_refused and goal.error in INVALID_GOAL_CODES else ""
         yield ScenarioGoal(
-            name, goal.pose, _timeout(goal, drive.duration), _goal_reason(goal), expect, _wait(goal, following)
+            name, goal.pose, _timeout(goal, drive.duration), _goal_reason(goal), expect, _wait(goal, next_goal)
         )
 
 
 def _goal_reason(goal: RecordedGoal) -> Reason:
-    result = {"unknown": "its result is unknown"}.get(
-        goal.status, f"{goal.status}{f' ({goal.error})' if goal.error else ''}"
-    )
+    """Return the source and the result of a goal as a reason."""
+    error = f" ({goal.error})" if goal.error else ""
+    result = "its result is unknown" if goal.status == "unknown" else f"{goal.status}{error}"
     confidence = "high" if goal.source.startswith("/") else "medium"
     return Reason(f"{goal.source}; {result}", goal.sent_time, goal.end_time, confidence)
 
@@ -227,15 +250,16 @@ def _timeout(goal: RecordedGoal, duration: float) -> float:
     return max(MIN_TIMEOUT_S, math.ceil(TIMEOUT_FACTOR * (goal.end_time - goal.sent_time)))
 
 
-def _wait(goal: RecordedGoal, following: RecordedGoal | None) -> float:
-    """Return the time in s that the robot waits at a goal before the following goal."""
-    if following is None or goal.end_time is None or goal.status not in ("reached", "unknown"):
+def _wait(goal: RecordedGoal, next_goal: RecordedGoal | None) -> float:
+    """Return the time in s that the robot waits at a goal before the next goal."""
+    if next_goal is None or goal.end_time is None or goal.status not in ("reached", "unknown"):
         return 0.0
-    gap = following.sent_time - goal.end_time
-    return round(gap, 1) if gap >= MIN_WAIT_S else 0.0
+    wait = next_goal.sent_time - goal.end_time
+    return round(wait, 1) if wait >= MIN_WAIT_S else 0.0
 
 
 def _summary(drive: RecordedDrive, estimated: EstimatedParts) -> Iterator[str]:
+    """Yield sentences about the drive and its incidents."""
     yield f"Reconstructed from a recorded drive of {drive.duration:.1f} s."
     for incident in estimated.incidents:
         x, y = incident.position

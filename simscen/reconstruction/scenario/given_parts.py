@@ -1,4 +1,7 @@
-"""Chooses world, map, robot, and stack from the user's options, the log header, or the messages, in this order."""
+"""Chooses world, map, robot, and stack of the scenario.
+
+The sources are, in this order: options of the user, the header of the log, and the messages in the log.
+"""
 
 from __future__ import annotations
 
@@ -39,9 +42,9 @@ MAX_EQUAL_MAP_DIFFERENCE = 0.002
 
 @dataclass(frozen=True)
 class GivenFiles:
-    """World, map, and robot from the user's options. They replace those of the log.
+    """World, map, and robot from options of the user. They replace the world, map, and robot in the log.
 
-    `robot` is a robot file, the name of a shipped robot, or the name of a robot in the log; "" for none.
+    `robot` is a robot file, the name of a shipped robot, or the name of a robot in the log; "" without this option.
     """
 
     world: Path | None = None
@@ -50,13 +53,16 @@ class GivenFiles:
 
 
 class NewFiles:
-    """Files written next to the scenario, in order, which are removed again if the reconstruction fails."""
+    """Files that are written next to the scenario. They are removed if the reconstruction fails.
+
+    `paths` are the paths of these files, in the order in which they are written.
+    """
 
     def __init__(self) -> None:
         self.paths: list[Path] = []
 
     def add(self, *files: Path) -> None:
-        """Add files before they are written. Raises UsageError if one exists."""
+        """Add files that are written next. Raises UsageError if one of the files exists."""
         for file in files:
             if file.exists():
                 raise UsageError(f"{file} already exists; choose another name for the scenario, or remove the file")
@@ -70,56 +76,63 @@ class NewFiles:
 
 @dataclass
 class WorldChoice:
-    """World and map of the scenario, with reasons.
+    """World and map of the scenario.
 
-    `written` and `map` are the values of the keys `world` and `map` in the scenario. `is_built` states that the walls
-    were built from the scans. `unknowns` are phrases about missing information.
+    Attributes:
+        world_value: Value of the key `world` in the scenario.
+        world: World that this value describes.
+        reason: Reason for the choice of the world.
+        map_value: Value of the key `map` in the scenario; "" if the scenario does not have this key.
+        map_reason: Reason for the choice of the map; None if the scenario does not have the key `map`.
+        is_built: Whether the walls were built from the scans.
+        unknowns: Phrases that complete the sentence "The log does not show …".
     """
 
-    written: str | Mapping[str, Any]
+    world_value: str | Mapping[str, Any]
     world: World
     reason: Reason
-    map: str = ""
+    map_value: str = ""
     map_reason: Reason | None = None
     is_built: bool = False
     unknowns: list[str] = field(default_factory=list)
 
 
 def choose_world(
-    drive: RecordedDrive, described: RunDescription, files: GivenFiles, out: Path, new: NewFiles
+    drive: RecordedDrive, described: RunDescription, files: GivenFiles, out: Path, new_files: NewFiles
 ) -> WorldChoice:
     """Return the world and the map for the scenario file `out`, and write world and map files next to `out`.
 
-    The written files are added to `new`. Raises InvalidInput for an unusable file, UsageError if a file to write
+    The written files are added to `new_files`. Raises InvalidInput for an unusable file, UsageError if a file to write
     exists, and OSError if it cannot be written.
     """
     if files.world is not None:
-        choice = _world_of_file(files.world, out, Reason("given with --world"), new)
+        choice = _world_from_file(files.world, out, Reason("given with --world"), new_files)
     elif isinstance(described.world, Path):
-        choice = _world_of_file(described.world, out, Reason("world file in the header of the log"), new)
+        choice = _world_from_file(described.world, out, Reason("world file in the header of the log"), new_files)
     elif isinstance(described.world, Mapping):
         spec = WorldSpec.model_validate(described.world)
         world = world_from_spec(spec, spec.name or "world")
         choice = WorldChoice(described.world, world, Reason("walls and obstacles in the header of the log"))
     else:
-        return _world_of_map(drive, files, out, new)
+        return _world_from_map(drive, files, out, new_files)
     if not described.has_map:
-        choice.map, choice.map_reason = "none", Reason("the log has no map")
+        choice.map_value, choice.map_reason = "none", Reason("the log has no map")
     elif files.map is not None:
-        choice.map, choice.map_reason = relative_path(files.map, out), Reason("given with --map")
-    elif drive.map is not None and _differs(drive.map, StaticWorld(choice.world, drive.lidar_height).grid):
-        file = _write_map(drive.map, out.with_name(f"{scenario_stem(out)}_map.yaml"), new)
-        choice.map, choice.map_reason = file.name, Reason("the map on /map differs from the world", 0.0)
+        choice.map_value, choice.map_reason = relative_path(files.map, out), Reason("given with --map")
+    elif drive.map is not None and _have_different_walls(drive.map, StaticWorld(choice.world, drive.lidar_height).grid):
+        file = _write_map(drive.map, out.with_name(f"{scenario_stem(out)}_map.yaml"), new_files)
+        choice.map_value, choice.map_reason = file.name, Reason("the map on /map differs from the world", 0.0)
     return choice
 
 
-def _write_map(grid: OccupancyGrid, file: Path, new: NewFiles) -> Path:
-    new.add(file, file.with_suffix(".pgm"))
+def _write_map(grid: OccupancyGrid, file: Path, new_files: NewFiles) -> Path:
+    """Write a ROS map with the name `file`, and an image next to it. Return `file`."""
+    new_files.add(file, file.with_suffix(".pgm"))
     save_map(grid, file)
     return file
 
 
-def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path, new: NewFiles) -> WorldChoice:
+def _world_from_map(drive: RecordedDrive, files: GivenFiles, out: Path, new_files: NewFiles) -> WorldChoice:
     """Return a world with the walls of the given map, of the map in the log, or of a map built from the scans."""
     if files.map is not None:
         loaded = load_world_file(files.map, default_root([files.map]))
@@ -127,8 +140,8 @@ def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path, new: NewFi
             raise InvalidInput(
                 [Problem(str(files.map), 0, 0, "SC320", "not a ROS map", "use --world for other worlds")]
             )
-        grid, written = load_map(loaded.map), relative_path(files.map, out)
-        return WorldChoice(written, world_from_map(grid, scenario_stem(out)), Reason("given with --map"))
+        grid, world_value = load_map(loaded.map), relative_path(files.map, out)
+        return WorldChoice(world_value, world_from_map(grid, scenario_stem(out)), Reason("given with --map"))
     unknowns = ["walls and objects that no scan shows"]
     if drive.map is not None:
         grid, reason = drive.map, Reason("the walls are the occupied cells of /map", 0.0)
@@ -136,7 +149,7 @@ def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path, new: NewFi
         grid = map_from_scans(drive)
         reason = Reason("built from the scans along the poses, because the log has no map", None, None, "medium")
         unknowns.append("which parts of the built map were on the robot's own map")
-    file = _write_map(grid, out.with_name(f"{scenario_stem(out)}_map.yaml"), new)
+    file = _write_map(grid, out.with_name(f"{scenario_stem(out)}_map.yaml"), new_files)
     return WorldChoice(
         file.name,
         world_from_map(grid, scenario_stem(out)),
@@ -146,28 +159,28 @@ def _world_of_map(drive: RecordedDrive, files: GivenFiles, out: Path, new: NewFi
     )
 
 
-def _world_of_file(file: Path, out: Path, reason: Reason, new: NewFiles) -> WorldChoice:
-    """Return the world in `file`, and copy the file next to `out` if it is outside of the scenario's root folder."""
+def _world_from_file(file: Path, out: Path, reason: Reason, new_files: NewFiles) -> WorldChoice:
+    """Return the world in `file`. Copy the file next to `out` if it is outside of the root folder of the scenario."""
     root = default_root([file])
     loaded = load_world_file(file, root)
     out_root = default_root([out])
-    written = relative_path(file, out)
+    world_value = relative_path(file, out)
     if not file.resolve().is_relative_to(out_root.resolve()):
         copy = out.with_name(f"{scenario_stem(out)}{''.join(file.suffixes[-2:])}")
         if loaded.map is not None:
-            _write_map(load_map(loaded.map), copy, new)
+            _write_map(load_map(loaded.map), copy, new_files)
         else:
-            new.add(copy)
+            new_files.add(copy)
             shutil.copyfile(file, copy)
-        written = copy.name
-    return WorldChoice(written, world_from_file(loaded, root), reason)
+        world_value = copy.name
+    return WorldChoice(world_value, world_from_file(loaded, root), reason)
 
 
-def _differs(given: OccupancyGrid, drawn: OccupancyGrid) -> bool:
-    """Return whether the map `given` to the robot and the map `drawn` from the world have different walls."""
-    if given.shape != drawn.shape or given.origin.distance(drawn.origin) > 1e-6:
+def _have_different_walls(first: OccupancyGrid, second: OccupancyGrid) -> bool:
+    """Return whether two maps differ in size, in position, or in more than MAX_EQUAL_MAP_DIFFERENCE of their cells."""
+    if first.shape != second.shape or first.origin.distance(second.origin) > 1e-6:
         return True
-    return float(np.mean((given.cells > 50) != (drawn.cells > 50))) > MAX_EQUAL_MAP_DIFFERENCE
+    return float(np.mean((first.cells > 50) != (second.cells > 50))) > MAX_EQUAL_MAP_DIFFERENCE
 
 
 def prepare_given_parts(
@@ -177,11 +190,11 @@ def prepare_given_parts(
     files: GivenFiles,
     out: Path,
     static_world: StaticWorld,
-    new: NewFiles,
+    new_files: NewFiles,
 ) -> GivenParts:
-    """Return the parts of the scenario that are not estimated. Write a robot file if user and log name no robot.
+    """Return the parts of the scenario that are not estimated. Write a robot file if neither user nor log name a robot.
 
-    The robot file is added to `new`. Raises UsageError if the file exists, and OSError if it cannot be written.
+    The robot file is added to `new_files`. Raises UsageError if the file exists, and OSError if it cannot be written.
     """
     reasons = {"world": choice.reason}
     if choice.map_reason is not None:
@@ -197,10 +210,10 @@ def prepare_given_parts(
     else:
         clearance = float(static_world.distance_to_walls(drive.poses.values[:, :2]).min()) - WALL_MARGIN_M
         file = out.with_name(f"{scenario_stem(out)}.robot.yaml")
-        new.add(file)
-        written = write_robot_file(drive, file, _lidar_noise(drive, static_world), clearance)
-        robot, unknowns = written.file.name, [*unknowns, *written.unknowns]
-        reasons["robot"] = Reason(written.reason, None, None, "medium")
+        new_files.add(file)
+        written_robot = write_robot_file(drive, file, _lidar_noise(drive, static_world), clearance)
+        robot, unknowns = file.name, [*unknowns, *written_robot.unknowns]
+        reasons["robot"] = Reason(written_robot.reason, None, None, "medium")
     if stack:
         reasons["stack"] = Reason("configuration of the stack in the header of the log")
     elif described.robot is None:
@@ -208,11 +221,11 @@ def prepare_given_parts(
         speed = observed_limits(drive)[0]
         stack = {"controller": {"type": "regulated_pure_pursuit", "desired_linear_vel": speed}}
         reasons["stack"] = Reason(f"the robot drives at up to {speed:.2f} m/s", None, None, "medium")
-    return GivenParts(choice.written, choice.map, robot, described.seed, stack, reasons, unknowns)
+    return GivenParts(choice.world_value, choice.map_value, robot, described.seed, stack, reasons, unknowns)
 
 
 def _lidar_noise(drive: RecordedDrive, static_world: StaticWorld) -> float:
-    """Return the median standard deviation of the range noise in m; the value of a typical robot without scans."""
+    """Return the median standard deviation of the range noise in m; without scans, the noise of a typical robot."""
     scans = None if drive.scans is None else scans_with_pose(drive, drive.scans)
     if scans is None or len(scans) < 3:
         return TYPICAL_ROBOT.lidar_noise

@@ -28,7 +28,7 @@ class RobotProperties:
         radius: Radius in m of the circle around the footprint.
         wheel_separation: Distance in m between left and right wheels.
         skids: Whether the robot is a skid-steer robot, whose wheels skid sideways in turns.
-        sensors: Names in the robot file of the sensors "lidar", "odom", and "imu"; empty if the file is unknown.
+        sensors: Names of the sensors in the robot file, by "lidar", "odom", and "imu"; empty without a robot file.
         is_known: Whether the properties are from the file of the recorded robot.
     """
 
@@ -45,9 +45,10 @@ TYPICAL_ROBOT = RobotProperties()
 
 
 def robot_properties(robot: str, folder: Path, is_known: bool) -> RobotProperties:
-    """Return the properties of a robot file or shipped robot; TYPICAL_ROBOT if it cannot be loaded.
+    """Return the properties of a robot. Return TYPICAL_ROBOT if the robot file cannot be loaded.
 
-    `folder` is the folder of the scenario. `is_known` states that the file describes the recorded robot.
+    `robot` is the name of a shipped robot, or the path of a robot file relative to `folder`, the folder of the
+    scenario. `is_known` states that the file describes the recorded robot.
     """
     file = folder / robot
     name = str(file) if file.is_file() else robot
@@ -63,18 +64,20 @@ def robot_properties(robot: str, folder: Path, is_known: bool) -> RobotPropertie
     names: dict[str, str] = {}
     for name, sensor in spec.sensors.items():
         kinds = ("lidar", sensor.lidar), ("odom", sensor.odometry), ("imu", sensor.imu)
-        names |= {usual: name for usual, given in kinds if given and usual not in names}
+        names |= {kind: name for kind, setting in kinds if setting and kind not in names}
     corners = (math.hypot(x, y) for x, y in spec.footprint or ())
     radius = spec.radius or max(corners, default=TYPICAL_ROBOT.radius)
     return RobotProperties(noise, radius, wheel_separation, spec.drive.type == "skid_steer", names, is_known)
 
 
 TICK_RATE_HZ = 240
-"""Default tick rate of scenarios, which must be a multiple of the sensor rates."""
+"""Default tick rate of scenarios. It must be a multiple of the sensor rates."""
 DEFAULT_RADIUS_M, MIN_RADIUS_M = 0.22, 0.1
 """Assumed radius of a robot with unknown footprint, and minimum radius of a robot that drove close to walls."""
 DEFAULT_MASS_KG, DEFAULT_ACCELERATION_M_S2, DEFAULT_TURN_ACCELERATION_RAD_S2 = 5.0, 1.0, 3.2
 """Assumed mass and accelerations."""
+DEFAULT_ODOMETRY_RATE_HZ, DEFAULT_IMU_RATE_HZ, DEFAULT_LIDAR_RATE_HZ = 40.0, 60.0, 10.0
+"""Assumed rates of sensors with fewer than two messages."""
 BODY_TOP_M, BODY_BOTTOM_M, MIN_LIDAR_HEIGHT_M = 0.12, 0.03, 0.15
 """Assumed heights of the top and bottom of the body, and minimum height of a lidar."""
 WHEEL_RADIUS_M, SEPARATION_PER_HALF_WIDTH = 0.033, 1.3
@@ -83,17 +86,20 @@ VELOCITY_STEP_S = 0.25
 """Time over which velocities are averaged, if only poses are known."""
 SPEED_PERCENTILE, SPEED_MARGIN = 99.0, 1.05
 """Percentile that is used as the maximum of the noisy speeds, and ratio of the speed limit to this maximum."""
-MIN_SPEED_M_S, MIN_TURN_RATE_RAD_S = 0.1, 0.5
-"""Minimum of the speed limits, for a robot that hardly moves."""
-MAX_BEAMS = 4096
-"""Maximum number of beams of a lidar in a robot file."""
+MIN_SPEED_LIMIT_M_S, MIN_TURN_RATE_LIMIT_RAD_S = 0.1, 0.5
+"""Minimum limits of speed and turn rate, for a robot that hardly moves."""
+MAX_BEAMS, MAX_RANGE_M = 4096, 100.0
+"""Maximum number of beams, and maximum range, of a lidar in a robot file."""
 
 
 @dataclass(frozen=True)
 class WrittenRobot:
-    """Written robot file, reason for its content, and phrases about properties of the robot that the log lacks."""
+    """Description of a written robot file.
 
-    file: Path
+    reason:    reason for its content
+    unknowns:  phrases that complete the sentence "The log does not show …"
+    """
+
     reason: str
     unknowns: list[str]
 
@@ -106,8 +112,8 @@ def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float, clear
     """
     speed, turn_rate = observed_limits(drive)
     unknowns = ["mass, wheels, and accelerations of the robot; usual values are assumed"]
-    assumed = max(MIN_RADIUS_M, min(DEFAULT_RADIUS_M, math.floor(100 * clearance) / 100))
-    radius = max((math.hypot(*corner) for corner in drive.footprint), default=assumed)
+    assumed_radius = max(MIN_RADIUS_M, min(DEFAULT_RADIUS_M, math.floor(100 * clearance) / 100))
+    radius = max((math.hypot(*corner) for corner in drive.footprint), default=assumed_radius)
     half_width = max((abs(y) for _, y in drive.footprint), default=radius)
     outline: dict[str, Any] = {"radius": radius}
     body: dict[str, Any] = {"cylinder": [round(radius, 3), round(BODY_TOP_M - BODY_BOTTOM_M, 3)], "z": BODY_BOTTOM_M}
@@ -138,29 +144,29 @@ def write_robot_file(drive: RecordedDrive, file: Path, lidar_noise: float, clear
         "sensors": _sensors(drive, lidar_noise),
     }
     file.write_text(to_yaml(data, CompactDumper), encoding="utf-8")
-    known = ["speed limits", *(["footprint"] if drive.footprint else []), *(["lidar"] if drive.scans else [])]
-    return WrittenRobot(file, f"{', '.join(known)} as seen in the log", unknowns)
+    observed = ["speed limits", *(["footprint"] if drive.footprint else []), *(["lidar"] if drive.scans else [])]
+    return WrittenRobot(f"{', '.join(observed)} as seen in the log", unknowns)
 
 
 def observed_limits(drive: RecordedDrive) -> tuple[float, float]:
     """Return limits for the speed in m/s and the turn rate in rad/s: the maximum in the drive, with a margin.
 
-    Speeds are from odometry and commands, or from the poses if the log has neither. A ground truth replaces the speeds
-    of the odometry.
+    Speeds are from odometry and commands, or from the poses if the log has neither odometry nor commands. If the drive
+    has true poses, the speeds of the odometry are replaced by true speeds.
     """
-    of_truth = true_speeds(drive) if drive.has_true_poses else np.empty(0)
-    driven = float(np.percentile(of_truth, SPEED_PERCENTILE)) if len(of_truth) else _largest(drive.odometry, 3)
-    speeds = driven, _largest(drive.commands, 0)
-    turns = _largest(drive.odometry, 5), _largest(drive.commands, 2)
+    true = true_speeds(drive) if drive.has_true_poses else np.empty(0)
+    driven_speed = float(np.percentile(true, SPEED_PERCENTILE)) if len(true) else _max_value(drive.odometry, 3)
+    speed = max(driven_speed, _max_value(drive.commands, 0))
+    turn_rate = max(_max_value(drive.odometry, 5), _max_value(drive.commands, 2))
     if not len(drive.odometry) and not len(drive.commands):
-        of_poses = _velocities(drive.poses)
-        speeds, turns = (_largest(of_poses, 0), 0.0), (_largest(of_poses, 1), 0.0)
-    speed = math.ceil(100 * SPEED_MARGIN * max(speeds)) / 100
-    turn_rate = math.ceil(100 * SPEED_MARGIN * max(turns)) / 100
-    return max(speed, MIN_SPEED_M_S), max(turn_rate, MIN_TURN_RATE_RAD_S)
+        velocities = _velocities(drive.poses)
+        speed, turn_rate = _max_value(velocities, 0), _max_value(velocities, 1)
+    speed_limit = math.ceil(100 * SPEED_MARGIN * speed) / 100
+    turn_rate_limit = math.ceil(100 * SPEED_MARGIN * turn_rate) / 100
+    return max(speed_limit, MIN_SPEED_LIMIT_M_S), max(turn_rate_limit, MIN_TURN_RATE_LIMIT_RAD_S)
 
 
-def _largest(signal: TimedValues, column: int) -> float:
+def _max_value(signal: TimedValues, column: int) -> float:
     """Return the SPEED_PERCENTILE of the absolute values in a column; 0 without values."""
     return float(np.percentile(np.abs(signal.values[:, column]), SPEED_PERCENTILE)) if len(signal) else 0.0
 
@@ -169,42 +175,46 @@ def _velocities(poses: TimedValues) -> TimedValues:
     """Return the speed and the turn rate (n, 2) between poses, averaged over VELOCITY_STEP_S."""
     times = np.arange(poses.times[0], poses.times[-1], VELOCITY_STEP_S)
     steps = np.diff(poses.poses_at(times), axis=0) / VELOCITY_STEP_S
-    turns = np.diff(np.unwrap(poses.poses_at(times)[:, 2])) / VELOCITY_STEP_S
-    return TimedValues(times[1:], np.column_stack((np.hypot(steps[:, 0], steps[:, 1]), turns)), times[1:])
+    turn_rates = np.diff(np.unwrap(poses.poses_at(times)[:, 2])) / VELOCITY_STEP_S
+    return TimedValues(times[1:], np.column_stack((np.hypot(steps[:, 0], steps[:, 1]), turn_rates)), times[1:])
 
 
 def _sensors(drive: RecordedDrive, lidar_noise: float) -> dict[str, Any]:
+    """Return the value of the key `sensors`."""
     sensors: dict[str, Any] = {}
     if drive.scans is not None:
         sensors["lidar"] = {"lidar": _lidar(drive.scans, lidar_noise)}
-    sensors["odom"] = {"odometry": {"rate": _rate(drive.odometry.times, 40.0)}}
+    sensors["odom"] = {"odometry": {"rate": _rate(drive.odometry.times, DEFAULT_ODOMETRY_RATE_HZ)}}
     if len(drive.turn_rates) > 1:
-        sensors["imu"] = {"imu": {"rate": _rate(drive.turn_rates.times, 60.0)}}
+        sensors["imu"] = {"imu": {"rate": _rate(drive.turn_rates.times, DEFAULT_IMU_RATE_HZ)}}
     return sensors
 
 
 def _lidar(scans: Scans, noise: float) -> dict[str, Any]:
     """Return the value of the key `lidar`. `noise` is the standard deviation of the ranges in m."""
     step = abs(float(scans.angles[1] - scans.angles[0]))
-    full = len(scans.angles) * step > 2 * math.pi - 1.5 * step
-    view = 2 * math.pi if full else float(np.ptp(scans.angles))
-    center = 0.0 if full else float(scans.angles.mean())
+    is_full_circle = len(scans.angles) * step > 2 * math.pi - 1.5 * step
+    field_of_view = 2 * math.pi if is_full_circle else float(np.ptp(scans.angles))
+    center = 0.0 if is_full_circle else float(scans.angles.mean())
     x, y, yaw = scans.mount
     mount = {"x": round(x, 3), "y": round(y, 3), "z": round(max(scans.height, MIN_LIDAR_HEIGHT_M), 3)}
     mount["yaw"] = round(yaw + center, 4)
     return {
-        "rate": _rate(scans.times, 10.0),
+        "rate": _rate(scans.times, DEFAULT_LIDAR_RATE_HZ),
         "beams": min(len(scans.angles), MAX_BEAMS),
-        "field_of_view": round(view, 5),
+        "field_of_view": round(field_of_view, 5),
         "min_range": round(float(scans.range_min), 3),
-        "max_range": round(float(min(scans.range_max, 100.0)), 2),
+        "max_range": round(float(min(scans.range_max, MAX_RANGE_M)), 2),
         "noise": round(noise, 4),
         "mount": mount,
     }
 
 
-def _rate(times: Array, usual: float) -> float:
-    """Return the divisor of the tick rate, in Hz, nearest to the rate of a signal (`usual` if unknown)."""
-    measured = 1.0 / max(usual_period(times), 1e-3) if len(times) > 1 else usual
+def _rate(times: Array, default: float) -> float:
+    """Return the rate in Hz of messages at `times` (n,), rounded to a divisor of the tick rate.
+
+    `default` is the rate in Hz for fewer than two messages.
+    """
+    measured = 1.0 / max(usual_period(times), 1e-3) if len(times) > 1 else default
     divisors = [rate for rate in range(1, TICK_RATE_HZ + 1) if TICK_RATE_HZ % rate == 0]
     return float(min(divisors, key=lambda rate: abs(math.log(rate / measured))))

@@ -1,6 +1,6 @@
 """Formats a reconstructed scenario as YAML, with a comment that gives the reason for each part.
 
-The private generators yield the lines of one part of the file.
+The functions `_…_lines` yield or return the lines of a part of the file.
 """
 
 from __future__ import annotations
@@ -20,26 +20,28 @@ from simscen.reconstruction.reasons import FoundFault
 from simscen.reconstruction.scenario.contents import ScenarioContents
 
 MAX_COLUMNS = 118
-"""Length at which comments, the description, and the keys of a pedestrian are wrapped."""
+"""Maximum length of the lines of comments, of the description, and of the keys of a pedestrian."""
 OBJECT_HEIGHT_M, PERSON_HEIGHT_M = 1.0, 1.7
 """Assumed heights of objects and people."""
 NO_BREAK_SPACE = "\x00"
 """Placeholder for a space at which lines must not be broken."""
-_PLAIN = re.compile(r"[\w./ %-]+")
+_PLAIN_SCALAR = re.compile(r"[\w./ %-]+")
 """Scalars that need no quotes in flow style."""
 
 
 def scenario_text(contents: ScenarioContents) -> str:
     """Return the YAML text of the scenario file."""
-    return "\n".join(_lines(contents)) + "\n"
+    return "\n".join(_scenario_lines(contents)) + "\n"
 
 
-def _lines(contents: ScenarioContents) -> Iterator[str]:
-    yield from _comment(f"Written by `simscen new --from-log` from {contents.source}. Times count from its start.")
+def _scenario_lines(contents: ScenarioContents) -> Iterator[str]:
+    yield from _comment_lines(
+        f"Written by `simscen new --from-log` from {contents.source}. Times count from its start."
+    )
     if contents.unknowns:
-        yield from _comment("The log does not show:")
+        yield from _comment_lines("The log does not show:")
         for unknown in contents.unknowns:
-            yield from _comment(f"- {unknown}", hanging="  ")
+            yield from _comment_lines(f"- {unknown}", hanging="  ")
     yield "simscen: 1"
     yield f"name: {_text(contents.name)}"
     yield "description: >"
@@ -48,38 +50,38 @@ def _lines(contents: ScenarioContents) -> Iterator[str]:
     yield "tags: [from-log]"
     yield f"seed: {contents.given.seed}"
     yield ""
-    yield from _reason(contents, "world")
-    yield from _entry("world", contents.given.world)
+    yield from _reason_lines(contents, "world")
+    yield from _entry_lines("world", contents.given.world)
     if contents.given.map:
-        yield from _reason(contents, "map")
-        yield from _entry("map", contents.given.map)
-    yield from _robot(contents)
+        yield from _reason_lines(contents, "map")
+        yield from _entry_lines("map", contents.given.map)
+    yield from _robot_lines(contents)
     if contents.given.stack:
-        yield from _reason(contents, "stack")
-        yield from _entry("stack", dict(contents.given.stack))
+        yield from _reason_lines(contents, "stack")
+        yield from _entry_lines("stack", dict(contents.given.stack))
     if contents.passing_radius is not None:
-        yield from _reason(contents, "navigation")
+        yield from _reason_lines(contents, "navigation")
         yield f"navigation: {{mode: navigate_through_poses, radius: {contents.passing_radius:g} m}}"
     if not contents.stops_at_failure:
         yield "on_goal_failure: continue"
-    yield from _goals(contents)
+    yield from _goal_lines(contents)
     yield f"time_limit: {contents.time_limit:.0f} s"
-    yield from _events(contents)
+    yield from _event_lines(contents)
     if contents.estimated.faults:
         yield ""
         yield "faults:"
         for fault in contents.estimated.faults:
-            yield from _comment(fault.reason.comment, "  ")
+            yield from _comment_lines(fault.reason.comment, "  ")
             yield f"  - {_flow(_fault_entry(fault))}"
     yield ""
     yield "pass:"
     for criterion in contents.criteria:
-        yield from _comment(criterion.reason.comment, "  ")
+        yield from _comment_lines(criterion.reason.comment, "  ")
         yield f"  - {criterion.kind}: {_flow(dict(criterion.values))}"
 
 
-def _comment(text: str, indent: str = "", hanging: str = "") -> list[str]:
-    """Return a wrapped YAML comment. `hanging` is the indentation of further lines."""
+def _comment_lines(text: str, indent: str = "", hanging: str = "") -> list[str]:
+    """Return the lines of a YAML comment. `hanging` is the additional indentation of the second and further lines."""
     return textwrap.wrap(
         text,
         MAX_COLUMNS,
@@ -90,23 +92,24 @@ def _comment(text: str, indent: str = "", hanging: str = "") -> list[str]:
     )
 
 
-def _reason(contents: ScenarioContents, key: str) -> list[str]:
+def _reason_lines(contents: ScenarioContents, key: str) -> list[str]:
+    """Return the reason for the value of a key as a comment; [] without a reason."""
     reason = contents.reasons.get(key)
-    return [] if reason is None else _comment(reason.comment)
+    return [] if reason is None else _comment_lines(reason.comment)
 
 
-def _robot(contents: ScenarioContents) -> Iterator[str]:
+def _robot_lines(contents: ScenarioContents) -> Iterator[str]:
     yield ""
-    yield from _reason(contents, "robot")
+    yield from _reason_lines(contents, "robot")
     yield "robot:"
     yield f"  model: {_text(contents.given.robot)}"
     if (start := contents.reasons.get("start")) is not None:
-        yield from _comment(start.comment, "  ")
+        yield from _comment_lines(start.comment, "  ")
     yield f"  pose: {_pose(contents.start)}"
     if contents.estimate is None:
         return
     if (estimate := contents.reasons.get("estimate")) is not None:
-        yield from _comment(estimate.comment, "  ")
+        yield from _comment_lines(estimate.comment, "  ")
     if isinstance(contents.estimate, str):
         yield f"  initial_estimate: {contents.estimate}"
         return
@@ -115,41 +118,41 @@ def _robot(contents: ScenarioContents) -> Iterator[str]:
     yield f"  initial_estimate: {_pose(pose)[:-1]}, std: {std}}}"
 
 
-def _goals(contents: ScenarioContents) -> Iterator[str]:
+def _goal_lines(contents: ScenarioContents) -> Iterator[str]:
     yield ""
     yield "goals:" if contents.goals else "goals: []"
     for goal in contents.goals:
-        yield from _comment(goal.reason.comment, "  ")
+        yield from _comment_lines(goal.reason.comment, "  ")
         entry = f"name: {_text(goal.name)}, pose: {_pose(goal.pose)}, timeout: {goal.timeout:g} s"
         entry += f", expect: {{error_code: {goal.expect}}}" if goal.expect else ""
         entry += f", on_reached: {{wait: {goal.wait:.1f} s}}" if goal.wait else ""
         yield f"  - {{{entry}}}"
 
 
-def _events(contents: ScenarioContents) -> Iterator[str]:
+def _event_lines(contents: ScenarioContents) -> Iterator[str]:
     if not contents.estimated.objects and not contents.estimated.kidnaps:
         return
     yield ""
     yield "events:"
     for thing in contents.estimated.objects:
-        yield from _comment(thing.comment, "  ")
-        yield from _object(thing)
+        yield from _comment_lines(thing.comment, "  ")
+        yield from _object_lines(thing)
     for time, pose, reason in contents.estimated.kidnaps:
-        yield from _comment(reason.comment, "  ")
+        yield from _comment_lines(reason.comment, "  ")
         yield f"  - name: robot is carried off at {time:.1f} s"
         yield f"    when: {{time: {time:.2f} s}}"
         yield f"    do: {{kidnap: {{pose: {_pose(pose)}}}}}"
 
 
-def _object(thing: FoundObject) -> Iterator[str]:
-    yield from _scripted_object(thing) if thing.pedestrian is None else _pedestrian(thing.pedestrian)
+def _object_lines(thing: FoundObject) -> Iterator[str]:
+    yield from _scripted_object_lines(thing) if thing.pedestrian is None else _pedestrian_lines(thing.pedestrian)
     if thing.disappear_time is not None:
         yield f"  - name: {_text(f'{thing.name} disappears')}"
         yield f"    when: {{time: {thing.disappear_time:.2f} s}}"
         yield f"    do: {{remove: {{name: {_text(thing.name)}}}}}"
 
 
-def _pedestrian(fitted: FittedPedestrian) -> Iterator[str]:
+def _pedestrian_lines(fitted: FittedPedestrian) -> Iterator[str]:
     walker = fitted.walker
     goals = ", ".join(f"[{x:.2f}, {y:.2f}]" for x, y in walker.goals)
     keys = [
@@ -167,12 +170,12 @@ def _pedestrian(fitted: FittedPedestrian) -> Iterator[str]:
     yield f"    when: {{time: {fitted.appear_time:.2f} s}}"
     yield "    do:"
     yield "      pedestrian:"
-    glued = ", ".join(key.replace(" ", NO_BREAK_SPACE) for key in keys)
-    lines = textwrap.wrap(f"{{{glued}}}", MAX_COLUMNS, initial_indent=" " * 8, subsequent_indent=" " * 9)
+    mapping = ", ".join(key.replace(" ", NO_BREAK_SPACE) for key in keys)
+    lines = textwrap.wrap(f"{{{mapping}}}", MAX_COLUMNS, initial_indent=" " * 8, subsequent_indent=" " * 9)
     yield from (line.replace(NO_BREAK_SPACE, " ") for line in lines)
 
 
-def _scripted_object(thing: FoundObject) -> Iterator[str]:
+def _scripted_object_lines(thing: FoundObject) -> Iterator[str]:
     begin = thing.appear_time or 0.0
     _, x, y, yaw = thing.keyframes[0]
     height = PERSON_HEIGHT_M if is_person(thing) else OBJECT_HEIGHT_M
@@ -193,6 +196,7 @@ def _scripted_object(thing: FoundObject) -> Iterator[str]:
 
 
 def _fault_entry(fault: FoundFault) -> dict[str, Any]:
+    """Return the entry of the key `faults` for a fault."""
     entry: dict[str, Any] = {"sensor": fault.target, fault.kind: dict(fault.values)}
     if fault.begin is not None:
         entry["when"] = {"time": f"{fault.begin:.2f} s"}
@@ -202,16 +206,18 @@ def _fault_entry(fault: FoundFault) -> dict[str, Any]:
 
 
 def _pose(pose: Pose2) -> str:
+    """Return a pose as a YAML mapping in flow style."""
     return f"{{x: {pose.x:.3f}, y: {pose.y:.3f}, yaw: {math.degrees(pose.yaw):.1f} deg}}"
 
 
 def _text(text: str) -> str:
     """Return a string as a YAML scalar, with quotes if flow style requires them."""
     plain = to_yaml({"x": text}).removeprefix("x: ").rstrip("\n")
-    return plain if _PLAIN.fullmatch(plain) else json.dumps(text, ensure_ascii=False)
+    return plain if _PLAIN_SCALAR.fullmatch(plain) else json.dumps(text, ensure_ascii=False)
 
 
-def _entry(key: str, value: Any) -> list[str]:
+def _entry_lines(key: str, value: Any) -> list[str]:
+    """Return the lines of a key with its value."""
     if isinstance(value, str):
         return [f"{key}: {_text(value)}"]
     return to_yaml({key: value}, CompactDumper).rstrip("\n").split("\n")

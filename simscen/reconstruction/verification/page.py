@@ -52,8 +52,14 @@ text.goalname { fill: var(--good); } text.objectname { fill: var(--object); } te
 """
 
 
-def verification_page(name: str, world: StaticWorld, objects: Sequence[FoundObject], verified: Verification) -> str:
-    """Return the HTML page, which loads nothing from the network. `name` is the name of the scenario."""
+def verification_page(name: str, world: StaticWorld, objects: Sequence[FoundObject], verification: Verification) -> str:
+    """Return the HTML page, which loads nothing from the network.
+
+    name:          name of the scenario
+    world:         world with which the scans of the drive were compared
+    objects:       objects and people in the scenario
+    verification:  comparison of the recorded drive with the run
+    """
     policy = f"default-src 'none'; img-src data:; style-src '{csp_hash(STYLE)}'; base-uri 'none'; form-action 'none'"
     parts = [
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
@@ -61,53 +67,55 @@ def verification_page(name: str, world: StaticWorld, objects: Sequence[FoundObje
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
         f"<title>{escape(name)}: log and run</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>",
         f"<h1>{escape(name)}: the log and a run of its scenario</h1>",
-        *_result(verified),
-        *_maps(world, objects, verified),
-        *_charts(verified),
-        *_table(verified),
+        *_result(verification),
+        *_maps(world, objects, verification),
+        *_charts(verification),
+        *_table(verification),
         "</main>\n</body>\n</html>\n",
     ]
     return "\n".join(parts)
 
 
-def _result(verified: Verification) -> Iterator[str]:
+def _result(verification: Verification) -> Iterator[str]:
     """Yield the statement whether the run reproduced the incidents, a list of incidents, and the failed criteria."""
-    count = len(verified.incidents)
-    again = sum(incident.is_reproduced for incident in verified.incidents)
+    count = len(verification.incidents)
+    repeated_count = sum(incident.is_reproduced for incident in verification.incidents)
+    css_class = "yes" if repeated_count == count else "no"
     if not count:
         yield '<p class="result yes">The log has no incident that the run could repeat.</p>'
     elif count == 1:
-        does = "repeats" if again else "does not repeat"
-        yield f'<p class="result {"yes" if again else "no"}">The run {does} the incident of the log.</p>'
+        verb = "repeats" if repeated_count else "does not repeat"
+        yield f'<p class="result {css_class}">The run {verb} the incident of the log.</p>'
     else:
-        yes, many = ("yes", f"all {count}") if again == count else ("no", f"{again} of the {count}")
-        yield f'<p class="result {yes}">The run repeats {many} incidents of the log.</p>'
-    if count or verified.new_incidents:
+        number = f"all {count}" if repeated_count == count else f"{repeated_count} of the {count}"
+        yield f'<p class="result {css_class}">The run repeats {number} incidents of the log.</p>'
+    if count or verification.new_incidents:
         yield "<ul>"
-        for incident in verified.incidents:
+        for incident in verification.incidents:
             yield f'<li class="{"yes" if incident.is_reproduced else "no"}">{escape(incident.sentence)}</li>'
-        for new in verified.new_incidents:
+        for new in verification.new_incidents:
             yield f'<li class="no">only in the run: {escape(new.kind)} at {new.time:.2f} s ({escape(new.detail)})</li>'
         yield "</ul>"
-    failed = ", ".join(verified.failed)
+    failed = ", ".join(verification.failed_criteria)
     yield f"<p>{escape(f'Criteria that fail in the run: {failed}.' if failed else 'All criteria hold in the run.')}</p>"
 
 
-def _maps(world: StaticWorld, objects: Sequence[FoundObject], verified: Verification) -> Iterator[str]:
-    recorded = [incident.recorded for incident in verified.incidents]
-    repeated = [incident.repeated for incident in verified.incidents if incident.repeated is not None]
-    drives = verified.drive, verified.repeated
+def _maps(world: StaticWorld, objects: Sequence[FoundObject], verification: Verification) -> Iterator[str]:
+    """Yield the maps of the recorded drive and of the run, side by side."""
+    recorded = [incident.recorded for incident in verification.incidents]
+    repeated = [incident.repeated for incident in verification.incidents if incident.repeated is not None]
+    drives = verification.recorded, verification.repeated
     box = box_around(drives, objects)
     yield "<h2>Path and what the lidar saw</h2>"
-    yield f'<ul class="legend">{"".join(_legend(bool(objects), bool(recorded or verified.new_incidents)))}</ul>'
+    yield f'<ul class="legend">{"".join(_legend(bool(objects), bool(recorded or verification.new_incidents)))}</ul>'
     yield '<div class="pair">'
-    for title, kind, drive, other, incidents in (
+    for title, css_class, drive, other_drive, incidents in (
         ("Log", "log", *drives, recorded),
-        ("Run of the scenario", "run", *drives[::-1], [*repeated, *verified.new_incidents]),
+        ("Run of the scenario", "run", *drives[::-1], [*repeated, *verification.new_incidents]),
     ):
         label = f"{title}: path of the robot, seen from above"
-        drawn = drive_map(label, kind, drive, other, objects, incidents, world, box)
-        yield f"<figure><figcaption><h3>{title}</h3></figcaption>{drawn}</figure>"
+        svg = drive_map(label, css_class, drive, other_drive, objects, incidents, world, box)
+        yield f"<figure><figcaption><h3>{title}</h3></figcaption>{svg}</figure>"
     yield "</div>"
 
 
@@ -128,25 +136,22 @@ def _legend(has_objects: bool, has_incidents: bool) -> Iterator[str]:
     yield "<li>dots: position at that time; dotted: path of the other drive</li>"
 
 
-def _charts(verified: Verification) -> Iterator[str]:
-    """Yield charts of the distance between the robots of log and run, and of each scan's smallest range in both."""
+def _charts(verification: Verification) -> Iterator[str]:
+    """Yield a chart of the distance between the robots of log and run, and a chart of the smallest ranges of scans."""
     yield "<h2>Timing and clearance</h2>"
     yield '<div class="pair">'
-    times = common_times(verified.drive, verified.repeated)
+    times = common_times(verification.recorded, verification.repeated)
     if len(times) > 1:
-        apart = distances_between(verified.drive, verified.repeated, times)
-        label = f"Distance between the robot in the log and in the run at the same time, at most {apart.max():.2f} m"
-        yield _figure(label, [Series("gap", times, apart)])
-    nearest = [
-        Series(name, *found)
-        for name, found in (
-            ("log", nearest_returns(verified.drive)),
-            ("run", nearest_returns(verified.repeated)),
-        )
-        if found is not None
+        distances = distances_between(verification.recorded, verification.repeated, times)
+        maximum = f"{distances.max():.2f} m"
+        label = f"Distance between the robot in the log and in the run at the same time, at most {maximum}"
+        yield _figure(label, [Series("gap", times, distances)])
+    drives = ("log", verification.recorded), ("run", verification.repeated)
+    series = [
+        Series(css_class, *returns) for css_class, drive in drives if (returns := nearest_returns(drive)) is not None
     ]
-    if nearest:
-        yield _figure("Smallest range of each scan, in the log and in the run (dashed)", nearest)
+    if series:
+        yield _figure("Smallest range of each scan, in the log and in the run (dashed)", series)
     yield "</div>"
 
 
@@ -154,11 +159,12 @@ def _figure(label: str, series: Sequence[Series]) -> str:
     return f"<figure><figcaption>{escape(label)}</figcaption>{chart(label, series, 'm')}</figure>"
 
 
-def _table(verified: Verification) -> Iterator[str]:
+def _table(verification: Verification) -> Iterator[str]:
+    """Yield the table of compared quantities."""
     yield '<h2>Numbers</h2>\n<div class="wide" role="region" aria-label="Numbers" tabindex="0">'
     yield '<table>\n<tr><th scope="col">quantity</th><th scope="col">log</th><th scope="col">run</th>'
     yield '<th scope="col">difference</th></tr>'
-    for row in verified.quantities:
+    for row in verification.quantities:
         cells = "".join(f"<td>{escape(cell)}</td>" for cell in (row.log, row.run, row.difference))
         yield f'<tr><th scope="row">{escape(row.name)}</th>{cells}</tr>'
     yield "</table>\n</div>"

@@ -18,7 +18,7 @@ from simscen.reconstruction.verification.comparison import (
     compare_drives,
     compare_incidents,
     compare_with_run,
-    fraction_seen_alike,
+    fraction_of_equal_ranges,
 )
 from simscen.reconstruction.verification.page import verification_page
 
@@ -52,14 +52,14 @@ def test_scans_are_compared_in_the_same_directions_and_without_what_did_not_retu
     zeros = one.scans.ranges.copy()
     zeros[:, ::3] = 0.0
     times = np.arange(0.0, 10.0, 0.1)
-    assert fraction_seen_alike(one, turned, times) > 0.98
-    assert fraction_seen_alike(replace(one, scans=replace(one.scans, ranges=zeros)), one, times) == 1.0
-    assert fraction_seen_alike(one, replace(one, poses=turned.poses), times) < 0.7
+    assert fraction_of_equal_ranges(one, turned, times) > 0.98
+    assert fraction_of_equal_ranges(replace(one, scans=replace(one.scans, ranges=zeros)), one, times) == 1.0
+    assert fraction_of_equal_ranges(one, replace(one, poses=turned.poses), times) < 0.7
 
 
 def test_scans_are_compared_only_where_both_robots_are_at_one_place():
     one = drives.drive(drives.scans())
-    assert fraction_seen_alike(one, shifted(one, 1.0), np.arange(0.0, 10.0, 0.1)) is None
+    assert fraction_of_equal_ranges(one, shifted(one, 1.0), np.arange(0.0, 10.0, 0.1)) is None
 
 
 def test_the_same_incident_nearby_is_reproduced():

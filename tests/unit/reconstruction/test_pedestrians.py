@@ -8,7 +8,7 @@ from simscen.reconstruction.objects.found_object import FoundObject
 from simscen.reconstruction.objects.pedestrian_trial import PedestrianTrial
 from simscen.reconstruction.objects.pedestrians import fit_pedestrians, is_person
 from simscen.reconstruction.reasons import Reason
-from simscen.reconstruction.scenario.scenario_text import _object
+from simscen.reconstruction.scenario.scenario_text import _object_lines
 from simscen.run.live_world.pedestrians import PedestrianMap
 from tests.scenario_files import spec_of_text
 
@@ -68,7 +68,7 @@ def test_an_object_faster_than_people_walk_stays_scripted():
 
 def test_the_written_pedestrian_can_be_read_again():
     (found,) = fitted(thing(lambda time: (9.0, 0.6 + 0.6 * (time - 1.0))))
-    events = "\n".join(_object(found))
+    events = "\n".join(_object_lines(found))
     head = "simscen: 1\nworld: room.world.yaml\nrobot: {pose: {x: 0, y: 0}}\nevents:\n"
     text = f"{head}{events}\npass:\n  - collisions: {{max: 0}}\n"
     pedestrian = spec_of_text(text, "scenario.yaml").events[0].do.pedestrian

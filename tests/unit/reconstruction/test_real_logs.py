@@ -220,8 +220,9 @@ def test_the_assumed_robot_fits_where_it_drove(tmp_path):
     walls = StaticWorld(world_from_map(map_from_scans(drive), "map"), drives.HEIGHT)
     nearest = float(walls.distance_to_walls(at[:, :2]).min())
     assert nearest >= 0.15
-    written = write_robot_file(drive, tmp_path / "a.robot.yaml", 0.01, nearest - 0.05)
-    radius = float(re.search(r"radius: ([\d.]+)", written.file.read_text()).group(1))
+    file = tmp_path / "a.robot.yaml"
+    written = write_robot_file(drive, file, 0.01, nearest - 0.05)
+    radius = float(re.search(r"radius: ([\d.]+)", file.read_text()).group(1))
     assert 0.1 <= radius < nearest
     assert any(f"a radius of {radius} m" in unknown for unknown in written.unknowns)
 
