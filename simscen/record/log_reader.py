@@ -13,6 +13,7 @@ from zstandard import ZstdError
 from simscen.core.errors import InvalidInput, Problem
 from simscen.core.records.trace import Trace
 from simscen.core.records.verdict import COMPLETE_COVERAGE, LogCoverage
+from simscen.record import topics
 from simscen.record.log_contents import LogContents, NotSimscenLog
 from simscen.record.log_file import PARTIAL_SUFFIX
 from simscen.record.log_header import LogHeader
@@ -85,7 +86,9 @@ def read_run(path: Path, with_sensors: bool = False) -> Log:
     """Read a log with `read_log`. In addition, raises InvalidInput if the log has no ground truth."""
     log = read_log(path, with_sensors=with_sensors)
     if not len(log.trace.truth):
-        raise invalid_log(path, "SC803", "the log has no ground truth: its run was aborted before the first step")
+        removed = f"the messages of {topics.TRUTH.name} were removed"
+        reason = removed if log.complete else "its run was aborted before the first step"
+        raise invalid_log(path, "SC803", f"the log has no ground truth: {reason}")
     return log
 
 

@@ -21,7 +21,7 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.judge.run_result import judge_run
 from simscen.record.log_contents import LogContents
 from simscen.record.log_header import case_to_json
-from simscen.record.log_reader import Log, read_log
+from simscen.record.log_reader import Log, read_log, read_run
 from simscen.record.messages import decode
 from simscen.record.messages.decode import MessageReader
 from simscen.record.recorder import Recorder
@@ -120,6 +120,12 @@ def test_log_without_message_counts_does_not_pass(log: Path, tmp_path: Path) -> 
     read = read_log(edited(log, tmp_path / "edited.mcap", counts=False))
     assert set(read.coverage.partial) == set(Evidence)
     assert {verdict.status for verdict in judged(read).verdicts} == {Status.INCONCLUSIVE}
+
+
+def test_log_without_ground_truth_is_refused_with_the_removed_topic(log: Path, tmp_path: Path) -> None:
+    path = edited(log, tmp_path / "edited.mcap", lambda topic, _: topic != TRUTH)
+    with pytest.raises(InvalidInput, match=f"no ground truth: the messages of {TRUTH} were removed"):
+        read_run(path)
 
 
 def test_messages_in_reverse_order_are_refused(log: Path, tmp_path: Path) -> None:
