@@ -65,7 +65,7 @@ EXTRA_TOPICS = {
     "footprint": "/local_costmap/published_footprint",
     "events": topics.EVENTS.name,
 }
-"""Default topics of the roles that only a reconstruction uses. The other roles are in TOPICS."""
+"""Default topics by role, for roles that only a reconstruction uses. The other roles are in TOPICS."""
 TOPIC_ROLES = (*TOPICS, *(role for role in EXTRA_TOPICS if role != "events"))
 """Roles whose topic users can change with `--topic NAME=TOPIC`."""
 
@@ -96,6 +96,7 @@ _DECODERS: dict[str, Decoders] = {
     "footprint": {"geometry_msgs/msg/PolygonStamped": decode_polygon},
     "events": {topics.EVENTS.type: MessageReader.string},
 }
+"""Decoders by role and message type."""
 
 
 @dataclass

@@ -32,7 +32,7 @@ NO_COVARIANCE: Numbers = (0.0,) * 6
 
 
 class InvalidOrientation(ValueError):
-    """A pose of a message has an orientation that is not a quaternion of length 1."""
+    """The orientation of a pose in a message is not a quaternion of length 1."""
 
     def __init__(self) -> None:
         super().__init__("an orientation is not a quaternion of length 1")

@@ -15,7 +15,9 @@ from simscen.record.topics import Topic
 from simscen.record.trace_thinning import Thinning
 
 _START: Stamp = (0, 0)
+"""Stamp of transforms on /tf_static."""
 _PRESSED_MESSAGE, _FREE_MESSAGE = encode.boolean(True), encode.boolean(False)
+"""Serialized messages of a bumper."""
 _DEFAULT_TOPICS = {
     "Scan": ("scan", topics.SCAN_TYPE),
     "Odometry": ("odom", topics.ODOMETRY_TYPE),
