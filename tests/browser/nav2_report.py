@@ -58,5 +58,5 @@ def with_nav2_report(
     messages += [(end, severity, "amcl", text) for severity, text in lines]
     serialized = [(tick, log(time.stamp(tick), *line)) for tick, *line in messages]
     about = json.dumps({"parameters": parameters}, sort_keys=True)
-    sensors = replace(log_.sensors, lines=serialized)
+    sensors = replace(log_.sensors, log_lines=serialized)
     return replace(log_, sensors=sensors, stack={"external": "nav2", "about": about})

@@ -114,7 +114,7 @@ def damaged_log(corpus: list[bytes], rng: random.Random) -> tuple[int, bytes]:
                 case records.Schema():
                     kinds[record.id] = MessageType(record.name, record.data.decode(), "")
                 case records.Channel():
-                    channels[record.id] = writer.channel(record.topic, kinds[record.schema_id], record.metadata)
+                    channels[record.id] = writer.add_channel(record.topic, kinds[record.schema_id], record.metadata)
                 case records.Message():
                     channels[record.channel_id].write(record.log_time, damaged(record.data))
                 case records.Attachment():

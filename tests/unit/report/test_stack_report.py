@@ -33,7 +33,7 @@ def log_with(*lines: tuple[int, int, str, str], stack: dict[str, str] | None = N
     time = Clock(RATE)
     messages = [(tick, log(time.stamp(tick), *line)) for tick, *line in lines]
     trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]})
-    sensors = SensorMessages(time, lines=messages)
+    sensors = SensorMessages(time, log_lines=messages)
     return Log(LogHeader("hall/drive", 7, Case(Pose2(0, 0), ())), trace, "", True, sensors=sensors, stack=stack or {})
 
 
