@@ -251,7 +251,8 @@ def test_the_speed_limit_is_from_the_ground_truth_and_the_commands():
 def test_the_lidar_of_the_robot_file_has_the_directions_of_the_log(count, step, beams, view, tmp_path):
     angles = step * (np.arange(count) - (count - 1) / 2)
     measured = replace(drives.scans(), angles=angles, ranges=np.ones((len(drives.scans()), count)))
-    file = write_robot_file(drives.drive(measured), tmp_path / "a.robot.yaml", 0.01, 1.0).file
+    file = tmp_path / "a.robot.yaml"
+    write_robot_file(drives.drive(measured), file, 0.01, 1.0)
     lidar = load_robot_file(str(file), tmp_path).robot.spec.sensors["lidar"].lidar
     assert (lidar.beams, lidar.field_of_view) == (beams, pytest.approx(view, abs=1e-4))
 
