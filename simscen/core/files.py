@@ -54,7 +54,7 @@ _READ_FILES: ContextVar[set[Path] | None] = ContextVar("files_read", default=Non
 
 @contextmanager
 def collect_read_files() -> Iterator[set[Path]]:
-    """Collect the files that are read during the `with` block: yield a set to which `record_read_file` adds them."""
+    """Yield a set to which `record_read_file` adds the files that are read during the `with` block."""
     read: set[Path] = set()
     token = _READ_FILES.set(read)
     try:

@@ -13,7 +13,7 @@ MAX_SEED = 2**32 - 1
 
 @dataclass(frozen=True)
 class Streams:
-    """Source of the random generators of a run, which are derived from its `seed`.
+    """Source of the random generators of a run. All generators are derived from `seed`.
 
     `robot` is the name of the robot that uses the generators; "" for a single robot. Raises ValueError unless `seed` is
     in 1 … MAX_SEED.

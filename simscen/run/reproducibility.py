@@ -56,10 +56,10 @@ def _digest_of_files(files: tuple[tuple[str, Path, int, int], ...]) -> str:
 
 def _package_files(class_path: str) -> Iterator[tuple[str, Path]]:
     """Yield name and path of each file of the top-level package that contains a class ("module:Class")."""
-    found = importlib.util.find_spec(class_path.partition(":")[0])
-    if found is None or found.origin is None:
+    spec = importlib.util.find_spec(class_path.partition(":")[0])
+    if spec is None or spec.origin is None:
         return
-    file = Path(found.origin)
+    file = Path(spec.origin)
     folder = file.parent
     if not (folder / "__init__.py").is_file():
         yield file.name, file
@@ -163,7 +163,7 @@ def referenced_files(loaded: LoadedScenario) -> list[Path]:
     views = list(loaded.robot_views.values())
     maps = [loaded.world.map, *(view.map for view in views)]
     return [
-        *(found.image for found in maps if isinstance(found, LoadedMap)),
+        *(robot_map.image for robot_map in maps if isinstance(robot_map, LoadedMap)),
         *(file for file in (loaded.world.sdf, *(view.robot.urdf for view in views)) if file),
     ]
 

@@ -15,7 +15,7 @@ MAX_REST_TILT_RAD, MAX_REST_HEIGHT_M, MAX_REST_DRIFT_M = math.radians(1.0), 0.00
 MAX_DISTANCE_ERROR, MAX_ODOMETRY_ERROR = 0.02, 0.01
 """Largest relative errors on a line: true distance compared with the command, and odometry compared with the truth."""
 MAX_HEADING_RAD, MAX_DRIVING_TILT_RAD = math.radians(2.0), math.radians(3.0)
-"""Largest heading at the end of the line, and largest tilt of the base while driving."""
+"""Largest change of the heading on the line, and largest tilt of the base while driving."""
 NEGLIGIBLE_CORRECTION = 0.005
 """Maximum relative deviation of the track width for which no correction is advised."""
 
@@ -26,7 +26,7 @@ class TurnLimits(NamedTuple):
     Attributes:
         angle: True angle of the turn, compared with the commanded angle.
         odometry: Angle of the turn by odometry, compared with the true angle.
-        square_end: Distance from the true end of the square to its end by odometry, relative to its perimeter.
+        square_end: Distance between the true end pose and the end pose by odometry, relative to the square's perimeter.
         offset: Distance from the start while turning in place, relative to the circumscribed radius.
     """
 

@@ -46,7 +46,7 @@ def test_user_site_packages_and_pth_files_are_found(tmp_path, packages) -> None:
     install(from_home, "mine", "3.0", {"criterion": {"mine": "mine:Mine"}})
     (from_home / "mine.pth").write_text(f"{source}\n")
     used = [["mine", str(from_home)]]
-    argument = json.dumps({"path": [str(from_home)], "user": str(from_home), "used": used})
+    argument = json.dumps({"path": [str(from_home)], "user": str(from_home), "packages": used})
     assert isolated(argument, from_home).startswith("[('3.0', 'mine')]")
 
 
@@ -55,7 +55,7 @@ def test_validated_version_of_a_package_is_used(tmp_path, packages) -> None:
     for folder, version in ((old, "1.0"), (new, "2.0")):
         text = (ROOT / "tests/plugins/yardwork/yardwork/dwell.py").read_text()
         install(folder, "yard", version, {"criterion": {"dwell": "dwell:Dwell"}}, dwell=text)
-    argument = json.dumps({"path": [str(old), str(new)], "user": "", "used": [["yard", str(new)]]})
+    argument = json.dumps({"path": [str(old), str(new)], "user": "", "packages": [["yard", str(new)]]})
     assert isolated(argument, new) == "[('2.0', 'dwell')] 0"
 
 

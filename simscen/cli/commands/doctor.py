@@ -138,7 +138,7 @@ def check_run() -> str:
     with tempfile.TemporaryDirectory(prefix="simscen-doctor-") as name:
         folder = Path(name).resolve()
         (folder / "doctor.scenario.yaml").write_text(_SCENARIO, encoding="utf-8")
-        options = SessionOptions(workers=2, twice=True, wall_limit=60.0)
+        options = SessionOptions(workers=2, check_determinism=True, wall_limit=60.0)
         try:
             jobs = plan_jobs([load_scenario(folder / "doctor.scenario.yaml", folder)], options, folder / "out")
             with interrupt_on_signals(), backend_of(options) as backend:

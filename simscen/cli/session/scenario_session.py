@@ -67,17 +67,17 @@ def execute_session(
     on_loaded(scenarios)
     if warnings:
         print_text(as_text(warnings), sys.stderr)
-    if options.against is not None and not (options.against / RUNS_FOLDER).is_dir():
-        reason = "the folder contains no runs" if options.against.is_dir() else "no such folder"
-        raise UsageError(f"--check-against {options.against}: {reason}")
+    if options.check_against is not None and not (options.check_against / RUNS_FOLDER).is_dir():
+        reason = "the folder contains no runs" if options.check_against.is_dir() else "no such folder"
+        raise UsageError(f"--check-against {options.check_against}: {reason}")
     for scenario in scenarios:
         scenario_seeds(scenario, options)
     if request.last_failed:
         if output.resume is not None:
             raise UsageError("--last-failed and --resume exclude each other")
-        only, message = failed_runs(scenarios, options, output.out)
+        selected_runs, message = failed_runs(scenarios, options, output.out)
         print_text(f"simscen: {message}", sys.stderr)
-        options = replace(options, only=only)
+        options = replace(options, selected_runs=selected_runs)
     inputs = {file for each in scenarios for file in (*each.files.values(), *each.read_files)}
     reports, journal = start_session(output, inputs, plugins_and_stacks(scenarios))
     jobs = plan_jobs(scenarios, options, reports.folder)

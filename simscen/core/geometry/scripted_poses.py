@@ -134,4 +134,4 @@ class BatchPathSampler:
 
 
 _PLACEHOLDER = PathSegment(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
-"""Replaces the segments of a path with easing. `turn` is not 0, so that its poses are computed one by one."""
+"""Replaces the segments of a path with easing. `turn` is not 0: poses on the path are computed one by one."""

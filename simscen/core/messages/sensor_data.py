@@ -1,6 +1,6 @@
 """Sensor readings, and their conversion to level scans and to the base frame.
 
-Each reading contains the name of its `sensor` in the robot file and the `tick` at which it was measured.
+Each reading contains the name of the `sensor` in the robot file, and the `tick` of the measurement.
 """
 
 from __future__ import annotations

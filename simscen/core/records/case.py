@@ -143,7 +143,7 @@ class Run:
 
     def verdict(self, name: str) -> Verdict:
         """Return the verdict with the id `name`, e.g. "path_length". Raises KeyError if no verdict has this id."""
-        found = {verdict.id: verdict for verdict in self.result.verdicts}
-        if name not in found:
-            raise KeyError(f"no criterion has the id {name!r}; there are: {', '.join(found)}")
-        return found[name]
+        verdicts = {verdict.id: verdict for verdict in self.result.verdicts}
+        if name not in verdicts:
+            raise KeyError(f"no criterion has the id {name!r}; there are: {', '.join(verdicts)}")
+        return verdicts[name]

@@ -1,4 +1,4 @@
-"""Events that a session (one call of `simscen run`) emits. All reports are made from these events."""
+"""Events of a session (one call of `simscen run`). All reports are made from these events."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ from simscen.core.records.study import Study
 
 @dataclass(frozen=True)
 class Artifacts:
-    """Paths of the output files of a run, as they are printed; "" for a file that was not written."""
+    """Paths of the output files of a run, as reports print them; "" for a file that was not written."""
 
     folder: str = ""
     mcap: str = ""

@@ -138,8 +138,8 @@ def _map_from_odom(messages: MessagesByTopic) -> Pose2 | None:
         for part in _decode_all(messages, topics.TF.name, partial(decode_checked, decode.transforms))
         for link in part
     ]
-    found = [link for link in links if (link.frame, link.child) == (frame_names.MAP, frame_names.ODOM)]
-    return _to_pose2(found[-1]) if found else None
+    matching = [link for link in links if (link.frame, link.child) == (frame_names.MAP, frame_names.ODOM)]
+    return _to_pose2(matching[-1]) if matching else None
 
 
 def _filtered_odometry(messages: MessagesByTopic, clock: Clock, now: int) -> Iterator[Odometry]:

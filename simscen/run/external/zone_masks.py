@@ -104,6 +104,8 @@ class _SpeedMask:
     ) -> None:
         self.grid, self._full_speed = grid, surroundings.robot.max_linear
         fastest = max((limit for _, limit in zones), default=0.0)
+        if zones and file is not None and not file.multiplier:  # the scale of this file cannot express other limits
+            fastest, file = max(fastest, file.limit_of_cell(1, self._full_speed) or 0.0), None
         self._percent = file is not None and file.percent
         self._base = 0.0 if file is None else file.base
         self._multiplier = max(SPEED_STEP_M_S, fastest / OCCUPIED) if file is None else file.multiplier

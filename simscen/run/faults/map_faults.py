@@ -25,7 +25,7 @@ def apply_map_faults(prepared: PreparedScenario, seed: int) -> PreparedScenario:
         return _apply_to_robot(prepared, Streams(seed))
     parts = {name: _apply_to_robot(part, Streams(seed, name)) for name, part in prepared.robots.items()}
     if all(parts[name] is part for name, part in prepared.robots.items()):
-        return prepared  # keeps its cached results
+        return prepared  # the same object, for which results are cached
     first = next(iter(parts.values()))
     return replace(prepared, map=first.map, map_faults=first.map_faults, robots=parts)
 

@@ -13,7 +13,7 @@ from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.raycasting.ray_scene import RayScene
 
 REFRESH_DISTANCE_M = 4.0
-"""Distance that a sensor moves before the list of the objects that its rays can reach is computed again."""
+"""Distance that a sensor can move until the list of the objects in reach is computed again."""
 
 
 class LiveRayCaster(RayCaster):

@@ -90,7 +90,7 @@ class ForkServerProcess:
             self._send_buffer.clear()
 
     def close(self) -> None:
-        """Let the fork server kill its workers and exit; kill it if it has no jobs, or does not exit in time.
+        """End the fork server and its workers. Kills a fork server that got no jobs, or that does not exit in time.
 
         Has no effect after the first call.
         """

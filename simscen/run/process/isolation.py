@@ -88,11 +88,11 @@ def kill_children_except(kept: Iterable[int]) -> None:
 
     Call `adopt_orphans` once before. Programs of other users, such as `sudo`, cannot be killed, and continue.
     """
-    own, excluded = os.getpid(), set(kept)
+    own_pid, excluded = os.getpid(), set(kept)
     while True:
         # Not /proc/PID/task/PID/children, which can be incomplete while some children exit (proc(5)).
         running = [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]
-        children = [pid for pid in running if pid not in excluded and _parent(pid) == own]  # including zombies
+        children = [pid for pid in running if pid not in excluded and _parent(pid) == own_pid]  # including zombies
         if not children:
             return
         for pid in children:
@@ -115,10 +115,10 @@ def _parent(pid: int) -> int:
 
 def plugin_path(plugins: Iterable[RegisteredType]) -> str:
     """Return the argument of `apply_plugin_path`, so that a fork server finds the same plug-ins as this process."""
-    used = sorted({(entry.distribution, entry.folder) for entry in plugins})
+    packages = sorted({(entry.distribution, entry.folder) for entry in plugins})
     user_site = site.getusersitepackages() if site.ENABLE_USER_SITE else ""
     return json.dumps(
-        {"path": [str(Path(folder).absolute()) for folder in search_path()], "user": user_site, "used": used}
+        {"path": [str(Path(folder).absolute()) for folder in search_path()], "user": user_site, "packages": packages}
     )
 
 
@@ -134,10 +134,10 @@ def apply_plugin_path(argument: str) -> None:
             site.addsitedir(folder) if folder == configuration["user"] else sys.path.append(folder)
     from importlib.metadata import PackageNotFoundError, distribution
 
-    for name, folder in configuration["used"]:
+    for name, folder in configuration["packages"]:
         try:
             found = str(distribution(name).locate_file(""))
-        except PackageNotFoundError:  # its runs report the missing package
+        except PackageNotFoundError:  # the runs report the missing package
             continue
         if os.path.realpath(found) != os.path.realpath(folder):
             sys.path.insert(0, folder)

@@ -81,9 +81,9 @@ def _stack_warnings(folder: Path) -> tuple[str, ...]:
     warnings: dict[str, None] = {}
     for file in sorted(folder.glob("stack*.json")):
         with suppress(ValueError):  # the worker was killed, or the disk was full
-            given = json.loads(file.read_text(encoding="utf-8")).get("about", {}).get("warnings", [])
-            if isinstance(given, list):
-                warnings.update(dict.fromkeys(text for text in given if isinstance(text, str)))
+            texts = json.loads(file.read_text(encoding="utf-8")).get("about", {}).get("warnings", [])
+            if isinstance(texts, list):
+                warnings.update(dict.fromkeys(text for text in texts if isinstance(text, str)))
     return tuple(warnings)
 
 

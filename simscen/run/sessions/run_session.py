@@ -27,12 +27,12 @@ class SessionOptions:
     Attributes:
         workers: Largest number of concurrent runs.
         seed: First of the `repeat` consecutive seeds (None: the seed of each scenario).
-        twice: Whether each run is repeated with the same seed and must give the same log.
+        check_determinism: Whether each run is repeated with the same seed and must give the same log.
         fail_fast: Whether the session ends after the first run that does not pass.
         wall_limit: Limit of the wall time of each run in s.
-        against: Output folder of an earlier session with which each run is compared (None: no comparison).
+        check_against: Output folder of an earlier session with which each run is compared (None: no comparison).
         replay: Outcomes for which a replay page is written.
-        only: Runs to execute (None: all).
+        selected_runs: Runs to execute (None: all).
         keep_logs: Runs of which all files are kept.
         cluster: Address of the Ray cluster that executes the runs ("": this machine).
     """
@@ -40,12 +40,12 @@ class SessionOptions:
     workers: int = 1
     seed: int | None = None
     repeat: int = 1
-    twice: bool = False
+    check_determinism: bool = False
     fail_fast: bool = False
     wall_limit: float = 300.0
-    against: Path | None = None
+    check_against: Path | None = None
     replay: OutcomeFilter = OutcomeFilter.NONE
-    only: frozenset[RunKey] | None = None
+    selected_runs: frozenset[RunKey] | None = None
     keep_logs: LogRetention = LogRetention.ALL
     cluster: str = ""
 
@@ -77,22 +77,22 @@ def plan_jobs(scenarios: Sequence[LoadedScenario], options: SessionOptions, out:
         for seed in _seeds(title, variants[0], options):
             for scenario in variants:
                 key = scenario.key(seed)
-                if options.only is not None and key not in options.only:
+                if options.selected_runs is not None and key not in options.selected_runs:
                     continue
-                for run_key in (key, key.repetition) if options.twice else (key,):
+                for run_key in (key, key.repetition) if options.check_determinism else (key,):
                     jobs.append(options.job(len(jobs), scenario, run_key, out))
     # Skipped scenarios come last, because the numbers of a run and its repetition must differ only in the last bit.
-    for scenario in skipped if options.only is None else ():
+    for scenario in skipped if options.selected_runs is None else ():
         key = scenario.key(scenario_seeds(scenario, options)[0])
         jobs.append(options.job(len(jobs), scenario, key, out))
     return jobs
 
 
 def _seeds(title: str, scenario: LoadedScenario, options: SessionOptions) -> Sequence[int]:
-    """Return the seeds of a scenario, or only the seeds in `options.only`."""
-    if options.only is None:
+    """Return the seeds of a scenario, or only the seeds in `options.selected_runs`."""
+    if options.selected_runs is None:
         return scenario_seeds(scenario, options)
-    return sorted({key.seed for key in options.only if key.test == title})
+    return sorted({key.seed for key in options.selected_runs if key.test == title})
 
 
 def run_session(
@@ -129,12 +129,12 @@ def run_session(
                 case Progressed(seconds=seconds):
                     listener(RunProgress(job.key, seconds))
                 case Ended(end=end):
-                    other_number = job.number ^ 1  # of its repetition, or of the run that it repeats; see `plan_jobs`
-                    is_other_finished = options.twice and other_number in positions
+                    other_number = job.number ^ 1  # the repetition of this run, or the run that it repeats
+                    is_other_finished = options.check_determinism and other_number in positions
                     other = results[positions[other_number]] if is_other_finished else None
                     run = compare_with_repetition(finished_run(job, end), other)
-                    if options.against is not None:
-                        run = compare_with_session(run, options.against)
+                    if options.check_against is not None:
+                        run = compare_with_session(run, options.check_against)
                     if options.keep_logs is LogRetention.FAILED and run.outcome.is_good:
                         run = delete_all_but_result(run)
                     report(job, run)
@@ -148,9 +148,9 @@ def run_session(
 
 def delete_all_but_result(run: RunFinished) -> RunFinished:
     """Delete all files of a run except its result.json; return the run without paths of deleted files."""
-    kept = Path(run.artifacts.result)
+    result = Path(run.artifacts.result)
     for file in Path(run.artifacts.folder).iterdir():
-        if file.is_file() and file != kept:
+        if file.is_file() and file != result:
             file.unlink()
     return replace(run, artifacts=replace(run.artifacts, mcap="", picture="", replay=""))
 

@@ -123,6 +123,15 @@ def test_limits_in_percent_keep_the_scale_of_the_mask_file() -> None:
     ]
 
 
+def test_mask_file_with_a_constant_limit_is_combined_with_zones() -> None:
+    """The limit of the file is 50 percent of 0.5 m/s, for any value."""
+    limits = SpeedLimits(OccupancyGrid(np.full((2, 2), 7, dtype=np.int8), 1.0), True, 50.0, 0.0)
+    zones = Zones((), ((SQUARE, 0.1),), FilterMasks(None, limits))
+    around = surroundings(speed_zones=zones.speed, masks=zones.masks)
+    assert drawn(around, zones)[SPEED_ZONES.name] == [[25, 25, 0, 0], [25, 10, 10, 0], [0, 10, 10, 0], [0, 0, 0, 0]]
+    assert ZoneMasks(around, NO_ZONES).meanings[0]["multiplier"] == pytest.approx(0.01)
+
+
 def test_fast_limits_get_a_coarser_scale() -> None:
     zones = Zones((), ((SQUARE, 2.0),))
     around = surroundings(speed_zones=zones.speed)
