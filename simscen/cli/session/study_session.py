@@ -269,8 +269,8 @@ class _StudySession:
     def _study_plan(self) -> StudyPlan:
         values = {run.key: run.varied for run in self._planned if run.varied}
         scenario = next(iter(self._loaded.values())).id
-        is_designed = not self._is_random and self._space is not None
-        return StudyPlan(scenario, self._is_random, self._claim, values, is_designed, self._draw_count)
+        is_pairwise = self._space is not None and any(block.is_pairwise for block in self._space.blocks)
+        return StudyPlan(scenario, self._is_random, self._claim, values, is_pairwise, self._draw_count)
 
     def _is_decided(self, finished_runs: Sequence[RunFinished]) -> bool:
         """Return whether these runs decide a sequential claim."""

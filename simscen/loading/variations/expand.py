@@ -61,11 +61,15 @@ class Variation:
 
 @dataclass(frozen=True)
 class Block:
-    """Block of variations: combinations of axes that meet conditions, or one axis of random draws (`is_random`)."""
+    """Block of variations: combinations of axes that meet conditions, or one axis of random draws (`is_random`).
+
+    is_pairwise:  whether an axis contains each pair of values of two parameters (`pairwise`)
+    """
 
     axes: Sequence[Axis]
     conditions: Sequence[Condition]
     is_random: bool
+    is_pairwise: bool = False
 
     @property
     def count(self) -> int:
@@ -193,7 +197,7 @@ def variation_space(tree: MappingNode) -> VariationSpace | list[Problem] | None:
     nodes = entry.value.items if isinstance(entry.value, SequenceNode) else [entry.value]
     is_random = len(specs) == 1 and specs[0].is_random
     for block, node in zip(specs, nodes, strict=True):
-        found.append(Block(*builder.build_block(block, node), is_random))
+        found.append(Block(*builder.build_block(block, node), is_random, block.pairwise is not None))
     if specs and not is_random and ACCEPTANCE in tree.entries:
         message = "these variations are not independent random draws, so no confidence can be stated for a pass rate"
         hint = "vary with `sampled` and `method: random` alone, or remove `acceptance`"

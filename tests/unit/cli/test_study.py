@@ -202,6 +202,11 @@ def test_invalid_studies_are_refused(
     assert message in done.err
 
 
+def test_pairs_are_counted_only_for_pairwise_values(study: Callable[..., Any], tmp_path: Path) -> None:
+    study(SCENARIO + "variations: {pairs: {robot.pose.x: [1 m, 2 m], robot.pose.y: [9, 10]}}\n", "--out", "out")
+    assert results(tmp_path)["study"]["pair_coverage"] is None
+
+
 def test_logs_of_passed_runs_are_deleted_on_request(
     study: Callable[..., Any], simscen: Callable[..., Any], tmp_path: Path
 ) -> None:
