@@ -1,4 +1,4 @@
-"""Make `fault_effects.py` importable in the tests of this folder."""
+"""Make `fault_effects.py` importable in the tests of this folder, which pytest's importlib mode does not."""
 
 import sys
 from pathlib import Path

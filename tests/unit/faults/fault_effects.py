@@ -1,4 +1,4 @@
-"""Started faults with a manual clock, and messages for them."""
+"""Functions that start faults, a clock set by tests, and messages that faults change."""
 
 import math
 
@@ -22,17 +22,19 @@ class ManualClock:
 
 
 def start(fault: dict, kind: str, now=lambda: 0, separation=0.3, seed=1, simulator=None):
+    """Return the effect of a fault, written as in a scenario, on messages of a kind, such as Scan or Command."""
     setting = FaultSetting(separation, Clock(240), now, kind, simulator)
     return AnyFault.model_validate(fault).fault.begin(np.random.default_rng(seed), setting)
 
 
 def unsuitable_key(fault: dict, kind: str, rate=0.0, spec=None):
+    """Return the key of the fault that does not suit its target and the reason, or None."""
     return AnyFault.model_validate(fault).fault.unsuitable_key(FaultTarget(kind, rate, spec))
 
 
-def scan(ranges, tick=0, least=0.1, most=12.0) -> Scan:
+def scan(ranges, tick=0, range_min=0.1, range_max=12.0) -> Scan:
     values = np.asarray(ranges, dtype=float)
-    return Scan("lidar", tick, values, -math.pi, 2 * math.pi / len(values), least, most)
+    return Scan("lidar", tick, values, -math.pi, 2 * math.pi / len(values), range_min, range_max)
 
 
 def odometry(pose=Pose2(0, 0), tick=0, twist=STOP) -> Odometry:

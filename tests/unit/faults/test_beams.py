@@ -9,11 +9,9 @@ from fault_effects import image, scan, start, unsuitable_key
 from simscen.faults.lidar_environment import MM_PER_HOUR
 from simscen.model.sensors import Lidar
 
-DEG = math.pi / 180
-
 
 def visible_directions(sector: dict) -> list[int]:
-    """Return the directions in whole degrees from -180 to 179 that measure a range."""
+    """Return the directions, from -180 to 179 degrees, in which a lidar with a blind sector measures ranges."""
     ranges = start({"sector": sector}, "Scan").reading(scan(np.full(360, 2.0))).ranges
     return [k - 180 for k in range(360) if ranges[k] == 2.0]
 
@@ -55,9 +53,11 @@ def test_ghost_includes_the_beams_at_both_edges_of_its_window(width):
 
 
 def test_dust_shortens_beams_by_a_poisson_process():
-    """At range r a share 1 - exp(-r / L) is short; of those the mean is L - r / (exp(r / L) - 1)."""
+    """With a wall at r, a share 1 - exp(-r / L) of the beams is short, with the mean L - r / (exp(r / L) - 1)."""
     path, wall = 8.0, 5.0
-    measured = start({"dust": {"mean_free_path": path}}, "Scan").reading(scan(np.full(40_000, wall), least=0.0)).ranges
+    measured = (
+        start({"dust": {"mean_free_path": path}}, "Scan").reading(scan(np.full(40_000, wall), range_min=0.0)).ranges
+    )
     short = measured < wall
     assert short.mean() == pytest.approx(1 - math.exp(-wall / path), abs=0.01)
     assert measured[short].mean() == pytest.approx(path - wall / (math.exp(wall / path) - 1), rel=0.02)
@@ -66,7 +66,9 @@ def test_dust_shortens_beams_by_a_poisson_process():
 
 def test_dust_is_hit_by_beams_without_target_within_the_range_of_the_lidar():
     measured = (
-        start({"dust": {"mean_free_path": 1}}, "Scan").reading(scan(np.full(20_000, np.inf), least=0.5, most=4)).ranges
+        start({"dust": {"mean_free_path": 1}}, "Scan")
+        .reading(scan(np.full(20_000, np.inf), range_min=0.5, range_max=4))
+        .ranges
     )
     finite = measured[np.isfinite(measured)]
     assert 0.5 <= finite.min() < finite.max() < 4
@@ -75,7 +77,7 @@ def test_dust_is_hit_by_beams_without_target_within_the_range_of_the_lidar():
 
 
 def test_rain_hides_targets_beyond_the_detection_limit():
-    """The farthest range that is seen solves ρ exp(-2 α z) / z² = 0.9 / 12² (here by bisection)."""
+    """The largest measured range z solves ρ exp(-2 α z) / z² = 0.9 / 12² (here by bisection)."""
     alpha, low, high = 0.01 * 25**0.6, 0.1, 12.0
     for _ in range(60):
         middle = (low + high) / 2

@@ -7,9 +7,9 @@ from fault_effects import image, imu, odometry, scan, start, unsuitable_key
 VALUES = {"nan": np.nan, "inf": np.inf, "zero": 0.0, "negative": -1.0, "huge": 1e30}
 
 
-@pytest.mark.parametrize("what", VALUES)
-def test_garbage_values_have_the_given_types(what):
-    spec, value = {"garbage": {"value": what}}, VALUES[what]
+@pytest.mark.parametrize("name", VALUES)
+def test_garbage_has_the_given_value_in_each_message_type(name):
+    spec, value = {"garbage": {"value": name}}, VALUES[name]
     np.testing.assert_array_equal(start(spec, "Scan").reading(scan([1.0, 2.0])).ranges, [value] * 2)
     np.testing.assert_array_equal(start(spec, "Odometry").reading(odometry()).pose, [value] * 3)
     np.testing.assert_array_equal(start(spec, "Imu").reading(imu()).linear_acceleration, [value] * 3)
@@ -24,9 +24,9 @@ def test_message_can_be_truncated_or_empty():
 
 
 def test_garbage_has_the_given_share_and_other_messages_are_unchanged():
-    effect, good = start({"garbage": {"probability": "30 %"}}, "Imu"), imu()
-    got = [effect.reading(good) for _ in range(4000)]
-    assert sum(one is not good for one in got) / 4000 == pytest.approx(0.3, abs=0.03)
+    effect, message = start({"garbage": {"probability": "30 %"}}, "Imu"), imu()
+    outputs = [effect.reading(message) for _ in range(4000)]
+    assert sum(output is not message for output in outputs) / 4000 == pytest.approx(0.3, abs=0.03)
 
 
 def test_default_garbage_is_drawn_from_all_values():

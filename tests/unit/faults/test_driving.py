@@ -10,10 +10,11 @@ from simscen.core.messages.sensor_data import Odometry
 from simscen.faults.base import AnyFault, FaultSetting
 from simscen.model.robot import Differential, Omnidirectional
 
-WHEELED = Differential(type="differential", wheel_radius=0.1, wheel_separation=0.4)
+DIFFERENTIAL_DRIVE = Differential(type="differential", wheel_radius=0.1, wheel_separation=0.4)
 
 
 def wheel_speeds(motion: Twist, separation: float = 0.4) -> tuple[float, float]:
+    """Return the speed of the left and the right wheel on the ground in m/s."""
     return motion.vx - separation / 2 * motion.wz, motion.vx + separation / 2 * motion.wz
 
 
@@ -74,15 +75,15 @@ def test_wheel_slip_affects_each_odometry_sensor_separately():
 def test_left_and_right_are_valid_only_for_differential_wheels(word):
     assert unsuitable_key({word: {"left": 0.5}}, "Command")[0] == "left"
     assert unsuitable_key({word: {"right": 0.5}}, "Wheels", spec=Omnidirectional(type="omnidirectional"))[0] == "right"
-    assert unsuitable_key({word: {"right": 0.5}}, "Wheels", spec=WHEELED) is None
+    assert unsuitable_key({word: {"right": 0.5}}, "Wheels", spec=DIFFERENTIAL_DRIVE) is None
 
 
 def test_battery_limit_falls_linearly_and_keeps_the_curvature_of_commands():
     now = ManualClock()
     effect = start({"low_battery": {"start": 0.5, "end": 0.1, "drain": "10 s"}}, "Command", now)
     motion, limits = Twist(0.6, 0.0, 0.3), {0: 0.5, 1200: 0.3, 2400: 0.1, 4800: 0.1}
-    for now.tick, most in limits.items():
-        assert effect.command(motion) == pytest.approx((most, 0.0, most / 2))
+    for now.tick, limit in limits.items():
+        assert effect.command(motion) == pytest.approx((limit, 0.0, limit / 2))
     assert effect.command(Twist(0.05, 0.0, 1.0)) == Twist(0.05, 0.0, 1.0)
 
 

@@ -9,21 +9,19 @@ from fault_effects import ManualClock, belief, image, imu, odometry, scan, start
 from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 
-MANY = 10_000
-
 
 def test_camera_noise_has_the_given_strength_and_stays_in_range():
-    seen = start({"noise": {"std": "5 cm", "colour": "4 %"}}, "Image").reading(image(np.full((100, 100), 2.0)))
-    assert seen.depth.std() == pytest.approx(0.05, rel=0.05)
-    assert seen.rgb.std() == pytest.approx(0.04 * 255, rel=0.05)
-    assert (seen.rgb.dtype, seen.depth.dtype) == (np.uint8, np.float32)
+    output = start({"noise": {"std": "5 cm", "colour": "4 %"}}, "Image").reading(image(np.full((100, 100), 2.0)))
+    assert output.depth.std() == pytest.approx(0.05, rel=0.05)
+    assert output.rgb.std() == pytest.approx(0.04 * 255, rel=0.05)
+    assert (output.rgb.dtype, output.depth.dtype) == (np.uint8, np.float32)
     assert np.isinf(start({"noise": {"std": 1.0}}, "Image").reading(image([[np.inf]])).depth).all()
 
 
 def test_imu_noise_has_the_given_standard_deviation_on_each_axis():
     effect = start({"noise": {"gyro": "0.05 rad/s", "accelerometer": 0.3}}, "Imu")
-    got = [effect.reading(imu()) for _ in range(4000)]
-    rates, accelerations = (np.array([getattr(one, name) for one in got]) for name in
+    outputs = [effect.reading(imu()) for _ in range(4000)]
+    rates, accelerations = (np.array([getattr(reading, name) for reading in outputs]) for name in
                         ("angular_velocity", "linear_acceleration"))  # fmt: skip
     assert rates.std(axis=0) == pytest.approx([0.05] * 3, rel=0.06)
     assert accelerations.std(axis=0) == pytest.approx([0.3] * 3, rel=0.06)
@@ -56,22 +54,24 @@ def test_noisy_odometry_reports_the_velocity_of_its_reported_path():
 
 def test_belief_noise_is_independent_and_keeps_the_odometry():
     effect = start({"noise": {"linear": "10 cm", "angular": "2 deg"}}, "Belief")
-    output = [effect.belief(belief(Pose2(3, 4, 0.5), Pose2(1, 0, 0.1))) for _ in range(3000)]
-    poses = np.array([one.pose for one in output])
+    outputs = [effect.belief(belief(Pose2(3, 4, 0.5), Pose2(1, 0, 0.1))) for _ in range(3000)]
+    poses = np.array([output.pose for output in outputs])
     assert poses.std(axis=0) == pytest.approx([0.1, 0.1, math.radians(2)], rel=0.06)
-    assert output[7].map_from_odom.compose(Pose2(1, 0, 0.1)) == pytest.approx(output[7].pose)
+    assert outputs[7].map_from_odom.compose(Pose2(1, 0, 0.1)) == pytest.approx(outputs[7].pose)
 
 
 def test_bias_is_added_to_finite_measurements_only():
     assert start({"bias": {"range": "-20 cm"}}, "Scan").reading(scan([1.0, np.inf, np.nan, 0.2])).ranges == (
         pytest.approx([0.8, np.inf, np.nan, -np.inf], nan_ok=True)
     )
-    motion = start({"bias": {"gyro": 0.1, "accelerometer": -0.5}}, "Imu").reading(imu())
-    assert motion.angular_velocity == pytest.approx((0, 0, 0.3))
-    assert motion.linear_acceleration == pytest.approx((-0.4, 0, 9.81))
-    seen = start({"bias": {"range": 0.5, "brightness": "20 %"}}, "Image").reading(image([[1.0, np.inf]], gray=230))
-    assert seen.depth.tolist() == [[1.5, np.inf]]
-    assert (seen.rgb == 255).all()
+    imu_reading = start({"bias": {"gyro": 0.1, "accelerometer": -0.5}}, "Imu").reading(imu())
+    assert imu_reading.angular_velocity == pytest.approx((0, 0, 0.3))
+    assert imu_reading.linear_acceleration == pytest.approx((-0.4, 0, 9.81))
+    camera_image = start({"bias": {"range": 0.5, "brightness": "20 %"}}, "Image").reading(
+        image([[1.0, np.inf]], gray=230)
+    )
+    assert camera_image.depth.tolist() == [[1.5, np.inf]]
+    assert (camera_image.rgb == 255).all()
 
 
 def test_range_scaled_beyond_the_maximum_is_no_hit():
@@ -79,7 +79,7 @@ def test_range_scaled_beyond_the_maximum_is_no_hit():
     assert output == pytest.approx([2.0, np.inf, np.inf, np.nan], nan_ok=True)
 
 
-def test_scaled_odometry_drives_and_turns_by_the_factor():
+def test_scaled_odometry_multiplies_distance_and_twist_by_the_factor():
     effect = start({"scale": {"factor": "110 %"}}, "Odometry")
     effect.reading(odometry())
     output = effect.reading(odometry(Pose2(1.0, 0.0, 0.0), 6, Twist(0.5, 0, 0.2)))
@@ -101,8 +101,8 @@ def test_drift_grows_with_the_time_since_its_start():
 def test_garbage_does_not_change_later_distorted_odometry(garbage):
     effect = start({"scale": {"factor": 2.0}}, "Odometry")
     assert effect.reading(odometry(Pose2(0, 0))).pose == Pose2(0, 0)
-    rubbish = odometry(Pose2(garbage, garbage, garbage))
-    assert effect.reading(rubbish) is rubbish
+    garbage_reading = odometry(Pose2(garbage, garbage, garbage))
+    assert effect.reading(garbage_reading) is garbage_reading
     assert effect.reading(odometry(Pose2(1, 0))).pose == Pose2(2, 0)
 
 
@@ -112,8 +112,8 @@ def test_odometry_drifts_at_standstill_and_keeps_the_drift_after_the_fault():
         output = effect.reading(odometry(tick=tick))
     assert output.pose == pytest.approx((0.2, 0, 0))
     assert output.twist.vx == pytest.approx(0.1)
-    rest = effect.end()
-    assert rest.reading(odometry(tick=720)).pose == pytest.approx((0.2, 0, 0))
+    remaining = effect.end()
+    assert remaining.reading(odometry(tick=720)).pose == pytest.approx((0.2, 0, 0))
 
 
 def test_belief_drifts_along_the_heading_at_the_start_of_the_fault():

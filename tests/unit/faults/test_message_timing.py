@@ -8,17 +8,17 @@ from simscen.core.geometry import Pose2
 from simscen.core.geometry.kinematics import Twist
 
 
-def arrivals(fault: dict, ticks: int, period: int = 24, until: int | None = None) -> list[tuple[int, int]]:
-    """Return the ticks at which each scan arrives and was taken; the fault ends at `until`."""
+def arrivals(fault: dict, ticks: int, period: int = 24, end_tick: int | None = None) -> list[tuple[int, int]]:
+    """Return the tick of arrival and the tick of measurement of each scan; the fault ends at `end_tick`."""
     now = ManualClock()
-    effect, got = start(fault, "Scan", now), []
+    effect, arrived = start(fault, "Scan", now), []
     for now.tick in range(ticks):
-        if now.tick == until:
+        if now.tick == end_tick:
             effect = effect.end()
-        got += [(now.tick, one.tick) for one in effect.arriving_readings()]
-        if now.tick % period == 0 and (one := effect.reading(scan([1.0], now.tick))) is not None:
-            got.append((now.tick, one.tick))
-    return got
+        arrived += [(now.tick, reading.tick) for reading in effect.arriving_readings()]
+        if now.tick % period == 0 and (reading := effect.reading(scan([1.0], now.tick))) is not None:
+            arrived.append((now.tick, reading.tick))
+    return arrived
 
 
 def test_fixed_delay_is_equal_for_every_message():
@@ -26,26 +26,26 @@ def test_fixed_delay_is_equal_for_every_message():
 
 
 def test_random_delay_keeps_the_order_of_messages():
-    got = arrivals({"delay": {"latency": "100 ms", "jitter": "1 s"}}, 24_000)
-    assert [taken for _, taken in got] == [24 * k for k in range(len(got))]
-    arrived = np.array([at for at, _ in got])
+    scans = arrivals({"delay": {"latency": "100 ms", "jitter": "1 s"}}, 24_000)
+    assert [measured for _, measured in scans] == [24 * k for k in range(len(scans))]
+    arrived = np.array([tick for tick, _ in scans])
     assert (np.diff(arrived) >= 0).all()
-    late = (arrived - np.array([taken for _, taken in got])) / 240
-    assert late.min() >= 0.1 - 1 / 480
-    assert late.max() <= 1.1 + 1 / 480
-    # A message waits for the slowest of those before it: later than uniform on average, which would be 0.6 s.
-    assert late.mean() > 0.6
+    delays = (arrived - np.array([measured for _, measured in scans])) / 240
+    assert delays.min() >= 0.1 - 1 / 480
+    assert delays.max() <= 1.1 + 1 / 480
+    # A message waits for all earlier ones, so the mean delay is above that of the uniform distribution, 0.6 s.
+    assert delays.mean() > 0.6
 
 
 def test_rare_messages_have_a_uniform_delay():
-    got = arrivals({"delay": {"latency": "100 ms", "jitter": "1 s"}}, 480_000, period=480)
-    late = np.array([(at - taken) / 240 for at, taken in got])
-    assert np.quantile(late, [0.25, 0.5, 0.75]) == pytest.approx([0.35, 0.6, 0.85], abs=0.05)
+    scans = arrivals({"delay": {"latency": "100 ms", "jitter": "1 s"}}, 480_000, period=480)
+    delays = np.array([(arrived - measured) / 240 for arrived, measured in scans])
+    assert np.quantile(delays, [0.25, 0.5, 0.75]) == pytest.approx([0.35, 0.6, 0.85], abs=0.05)
 
 
-def test_delayed_messages_arrive_before_newer_ones():
-    got = arrivals({"delay": {"latency": "0.5 s"}}, 400, until=60)
-    assert got == [(120, 0), (144, 24), (168, 48), (168, 72), (168, 96), (168, 120), (168, 144), (168, 168)] + [
+def test_delayed_messages_arrive_in_order_after_the_fault_ends():
+    scans = arrivals({"delay": {"latency": "0.5 s"}}, 400, end_tick=60)
+    assert scans == [(120, 0), (144, 24), (168, 48), (168, 72), (168, 96), (168, 120), (168, 144), (168, 168)] + [
         (24 * k, 24 * k) for k in range(8, 17)
     ]
 
@@ -60,15 +60,15 @@ def test_only_the_newest_delayed_command_is_used():
     assert effect.arriving_command() is None
 
 
-@pytest.mark.parametrize(("rate", "every"), [("5 Hz", 48), ("2 Hz", 120)])
-def test_slow_sensor_has_the_given_rate(rate, every):
-    assert [at for at, _ in arrivals({"slow": {"rate": rate}}, 1201)] == list(range(0, 1201, every))
+@pytest.mark.parametrize(("rate", "period"), [("5 Hz", 48), ("2 Hz", 120)])
+def test_slow_sensor_has_the_given_rate(rate, period):
+    assert [tick for tick, _ in arrivals({"slow": {"rate": rate}}, 1201)] == list(range(0, 1201, period))
 
 
 def test_rate_that_does_not_divide_that_of_the_sensor_holds_on_average():
-    got = [at for at, _ in arrivals({"slow": {"rate": "3 Hz"}}, 2400)]
-    assert len(got) == 30
-    assert set(np.diff(got)) == {72, 96}
+    ticks = [tick for tick, _ in arrivals({"slow": {"rate": "3 Hz"}}, 2400)]
+    assert len(ticks) == 30
+    assert set(np.diff(ticks)) == {72, 96}
 
 
 def test_slow_rate_must_be_below_that_of_the_sensor():
@@ -77,13 +77,15 @@ def test_slow_rate_must_be_below_that_of_the_sensor():
 
 
 def test_intermittent_fault_has_the_stated_share_and_burst_length():
-    got = np.array([at for at, _ in arrivals({"intermittent": {"up": "1 s", "down": "0.5 s"}}, 240_000, period=6)])
-    assert len(got) / 40_000 == pytest.approx(2 / 3, abs=0.03)
-    gaps = np.diff(got)
+    ticks = np.array(
+        [tick for tick, _ in arrivals({"intermittent": {"up": "1 s", "down": "0.5 s"}}, 240_000, period=6)]
+    )
+    assert len(ticks) / 40_000 == pytest.approx(2 / 3, abs=0.03)
+    gaps = np.diff(ticks)
     gaps = gaps[gaps > 6] / 240
     assert gaps.mean() == pytest.approx(0.5, rel=0.15)
     assert gaps.std() == pytest.approx(0.5, rel=0.2)
-    assert got[0] > 0
+    assert ticks[0] > 0
 
 
 @pytest.mark.parametrize(
@@ -95,7 +97,7 @@ def test_intermittent_fault_has_the_stated_share_and_burst_length():
         ("Image", image([[1.0]]), image([[2.0]], 24)),
     ],
 )
-def test_a_stuck_sensor_repeats_its_first_message_with_fresh_stamps(kind, first, later):
+def test_stuck_sensor_repeats_its_first_message_with_new_stamps(kind, first, later):
     effect = start({"stuck": {}}, kind)
     assert effect.reading(first) is not None
     output = effect.reading(later)
@@ -133,30 +135,30 @@ def test_belief_jumps_in_the_robot_frame_and_keeps_the_offset_of_the_map():
     assert after.map_from_odom.compose(Pose2(0.5, 0)) == pytest.approx(after.pose)
 
 
-def corrections(fault: dict, ticks: int, until: int | None = None) -> list[float]:
-    """Return the corrections that the navigator receives if correction and odometry grow by 1 m per tick."""
+def corrections(fault: dict, ticks: int, end_tick: int | None = None) -> list[float]:
+    """Return the x of map_from_odom at each tick, if map_from_odom and odometry both grow by 1 m per tick."""
     now = ManualClock()
     effect, received = start(fault, "Belief", now), []
     for now.tick in range(ticks):
-        if now.tick == until:
+        if now.tick == end_tick:
             effect = effect.end()
-        got = effect.belief(belief(Pose2(2.0 * now.tick, 0), Pose2(now.tick, 0))) if effect else None
-        if got:
-            assert got.pose.x == pytest.approx(got.map_from_odom.x + now.tick)
-        received.append(got.map_from_odom.x if got else now.tick)
+        output = effect.belief(belief(Pose2(2.0 * now.tick, 0), Pose2(now.tick, 0))) if effect else None
+        if output:
+            assert output.pose.x == pytest.approx(output.map_from_odom.x + now.tick)
+        received.append(output.map_from_odom.x if output else now.tick)
     return received
 
 
 def test_delayed_localizer_corrections_are_extrapolated_by_odometry():
     received = corrections({"delay": {"latency": "50 ms"}}, 60)
     assert received == pytest.approx([max(0, tick - 12) for tick in range(60)])
-    ended = corrections({"delay": {"latency": "50 ms"}}, 60, until=30)
+    ended = corrections({"delay": {"latency": "50 ms"}}, 60, end_tick=30)
     assert ended[:41] == pytest.approx(received[:41])
     assert ended[41:] == pytest.approx(list(range(41, 60)))
 
 
 def test_last_correction_is_kept_until_the_next_one():
     assert corrections({"slow": {"rate": "10 Hz"}}, 60) == pytest.approx([24 * (tick // 24) for tick in range(60)])
-    gappy = corrections({"intermittent": {"up": "0.1 s", "down": "0.1 s"}}, 2400)
-    assert all(gappy[k] in (k, gappy[k - 1]) for k in range(1, 2400))
-    assert np.mean([gappy[k] != k for k in range(2400)]) == pytest.approx(0.5, abs=0.15)
+    intermittent = corrections({"intermittent": {"up": "0.1 s", "down": "0.1 s"}}, 2400)
+    assert all(intermittent[k] in (k, intermittent[k - 1]) for k in range(1, 2400))
+    assert np.mean([intermittent[k] != k for k in range(2400)]) == pytest.approx(0.5, abs=0.15)

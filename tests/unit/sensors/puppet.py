@@ -11,14 +11,20 @@ from simscen.core.geometry.ray_fans import RayCaster
 
 @dataclass
 class Puppet:
-    """A SensorView whose truth is set by hand."""
+    """SensorView whose true state is set by the test.
+
+    linear, angular: velocity of the base in m/s and rad/s, world frame
+    wheel_angles: encoder angles in rad, in the order of the drive's wheels
+    pressed: whether an obstacle touches the hull
+    placement_count: how often the robot was teleported
+    """
 
     pose: Pose3 = Pose3()
     linear: tuple[float, float, float] = (0.0, 0.0, 0.0)
     angular: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    rolled: tuple[float, ...] = (0.0, 0.0)
+    wheel_angles: tuple[float, ...] = (0.0, 0.0)
     pressed: bool = False
-    placed: int = 0
+    placement_count: int = 0
 
     def base_pose(self):
         return self.pose
@@ -27,10 +33,10 @@ class Puppet:
         return self.linear, self.angular
 
     def placements(self):
-        return self.placed
+        return self.placement_count
 
     def encoders(self):
-        return self.rolled
+        return self.wheel_angles
 
     def touching(self):
         return self.pressed
@@ -40,7 +46,7 @@ class Puppet:
 
 
 class SquareRoom(RayCaster):
-    """Four walls at x, y = ± `half`: distances in closed form."""
+    """Four walls at x = ± `half` and y = ± `half` in m, with distances in closed form."""
 
     def __init__(self, half):
         self.half = half
@@ -51,12 +57,12 @@ class SquareRoom(RayCaster):
         return np.nanmin(np.where(walls > 0, walls, np.inf), axis=1)
 
 
-class Nothing(RayCaster):
-    """An empty world."""
+class EmptyWorld(RayCaster):
+    """World without obstacles."""
 
     def cast(self, origins, directions, reach=math.inf):
         return np.full(len(origins), np.inf)
 
 
-def at(x, y, yaw=0.0):
+def puppet_at(x, y, yaw=0.0):
     return Puppet(Pose3.planar(Pose2(x, y, yaw)))

@@ -1,3 +1,5 @@
+"""Tests of how the sensors of a robot are built from its file: order, periods, refused values, and noise."""
+
 import math
 from types import SimpleNamespace
 
@@ -48,18 +50,18 @@ def test_periods_are_whole_ticks():
         "back": 24, "bumper": 6, "front": 12, "imu": 4, "odom": 6, "zed": 48}  # fmt: skip
 
 
-def test_a_rate_that_does_not_divide_the_clock_is_refused_with_the_nearest_that_does():
+def test_rate_that_does_not_divide_the_clock_is_refused_and_the_nearest_valid_rate_named():
     with pytest.raises(ValueError, match="7 Hz does not divide 240 Hz; the nearest that does is"):
         build({"lidar": {"lidar": {"rate": 7.0}}})
 
 
 @pytest.mark.parametrize("sensor", [{"lidar": {"field_of_view": 7.0}}, {"camera": {"field_of_view": math.pi}}])
-def test_field_of_view_wider_than_the_sensor_can_have_is_refused(sensor):
+def test_too_wide_field_of_view_is_refused(sensor):
     with pytest.raises(ValidationError, match="field_of_view"):
         robot({"wide": sensor})
 
 
-def test_steering_by_a_quarter_turn_is_refused():
+def test_maximum_steering_angle_of_90_degrees_is_refused():
     size = {"wheel_radius": 0.1, "wheel_separation": 0.3, "wheel_base": 0.3}
     with pytest.raises(ValidationError, match="max_steering"):
         Ackermann(type="ackermann", max_steering=math.pi / 2, **size)
@@ -72,8 +74,8 @@ def test_each_sensor_type_returns_its_reading_type():
 
 def test_additional_sensor_does_not_change_the_others():
     alone = build({"front": SENSORS["front"]})[0].read(0)
-    among = next(sensor for sensor in build() if sensor.name == "front").read(0)
-    assert np.array_equal(alone.ranges, among.ranges)
+    with_others = next(sensor for sensor in build() if sensor.name == "front").read(0)
+    assert np.array_equal(alone.ranges, with_others.ranges)
 
 
 def test_noise_of_two_lidars_differs():
@@ -90,7 +92,7 @@ def test_bumper_reports_contacts_of_the_hull():
 
 
 @pytest.mark.parametrize("increment", [0, 0.0])
-def test_scan_of_a_plug_in_without_an_angle_between_its_beams_is_refused(increment):
+def test_scan_of_a_plug_in_with_zero_angle_increment_is_refused(increment):
     def sensor(_spec, _setting):
         return SimpleNamespace(read=lambda tick: Scan("beam", tick, np.ones(1), 0.0, increment, 0.1, 10.0))
 

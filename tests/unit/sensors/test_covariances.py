@@ -14,7 +14,7 @@ RUNS = 400
 
 
 def test_the_variance_of_the_twist_has_a_closed_form() -> None:
-    """d = 0.5 m/s * t and |turn| = 0.8 rad/s * t, divided by t²."""
+    """d = 0.5 m/s * t and |turn| = 0.8 rad/s * t; the variances are divided by t²."""
     view = Puppet()
     sensor = odometry(view, **NOISE)
     roll(view, 0.5, -0.8, SECONDS)
@@ -25,15 +25,15 @@ def test_the_variance_of_the_twist_has_a_closed_form() -> None:
 
 
 def test_a_base_that_moves_sideways_has_a_lateral_variance() -> None:
-    view = Puppet(rolled=(0.0, 0.0, 0.0))
+    view = Puppet(wheel_angles=(0.0, 0.0, 0.0))
     sensor = odometry(view, Omnidirectional(type="omnidirectional"), **NOISE)
-    view.rolled = (0.03, 0.04, 0.0)
+    view.wheel_angles = (0.03, 0.04, 0.0)
     vx, vy, _ = sensor.read(6).twist_variance
     assert vx == vy == pytest.approx(0.02**2 * 0.05 / SECONDS**2)
 
 
 def test_wheels_at_rest_have_no_variance() -> None:
-    assert odometry(Puppet(rolled=(1.0, 2.0)), **NOISE).read(6).twist_variance == (0.0, 0.0, 0.0)
+    assert odometry(Puppet(wheel_angles=(1.0, 2.0)), **NOISE).read(6).twist_variance == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("rate", [10, 40])
@@ -52,7 +52,7 @@ def test_scatter_of_twists_matches_their_variance(vx: float, wz: float, rate: in
 
 
 def test_scatter_of_poses_matches_their_covariance() -> None:
-    """An arc of 2 m and 1.6 rad: the mean NEES of the accumulated pose is within its 99.9 % bounds around 3."""
+    """After an arc of 2 m and 1.6 rad, the mean NEES of the pose is within its 99.9 % bounds around 3."""
     ends, covariances = [], []
     for seed in range(4000, 4000 + RUNS):
         view = Puppet()

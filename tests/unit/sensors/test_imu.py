@@ -1,3 +1,5 @@
+"""Tests of the IMU: gravity, acceleration, angular velocity, noise, and teleporting."""
+
 import math
 
 import numpy as np
@@ -26,7 +28,7 @@ def test_level_imu_at_rest_measures_gravity():
 def test_imu_measures_acceleration_in_its_own_frame():
     view = Puppet(Pose3.from_rpy(0, 0, 0, 0, 0, math.pi / 2))
     sensor = imu(view, **EXACT)
-    view.linear = (0.0, 0.02, 0.0)  # along the world's y, which is straight ahead
+    view.linear = (0.0, 0.02, 0.0)  # along y of the world, which is forward for this robot
     assert sensor.read(4).linear_acceleration == pytest.approx((1.2, 0.0, 9.81))
     assert sensor.read(8).linear_acceleration == pytest.approx((0.0, 0.0, 9.81))
 
@@ -36,7 +38,7 @@ def test_imu_on_a_slope_measures_tilted_gravity():
     assert reading.linear_acceleration == pytest.approx((9.81 * math.sin(0.1), 0.0, 9.81 * math.cos(0.1)))
 
 
-def test_turn_rates_are_about_its_own_axes():
+def test_imu_measures_angular_velocity_about_its_own_axes():
     view = Puppet(Pose3.from_rpy(0, 0, 0, math.pi / 2, 0, 0), angular=(0.0, 0.0, 1.0))
     assert imu(view, **EXACT).read(4).angular_velocity == pytest.approx((0.0, 1.0, 0.0))
 
@@ -58,7 +60,7 @@ def test_noise_changes_between_readings_and_bias_does_not():
 def test_teleporting_causes_no_acceleration(pose):
     view = Puppet(linear=(0.4, 0.0, 0.0))
     sensor = imu(view, **EXACT)
-    view.pose, view.linear, view.placed = pose, (0.0, 0.0, 0.0), 1
+    view.pose, view.linear, view.placement_count = pose, (0.0, 0.0, 0.0), 1
     assert sensor.read(4).linear_acceleration == pytest.approx((0.0, 0.0, 9.81))
     view.linear = (0.02, 0.0, 0.0)
     assert math.hypot(*sensor.read(8).linear_acceleration[:2]) == pytest.approx(1.2)

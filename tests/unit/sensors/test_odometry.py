@@ -1,3 +1,5 @@
+"""Tests of wheel odometry against the kinematics of each drive and the moments of its noise."""
+
 import math
 
 import numpy as np
@@ -24,14 +26,14 @@ def odometry(view, drive=DRIVE, seed=1, seconds=0.025, **spec):
 
 
 def roll(view, vx, wz, seconds, drive=DRIVE):
-    """Turn the wheels as they would without slip."""
+    """Turn the wheels as in motion without slip at `vx` m/s and `wz` rad/s."""
     half = drive.wheel_separation / 2
-    left, right = view.rolled
+    left, right = view.wheel_angles
     left, right = (
         left + (vx - wz * half) * seconds / drive.wheel_radius,
         right + (vx + wz * half) * seconds / drive.wheel_radius,
     )
-    view.rolled = (left, right)
+    view.wheel_angles = (left, right)
 
 
 @pytest.mark.parametrize("drive", [
@@ -64,24 +66,24 @@ def test_skid_steer_odometry_uses_the_turning_scale():
 
 
 def test_omnidirectional_odometry_includes_sideways_motion():
-    view = Puppet(rolled=(0.0, 0.0, 0.0))
+    view = Puppet(wheel_angles=(0.0, 0.0, 0.0))
     sensor = odometry(view, Omnidirectional(type="omnidirectional"), **EXACT)
-    view.rolled = (0.0, 0.5 * math.pi, math.pi)
+    view.wheel_angles = (0.0, 0.5 * math.pi, math.pi)
     assert sensor.read(6).pose == pytest.approx(Pose2(-1.0, 0.0, math.pi))
 
 
 def test_odom_frame_starts_at_the_initial_pose():
-    sensor = odometry(Puppet(rolled=(123.0, 45.0)), **EXACT)
+    sensor = odometry(Puppet(wheel_angles=(123.0, 45.0)), **EXACT)
     assert sensor.read(0).pose == Pose2(0.0, 0.0, 0.0)
 
 
 def test_a_robot_at_rest_does_not_drift():
-    sensor = odometry(Puppet(rolled=(1.0, 2.0)))
+    sensor = odometry(Puppet(wheel_angles=(1.0, 2.0)))
     assert {sensor.read(k).pose for k in range(100)} == {Pose2(0.0, 0.0, 0.0)}
 
 
 @pytest.mark.parametrize("rate", [10, 40])
-def test_errors_after_a_meter_are_those_of_the_specification_at_any_rate(rate):
+def test_errors_after_a_meter_have_the_specified_deviation_at_any_rate(rate):
     spec = {"translation_noise": 0.02, "rotation_noise": 0.0, "drift_noise": 0.03}
     ends = []
     for seed in range(400):
@@ -98,7 +100,7 @@ def test_errors_after_a_meter_are_those_of_the_specification_at_any_rate(rate):
     assert yaw.std() == pytest.approx(0.03, rel=0.12)
 
 
-def test_errors_after_a_radian_are_those_of_the_specification():
+def test_errors_after_a_radian_have_the_specified_deviation():
     yaws = []
     for seed in range(400):
         view = Puppet()

@@ -1,11 +1,11 @@
-"""Lidars and IMUs with roll and pitch, on level and tilted robots: raw readings, and readings in the base frame."""
+"""Tests of lidars and IMUs with roll and pitch on level and tilted robots, in the sensor and the base frame."""
 
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from puppet import Nothing, Puppet, SquareRoom, at
+from puppet import EmptyWorld, Puppet, SquareRoom, puppet_at
 
 from simscen.core.geometry import Pose3
 from simscen.core.messages.sensor_data import imu_in_base_frame, level_scan
@@ -14,13 +14,13 @@ from simscen.sensors.imu import ImuSensor
 from simscen.sensors.lidar import LidarSensor
 from simscen.sensors.sensor import SensorSetting
 
-HEIGHT = 0.3
+MOUNT_HEIGHT_M = 0.3
 EXACT = {"gyro_noise": 0.0, "gyro_bias": 0.0, "accelerometer_noise": 0.0}
 
 
 def scan(view, rays, mount, **spec):
     setting = SensorSetting("lidar", 24, 0.1, np.random.default_rng(1), view, rays, None)
-    return LidarSensor(Lidar(noise=0.0, mount=Mount(z=HEIGHT, **mount), **spec), setting).read(24)
+    return LidarSensor(Lidar(noise=0.0, mount=Mount(z=MOUNT_HEIGHT_M, **mount), **spec), setting).read(24)
 
 
 def imu(view, **mount):
@@ -31,11 +31,11 @@ def imu(view, **mount):
 @pytest.mark.parametrize("field_of_view", [2 * math.pi, math.radians(270)])
 @pytest.mark.parametrize("yaw", [0.0, 0.7, math.pi])
 def test_upside_down_lidar_reports_reversed_beams(field_of_view, yaw):
-    place, room, mount = at(0.5, -0.3, 0.4), SquareRoom(3.0), {"x": 0.1, "yaw": yaw}
-    upright = scan(place, room, mount, field_of_view=field_of_view, beams=271)
-    inverted = scan(place, room, {**mount, "roll": math.pi}, field_of_view=field_of_view, beams=271)
+    view, room, mount = puppet_at(0.5, -0.3, 0.4), SquareRoom(3.0), {"x": 0.1, "yaw": yaw}
+    upright = scan(view, room, mount, field_of_view=field_of_view, beams=271)
+    inverted = scan(view, room, {**mount, "roll": math.pi}, field_of_view=field_of_view, beams=271)
     assert np.abs(inverted.ranges - upright.ranges).max() > 0.5
-    # A full circle begins at -180 degrees, which is the last beam when it is seen from below.
+    # The first beam of a full circle, at -180 degrees, is the last beam of the inverted lidar.
     is_circle = field_of_view > 6
     assert level_scan(inverted).ranges == pytest.approx(np.roll(upright.ranges, -1) if is_circle else upright.ranges)
     assert level_scan(inverted).angle_min == pytest.approx(upright.angle_min + is_circle * upright.angle_increment)
@@ -43,10 +43,10 @@ def test_upside_down_lidar_reports_reversed_beams(field_of_view, yaw):
 
 def test_pitched_lidar_measures_the_floor_and_its_level_scan_does_not():
     pitch = math.radians(3)
-    tilted = scan(at(0, 0), Nothing(), {"pitch": pitch}, max_range=20.0)
+    tilted = scan(puppet_at(0, 0), EmptyWorld(), {"pitch": pitch}, max_range=20.0)
     ahead = np.argmin(np.abs(tilted.angles()))
-    assert tilted.ranges[ahead] == pytest.approx(HEIGHT / math.sin(pitch), abs=0.001)
-    assert np.isposinf(tilted.ranges[0])  # backward, it looks up
+    assert tilted.ranges[ahead] == pytest.approx(MOUNT_HEIGHT_M / math.sin(pitch), abs=0.001)
+    assert np.isposinf(tilted.ranges[0])  # the backward beams point up
     level = level_scan(tilted)
     assert np.isnan(level.ranges[ahead])
     assert np.isposinf(level.ranges[0])
@@ -57,9 +57,9 @@ def test_pitched_lidar_measures_the_floor_and_its_level_scan_does_not():
 def test_level_lidar_measures_the_floor_when_the_robot_is_tilted(yaw):
     pitch = math.radians(3)
     view = Puppet(Pose3.from_rpy(1.0, 2.0, 0.05, 0.0, pitch, 0.7))
-    measured = scan(view, Nothing(), {"yaw": yaw}, max_range=20.0)
+    measured = scan(view, EmptyWorld(), {"yaw": yaw}, max_range=20.0)
     # The lidar is 5 cm higher than on level ground, and the plane of its beams falls to the front of the robot.
-    height = 0.05 + HEIGHT * math.cos(pitch)
+    height = 0.05 + MOUNT_HEIGHT_M * math.cos(pitch)
     fall = math.sin(pitch) * np.cos(measured.angles() + yaw)
     with np.errstate(divide="ignore"):
         to_floor = np.where(fall > height / 20.0, height / fall, np.inf)
@@ -69,27 +69,27 @@ def test_level_lidar_measures_the_floor_when_the_robot_is_tilted(yaw):
 
 def test_level_lidar_does_not_measure_the_floor_beyond_its_range():
     view = Puppet(Pose3.from_rpy(0.0, 0.0, 0.0, 0.0, math.radians(1), 0.0))
-    assert np.isposinf(scan(view, Nothing(), {}, max_range=12.0).ranges).all()
+    assert np.isposinf(scan(view, EmptyWorld(), {}, max_range=12.0).ranges).all()
 
 
 @pytest.mark.parametrize("mount", [{"pitch": 0.03}, {"roll": 0.05}, {"pitch": -0.04, "roll": 0.02, "yaw": 1.0}])
 def test_level_scan_of_a_tilted_lidar_shows_the_walls(mount):
-    level = level_scan(scan(at(0.5, -0.3, 0.4), SquareRoom(3.0), mount))
-    hits = at(0.5, -0.3, 0.4).pose.plane.apply(level.points())
+    level = level_scan(scan(puppet_at(0.5, -0.3, 0.4), SquareRoom(3.0), mount))
+    hits = puppet_at(0.5, -0.3, 0.4).pose.plane.apply(level.points())
     assert len(hits) > 300
-    # A beam is off by at most half an increment, which matters most in the corners.
+    # The direction of a beam is off by at most half an increment, which has the largest effect in the corners.
     assert np.abs(np.abs(hits).max(axis=1) - 3.0).max() < math.hypot(3.5, 3.3) * level.angle_increment / 2
 
 
 def test_hits_outside_the_angles_of_the_level_scan_are_ignored():
-    tilted = scan(at(0, 0), SquareRoom(3.0), {"pitch": -0.4}, field_of_view=math.radians(90), beams=91)
+    tilted = scan(puppet_at(0, 0), SquareRoom(3.0), {"pitch": -0.4}, field_of_view=math.radians(90), beams=91)
     tilted = replace(tilted, ranges=np.where(tilted.angles() < math.radians(-43), 1.0, np.inf))
     assert (tilted.points()[:, 1] < 0).all()
     assert (level_scan(tilted).points()[:, 1] < 0).all()
 
 
 def test_scan_of_a_level_lidar_is_not_converted():
-    level = scan(at(0, 0), SquareRoom(3.0), {"yaw": 0.3})
+    level = scan(puppet_at(0, 0), SquareRoom(3.0), {"yaw": 0.3})
     assert level_scan(level) is level
 
 
@@ -117,4 +117,6 @@ def test_imu_beside_the_axis_of_a_turn_measures_centripetal_acceleration():
     view.pose = Pose3.from_rpy(0, 0, 0, 0, 0, rate / 60)
     forward, left, _ = sensor.read(4).linear_acceleration
     assert forward == pytest.approx(-(rate**2) * distance, rel=0.001)
-    assert left == pytest.approx(rate**2 * distance * rate / 120, rel=0.01)  # its frame turns during the period
+    assert left == pytest.approx(
+        rate**2 * distance * rate / 120, rel=0.01
+    )  # the frame of the IMU turns during the period

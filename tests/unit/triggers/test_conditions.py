@@ -21,8 +21,8 @@ HALL = ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0))
 
 
 @dataclass
-class Now:
-    """A situation as a test arranges it."""
+class Situation:
+    """Situation whose values are set by the test; `scans` are the ticks of the last scans by sensor."""
 
     tick: int = 0
     robot: Pose2 = Pose2(0.0, 0.0)
@@ -46,12 +46,13 @@ class Now:
         return self.objects.get(name)
 
 
-def holds(words, **now) -> bool:
-    return Trigger.model_validate(words).holds(Now(**now))
+def holds(words, **situation) -> bool:
+    """Return whether the trigger, written as in a scenario, holds in the situation."""
+    return Trigger.model_validate(words).holds(Situation(**situation))
 
 
 @pytest.mark.parametrize(("tick", "expected"), [(239, False), (240, True), (241, True)])
-def test_a_time_is_reached_at_its_tick(tick, expected):
+def test_time_holds_from_its_tick_on(tick, expected):
     assert holds({"time": "1 s"}, tick=tick) is expected
 
 
@@ -85,9 +86,9 @@ def test_distance_remaining_does_not_hold_without_a_goal():
     assert not holds({"distance_remaining": 100})
 
 
-@pytest.mark.parametrize(("off", "expected"), [(0.49, False), (0.5, False), (0.51, True)])
-def test_localization_error_holds_above_the_bound(off, expected):
-    belief = Belief(Pose2(1.0, 1.0 + off), np.eye(3))
+@pytest.mark.parametrize(("offset", "expected"), [(0.49, False), (0.5, False), (0.51, True)])
+def test_localization_error_holds_above_the_bound(offset, expected):
+    belief = Belief(Pose2(1.0, 1.0 + offset), np.eye(3))
     assert holds({"localization_error": 0.5}, robot=Pose2(1.0, 1.0), belief=belief) is expected
 
 
@@ -104,10 +105,10 @@ def test_believed_distance_remaining_uses_the_estimate(x, expected):
     assert not holds(words, belief=belief)
 
 
-@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(("rate", "below", "above"), [(0.49, True, False), (0.5, False, False), (0.51, False, True)])
-def test_turn_rate_ignores_the_direction(rate, below, above, side):
-    twist = Twist(3.0, 0.0, side * rate)
+def test_turn_rate_is_compared_without_its_sign(rate, below, above, sign):
+    twist = Twist(3.0, 0.0, sign * rate)
     assert holds({"turning_below": "0.5 rad/s"}, twist=twist) is below
     assert holds({"turning_above": "0.5 rad/s"}, twist=twist) is above
 
@@ -134,18 +135,18 @@ def test_scan_age_counts_from_the_start_before_the_first_scan(tick, expected):
 
 
 @pytest.mark.parametrize(
-    ("off", "turn", "expected"), [(0.5, 0.5, False), (0.51, 0.0, True), (0.0, 0.53, True), (0.0, 2 * np.pi, False)]
+    ("offset", "turn", "expected"), [(0.5, 0.5, False), (0.51, 0.0, True), (0.0, 0.53, True), (0.0, 2 * np.pi, False)]
 )
-def test_robot_is_lost_if_position_or_heading_is_wrong(off, turn, expected):
-    belief = Belief(Pose2(1.0, 1.0 + off, 3.0 + turn), np.eye(3) * 100)
+def test_robot_is_lost_if_position_or_heading_is_wrong(offset, turn, expected):
+    belief = Belief(Pose2(1.0, 1.0 + offset, 3.0 + turn), np.eye(3) * 100)
     assert holds({"localization_lost": {}}, robot=Pose2(1.0, 1.0, 3.0), belief=belief) is expected
 
 
 @pytest.mark.parametrize(("bound", "expected"), [(0.499, True), (0.501, False)])
 def test_uncertain_robot_is_lost_by_its_largest_standard_deviation(bound, expected):
-    turned = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
+    rotation = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
     covariance = np.eye(3)
-    covariance[:2, :2] = turned @ np.diag([0.5**2, 0.1**2]) @ turned.T
+    covariance[:2, :2] = rotation @ np.diag([0.5**2, 0.1**2]) @ rotation.T
     belief = Belief(Pose2(1.0, 1.0), covariance)
     assert holds({"localization_lost": {"std": bound}}, robot=Pose2(1.0, 1.0), belief=belief) is expected
 
@@ -172,8 +173,10 @@ def test_region_includes_its_edge(x, expected):
 def test_robot_within_includes_the_given_distance(x, expected):
     assert holds({"robot_within": {"region": "hall", "distance": 1.5}}, robot=Pose2(x, 1.0)) is expected
     assert holds({"robot_within": {"of": [2, 1], "distance": 1.5}}, robot=Pose2(x, 1.0)) is expected
-    there = {"cart": Pose2(2.0, 1.0)}
-    assert holds({"robot_within": {"object": "cart", "distance": 1.5}}, robot=Pose2(x, 1.0), objects=there) is expected
+    objects = {"cart": Pose2(2.0, 1.0)}
+    assert (
+        holds({"robot_within": {"object": "cart", "distance": 1.5}}, robot=Pose2(x, 1.0), objects=objects) is expected
+    )
 
 
 def test_x_and_y_of_a_point_are_not_swapped():
@@ -213,9 +216,9 @@ def test_logged_events_count_by_kind_and_name(kind):
 @pytest.mark.parametrize("kind", ["goal", "recovery", "collision", "pedestrian"])
 def test_condition_without_a_name_counts_all_events(kind):
     words, logged = LOGGED[kind]
-    bare = {key: value for key, value in words.items() if key == "status"}
-    assert holds({kind: bare}, events=(Event(1, logged, "whatever"),))
-    assert not holds({kind: bare})
+    unnamed = {key: value for key, value in words.items() if key == "status"}
+    assert holds({kind: unnamed}, events=(Event(1, logged, "whatever"),))
+    assert not holds({kind: unnamed})
 
 
 @pytest.mark.parametrize("kind", ["goal", "recovery", "pedestrian"])
@@ -235,23 +238,23 @@ def test_end_of_an_event_does_not_count_as_its_start():
 
 
 def test_start_and_end_of_a_fault_count_like_those_of_an_event():
-    began, over = Event(1, EventKind.FAULT_STARTED, "lidar.off"), Event(2, EventKind.FAULT_ENDED, "lidar.off")
-    assert holds({"event": {"name": "lidar.off"}}, events=(began,))
-    assert not holds({"event": {"name": "lidar.off", "status": "ended"}}, events=(began,))
-    assert holds({"event": {"name": "lidar.off", "status": "ended"}}, events=(began, over))
-    assert not holds({"event": {"name": "odom.bias"}}, events=(began, over))
+    started, ended = Event(1, EventKind.FAULT_STARTED, "lidar.off"), Event(2, EventKind.FAULT_ENDED, "lidar.off")
+    assert holds({"event": {"name": "lidar.off"}}, events=(started,))
+    assert not holds({"event": {"name": "lidar.off", "status": "ended"}}, events=(started,))
+    assert holds({"event": {"name": "lidar.off", "status": "ended"}}, events=(started, ended))
+    assert not holds({"event": {"name": "odom.bias"}}, events=(started, ended))
 
 
 def test_a_replan_is_a_plan_that_is_not_for_a_new_goal():
-    first, again = (
+    first, replan = (
         Event(1, EventKind.PLAN_MADE, "", {"reason": "goal"}),
         Event(2, EventKind.PLAN_MADE, "", {"reason": "blocked"}),
     )
-    other = Event(3, EventKind.PLAN_FAILED, "", {"reason": "blocked"})
-    assert not holds({"replan": {}}, events=(first, first, other))
-    assert holds({"replan": {}}, events=(first, again))
-    assert not holds({"replan": {"count": 2}}, events=(first, again))
-    assert holds({"replan": {"count": 2}}, events=(again, again))
+    failure = Event(3, EventKind.PLAN_FAILED, "", {"reason": "blocked"})
+    assert not holds({"replan": {}}, events=(first, first, failure))
+    assert holds({"replan": {}}, events=(first, replan))
+    assert not holds({"replan": {"count": 2}}, events=(first, replan))
+    assert holds({"replan": {"count": 2}}, events=(replan, replan))
 
 
 SOON, LATE = {"time": 1}, {"time": 2}
@@ -274,8 +277,8 @@ def test_conditions_combine(words, expected):
 
 
 def test_default_trigger_fires_once_immediately_and_certainly():
-    usual = Trigger.model_validate({"time": 1})
-    assert (usual.edge, usual.delay, usual.times, usual.probability) == ("rising", 0.0, 1, 1.0)
+    trigger = Trigger.model_validate({"time": 1})
+    assert (trigger.edge, trigger.delay, trigger.times, trigger.probability) == ("rising", 0.0, 1, 1.0)
 
 
 @pytest.mark.parametrize("words", [{"times": 0}, {"times": 10_001}, {"delay": -1}, {"probability": 1.5}])
@@ -296,7 +299,7 @@ TOUR = tuple(
 
 
 @pytest.mark.parametrize(
-    ("words", "events"),
+    ("words", "first_count"),
     [
         ({}, 2),
         ({"count": 2}, 4),
@@ -305,19 +308,19 @@ TOUR = tuple(
         ({"name": "door"}, None),
     ],
 )
-def test_waypoints_are_goals_that_were_reached_or_passed_in_any_loop(words, events):
-    held = [number for number in range(len(TOUR) + 1) if holds({"waypoint": words}, events=TOUR[:number])]
-    assert held == ([] if events is None else list(range(events, len(TOUR) + 1)))
+def test_waypoints_are_goals_that_were_reached_or_passed_in_any_loop(words, first_count):
+    counts = [count for count in range(len(TOUR) + 1) if holds({"waypoint": words}, events=TOUR[:count])]
+    assert counts == ([] if first_count is None else list(range(first_count, len(TOUR) + 1)))
 
 
 @pytest.mark.parametrize("kind", ["goal", "replan", "recovery"])
 @pytest.mark.parametrize("count", [0, 10_001])
-def test_counts_are_at_least_one(kind, count):
+def test_counts_are_between_1_and_10000(kind, count):
     words = {"goal": {"status": "reached"}, "replan": {}, "recovery": {}}[kind]
     with pytest.raises(ValidationError, match="count"):
         Trigger.model_validate({kind: {**words, "count": count}})
-    for fine in (1, 10_000):
-        assert Trigger.model_validate({kind: {**words, "count": fine}}).kind == kind
+    for valid_count in (1, 10_000):
+        assert Trigger.model_validate({kind: {**words, "count": valid_count}}).kind == kind
 
 
 @pytest.mark.parametrize("key", ["all", "any"])

@@ -1,4 +1,4 @@
-"""What tests of people build: walls of segments, a robot, and a stretch of time."""
+"""Crowds, walls, and robots for tests of pedestrians, and a loop that lets a crowd walk."""
 
 import math
 
@@ -9,8 +9,9 @@ from simscen.core.geometry import Pose2
 from simscen.pedestrians.crowd import Crowd
 from simscen.pedestrians.surroundings import ObservedRobot, Surroundings, WallMap
 
-STEP = 0.05
+STEP_S = 0.05
 SQUARE = np.array([(0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)])
+"""Footprint of a robot with a radius of 0.2 m."""
 
 
 def walls(*segments) -> WallMap:
@@ -22,17 +23,18 @@ def corridor(width: float, length: float = 100.0) -> WallMap:
     return walls(*([[-length, y], [length, y]] for y in (-width / 2, width / 2)))
 
 
-def people(*walkers: WalkingPedestrian, around: WallMap | None = None) -> Crowd:
-    crowd = Crowd(around or walls(), lambda _start, goal, _radius: [goal])
+def make_crowd(*walkers: WalkingPedestrian, wall_map: WallMap | None = None) -> Crowd:
+    """Return a crowd of `walkers` who walk straight to their goals."""
+    crowd = Crowd(wall_map or walls(), lambda _start, goal, _radius: [goal])
     for walker in walkers:
         crowd.add(walker)
     return crowd
 
 
-def walker(name: str, x: float, y: float, *goals: tuple[float, float], **more) -> WalkingPedestrian:
-    """Who faces their first goal, or east."""
+def walker(name: str, x: float, y: float, *goals: tuple[float, float], **settings) -> WalkingPedestrian:
+    """Return a pedestrian who faces the first goal, or east without goals, unless `settings` contain a yaw."""
     yaw = math.atan2(goals[0][1] - y, goals[0][0] - x) if goals else 0.0
-    return WalkingPedestrian(name, Pose2(x, y, more.pop("yaw", yaw)), goals, **more)
+    return WalkingPedestrian(name, Pose2(x, y, settings.pop("yaw", yaw)), goals, **settings)
 
 
 def robot(
@@ -43,17 +45,22 @@ def robot(
 
 
 def walk(crowd: Crowd, seconds: float, *robots: ObservedRobot) -> tuple[dict[str, np.ndarray], list[PedestrianEvent]]:
-    """Everybody's x, y, yaw at each step, the first before it; and what they did. Robots drive on as they do."""
+    """Step the crowd while the robots keep their velocities.
+
+    Returns the track of each pedestrian, with the rows x, y, yaw before the first step and after each step, and all
+    events.
+    """
     tracks = {name: [pose] for name, pose in crowd.poses().items()}
     events: list[PedestrianEvent] = []
-    for number in range(round(seconds / STEP)):
-        now = tuple(_driven(one, number * STEP) for one in robots)
-        events += crowd.step(Surroundings(now), STEP)
+    for step in range(round(seconds / STEP_S)):
+        moved = tuple(_move(robot, step * STEP_S) for robot in robots)
+        events += crowd.step(Surroundings(moved), STEP_S)
         for name, pose in crowd.poses().items():
             tracks[name].append(pose)
     return {name: np.array(track) for name, track in tracks.items()}, events
 
 
-def _driven(one: ObservedRobot, seconds: float) -> ObservedRobot:
-    pose = Pose2(one.pose.x + seconds * one.velocity[0], one.pose.y + seconds * one.velocity[1], one.pose.yaw)
-    return ObservedRobot(one.name, pose, one.velocity, one.radius, one.outline)
+def _move(robot: ObservedRobot, seconds: float) -> ObservedRobot:
+    """Return the robot after `seconds` at its velocity."""
+    pose = Pose2(robot.pose.x + seconds * robot.velocity[0], robot.pose.y + seconds * robot.velocity[1], robot.pose.yaw)
+    return ObservedRobot(robot.name, pose, robot.velocity, robot.radius, robot.outline)
