@@ -1,4 +1,4 @@
-"""Tests of clearing the costmap: reopened paths are found, and missing paths are detected."""
+"""Tests of clearing the costmap: a reopened door is found, and a blocked hall is detected."""
 
 import pytest
 
@@ -15,7 +15,7 @@ WALL = (6.0, 0.05, 6.2, 5.95)
 
 
 def drive_toward_wall(seconds: float, *, entirely: bool = False) -> Drive:
-    """Drive in a hall of 6 m that a new wall divides after 2 s; the lidar marks obstacles within 2.5 m."""
+    """Drive in a hall that a new wall blocks after 2 s; `entirely` clears the whole costmap each time, as in Nav2."""
     world = Flatland().room(12, 6)
     grid = world.grid((-0.5, -0.5, 12.5, 6.5))
     spec = StackSpec(localizer=GroundTruth(type="ground_truth"), recovery=Recovery(clear_entirely=entirely))
@@ -38,15 +38,15 @@ def test_nav2_profile_clears_the_whole_costmap_each_time() -> None:
 
 
 def test_reopened_door_out_of_sight_is_tried_again() -> None:
-    """The costmap is cleared again about ten seconds after the first time."""
+    """The costmap is cleared a second time after about ten seconds."""
     mapped = Flatland().room(8, 8)
     mapped.boxes += [(3.9, 0.0, 4.0, 1.0), (3.9, 2.0, 4.0, 6.0), (3.9, 7.0, 4.0, 8.0)]  # two doors
-    world = Flatland([*mapped.boxes, lower := (3.9, 1.0, 4.0, 2.0), (3.9, 6.0, 4.0, 7.0)])
+    world = Flatland([*mapped.boxes, lower_door := (3.9, 1.0, 4.0, 2.0), (3.9, 6.0, 4.0, 7.0)])
     goal, grid = Goal("g", Pose2(6.0, 1.5), timeout=120.0), mapped.grid((-0.5, -0.5, 8.5, 8.5))
     d = drive(world, Pose2(2.0, 1.5), goal, grid=grid)
     while d.pose.y < 4.0:
         d.run(0.1)
-    world.boxes.remove(lower)
+    world.boxes.remove(lower_door)
     assert d.run(120).result == "SUCCEEDED"
 
 
@@ -57,9 +57,9 @@ def test_whole_costmap_is_cleared_with_growing_intervals() -> None:
     assert backoff.clears_entirely(100.0, 5.0)
 
 
-@pytest.mark.parametrize(("to_go", "clears"), [(4.5, False), (3.9, True)])
-def test_progress_of_a_meter_allows_clearing_at_once(to_go: float, clears: bool) -> None:
+@pytest.mark.parametrize(("remaining_m", "clears"), [(4.5, False), (3.9, True)])
+def test_progress_of_a_meter_allows_clearing_at_once(remaining_m: float, clears: bool) -> None:
     backoff = ClearingBackoff()
     assert backoff.clears_entirely(0.0, 5.0)
-    assert backoff.clears_entirely(1.0, to_go) == clears
-    assert not backoff.clears_entirely(2.0, to_go)
+    assert backoff.clears_entirely(1.0, remaining_m) == clears
+    assert not backoff.clears_entirely(2.0, remaining_m)

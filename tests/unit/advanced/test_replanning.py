@@ -1,3 +1,5 @@
+"""Tests of when the advanced stack replaces its plan."""
+
 import math
 
 import numpy as np
@@ -22,17 +24,17 @@ START = Pose2(1.0, 3.0)
 WORLD = Flatland().room(8, 6)
 
 
-class Scripted:
-    """Planner and controller with a scripted result: a path with a lateral `bulge` in m, or a failure."""
+class ScriptedPlanner:
+    """Planner and controller that return a path with a lateral `bulge` in m, or fail if `fails` is set."""
 
     def __init__(self) -> None:
         self.seeds: list[int] = []
-        self.bulge, self.broken = 0.0, False
+        self.bulge, self.fails = 0.0, False
         self.local_plan = None
 
     def plan(self, costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         self.seeds.append(seed)
-        if self.broken:
+        if self.fails:
             raise NavigationFailure(ErrorCode.NO_VALID_PATH, "scripted failure")
         x = np.linspace(start.x, goal.x, 121)
         y = start.y + self.bulge * np.sin(np.linspace(0, math.pi, 121))
@@ -48,11 +50,11 @@ class Scripted:
         return STOP
 
 
-class Bench:
-    """Plan manager with its costmap. `latency` is the planning time in ticks."""
+class PlanManagerSetup:
+    """Plan manager with a costmap and a scripted planner. `latency` is the planning time in ticks."""
 
     def __init__(self, latency: int = 0, **options: object) -> None:
-        self.script = Scripted()
+        self.script = ScriptedPlanner()
         grid = WORLD.grid((-0.5, -0.5, 8.5, 6.5))
         self.costmap = LayeredCostmap(CostmapSpec(), Surroundings(round_robot(), grid, TICK_RATE_HZ))
         self.journal: list[Event] = []
@@ -82,167 +84,167 @@ class Bench:
         self.costmap.update(START, Scan("lidar", 0, ranges, -math.pi, step, 0.05, 12.0))
 
 
-def test_a_plan_is_made_once_and_each_has_its_own_seed() -> None:
-    bench = Bench()
-    assert bench.steps(40) == ["goal"]
-    bench.manager.drop("recovery")
-    assert bench.steps(40) == ["recovery"]
-    assert bench.script.seeds == [101, 102]
+def test_goal_is_planned_once_and_each_plan_has_its_own_seed() -> None:
+    setup = PlanManagerSetup()
+    assert setup.steps(40) == ["goal"]
+    setup.manager.drop("recovery")
+    assert setup.steps(40) == ["recovery"]
+    assert setup.script.seeds == [101, 102]
 
 
 def test_blocked_plan_is_replaced_or_fails() -> None:
-    bench = Bench()
-    bench.steps(4)
-    bench.see((2.5, 3.0, 0.2))
-    bench.script.broken = True
+    setup = PlanManagerSetup()
+    setup.steps(4)
+    setup.see((2.5, 3.0, 0.2))
+    setup.script.fails = True
     with pytest.raises(NavigationFailure):
-        bench.steps(4)
-    bench.script.broken, bench.script.bulge = False, 1.0
-    assert bench.steps(4) == ["blocked"]
+        setup.steps(4)
+    setup.script.fails, setup.script.bulge = False, 1.0
+    assert setup.steps(4) == ["blocked"]
 
 
 def test_plan_that_was_blocked_while_it_was_made_is_replaced() -> None:
-    bench = Bench(latency=round(0.2 * TICK_RATE_HZ))
-    bench.steps(2)
-    bench.see((2.5, 3.0, 0.2))  # the planner does not know this obstacle
-    bench.script.bulge = 1.0
-    assert bench.steps(20) == ["goal", "blocked"]
+    setup = PlanManagerSetup(latency=round(0.2 * TICK_RATE_HZ))
+    setup.steps(2)
+    setup.see((2.5, 3.0, 0.2))  # the planner does not know this obstacle
+    setup.script.bulge = 1.0
+    assert setup.steps(20) == ["goal", "blocked"]
 
 
 def test_obstacle_next_to_the_plan_does_not_cause_replanning() -> None:
-    bench = Bench()
-    bench.steps(4)
-    bench.see((2.5, 4.5, 0.2))
-    assert bench.steps(80) == []
+    setup = PlanManagerSetup()
+    setup.steps(4)
+    setup.see((2.5, 4.5, 0.2))
+    assert setup.steps(80) == []
 
 
 def test_removed_obstacle_leads_to_a_clearly_shorter_plan() -> None:
-    bench = Bench()
-    bench.script.bulge = 2.5
-    bench.see((2.5, 3.0, 0.4))
-    bench.steps(4)
-    bench.see()
-    assert bench.steps(60) == []  # one search, but its plan was no shorter
-    bench.see((2.5, 3.0, 0.4))
-    bench.steps(4)
-    bench.script.bulge = 0.0
-    bench.see()
-    assert bench.steps(60) == ["better"]
+    setup = PlanManagerSetup()
+    setup.script.bulge = 2.5
+    setup.see((2.5, 3.0, 0.4))
+    setup.steps(4)
+    setup.see()
+    assert setup.steps(60) == []  # one search, but its plan was no shorter
+    setup.see((2.5, 3.0, 0.4))
+    setup.steps(4)
+    setup.script.bulge = 0.0
+    setup.see()
+    assert setup.steps(60) == ["better"]
 
 
 def test_no_better_plan_is_searched_if_the_straight_line_is_not_clearly_shorter() -> None:
-    """Otherwise the planner would be busy, and a blocked plan would have to wait."""
-    for bulge, searches in ((1.0, False), (2.5, True)):  # paths of 6.4 m and 8.5 m instead of 6 m
-        bench = Bench()
-        bench.script.bulge = bulge
-        bench.see((2.5, 3.0, 0.2))
-        bench.steps(4)
-        bench.see()
-        assert bench.steps(60) == []
-        assert (len(bench.script.seeds) == 2) == searches
+    """A useless search would delay the replacement of a blocked plan."""
+    for bulge, is_searched in ((1.0, False), (2.5, True)):  # paths of 6.4 m and 8.5 m instead of 6 m
+        setup = PlanManagerSetup()
+        setup.script.bulge = bulge
+        setup.see((2.5, 3.0, 0.2))
+        setup.steps(4)
+        setup.see()
+        assert setup.steps(60) == []
+        assert (len(setup.script.seeds) == 2) == is_searched
 
 
 def test_failed_search_for_a_better_plan_is_ignored() -> None:
-    bench = Bench()
-    bench.script.bulge = 2.5
-    bench.see((2.5, 3.0, 0.4))
-    bench.steps(4)
-    bench.script.broken = True
-    bench.see()
-    assert bench.steps(60) == []
-    assert len(bench.script.seeds) == 2
-    assert bench.manager.plan is not None
+    setup = PlanManagerSetup()
+    setup.script.bulge = 2.5
+    setup.see((2.5, 3.0, 0.4))
+    setup.steps(4)
+    setup.script.fails = True
+    setup.see()
+    assert setup.steps(60) == []
+    assert len(setup.script.seeds) == 2
+    assert setup.manager.plan is not None
 
 
 def test_replanning_at_a_rate_is_unconditional() -> None:
-    bench = Bench(replanning="rate", replanning_rate=2.0)
-    assert bench.steps(40) == ["goal", "rate", "rate", "rate"]
+    setup = PlanManagerSetup(replanning="rate", replanning_rate=2.0)
+    assert setup.steps(40) == ["goal", "rate", "rate", "rate"]
 
 
 def test_replanning_at_a_rate_near_the_goal_replaces_only_blocked_plans() -> None:
-    """IsGoalNearby and ValidatePath of Nav2's default trees."""
-    bench, near = Bench(replanning="rate", replanning_rate=2.0), Goal("near", Pose2(4.5, 3.0))
-    assert bench.steps(40, near) == ["goal"]
-    bench.see((3.0, 3.0, 0.3))
-    assert bench.steps(12, near) == ["rate"]
+    """As with IsGoalNearby and ValidatePath in Nav2's default behavior trees."""
+    setup, near = PlanManagerSetup(replanning="rate", replanning_rate=2.0), Goal("near", Pose2(4.5, 3.0))
+    assert setup.steps(40, near) == ["goal"]
+    setup.see((3.0, 3.0, 0.3))
+    assert setup.steps(12, near) == ["rate"]
 
 
-def test_a_plan_that_ends_too_far_from_the_goal_means_that_the_goal_is_occupied() -> None:
-    bench = Bench()
-    bench.script.plan = lambda *_: Path(np.array([[1.0, 3.0, 0.0], [6.5, 3.0, 0.0]]))
-    with pytest.raises(NavigationFailure) as failed:
-        bench.steps(1)
-    assert failed.value.code == ErrorCode.GOAL_OCCUPIED
+def test_plan_that_ends_too_far_from_the_goal_fails_with_goal_occupied() -> None:
+    setup = PlanManagerSetup()
+    setup.script.plan = lambda *_: Path(np.array([[1.0, 3.0, 0.0], [6.5, 3.0, 0.0]]))
+    with pytest.raises(NavigationFailure) as failure:
+        setup.steps(1)
+    assert failure.value.code == ErrorCode.GOAL_OCCUPIED
 
 
 def test_plans_keep_more_clearance_after_a_control_failure() -> None:
-    bench = Bench()
-    straight, asked = bench.script.plan, list[float]()
+    setup = PlanManagerSetup()
+    plan_straight, clearance_increases = setup.script.plan, list[float]()
 
     def plan(costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
         row, column = (
             round((center - low) / costmap.resolution) for center, low in zip((3.0, 1.0), costmap.origin, strict=True)
         )
-        asked.append(float(bench.costmap.view.distance[row, column] - costmap.distance[row, column]))
-        return straight(costmap, start, goal, seed)
+        clearance_increases.append(float(setup.costmap.view.distance[row, column] - costmap.distance[row, column]))
+        return plan_straight(costmap, start, goal, seed)
 
-    bench.script.plan = plan
-    bench.steps(2)
-    bench.manager.report_control_failure()
-    bench.manager.drop("recovery")
-    bench.steps(2)
-    bench.manager.reset(bench.now)
-    bench.steps(2)
-    assert asked == pytest.approx([0.0, 0.1, 0.15, 0.0])
+    setup.script.plan = plan
+    setup.steps(2)
+    setup.manager.report_control_failure()
+    setup.manager.drop("recovery")
+    setup.steps(2)
+    setup.manager.reset(setup.now)
+    setup.steps(2)
+    assert clearance_increases == pytest.approx([0.0, 0.1, 0.15, 0.0])
 
 
 @pytest.mark.parametrize(("xy_tolerance", "end_x"), [(0.25, 6.9), (0.05, 7.0)])
 def test_clearance_does_not_move_the_end_of_the_plan_beyond_the_tolerance(xy_tolerance: float, end_x: float) -> None:
-    bench = Bench()
-    straight = bench.script.plan
+    setup = PlanManagerSetup()
+    plan_straight = setup.script.plan
 
     def plan(costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        is_grown = costmap.distance is not bench.costmap.view.distance
-        return straight(costmap, start, Pose2(goal.x - 0.1, goal.y) if is_grown else goal, seed)
+        is_grown = costmap.distance is not setup.costmap.view.distance
+        return plan_straight(costmap, start, Pose2(goal.x - 0.1, goal.y) if is_grown else goal, seed)
 
-    bench.script.plan = plan
-    bench.manager.report_control_failure()
-    assert bench.steps(2, Goal("g", GOAL.pose, xy_tolerance=xy_tolerance)) == ["goal"]
-    assert bench.manager.plan.path.points[-1, 0] == pytest.approx(end_x)
+    setup.script.plan = plan
+    setup.manager.report_control_failure()
+    assert setup.steps(2, Goal("g", GOAL.pose, xy_tolerance=xy_tolerance)) == ["goal"]
+    assert setup.manager.plan.path.points[-1, 0] == pytest.approx(end_x)
 
 
-@pytest.mark.parametrize(("bulge", "kept"), [(0.3, True), (2.5, False)])
-def test_clearance_increases_if_the_path_is_hardly_longer(bulge: float, kept: bool) -> None:
-    bench = Bench()
-    bench.steps(2)
-    bench.manager.report_control_failure()
-    bench.manager.drop("recovery")
-    plan, bulges = bench.script.plan, iter([0.0, bulge])
+@pytest.mark.parametrize(("bulge", "is_accepted"), [(0.3, True), (2.5, False)])
+def test_clearance_increases_if_the_path_is_hardly_longer(bulge: float, is_accepted: bool) -> None:
+    setup = PlanManagerSetup()
+    setup.steps(2)
+    setup.manager.report_control_failure()
+    setup.manager.drop("recovery")
+    plan, bulges = setup.script.plan, iter([0.0, bulge])
 
-    def wider_plan(*asked: object) -> Path:
-        bench.script.bulge = next(bulges)
-        return plan(*asked)
+    def wider_plan(*arguments: object) -> Path:
+        setup.script.bulge = next(bulges)
+        return plan(*arguments)
 
-    bench.script.plan = wider_plan
-    bench.steps(2)
-    assert (bench.manager.plan.path.points[:, 1].max() > 3.2) == kept
+    setup.script.plan = wider_plan
+    setup.steps(2)
+    assert (setup.manager.plan.path.points[:, 1].max() > 3.2) == is_accepted
 
 
 def test_tight_path_is_retried_if_there_is_no_wider_one() -> None:
-    bench = Bench()
-    bench.steps(2)
-    bench.manager.report_control_failure()
-    bench.manager.drop("recovery")
-    straight, is_unchanged = bench.script.plan, list[bool]()
+    setup = PlanManagerSetup()
+    setup.steps(2)
+    setup.manager.report_control_failure()
+    setup.manager.drop("recovery")
+    plan_straight, is_unchanged = setup.script.plan, list[bool]()
 
     def plan(costmap: CostmapView, start: Pose2, goal: Pose2, seed: int) -> Path:
-        is_unchanged.append(costmap.distance is bench.costmap.view.distance)
+        is_unchanged.append(costmap.distance is setup.costmap.view.distance)
         if not is_unchanged[-1]:
             raise NavigationFailure(ErrorCode.NO_VALID_PATH, "too tight")
-        return straight(costmap, start, goal, seed)
+        return plan_straight(costmap, start, goal, seed)
 
-    bench.script.plan = plan
-    assert bench.steps(2) == ["recovery"]
+    setup.script.plan = plan
+    assert setup.steps(2) == ["recovery"]
     assert is_unchanged == [False, False, True]
 
 
@@ -252,35 +254,35 @@ def obstacle_at(y: float, vy: float) -> MovingObstacles:
 
 
 def test_plan_that_meets_a_moving_obstacle_is_renewed_twice_a_second() -> None:
-    bench = Bench()
-    assert bench.steps(20) == ["goal"]
-    bench.costmap.moving = obstacle_at(5.0, -1.0)  # meets the robot at (2, 3) in 2 s
-    assert bench.steps(20) == ["moving", "moving"]
-    bench.costmap.moving = NO_MOVING_OBSTACLES
-    assert bench.steps(40) == ["moving"]  # back to the straight path
+    setup = PlanManagerSetup()
+    assert setup.steps(20) == ["goal"]
+    setup.costmap.moving = obstacle_at(5.0, -1.0)  # meets the robot at (2, 3) in 2 s
+    assert setup.steps(20) == ["moving", "moving"]
+    setup.costmap.moving = NO_MOVING_OBSTACLES
+    assert setup.steps(40) == ["moving"]  # back to the straight path
 
 
 def test_rejected_plan_around_a_moving_obstacle_causes_no_more_replanning() -> None:
-    bench = Bench()
-    bench.script.bulge = 2.5
-    bench.see((2.5, 3.0, 0.4))
-    bench.steps(4)
-    bench.costmap.moving = obstacle_at(2.2, -0.2)  # not on the plan, but on alternative paths
-    bench.see()
-    assert bench.steps(60) == []
-    assert len(bench.script.seeds) == 2  # one search for a better plan
+    setup = PlanManagerSetup()
+    setup.script.bulge = 2.5
+    setup.see((2.5, 3.0, 0.4))
+    setup.steps(4)
+    setup.costmap.moving = obstacle_at(2.2, -0.2)  # not on the plan, but on alternative paths
+    setup.see()
+    assert setup.steps(60) == []
+    assert len(setup.script.seeds) == 2  # one search for a better plan
 
 
 def test_departing_obstacle_does_not_cause_replanning() -> None:
-    bench = Bench()
-    assert bench.steps(20) == ["goal"]
-    bench.costmap.moving = obstacle_at(4.5, 1.0)
-    assert bench.steps(40) == []
+    setup = PlanManagerSetup()
+    assert setup.steps(20) == ["goal"]
+    setup.costmap.moving = obstacle_at(4.5, 1.0)
+    assert setup.steps(40) == []
 
 
 def test_plan_is_kept_without_a_path_around_a_moving_obstacle() -> None:
-    bench = Bench()
-    assert bench.steps(20) == ["goal"]
-    bench.costmap.moving, bench.script.broken = obstacle_at(5.0, -1.0), True
-    assert bench.steps(20) == []
-    assert bench.manager.plan is not None
+    setup = PlanManagerSetup()
+    assert setup.steps(20) == ["goal"]
+    setup.costmap.moving, setup.script.fails = obstacle_at(5.0, -1.0), True
+    assert setup.steps(20) == []
+    assert setup.manager.plan is not None

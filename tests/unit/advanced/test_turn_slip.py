@@ -1,4 +1,4 @@
-"""Tests of uneven wheel slip."""
+"""Tests of the compensation of wheel slip that turns or delays the robot."""
 
 import math
 from dataclasses import replace
@@ -16,7 +16,7 @@ from simscen.core.records.trace import Decision
 from simscen.model.stack import StackSpec
 from simscen.testing.flatland import Drive, Flatland, drive
 
-BEND = 0.3
+GROUND_CURVATURE = 0.3
 """Additional curvature to the left in 1/m, caused by the ground."""
 ROOM = Flatland().room(14, 2.6)
 
@@ -32,19 +32,21 @@ class SlippingDrive:
         step = self._before.between(self.drive.pose)
         self._before = self.drive.pose
         self._odometry = self._odometry.compose(
-            Pose2(step.x * (1 + self._wheel_slip), step.y, step.yaw - BEND * step.x)
+            Pose2(step.x * (1 + self._wheel_slip), step.y, step.yaw - GROUND_CURVATURE * step.x)
         )
         imu = Imu("imu", tick, (0.0, 0.0, self.drive.twist.wz), (0.0, 0.0, 9.81))
-        sent = tuple(replace(one, pose=self._odometry) if isinstance(one, Odometry) else one for one in readings)
-        decision = self.stack.decide(tick, (imu, *sent))
+        modified_readings = tuple(
+            replace(reading, pose=self._odometry) if isinstance(reading, Odometry) else reading for reading in readings
+        )
+        decision = self.stack.decide(tick, (imu, *modified_readings))
         vx, vy, wz = decision.command
-        return replace(decision, command=Twist(vx, vy, wz + BEND * vx))
+        return replace(decision, command=Twist(vx, vy, wz + GROUND_CURVATURE * vx))
 
 
-def drive_with_slip(**smoothed: bool) -> Drive:
+def drive_with_slip(**smoother_options: bool) -> Drive:
     """Drive straight through a room for 11 m."""
     spec = StackSpec(
-        profile="advanced", localizer=SlipEkf(type="slip_ekf", rotation_noise=0.5), velocity_smoother=smoothed
+        profile="advanced", localizer=SlipEkf(type="slip_ekf", rotation_noise=0.5), velocity_smoother=smoother_options
     )
     d = drive(ROOM, Pose2(1.0, 1.3), Goal("g", Pose2(12.0, 1.3)), spec=spec, odometry=("odom",))
     d.stack = SlippingDrive(d)
@@ -70,10 +72,12 @@ def max_lateral_error(d: Drive) -> float:
     return max(abs(pose.y - 1.3) for pose in d.track if 4.0 < pose.x < 11.0)
 
 
-@pytest.mark.parametrize("matched, error", [(False, 0.7), (True, 0.1)])
-def test_scan_matching_corrects_the_distance_of_slipping_wheels(matched: bool, error: float) -> None:
+@pytest.mark.parametrize("match_scans, error", [(False, 0.7), (True, 0.1)])
+def test_scan_matching_corrects_the_distance_of_slipping_wheels(match_scans: bool, error: float) -> None:
     """Odometry overestimates the distance of 8 m by 10 %."""
-    spec = StackSpec(profile="advanced", localizer=SlipEkf(type="slip_ekf", rotation_noise=0.5, match_scans=matched))
+    spec = StackSpec(
+        profile="advanced", localizer=SlipEkf(type="slip_ekf", rotation_noise=0.5, match_scans=match_scans)
+    )
     world = Flatland().room(14, 6)
     world.discs += [(2.0 + 2.0 * k, 1.5 if k % 2 else 4.5, 0.2) for k in range(6)]
     d = drive(world, Pose2(1.0, 3.0), Goal("g", Pose2(12.9, 3.0)), spec=spec, odometry=("odom",))

@@ -1,4 +1,4 @@
-"""Let tests of this folder import each other's helpers in every import mode of pytest."""
+"""Make the modules of this folder importable in its tests, which pytest's importlib mode does not."""
 
 import sys
 from pathlib import Path

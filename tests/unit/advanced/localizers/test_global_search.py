@@ -1,4 +1,4 @@
-"""Tests of the global search for a pose."""
+"""Tests of the search for the robot's pose on the whole map."""
 
 import numpy as np
 import pytest
@@ -59,7 +59,7 @@ def test_empty_scans_find_no_pose() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 3, 4, 6, 9])
-def test_highest_scores_are_chosen_and_of_equal_ones_the_first(count: int) -> None:
+def test_highest_scores_are_chosen_and_the_first_of_equal_scores(count: int) -> None:
     scores = np.array([2, 5, 3, 3, 9, 3], dtype=np.uint16)
     by_score = sorted(range(6), key=lambda index: (-int(scores[index]), index))
     assert _highest(scores, count).tolist() == sorted(by_score[:count])

@@ -1,4 +1,4 @@
-"""Tests of map trust: weights of scans, and beams that leave the map."""
+"""Tests of map trust: the weight of a scan, and beams that end outside the map."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ from simscen.stack.localizers.beams import Beams, ComplexPoints
 from simscen.stack.localizers.particles import Particles
 from simscen.stack.localizers.sensor_models import obstacle_field
 
-NEAR = np.array([[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]])
-"""Concentrated particles in the middle of the map."""
+CONCENTRATED = np.array([[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]])
+"""Poses of particles in the middle of the map."""
 SPREAD = np.array([[-2.0, 0.0, 0.0], [2.0, 0.0, 0.1], [0.0, 0.5, -0.1]])
 
 
@@ -35,32 +35,32 @@ def scan_weight(poses: Array, on_walls: int, in_free_space: int, off_map: int) -
     """Return the weight of a scan with these numbers of beams, and which of its beams are compared."""
     walls = np.linspace(-1.0, 1.0, on_walls) + 1.9j
     ends = np.concatenate((walls, np.full(in_free_space, 2.0 + 0.0j), np.full(off_map, 14.0 + 0.0j)))
-    exponent, _, counting = trust().weight(Particles.with_equal_weights(poses), beams_to(ends))
-    return exponent, None if counting is None else counting.tolist()
+    exponent, _, is_compared = trust().weight(Particles.with_equal_weights(poses), beams_to(ends))
+    return exponent, None if is_compared is None else is_compared.tolist()
 
 
 def test_scan_that_fits_the_map_has_full_weight() -> None:
-    assert scan_weight(NEAR, 20, 0, 0) == (1.0, None)
+    assert scan_weight(CONCENTRATED, 20, 0, 0) == (1.0, None)
 
 
 @pytest.mark.parametrize(("on_walls", "in_free_space", "weight"), [(17, 3, 1.0), (12, 8, 3 / 7), (8, 12, 0.0)])
 def test_scan_with_few_fitting_beams_has_less_weight(on_walls: int, in_free_space: int, weight: float) -> None:
-    assert scan_weight(NEAR, on_walls, in_free_space, 0)[0] == pytest.approx(weight, abs=1e-9)
+    assert scan_weight(CONCENTRATED, on_walls, in_free_space, 0)[0] == pytest.approx(weight, abs=1e-9)
 
 
-@pytest.mark.parametrize("poses", [NEAR, SPREAD])
+@pytest.mark.parametrize("poses", [CONCENTRATED, SPREAD])
 def test_scan_with_few_beams_on_the_map_has_no_weight(poses: Array) -> None:
     """Regression: the scan had its full weight, and moved particles from unknown rooms back into the map."""
     assert scan_weight(poses, 2, 0, 30)[0] == 0.0
 
 
 def test_partly_mapped_scan_has_partial_weight() -> None:
-    exponent, _ = scan_weight(NEAR, 10, 0, 10)
+    exponent, _ = scan_weight(CONCENTRATED, 10, 0, 10)
     assert exponent == pytest.approx(4 / 7, abs=1e-9)
 
 
 def test_beams_that_leave_the_map_are_not_compared() -> None:
-    assert scan_weight(NEAR, 2, 1, 1)[1] == [True, True, True, False]
+    assert scan_weight(CONCENTRATED, 2, 1, 1)[1] == [True, True, True, False]
 
 
 def test_beams_without_a_hit_are_kept_if_others_are_excluded() -> None:
@@ -88,8 +88,8 @@ def test_beam_ends_are_computed_for_the_requested_poses() -> None:
     grid = OccupancyGrid(np.full((80, 80), FREE, dtype=np.int8), 0.1, Pose2(-4.0, -4.0, 0.0))
     field, beams = obstacle_field(grid, 2.0), beams_to(np.array([1.0 + 1.0j, -2.0 + 0.3j]))
     origin, shifted = np.zeros((1, 3)), np.array([[0.5, 0.0, 0.0]])
-    for poses, first in ((origin, (50, 50)), (shifted, (55, 50)), (origin, (50, 50)), (shifted, (55, 50))):
-        column, row = first
+    for poses, expected_cell in ((origin, (50, 50)), (shifted, (55, 50)), (origin, (50, 50)), (shifted, (55, 50))):
+        column, row = expected_cell
         assert beams.cells(field, poses)[0, 0] == (row + 1) * 82 + column + 1
 
 

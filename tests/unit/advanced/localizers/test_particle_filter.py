@@ -1,4 +1,4 @@
-"""Tests of particle motion when scan matching and odometry disagree."""
+"""Tests of the particle filter with scan matching: motion of the particles, and random particles."""
 
 import numpy as np
 import pytest
@@ -15,8 +15,8 @@ from simscen.testing.synthetic_room import BEAMS, cast, grid, scan
 START, ELSEWHERE = Pose2(-2.5, -1.8, 0.6), Pose2(3.9, -0.2, 2.4)
 
 
-def poses_after(scan_matching: Pose2, odometry: Pose2) -> Array:
-    """Return the poses (n, 3) of particles that all started at the origin."""
+def particles_after(scan_matching: Pose2, odometry: Pose2) -> Array:
+    """Return the poses (n, 3) of particles that start at the origin, after the motion measured by both sources."""
     spec = ScanMatchingAmcl()
     models, motion = map_models(grid(), spec), DifferentialMotionModel((0.2, 0.2, 0.2, 0.2))
     pf = ScanMatchingParticleFilter(spec, motion, models.sensor, models.free_space, np.random.default_rng(1))
@@ -26,22 +26,23 @@ def poses_after(scan_matching: Pose2, odometry: Pose2) -> Array:
 
 
 def test_some_particles_follow_odometry_if_scans_show_no_motion() -> None:
-    """People who walk next to a robot look like surroundings that move with it."""
-    poses = poses_after(Pose2(0.0, 0.0, 0.0), Pose2(1.0, 0.0, 0.0))
-    by_odometry = np.hypot(poses[:, 0], poses[:, 1]) > 0.1
-    assert abs(by_odometry.mean() - ODOMETRY_SHARE) < 0.05
+    """To scan matching, people who walk next to the robot look like static surroundings."""
+    poses = particles_after(Pose2(0.0, 0.0, 0.0), Pose2(1.0, 0.0, 0.0))
+    follows_odometry = np.hypot(poses[:, 0], poses[:, 1]) > 0.1
+    assert abs(follows_odometry.mean() - ODOMETRY_SHARE) < 0.05
 
 
 def test_some_particles_rotate_with_odometry_if_scan_matching_disagrees() -> None:
-    poses = poses_after(Pose2(0.0, 0.0, 0.3), Pose2(0.0, 0.0, 0.5))
-    by_odometry = np.abs(poses[:, 2] - 0.3) > 0.03
-    assert abs(by_odometry.mean() - ODOMETRY_SHARE) < 0.05
-    assert 0.4 < np.median(poses[by_odometry, 2]) < 0.6
+    poses = particles_after(Pose2(0.0, 0.0, 0.3), Pose2(0.0, 0.0, 0.5))
+    follows_odometry = np.abs(poses[:, 2] - 0.3) > 0.03
+    assert abs(follows_odometry.mean() - ODOMETRY_SHARE) < 0.05
+    assert 0.4 < np.median(poses[follows_odometry, 2]) < 0.6
 
 
 @pytest.mark.parametrize(("relocalization", "stay_together"), [("scan_matching", True), ("random", False)])
-def test_random_particles_are_added_only_by_random_relocalization(relocalization: str, stay_together: bool) -> None:
-    """The particles no longer fit the scans."""
+def test_only_random_relocalization_adds_random_particles_when_scans_no_longer_fit(
+    relocalization: str, stay_together: bool
+) -> None:
     spec = ScanMatchingAmcl.model_validate({
         "relocalization": relocalization, "recovery_alpha_slow": 0.01, "recovery_alpha_fast": 0.5,
         "map_trust_full": 0.0, "settling_distance": 0.0,

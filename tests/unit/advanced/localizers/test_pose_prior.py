@@ -1,4 +1,4 @@
-"""Tests of the pose prior, which bounds the drift of the robot."""
+"""Tests of the pose prior, the distribution of poses that the robot can have reached by odometry and scan matching."""
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from simscen.stack.localizers.particles import pose_errors
 START = Pose2(1.0, 2.0, np.pi / 2)
 PRIOR = PosePrior.at(np.array([5.0, 5.0, 0.0]), START)
 BASE = START.compose(Pose2(2.0, 1.0, 0.3))
+"""Base pose by scan matching after a drive from START."""
 STEP = MatchedMotion(Pose2(0.25, 0.0, 0.1), np.array([[4e-5, 1e-5, 0.0], [1e-5, 3e-5, 1e-5], [0.0, 1e-5, 2e-5]]))
 
 
@@ -38,12 +39,12 @@ def test_expected_pose_follows_matched_scans() -> None:
 def test_step_errors_accumulate_as_in_simulation(error: tuple[float, ...]) -> None:
     rng, base = np.random.default_rng(1), START
     prior = PosePrior.at(np.array([5.0, 5.0, 0.7]), START, (1e-6, 1e-6, 1e-6))
-    robots = np.tile(np.array(prior.pose), (20_000, 1))
+    poses = np.tile(np.array(prior.pose), (20_000, 1))
     for _ in range(20):
-        robots, before, base = sample_motion(robots, STEP, rng), base, base.compose(STEP.delta)
-        prior = prior.propagate(before, base, 0.3, ObservedMotion(step=STEP))
-    errors = pose_errors(prior.expected(base), robots)
-    delta, covariance = np.array(error), errors.T @ errors / len(robots)
+        poses, last_base, base = sample_motion(poses, STEP, rng), base, base.compose(STEP.delta)
+        prior = prior.propagate(last_base, base, 0.3, ObservedMotion(step=STEP))
+    errors = pose_errors(prior.expected(base), poses)
+    delta, covariance = np.array(error), errors.T @ errors / len(poses)
     assert cost_of_error(prior, base, delta) == pytest.approx(0.5 * delta @ np.linalg.inv(covariance) @ delta, rel=0.05)
 
 

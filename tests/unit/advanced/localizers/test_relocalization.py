@@ -1,4 +1,4 @@
-"""Tests of relocalization by recent scans."""
+"""Tests of relocalization: finding the robot's pose on the map with the scans of the last meters."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ ERROR = Pose2(0.4, -0.3, 0.15)
 
 
 def map_around_start() -> OccupancyGrid:
-    """Return the map of the corner around START only, which shows less than half of the surfaces seen there."""
+    """Return a map of the corner around START, with less than half of the surfaces that are visible from START."""
     cells = grid().cells.copy()
     cells[:, grid().shape[1] * 35 // 100 :] = UNKNOWN
     cells[grid().shape[0] * 40 // 100 :] = UNKNOWN
@@ -32,25 +32,26 @@ def relocalizations(
 ) -> list[Array]:  # fmt: skip
     """Return the remaining errors after each relocalization of a robot whose belief is off by `error`.
 
-    It drives `distance` m from START with a curvature `turn` (rad/m) and a scan every `spacing` m. `initial` and
-    `std` are error and standard deviations of the initial estimate.
+    The robot drives `distance` m from START with a curvature `turn` in rad/m and a scan every `spacing` m. The
+    relocalizer accepts poses near the initial estimate for `settling` m; `initial` and `std` are the error and the
+    standard deviations of this estimate.
     """
-    known = map_ or grid()
-    trust = MapTrust(obstacle_field(known, 2.0), unmapped_cells(known).ravel(), 0.45, 0.8)
-    finder = Relocalizer(GlobalSearch(known), trust, Estimate(START.compose(initial), std), settling)
-    offsets = []
-    for driven in np.arange(0.0, distance, spacing).tolist():
+    grid_map = map_ or grid()
+    trust = MapTrust(obstacle_field(grid_map, 2.0), unmapped_cells(grid_map).ravel(), 0.45, 0.8)
+    relocalizer = Relocalizer(GlobalSearch(grid_map), trust, Estimate(START.compose(initial), std), settling)
+    errors = []
+    for meters in np.arange(0.0, distance, spacing).tolist():
         base = (
-            Pose2(driven, 0.0, 0.0)
+            Pose2(meters, 0.0, 0.0)
             if not turn
-            else Pose2(np.sin(turn * driven) / turn, (1 - np.cos(turn * driven)) / turn, turn * driven)
+            else Pose2(np.sin(turn * meters) / turn, (1 - np.cos(turn * meters)) / turn, turn * meters)
         )
         pose = START.compose(base)
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
-        poses = finder.update(scan(ranges), base, pose.compose(error), (0.0, 100.0))
+        poses = relocalizer.update(scan(ranges), base, pose.compose(error), (0.0, 100.0))
         if poses is not None:
-            offsets.append(np.array(pose.between(Pose2(*poses[0][0].tolist()))))
-    return offsets
+            errors.append(np.array(pose.between(Pose2(*poses[0][0].tolist()))))
+    return errors
 
 
 def test_wrong_pose_is_corrected_by_recent_scans() -> None:
@@ -81,7 +82,7 @@ def test_particles_return_to_the_initial_pose_if_scans_fit_there() -> None:
 
 @pytest.mark.parametrize(("error", "count"), [(Pose2(0.9, -0.5, 0.1), 1), (Pose2(0.3, 0.2, 0.05), 0)])
 def test_particles_stay_at_the_initial_pose_on_a_sparse_map(error: Pose2, count: int) -> None:
-    """Regression: few mapped beams moved the particles by 4.9 m, although scan matching measured the motion."""
+    """Regression: scans with few mapped beams moved the particles by 4.9 m, against the measured motion."""
     offsets = relocalizations(error, distance=0.3, settling=4.0, map_=map_around_start())
     assert [np.abs(offset).max() < 1e-9 for offset in offsets[:1]] == [True] * count
 
@@ -102,15 +103,15 @@ def test_large_correction_needs_agreeing_searches_over_two_meters() -> None:
 def test_detected_kidnapping_clears_the_scan_memory(is_detected: bool, is_relocalized: bool) -> None:
     """Scans from before the kidnapping would make the correct pose fit no better than others."""
     trust = MapTrust(obstacle_field(grid(), 2.0), unmapped_cells(grid()).ravel(), 0.45, 0.8)
-    finder, offsets = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), []
+    relocalizer, offsets = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), []
     target = Pose2(3.9, -0.2, 2.17)
     step = MatchedMotion(Pose2(0.25, 0.0, 0.0), np.diag([1e-5, 1e-5, 1e-6]))
-    for k, driven in enumerate(np.concatenate((np.arange(0.0, 2.0, 0.25), 2.0 + np.arange(0.0, 3.0, 0.25))).tolist()):
-        base, is_moved = Pose2(driven, 0.0, 0.0), k >= 8
-        pose = target.compose(Pose2(driven - 2.0, 0.0, 0.0)) if is_moved else START.compose(base)
+    for k, meters in enumerate(np.concatenate((np.arange(0.0, 2.0, 0.25), 2.0 + np.arange(0.0, 3.0, 0.25))).tolist()):
+        base, is_kidnapped = Pose2(meters, 0.0, 0.0), k >= 8
+        pose = target.compose(Pose2(meters - 2.0, 0.0, 0.0)) if is_kidnapped else START.compose(base)
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
         motion = ObservedMotion(step=None if k == 8 else step, was_carried=is_detected and k == 8)
-        poses = finder.update(scan(ranges), base, START.compose(base), (0.0, 100.0), motion)
+        poses = relocalizer.update(scan(ranges), base, START.compose(base), (0.0, 100.0), motion)
         if poses is not None:
             offsets.append(pose.between(Pose2(*poses[0][0].tolist())))
     assert any(np.hypot(offset.x, offset.y) < 0.1 for offset in offsets) is is_relocalized
@@ -118,16 +119,17 @@ def test_detected_kidnapping_clears_the_scan_memory(is_detected: bool, is_reloca
 
 @pytest.mark.parametrize("is_kidnapped", [True, False])
 def test_kidnapped_robot_is_relocalized_with_weaker_evidence_than_off_map(is_kidnapped: bool) -> None:
-    """Unmapped rooms look like mapped ones, so a robot that left the map needs stronger evidence."""
+    """Unmapped rooms can look like mapped ones, so relocalization outside the map needs stronger evidence."""
     trust = MapTrust(obstacle_field(grid(), 2.0), unmapped_cells(grid()).ravel(), 0.45, 0.8)
-    finder, error, offsets = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0), Pose2(40.0, 3.0, 0.7), []
-    for k, driven in enumerate([0.25 * k for k in range(44)]):
-        base = Pose2(2 * np.sin(driven / 2), 2 * (1 - np.cos(driven / 2)), driven / 2)  # a circle
+    relocalizer = Relocalizer(GlobalSearch(grid()), trust, Estimate(START), 0.0)
+    error, offsets = Pose2(40.0, 3.0, 0.7), []
+    for k, meters in enumerate([0.25 * k for k in range(44)]):
+        base = Pose2(2 * np.sin(meters / 2), 2 * (1 - np.cos(meters / 2)), meters / 2)  # a circle
         pose = START.compose(base)
         ranges = cast(np.array([pose]), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS))[0]
         ranges[::6] *= 0.5  # people
         motion = ObservedMotion(was_carried=is_kidnapped and k == 1)
-        poses = finder.update(scan(ranges), base, pose.compose(error), (0.0, 100.0), motion)
+        poses = relocalizer.update(scan(ranges), base, pose.compose(error), (0.0, 100.0), motion)
         if poses is not None:
             offsets.append(pose.between(Pose2(*poses[0][0].tolist())))
     assert [np.hypot(offset.x, offset.y) < 0.1 for offset in offsets[:1]] == [True] * is_kidnapped

@@ -43,7 +43,7 @@ def test_pose_without_noise_equals_the_truth(imu: bool) -> None:
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("imu", [False, True])
 def test_covariance_is_consistent_with_the_errors(imu: bool, is_quick: bool) -> None:
-    """NEES of 3 degrees of freedom add up to chi-square; all but one of 1000 such tests pass by chance."""
+    """The sum of NEES values has a chi-square distribution; a consistent filter fails 1 of 1000 such tests."""
     log, values, runs = drive(10.0), [], 15 if is_quick else 50
     for seed in range(runs):
         start = Pose2(*(log.truth[0] + np.random.default_rng((seed, 3)).normal(0, STD)))
@@ -83,10 +83,10 @@ def test_corrected_turn_also_corrects_the_path() -> None:
     assert localizer.belief.pose == pytest.approx((0.5, 0, 0), abs=2e-3)
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e9])
-def test_broken_gyroscope_is_ignored(bad: float) -> None:
+@pytest.mark.parametrize("rate", [np.nan, np.inf, 1e9])
+def test_broken_gyroscope_is_ignored(rate: float) -> None:
     localizer = ekf(Estimate(Pose2(0, 0, 0), (0.1, 0.1, 0.1)))
-    feed(localizer, 40, Pose2(0.01, 0, 0), bad)
+    feed(localizer, 40, Pose2(0.01, 0, 0), rate)
     assert localizer.belief.pose == pytest.approx((0.4, 0, 0))
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy import stats
-from test_slip_ekf_slip import RATE, replayed
+from test_slip_ekf_slip import RATE, replay_drive
 
 from simscen.advanced.localizers.slip_model import SlipDetector
 from simscen.advanced.spec import SlipEkf
@@ -13,12 +13,15 @@ from simscen.core.geometry import Array
 from simscen.testing.synthetic_room import nees
 
 SPEC = SlipEkf(type="slip_ekf")
-TRACK = 0.4
+WHEEL_SEPARATION_M = 0.4
 Rng = np.random.Generator
+
+# Each disturbance changes true twists `truth` (n, 3) and wheel twists `wheels` (n, 3), both vx, vy, wz at 40 Hz, in
+# place. `times` (n,) are seconds since the start of the disturbance.
 
 
 def slide(rng: Rng, truth: Array, wheels: Array, times: Array) -> None:
-    """Push and turn the stationary robot in a random direction; `times` are seconds since the start of the slide."""
+    """Push and turn the stationary robot in a random direction."""
     direction, speed = rng.uniform(0, 2 * math.pi), rng.uniform(0.05, 0.6)
     truth[:] = speed * math.cos(direction), speed * math.sin(direction), random_rate(rng, 0.1, 1.0)
     wheels[:] = 0.0
@@ -51,9 +54,9 @@ def lock_on_ice(rng: Rng, truth: Array, wheels: Array, times: Array) -> None:
 
 
 def lock_left(rng: Rng, truth: Array, wheels: Array, times: Array) -> None:
-    """Lock the left wheel; the motion is between that before and a rotation about this wheel."""
-    wheels[:, 2] = (wheels[:, 0] + wheels[:, 2] * TRACK / 2) / TRACK
-    wheels[:, 0] = wheels[:, 2] * TRACK / 2
+    """Lock the left wheel: the robot drives a mixture of its earlier motion and a rotation about this wheel."""
+    wheels[:, 2] = (wheels[:, 0] + wheels[:, 2] * WHEEL_SEPARATION_M / 2) / WHEEL_SEPARATION_M
+    wheels[:, 0] = wheels[:, 2] * WHEEL_SEPARATION_M / 2
     grip = rng.uniform(0, 1)
     truth[:] = grip * truth + (1 - grip) * wheels
 
@@ -64,11 +67,15 @@ def spin(rng: Rng, truth: Array, wheels: Array, times: Array) -> None:
 
 
 def random_rate(rng: Rng, low: float, high: float) -> float:
+    """Return a turn rate with a random sign and an absolute value from `low` to `high` rad/s."""
     return float(rng.choice([-1, 1]) * rng.uniform(low, high))
 
 
-def drive(slip: object, seed: int) -> float:
-    """Return the NEES after 5 s at rest or in a bend, with a disturbance of 0.5 s to 3 s in the middle."""
+def nees_after_drive(slip: object, seed: int) -> float:
+    """Return the NEES after 5 s in a bend. The disturbance `slip` starts after 1 s and lasts 0.5 s to 3 s.
+
+    Before a slide, a ramp, or a turntable, the robot stops.
+    """
     rng = np.random.default_rng(seed)
     n, start = 5 * RATE, RATE
     truth = np.tile([rng.uniform(0.2, 0.8), 0.0, random_rate(rng, 0.2, 1.0)], (n, 1))
@@ -82,15 +89,17 @@ def drive(slip: object, seed: int) -> float:
     wheels[:, 0] += SPEC.translation_noise * np.sqrt(distance) * noise[0]
     wheels[:, 2] += SPEC.rotation_noise * np.sqrt(distance + turn) * noise[1]
     gyro = truth[:, 2] + rng.normal(0, SPEC.gyro_noise) + rng.normal(0, SPEC.gyro_noise, n)
-    return nees(*replayed(SPEC, truth, wheels, gyro))
+    return nees(*replay_drive(SPEC, truth, wheels, gyro))
 
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("slip", [slide, ramp, turntable, lock, lock_on_ice, lock_left, spin], ids=lambda f: f.__name__)
 def test_covariance_is_not_overconfident_for_any_slip(slip: object, is_quick: bool) -> None:
-    """NEES of 3 degrees of freedom add up to chi-square; it may be lower, as no sensor measures a slide."""
+    """The sum of NEES values has a chi-square distribution for a consistent filter. It may be lower here, as no sensor
+    measures a slide.
+    """
     seeds = range(4000, 4008 if is_quick else 4020)
-    nees_sum = sum(drive(slip, seed) for seed in seeds)
+    nees_sum = sum(nees_after_drive(slip, seed) for seed in seeds)
     assert len(seeds) < nees_sum < stats.chi2.ppf(0.999, 3 * len(seeds))
 
 

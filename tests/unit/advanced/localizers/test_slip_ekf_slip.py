@@ -13,68 +13,72 @@ from simscen.core.messages.navigation import Belief, Estimate
 from simscen.core.messages.sensor_data import Imu, Odometry
 from simscen.testing.synthetic_room import build_localizer, nees
 
-RATE, EVERY = 40, 6
+RATE, PERIOD_TICKS = 40, 6
 
 
-def replayed(
+def replay_drive(
     spec: SlipEkf, twists: Array, wheels: Array, gyro: Array, start: Pose2 | None = None
 ) -> tuple[Belief, Array]:
-    """Return the final belief of the EKF and its error.
+    """Return the final belief of the EKF and the error of its pose.
 
-    `twists` (n, 3) are the true velocities at 40 Hz, `wheels` (n, 3) those from odometry, `gyro` (n,) the readings.
+    `twists` (n, 3) are the true velocities vx, vy, wz at 40 Hz, `wheels` (n, 3) the velocities from odometry, and
+    `gyro` (n,) the yaw rates of the gyroscope.
     """
     localizer = build_localizer(spec, Estimate(start or Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
-    true = claimed = Pose2(0, 0, 0)
-    localizer.on_odometry(Odometry("odom", 0, claimed, Twist()))
+    true_pose = reported = Pose2(0, 0, 0)
+    localizer.on_odometry(Odometry("odom", 0, reported, Twist()))
     for k in range(len(twists)):
-        true, claimed = true.compose(_step(twists[k])), claimed.compose(_step(wheels[k]))
-        localizer.on_imu(Imu("imu", EVERY * (k + 1), (0.0, 0.0, float(gyro[k])), (0.0, 0.0, 9.81)))
-        localizer.on_odometry(Odometry("odom", EVERY * (k + 1), claimed, Twist()))
-    error = np.array(localizer.belief.pose) - np.array(true)
+        true_pose, reported = true_pose.compose(_displacement(twists[k])), reported.compose(_displacement(wheels[k]))
+        localizer.on_imu(Imu("imu", PERIOD_TICKS * (k + 1), (0.0, 0.0, float(gyro[k])), (0.0, 0.0, 9.81)))
+        localizer.on_odometry(Odometry("odom", PERIOD_TICKS * (k + 1), reported, Twist()))
+    error = np.array(localizer.belief.pose) - np.array(true_pose)
     return localizer.belief, np.array([error[0], error[1], math.remainder(error[2], 2 * math.pi)])
 
 
-def _step(twist: Array) -> Pose2:
+def _displacement(twist: Array) -> Pose2:
+    """Return the motion of one period at a constant twist."""
     vx, vy, wz = (twist / RATE).tolist()
     c, s = math.cos(wz / 2), math.sin(wz / 2)
     return Pose2(c * vx - s * vy, s * vx + c * vy, wz)
 
 
-def turning(seconds: float = 4.0) -> Array:
-    """Return a drive at 0.4 m/s and 1 rad/s."""
+def circle(seconds: float = 4.0) -> Array:
+    """Return the twists of a drive at 0.4 m/s and 1 rad/s."""
     return np.tile([0.4, 0.0, 1.0], (round(seconds * RATE), 1))
 
 
 def test_locked_wheels_in_a_turn_are_detected() -> None:
     """The wheels stop for one second while the robot slides: the heading stays correct, and the covariance grows."""
-    truth = turning()
-    claimed = truth.copy()
-    claimed[60:100] = 0.0
+    truth = circle()
+    reported = truth.copy()
+    reported[60:100] = 0.0
     spec = SlipEkf(type="slip_ekf", gyro_noise=0.005)
-    belief, error = replayed(spec, truth, claimed, truth[:, 2] + np.random.default_rng(1).normal(0, 0.005, len(truth)))
+    belief, error = replay_drive(
+        spec, truth, reported, truth[:, 2] + np.random.default_rng(1).normal(0, 0.005, len(truth))
+    )
     assert abs(error[2]) < 0.02
     assert nees(belief, error) < stats.chi2.ppf(0.999, 3)
-    assert math.hypot(*error[:2]) > 0.2  # no sensor measures the slide, …
-    assert np.sqrt(np.trace(belief.covariance[:2, :2])) > 0.2  # … so the covariance must be large
+    assert math.hypot(*error[:2]) > 0.2  # no sensor measures the slide
+    assert np.sqrt(np.trace(belief.covariance[:2, :2])) > 0.2  # the covariance must cover the slide
 
 
 def test_spinning_wheels_do_not_turn_the_estimate() -> None:
-    claimed = turning()
-    truth = np.zeros_like(claimed)
-    belief, error = replayed(
-        SlipEkf(type="slip_ekf"), truth, claimed, np.random.default_rng(2).normal(0, 0.005, len(truth))
+    reported = circle()
+    truth = np.zeros_like(reported)
+    belief, error = replay_drive(
+        SlipEkf(type="slip_ekf"), truth, reported, np.random.default_rng(2).normal(0, 0.005, len(truth))
     )
     assert abs(error[2]) < 0.02
     assert nees(belief, error) < stats.chi2.ppf(0.999, 3)
 
 
 def test_locked_wheels_do_not_change_the_gyro_bias() -> None:
-    """Afterward, wheels and gyroscope agree as before."""
-    truth = turning(8.0)
-    claimed = truth.copy()
-    claimed[100:140] = 0.0
+    """After one second of locked wheels, the heading error stays small."""
+    truth = circle(8.0)
+    reported = truth.copy()
+    reported[100:140] = 0.0
     bias = 0.004
-    belief, error = replayed(SlipEkf(type="slip_ekf"), truth, claimed, truth[:, 2] + bias)
+    belief, error = replay_drive(SlipEkf(type="slip_ekf"), truth, reported, truth[:, 2] + bias)
     assert abs(error[2]) < 0.04
     assert abs(error[2]) < 4 * math.sqrt(belief.covariance[2, 2])
 
@@ -82,20 +86,20 @@ def test_locked_wheels_do_not_change_the_gyro_bias() -> None:
 def test_position_variance_stops_growing_after_slip() -> None:
     """The position variance grows while the wheels slip, and hardly afterward."""
 
-    def spread(seconds: float) -> float:
-        truth = turning(seconds)
-        claimed = truth.copy()
-        claimed[60:100] = 0.0
-        belief, _ = replayed(SlipEkf(type="slip_ekf"), truth, claimed, truth[:, 2])
+    def position_std(seconds: float) -> float:
+        truth = circle(seconds)
+        reported = truth.copy()
+        reported[60:100] = 0.0
+        belief, _ = replay_drive(SlipEkf(type="slip_ekf"), truth, reported, truth[:, 2])
         return float(np.sqrt(np.trace(belief.covariance[:2, :2])))
 
-    before, after, later = spread(1.5), spread(2.5), spread(5.0)
+    before, after, later = position_std(1.5), position_std(2.5), position_std(5.0)
     assert after > 10 * before
     assert later < 1.5 * after
 
 
 def test_gyro_bias_variance_has_a_floor() -> None:
-    """After ten minutes at rest, a drifting bias is still detected."""
+    """The variance must not vanish after ten minutes at rest, as the filter could not follow a drifting bias."""
     n = 600 * RATE // 10  # at 4 Hz, for a short run time
     localizer = build_localizer(SlipEkf(type="slip_ekf"), Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)), 1)
     for k in range(n):
@@ -112,20 +116,20 @@ CASES = [  # precise robot, imprecise odometry with a good gyroscope, fast robot
     {"speed": 0.8, "translation": 0.05, "rotation": 0.1, "gyro": 0.002, "bias": 0.002},
     {"speed": 2.0, "translation": 0.02, "rotation": 0.03, "gyro": 0.02, "bias": 0.01},
 ]
-SECONDS = 5.0
+DURATION_S = 5.0
 
 
-def sampled(case: dict[str, float], slip: float, seed: int) -> tuple[Belief, Array]:
+def replay_random_drive(case: dict[str, float], slip: float, seed: int) -> tuple[Belief, Array]:
     """Replay a drive in bends with the specified noise and slips of about a second."""
     rng = np.random.default_rng((seed, round(1000 * slip)))
-    n, dt = round(SECONDS * RATE), 1 / RATE
+    n, dt = round(DURATION_S * RATE), 1 / RATE
     t = np.arange(n) * dt
     phase, frequency = rng.uniform(0, 6.3), rng.uniform(0.3, 1.0)
     truth = np.column_stack((np.full(n, case["speed"]), np.zeros(n), 1.2 * np.sin(frequency * t * 2 + phase)))
     distance, turn = np.abs(truth[:, 0]) * dt, np.abs(truth[:, 2]) * dt
-    claimed = truth.copy()
-    claimed[:, 0] += rng.normal(0, case["translation"] * np.sqrt(distance)) / dt
-    claimed[:, 2] += rng.normal(0, case["rotation"] * np.sqrt(distance + turn)) / dt
+    reported = truth.copy()
+    reported[:, 0] += rng.normal(0, case["translation"] * np.sqrt(distance)) / dt
+    reported[:, 2] += rng.normal(0, case["rotation"] * np.sqrt(distance + turn)) / dt
     share = rng.normal(0, slip)
     for k in range(n):
         truth[k, 0] *= 1 + share
@@ -136,15 +140,15 @@ def sampled(case: dict[str, float], slip: float, seed: int) -> tuple[Belief, Arr
         gyro_noise=case["gyro"],
         gyro_bias=case["bias"], gyro_bias_walk=0.0, wheel_slip=slip,
     )  # fmt: skip
-    return replayed(spec, truth, claimed, truth[:, 2] + bias + rng.normal(0, case["gyro"], n))
+    return replay_drive(spec, truth, reported, truth[:, 2] + bias + rng.normal(0, case["gyro"], n))
 
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("slip", [0.0, 0.2])
 @pytest.mark.parametrize("case", CASES, ids=["precise", "imprecise odometry", "fast"])
 def test_covariance_is_consistent_with_and_without_slip(case: dict[str, float], slip: float, is_quick: bool) -> None:
-    """NEES of 3 degrees of freedom add up to chi-square; all but one of 1000 such tests pass by chance."""
+    """The sum of NEES values has a chi-square distribution; a consistent filter fails 1 of 1000 such tests."""
     runs = 10 if is_quick else 25
-    values = [nees(*sampled(case, slip, seed)) for seed in range(1000, 1000 + runs)]
+    values = [nees(*replay_random_drive(case, slip, seed)) for seed in range(1000, 1000 + runs)]
     low, high = stats.chi2.ppf([0.0005, 0.9995], 3 * runs)
     assert low <= np.sum(values) <= high

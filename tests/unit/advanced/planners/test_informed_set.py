@@ -1,4 +1,4 @@
-"""Tests of the informed set: lengths of shortest paths, and the region of near-shortest ones."""
+"""Tests of the informed set: the length of the shortest path, and the region of all paths that are little longer."""
 
 import math
 
@@ -20,7 +20,7 @@ def room_costs(*boxes: tuple[float, float, float, float], radius: float = 0.22) 
     return TraversalCosts(LayeredCostmap(Spec(), Surroundings(robot, grid, TICK_RATE_HZ)).view, robot, 2.0, True)
 
 
-WALL = (4.9, 0.0, 5.0, 4.0)  # the path from (1, 1) to (9, 1) leads around its end, at (4.95, 4.22)
+WALL = (4.9, 0.0, 5.0, 4.0)  # the shortest path from (1, 1) to (9, 1) passes its end at (4.95, 4.22)
 
 
 def test_length_in_free_space_is_the_straight_distance() -> None:
@@ -29,9 +29,9 @@ def test_length_in_free_space_is_the_straight_distance() -> None:
         assert InformedSet(room_costs(), (1.0, 1.0), goal).length == pytest.approx(straight, rel=0.03, abs=0.2)
 
 
-def test_length_around_a_wall_is_that_of_the_detour() -> None:
-    around = 2 * math.hypot(3.95, 3.22)
-    assert InformedSet(room_costs(WALL), (1.0, 1.0), (9.0, 1.0)).length == pytest.approx(around, rel=0.05)
+def test_length_around_a_wall_is_the_length_of_the_detour() -> None:
+    detour = 2 * math.hypot(3.95, 3.22)
+    assert InformedSet(room_costs(WALL), (1.0, 1.0), (9.0, 1.0)).length == pytest.approx(detour, rel=0.05)
 
 
 def test_narrow_informed_set_contains_the_path_but_no_side_rooms() -> None:
@@ -45,7 +45,7 @@ def test_narrow_informed_set_contains_the_path_but_no_side_rooms() -> None:
     assert informed.contains(1.0, 5.5)
 
 
-def test_no_path_has_no_length_and_thin_walls_block() -> None:
+def test_length_is_infinite_behind_a_thin_wall_or_a_too_narrow_gap() -> None:
     costs = room_costs((4.9, 0.0, 5.0, 6.0))
     assert math.isinf(InformedSet(costs, (1.0, 1.0), (9.0, 1.0)).length)
     gap = room_costs((4.9, 0.0, 5.0, 2.8), (4.9, 3.25, 5.0, 6.0), radius=0.25)
@@ -53,7 +53,8 @@ def test_no_path_has_no_length_and_thin_walls_block() -> None:
 
 
 def test_informed_set_by_cost_contains_the_cheapest_path() -> None:
-    costs = room_costs((4.9, 0.0, 5.0, 0.6), (4.9, 1.2, 5.0, 4.0))  # a narrow gap ahead, and a wide one farther up
+    # The walls leave a narrow gap on the straight line and a wide gap at larger y.
+    costs = room_costs((4.9, 0.0, 5.0, 0.6), (4.9, 1.2, 5.0, 4.0))
     costs.rates[(costs.rates > 1.0) & (costs.rates < math.inf)] *= 20.0
     informed = InformedSet(costs, (1.0, 1.0), (9.0, 1.0), by_cost=True)
     shortest = InformedSet(costs, (1.0, 1.0), (9.0, 1.0))
@@ -73,8 +74,8 @@ def test_waypoints_divide_a_long_path_into_equal_legs_in_free_space() -> None:
     view = LayeredCostmap(Spec(), Surroundings(robot, world.grid((-0.5, -0.5, 50.5, 4.5)), TICK_RATE_HZ)).view
     costs = TraversalCosts(view, robot, 2.0, True)
     informed = InformedSet(costs, (1.0, 2.0), (49.0, 2.0))
-    ((point, along),) = informed.waypoints(view)
+    ((point, distance),) = informed.waypoints(view)
     assert MAX_LEG_M < informed.length < 2 * MAX_LEG_M
-    assert along == pytest.approx(informed.length / 2)
-    assert math.dist(point, (1.0, 2.0)) == pytest.approx(along, abs=0.5)
+    assert distance == pytest.approx(informed.length / 2)
+    assert math.dist(point, (1.0, 2.0)) == pytest.approx(distance, abs=0.5)
     assert view.distance[costs.cell(point)] == view.distance.max()

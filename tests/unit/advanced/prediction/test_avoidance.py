@@ -1,4 +1,4 @@
-"""Tests of whole drives among moving obstacles."""
+"""Tests of the avoidance of moving obstacles, most of them in whole drives."""
 
 import cmath
 import math
@@ -28,6 +28,7 @@ from simscen.stack.protocols import CostmapView, RobotModel
 from simscen.testing.flatland import TICK_RATE_HZ, Drive, Flatland, box_robot, drive
 
 Disc = tuple[float, float, float]
+"""x, y, and radius in m."""
 FAR_GOAL = Goal("far", Pose2(10.0, 0.0), xy_tolerance=0.3)
 CONTROLLERS = [
     RegulatedPurePursuit(desired_linear_vel=1.0),
@@ -49,8 +50,10 @@ def start(
     return drive(world or Flatland(), Pose2(0.0, 0.0), *goals, robot=box_robot(), spec=spec, range_max=20.0)
 
 
-def avoid(d: Drive, discs: Callable[[float], list[Disc]], seconds: float, until: str = "navigation.ended") -> Drive:
-    """Drive among moving discs for so many seconds or until an event of the kind `until`."""
+def drive_among(
+    d: Drive, discs: Callable[[float], list[Disc]], seconds: float, until: str = "navigation.ended"
+) -> Drive:
+    """Drive among the discs that `discs(t)` returns, for `seconds` or until an event of the kind `until`."""
     end = d.tick + round(seconds * TICK_RATE_HZ)
     while d.tick < end:
         d.world.discs = discs(d.tick / TICK_RATE_HZ)
@@ -64,7 +67,7 @@ def oncoming(t: float) -> list[Disc]:
 
 
 def crossing(t: float) -> list[Disc]:
-    """Return two discs that cross the path of a robot with 1 m/s, one after the other."""
+    """Return two discs that cross the path of a robot at 1 m/s one after the other."""
     return [(4.0, -5.0 + 1.2 * t, 0.4), (7.0, 9.0 - 1.2 * t, 0.4)]
 
 
@@ -74,19 +77,19 @@ def crossing(t: float) -> list[Disc]:
 def test_every_controller_avoids_oncoming_and_crossing_obstacles(
     controller: ControllerSpec, discs: Callable[[float], list[Disc]]
 ) -> None:
-    d = avoid(start(FAR_GOAL, controller=controller), discs, 30.0)
+    d = drive_among(start(FAR_GOAL, controller=controller), discs, 30.0)
     assert d.result == "SUCCEEDED"
     assert d.min_clearance > 0.1
 
 
 def test_without_prediction_the_robot_collides() -> None:
-    d = avoid(start(FAR_GOAL, enabled=False), oncoming, 30.0)
+    d = drive_among(start(FAR_GOAL, enabled=False), oncoming, 30.0)
     assert d.min_clearance < 0.1
 
 
 def test_robot_at_its_goal_evades_and_returns() -> None:
     goal = Goal("here", Pose2(1.0, 0.0), xy_tolerance=0.25)
-    d = avoid(start(goal), lambda _: [], 10.0)
+    d = drive_among(start(goal), lambda _: [], 10.0)
     assert d.result == "SUCCEEDED"
     arrived_at, start_s = d.pose, d.tick / TICK_RATE_HZ
 
@@ -96,7 +99,7 @@ def test_robot_at_its_goal_evades_and_returns() -> None:
     d.min_clearance = math.inf
     farthest = 0.0
     for _ in range(20):
-        avoid(d, crossing_disc, 1.0)
+        drive_among(d, crossing_disc, 1.0)
         farthest = max(farthest, d.pose.distance(arrived_at))
     assert d.min_clearance > 0.05
     assert farthest > 0.4
@@ -106,15 +109,15 @@ def test_robot_at_its_goal_evades_and_returns() -> None:
 
 
 def test_canceled_robot_does_not_evade() -> None:
-    d = avoid(start(FAR_GOAL), lambda _: [], 1.0)
+    d = drive_among(start(FAR_GOAL), lambda _: [], 1.0)
     d.stack.cancel(d.tick)
     count = len(d.commands)
-    avoid(d, lambda t: [(d.pose.x, 6.0 - 1.0 * t, 0.4)], 3.0, until="never")
+    drive_among(d, lambda t: [(d.pose.x, 6.0 - 1.0 * t, 0.4)], 3.0, until="never")
     assert set(d.commands[count:]) == {STOP}
 
 
 def test_moving_obstacle_leaves_no_trail_in_the_costmap() -> None:
-    d = avoid(start(FAR_GOAL), lambda t: [(3.0 + 0.9 * t, -3.0 + 0.8 * t, 0.4)], 6.0)
+    d = drive_among(start(FAR_GOAL), lambda t: [(3.0 + 0.9 * t, -3.0 + 0.8 * t, 0.4)], 6.0)
     reasons = {event.data["reason"] for event in d.events_of_kind("plan.made")}
     assert reasons == {"goal"}  # neither blocked nor replanned around the obstacle
 
@@ -137,14 +140,14 @@ def test_pruned_search_finds_the_cheapest_candidate(robot: RobotModel, monkeypat
     samples = [(rng.normal(0, 2, (3, 2)), rng.normal(0, 1, (3, 2)), rng.uniform(0, 1, 3)) for _ in range(24)]
     for batch_size in (avoidance.BATCH_SIZE, 10**6):
         monkeypatch.setattr(avoidance, "BATCH_SIZE", batch_size)
-        subject, commands = Avoidance(robot, 1.0), list[Twist]()
+        avoidance_of_robot, commands = Avoidance(robot, 1.0), list[Twist]()
         for centers, velocities, (x, vx, wz) in samples:
             states = zip(centers, velocities, strict=True)
             moving = MovingObstacles(
                 (MovingObstacle(complex(*xy), complex(*v), 0.3, 0.01, 0.0, 0.01) for xy, v in states), 1.0
             )
-            wanted, twist = Twist(1.0, 0.0, 0.1), Twist(float(vx), 0.0, float(wz))
-            commands.append(subject.steer(wanted, Pose2(float(x), 0.1, 0.2), twist, moving, costmap, path))
+            desired, twist = Twist(1.0, 0.0, 0.1), Twist(float(vx), 0.0, float(wz))
+            commands.append(avoidance_of_robot.steer(desired, Pose2(float(x), 0.1, 0.2), twist, moving, costmap, path))
         results.append(commands)
     assert results[0] == results[1]
     assert sum(command != Twist(1.0, 0.0, 0.1) for command in results[0]) > 6
@@ -171,23 +174,23 @@ def test_the_collision_monitor_brakes_by_the_relative_velocity_and_only_where_br
 
 
 @pytest.mark.parametrize("heading", [0.0, 90.0, 180.0])
-def test_a_command_is_as_risky_sideways_as_forward(heading: float) -> None:
-    """The obstacle crosses the path of the robot, and misses a robot at rest."""
-    turn = cmath.rect(1.0, math.radians(heading))
-    obstacle = MovingObstacle(turn * (1.4 + 1.0j), turn * -0.5j, 0.3, 1e-4, 0.0, 1e-3)
+def test_sideways_command_is_changed_like_a_forward_command(heading: float) -> None:
+    """An obstacle crosses the path of the moving robot, but would miss a robot at rest."""
+    direction = cmath.rect(1.0, math.radians(heading))
+    obstacle = MovingObstacle(direction * (1.4 + 1.0j), direction * -0.5j, 0.3, 1e-4, 0.0, 1e-3)
     moving = MovingObstacles([obstacle], Prediction().acceleration)
     costmap = CostmapView(np.zeros((200, 200), np.uint8), np.full((200, 200), 2.0, np.float32), 0.05, (-5.0, -5.0))
     robot = replace(box_robot(), max_lateral=0.6)
     commands = {"forward": Twist(0.5, 0.0, 0.0), "sideways": Twist(0.0, 0.5, 0.0), "rest": STOP}
     yaw = {"forward": 0.0, "sideways": -math.pi / 2, "rest": 0.0}
-    kept = {
+    is_kept = {
         name: Avoidance(robot, 0.6).steer(
             command, Pose2(0.0, 0.0, math.radians(heading) + yaw[name]), command, moving, costmap, None
         )
         is command
         for name, command in commands.items()
     }
-    assert kept == {"forward": False, "sideways": False, "rest": True}
+    assert is_kept == {"forward": False, "sideways": False, "rest": True}
 
 
 @pytest.mark.parametrize(("max_reverse", "speed"), [(0.1, -0.1), (1.0, -0.3), (0.0, 0.0)])

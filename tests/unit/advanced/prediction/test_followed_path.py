@@ -24,9 +24,9 @@ def rollout(yaw: float, vx: float) -> Rollouts:
 
 @pytest.mark.parametrize(("yaw", "vx"), [(0.0, 0.5), (math.pi, -0.5), (3.0, -0.5)], ids=["forward", "back", "oblique"])
 def test_robot_drives_forward_or_backward_toward_the_end_of_the_path(yaw: float, vx: float) -> None:
-    found = rollout(yaw, vx)
-    assert found.x[0, -1] == pytest.approx(START_X_M + 0.5 * HORIZON_S)
-    assert np.abs(np.cos(found.yaw[0]) - np.sign(vx)).max() < 1e-9
+    result = rollout(yaw, vx)
+    assert result.x[0, -1] == pytest.approx(START_X_M + 0.5 * HORIZON_S)
+    assert np.abs(np.cos(result.yaw[0]) - np.sign(vx)).max() < 1e-9
     twist = Twist(vx)
     position, _, deviation = PATH.position_over_time(Pose2(START_X_M, 0.0, yaw), twist, twist, box_robot())
     assert deviation == 0.0
@@ -34,6 +34,6 @@ def test_robot_drives_forward_or_backward_toward_the_end_of_the_path(yaw: float,
 
 
 def test_robot_that_backs_up_against_the_path_keeps_its_heading() -> None:
-    found = rollout(0.0, -0.5)
-    assert found.x.max() <= START_X_M
-    assert np.abs(found.yaw).max() < 1e-9
+    result = rollout(0.0, -0.5)
+    assert result.x.max() <= START_X_M
+    assert np.abs(result.yaw).max() < 1e-9

@@ -1,4 +1,4 @@
-"""Tests that each single use of the prediction prevents a collision."""
+"""Tests that the prediction prevents a collision if only the collision monitor or only the controller uses it."""
 
 from typing import Any
 
