@@ -12,6 +12,7 @@ from simscen.cli.catalog.topic_lookup import all_topics, key_topics, known_names
 from simscen.cli.catalog.topics import HEADINGS, Topic
 from simscen.cli.diagnostics import print_text
 from simscen.core.errors import UsageError
+from simscen.core.messages.navigation import error_code
 from simscen.loading.codes import CODES
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.spec.registry import GROUPS, BrokenPlugin, plugin_types
@@ -59,7 +60,8 @@ def _topics_named(name: str) -> list[Topic]:
     Raises UsageError if nothing is found.
     """
     known = all_topics()
-    lowered = name.lower()
+    # The code of an action through poses, such as 306, has the meaning of the code for a single pose.
+    lowered = str(int(error_code(int(name)))) if name.isdecimal() else name.lower()
     found = [
         topic
         for topic in known

@@ -94,6 +94,7 @@ def test_signals_are_listed_with_units_and_explained(simscen) -> None:
         ("sensors.lidar.mount.yaw", "0: straight ahead, positive: to the"),
         ("physics.tick_rate", "frequency in Hz"),
         ("GOAL_OCCUPIED", "Nav2's error code 206."),
+        ("306", "GOAL_OCCUPIED (error code)"),
         ("206", "GOAL_OCCUPIED (error code)"),
         ("stack-timeout", "An external stack did not answer"),
         ("exit 3", "could not be completed"),
