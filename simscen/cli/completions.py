@@ -61,8 +61,8 @@ def _files(incomplete: str, suffixes: tuple[str, ...]) -> list[str]:
         names = [f"{path.name}/" if path.is_dir() else path.name for path in sorted(folder.iterdir())]
     except OSError:
         return []
-    shown = [name for name in names if name.startswith(start) and (start.startswith(".") or not name.startswith("."))]
-    return [f"{parent}{slash}{name}" for name in shown if name.endswith(("/", *suffixes))]
+    names = [name for name in names if name.startswith(start) and (start.startswith(".") or not name.startswith("."))]
+    return [f"{parent}{slash}{name}" for name in names if name.endswith(("/", *suffixes))]
 
 
 def shipped_scenarios() -> dict[str, Path]:

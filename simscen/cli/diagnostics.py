@@ -123,12 +123,12 @@ def _excerpt(problem: Problem) -> list[str]:
     token = _TOKEN.match(source, start)
     length = len(token[0]) if token else 1
     first = max(0, start - MAX_COLUMNS // 2) if len(source) > MAX_COLUMNS else 0
-    shown = source[first : first + MAX_COLUMNS].rstrip()
-    length = max(1, min(length, len(shown) - (start - first)))
-    before, marked = shown[: start - first], shown[start - first : start - first + length]
+    excerpt = source[first : first + MAX_COLUMNS].rstrip()
+    length = max(1, min(length, len(excerpt) - (start - first)))
+    before, marked = excerpt[: start - first], excerpt[start - first : start - first + length]
     gutter = " " * (len(str(problem.line)) + 4)
     carets = " " * display_width(before) + "^" * max(1, display_width(marked))
-    return [f"    {problem.line} | {escape_ci_markers(shown)}", f"{gutter} | {carets}"]
+    return [f"    {problem.line} | {escape_ci_markers(excerpt)}", f"{gutter} | {carets}"]
 
 
 def _escape_message(text: str) -> str:

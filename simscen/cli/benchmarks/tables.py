@@ -33,7 +33,7 @@ def two_line_rows(table: Sequence[TableRow], columns: int) -> list[str]:
     """Return two lines per row, the name of the row and the other cells, for a terminal with `columns` characters."""
     widths = _column_widths(table)[1:]
     gap = "  " if 2 + sum(widths) + 2 * (len(widths) - 1) <= columns else " "
-    return [line for name, *rest in table for line in (name, "  " + gap.join(map(str.rjust, rest, widths)))]
+    return [line for name, *cells in table for line in (name, "  " + gap.join(map(str.rjust, cells, widths)))]
 
 
 def label_cells(head: TableRow, row: TableRow, columns: int) -> list[str]:

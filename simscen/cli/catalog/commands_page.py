@@ -133,9 +133,9 @@ def command_section(command: str, function: Callable[..., Any]) -> str:
     ]
     head = ["| argument or option | value | default | meaning |", "|---|---|---|---|"]
     table = "\n".join([*head, *rows]) if rows else "No arguments or options."
-    summary, *rest = _escape_markdown(inspect.cleandoc(function.__doc__ or "")).split("\n\n")
+    summary, *paragraphs = _escape_markdown(inspect.cleandoc(function.__doc__ or "")).split("\n\n")
     example = [f"```console\n$ {_EXAMPLES[command]}\n```"] if command in _EXAMPLES else []
-    return "\n\n".join([f"## `simscen {command}`", summary, *example, *rest, f"{table}\n"])
+    return "\n\n".join([f"## `simscen {command}`", summary, *example, *paragraphs, f"{table}\n"])
 
 
 def exit_code_section() -> str:

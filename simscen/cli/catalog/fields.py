@@ -124,8 +124,8 @@ def _plural(kind: str) -> str:
 
 def _simple_kind(kind: Any, metadata: tuple[Any, ...]) -> str:
     """Return the description of a type that is neither a union nor a list, with the bounds of its values."""
-    # The constraints of pydantic's Field are in its own metadata.
-    marks = [one for mark in metadata for one in (mark.metadata if isinstance(mark, FieldInfo) else [mark])]
+    # A FieldInfo has its constraints in its own metadata.
+    marks = [inner for mark in metadata for inner in (mark.metadata if isinstance(mark, FieldInfo) else [mark])]
     quantity = next((mark for mark in marks if isinstance(mark, Quantity)), None)
     if quantity is not None:
         text = f"{quantity.dimension} in {next(iter(UNITS[quantity.dimension]))}"

@@ -55,8 +55,8 @@ def schema_of(name: str, with_plugins: bool = False) -> Schema:
                 properties[f"{key}{APPEND_SUFFIX}"] = {**value, "description": description}
     schema = simplify_for_editors({**generated, "properties": properties}, definitions)
     # Other required keys may come from the extended file or from a defaults.yaml in the same folder.
-    needed = ["simscen"] if model.model_fields["simscen"].is_required() and name != "base" else []
-    return {"$schema": DRAFT, "title": f"simscen {name}", **schema, "required": needed}
+    required = ["simscen"] if model.model_fields["simscen"].is_required() and name != "base" else []
+    return {"$schema": DRAFT, "title": f"simscen {name}", **schema, "required": required}
 
 
 def _make_extensible_keys_optional(generated: Schema, definitions: Schema) -> None:
@@ -69,7 +69,7 @@ def _make_extensible_keys_optional(generated: Schema, definitions: Schema) -> No
 def _referenced_definitions(schema: Schema, definitions: Schema, *, in_lists: bool) -> set[str]:
     """Return the names of the definitions to which a schema refers within lists (`in_lists`) or outside of lists."""
     found: set[str] = set()
-    seen: set[tuple[str, bool]] = set()
+    visited: set[tuple[str, bool]] = set()
 
     def walk(node: Any, in_list: bool) -> None:
         if isinstance(node, list):
@@ -78,8 +78,8 @@ def _referenced_definitions(schema: Schema, definitions: Schema, *, in_lists: bo
         if not isinstance(node, dict):
             return
         name = str(node.get("$ref", "")).rpartition("/")[2]
-        if name and (name, in_list) not in seen:
-            seen.add((name, in_list))
+        if name and (name, in_list) not in visited:
+            visited.add((name, in_list))
             if in_list == in_lists:
                 found.add(name)
             walk(definitions[name], in_list)

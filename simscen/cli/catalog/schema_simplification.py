@@ -43,9 +43,9 @@ def _select_by_type(node: Schema, definitions: Schema) -> Schema:
         if index > 0 or "type" in members[ref].get("required", []):  # the first member can be the default
             condition["required"] = ["type"]
         cases.append({"if": condition, "then": {"$ref": ref}})
-    needed = {"required": ["type"]} if all("required" in case["if"] for case in cases) else {}
+    type_required = {"required": ["type"]} if all("required" in case["if"] for case in cases) else {}
     properties = {"type": {"enum": list(types.values())}}
-    return {**other_keywords, "type": "object", "properties": properties, **needed, "allOf": cases}
+    return {**other_keywords, "type": "object", "properties": properties, **type_required, "allOf": cases}
 
 
 def _select_by_key(node: Schema, keys: dict[str, str], definitions: Schema) -> Schema:

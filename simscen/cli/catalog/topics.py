@@ -229,5 +229,5 @@ def _topic(group: str, name: str, model: type[BaseModel]) -> Topic:
     """Return the topic of a model, from its docstring. A line "Example: …" becomes the example."""
     text = inspect.cleandoc(model.__doc__ or "")
     example = _EXAMPLE.search(text)
-    shown = example[1] if example else EXAMPLES.get(f"{group}.{name}", "")
-    return Topic(group, name, model, _EXAMPLE.sub("", text).strip(), shown)
+    example_text = example[1] if example else EXAMPLES.get(f"{group}.{name}", "")
+    return Topic(group, name, model, _EXAMPLE.sub("", text).strip(), example_text)

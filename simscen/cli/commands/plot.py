@@ -38,7 +38,7 @@ def command(
     except ValueError as error:
         raise invalid_log(file, "SC802", f"the log is damaged: {error}") from error
     scene = Scene(log.trace, log.header.case, map_, recorded_result(log, file), scenery)
-    robots = {name: (one.trace, one.header.case) for name, one in log.robots.items()}
+    robots = {name: (robot_log.trace, robot_log.header.case) for name, robot_log in log.robots.items()}
     picture = out or file.with_name("map.png")
     save(picture, lambda path: write_picture(scene_with_robots(scene, robots), path), [file])
     print_text(escaped(str(picture)))

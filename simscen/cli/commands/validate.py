@@ -109,6 +109,6 @@ def _summary(kinds: Counter[str], problems: list[Problem], invalid_files: int) -
 
 def _count(number: int, kind: str) -> str:
     """Return a number with the plural of a kind of file, such as "2 studies"."""
-    noun, of, rest = kind.partition(" of ")  # a parameter file of Nav2
+    noun, separator, owner = kind.partition(" of ")  # a parameter file of Nav2
     plural = "studies" if noun == "study" else f"{noun}s"
-    return f"{number} {noun if number == 1 else plural}{of}{rest}"
+    return f"{number} {noun if number == 1 else plural}{separator}{owner}"

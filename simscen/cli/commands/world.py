@@ -47,7 +47,7 @@ def inspect(
     path: File,
     png: Annotated[Path | None, typer.Option(help="Draw the cross-section at lidar height and the map (png).")] = None,
     height: Height = LIDAR_HEIGHT_M,
-    everything: Annotated[bool, typer.Option("--all", help="List all solids instead of the first ones.")] = False,
+    lists_all: Annotated[bool, typer.Option("--all", help="List all solids instead of the first ones.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
     root: Root = None,
     world_path: WorldPathOption = None,
@@ -68,7 +68,7 @@ def inspect(
     if as_json:
         print(json.dumps(asdict(summary), indent=2))
     else:
-        print_text("\n".join([escaped(f"{summary.name} · {path}"), *summary_lines(summary, height, everything)]))
+        print_text("\n".join([escaped(f"{summary.name} · {path}"), *summary_lines(summary, height, lists_all)]))
         warnings = relative_to_working_folder(world_reader_notes(built.world, source, root_folder), root_folder)
         if warnings:
             print_text(as_text(warnings))
@@ -199,10 +199,10 @@ MAX_NAME_LENGTH = 44
 """Maximum number of printed characters of a name. Only the end of a longer name is printed."""
 
 
-def summary_lines(summary: "WorldSummary", height: float, everything: bool) -> Iterator[str]:
+def summary_lines(summary: "WorldSummary", height: float, lists_all: bool) -> Iterator[str]:
     """Yield the printed lines about a world. `height` is the height of the cross-section in m.
 
-    All solids are listed if `everything`, otherwise only the first MAX_SOLIDS.
+    If `lists_all` is false, only the first MAX_SOLIDS solids are listed.
     """
     x0, y0, x1, y1 = summary.bounds
     yield f"  bounds    x {x0:.2f} … {x1:.2f} m, y {y0:.2f} … {y1:.2f} m ({x1 - x0:.2f} x {y1 - y0:.2f} m)"
@@ -215,7 +215,7 @@ def summary_lines(summary: "WorldSummary", height: float, everything: bool) -> I
     yield f"  map       {columns} x {rows} cells of {summary.map_resolution:g} m, cut at {height:g} m: " + (
         f"{occupied} occupied, {free} free, {unknown} unknown"
     )
-    yield from _item_lines("solids", summary.solids, len(summary.solids) if everything else MAX_SOLIDS)
+    yield from _item_lines("solids", summary.solids, len(summary.solids) if lists_all else MAX_SOLIDS)
     yield from _item_lines("objects", summary.bodies, len(summary.bodies))
     for title, names in (("places", summary.places), ("regions", summary.regions)):
         if names:

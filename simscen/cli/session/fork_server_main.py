@@ -147,7 +147,7 @@ def _write_outputs(job: Job, prepared: PreparedScenario, run: Run, folder: Path)
     """Write the picture and the replay page of a run, if the job requests them for its outcome."""
     if job.picture.includes(run.result.outcome):
         scene = Scene(run.trace, run.case, prepared.built.map, run.result, world_scenery(prepared))
-        robots = {name: (one.trace, one.case) for name, one in run.robots.items()}
+        robots = {name: (robot_run.trace, robot_run.case) for name, robot_run in run.robots.items()}
         write_picture(scene_with_robots(scene, robots), folder / "map.png")
     if job.replay.includes(run.result.outcome) and run.log is not None:
         from simscen.report.replay import write_replay

@@ -165,7 +165,8 @@ class Failure:
             return result.error is not None and result.error.by_stack
         if result.outcome is not Outcome.FAILED:
             return False
-        failed = [one for one in result.verdicts if one.criterion == self.criterion and one.status is Status.FAIL]
+        verdicts = [verdict for verdict in result.verdicts if verdict.criterion == self.criterion]
+        failed = [verdict for verdict in verdicts if verdict.status is Status.FAIL]
         if self.max_margin is None:
             return bool(failed)
         margins = map(_smallest_margin, failed)
@@ -220,8 +221,8 @@ class Shrinker:
         """Round the numbers that the failure does not need exactly."""
         tree, roundings = self.tree, find_roundings(self.tree, digits)
         self._simplify(
-            [one.keys for one in roundings],
-            lambda exact: with_roundings(tree, [one for one in roundings if one.keys not in exact]),
+            [rounding.keys for rounding in roundings],
+            lambda exact: with_roundings(tree, [rounding for rounding in roundings if rounding.keys not in exact]),
         )
 
     def _simplify(self, parts: Sequence[Keys], build: Callable[[Sequence[Keys]], MappingNode]) -> None:
@@ -231,10 +232,10 @@ class Shrinker:
         """
         if parts:
             accepts = self.failure.occurs_in
-            needed = minimize(
+            needed_parts = minimize(
                 parts, lambda lists: self.candidates.first_accepted([build(kept) for kept in lists], accepts)
             )
-            self.tree = build(needed)
+            self.tree = build(needed_parts)
 
 
 def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
@@ -248,7 +249,7 @@ def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
             return Failure("", "")
         raise RunError(result.error.kind, f"the run could not be completed: {result.error.message}")
     failed = [verdict for verdict in result.verdicts if verdict.status is Status.FAIL]
-    chosen = next((one for one in failed if criterion in ("", one.id, one.criterion)), None)
+    chosen = next((verdict for verdict in failed if criterion in ("", verdict.id, verdict.criterion)), None)
     if result.outcome is Outcome.FAILED_AS_EXPECTED:
         raise UsageError("the run failed as expected; remove `expected` from the scenario to shrink it")
     if result.outcome is not Outcome.FAILED:
@@ -256,7 +257,7 @@ def failure_of(result: RunResult, criterion: str, share: float) -> Failure:
     if not failed:
         raise UsageError("the run failed without violating a criterion, such as by an inconclusive verdict")
     if chosen is None:
-        raise UsageError(f"the run did not fail in {criterion}, but in {', '.join(one.id for one in failed)}")
+        raise UsageError(f"the run did not fail in {criterion}, but in {', '.join(verdict.id for verdict in failed)}")
     margin = _smallest_margin(chosen)
     return Failure(chosen.criterion, chosen.id, None if margin is None or margin >= 0.0 else share * margin)
 
