@@ -1,4 +1,4 @@
-"""Lets the tests of this folder share modules such as `scenes.py`."""
+"""Make modules such as `scenes.py` importable in the tests of this folder, which pytest's importlib mode does not."""
 
 import sys
 from pathlib import Path

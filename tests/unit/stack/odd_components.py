@@ -1,4 +1,4 @@
-"""Components of a package for tests: some work, and some break their contracts in the way that `does` names."""
+"""Stack components of a package for tests: some work, some are defective; `defect` selects how a planner fails."""
 
 import math
 
@@ -17,25 +17,25 @@ from simscen.stack.planners.ompl_planner import ompl_planner
 
 
 class Straight(PlannerSpec):
-    """A straight line."""
+    """Planner that returns a straight line, or fails in the way that `defect` names."""
 
     component = "odd:StraightPlanner"
     spacing: PositiveLength = 0.05
-    """Between two points."""
-    does: str = ""
+    """Distance between two points of the path."""
+    defect: str = ""
 
 
 class StraightPlanner:
     def __init__(self, spec, setting):
         self.spec, self.setting = spec, setting
         setting.rng.random(1000)
-        if spec.does == "not begin":
+        if spec.defect == "raise in constructor":
             raise OSError("no such model")
 
     def plan(self, costmap, start, goal, seed):
         count = max(2, math.ceil(start.distance(goal) / self.spec.spacing) + 1)
         points = np.array(start) + np.linspace(0, 1, count)[:, None] * (np.array(goal) - np.array(start))
-        match self.spec.does:
+        match self.spec.defect:
             case "raise":
                 return {}["no such key"]
             case "raise deep":
@@ -46,29 +46,31 @@ class StraightPlanner:
                 points = points[:, :2]
             case "list":
                 return points.tolist()
-            case "nothing":
+            case "empty":
                 points = points[:0]
-            case "elsewhere":
+            case "other start":
                 points = points + 0.5
         return Path(points)
 
 
-class Careful(PlannerSpec):
-    """OMPL's, drawing a lot."""
+class RandomDraws(PlannerSpec):
+    """OMPL planner that first draws many random numbers."""
 
-    component = "odd:careful"
+    component = "odd:random_draws"
 
 
-def careful(spec, setting):
+def random_draws(spec, setting):
     setting.rng.random(1000)
     return ompl_planner(OmplPlanner(), setting)
 
 
-class Wild(ControllerSpec):
-    component = "odd:WildController"
+class Infinite(ControllerSpec):
+    """Controller that commands an infinite velocity."""
+
+    component = "odd:InfiniteController"
 
 
-class WildController:
+class InfiniteController:
     full_speed, local_plan = 0.5, None
 
     def __init__(self, spec, setting):
@@ -84,11 +86,13 @@ class WildController:
         return Twist(math.inf)
 
 
-class Lost(LocalizerSpec):
-    component = "odd:LostLocalizer"
+class WrongShape(LocalizerSpec):
+    """Localizer whose covariance has a wrong shape."""
+
+    component = "odd:WrongShapeLocalizer"
 
 
-class LostLocalizer:
+class WrongShapeLocalizer:
     def __init__(self, spec, setting):
         pass
 
@@ -101,11 +105,13 @@ class LostLocalizer:
     on_scan = on_imu = on_odometry
 
 
-class Half(LocalizerSpec):
-    component = "odd:HalfLocalizer"
+class Incomplete(LocalizerSpec):
+    """Localizer without the methods for readings."""
+
+    component = "odd:IncompleteLocalizer"
 
 
-class HalfLocalizer:
+class IncompleteLocalizer:
     def __init__(self, spec, setting):
         pass
 
@@ -113,15 +119,15 @@ class HalfLocalizer:
         pass
 
 
-class Nod(BehaviorSpec):
-    """Wait a little."""
+class Pause(BehaviorSpec):
+    """Behavior that waits for `wait_duration` s."""
 
-    component = "odd:Nodding"
+    component = "odd:PauseBehavior"
     wait_duration: float = 0.2
 
 
-class Nodding:
-    name = "whatever it calls itself"
+class PauseBehavior:
+    name = "a name that simscen ignores"
 
     def __init__(self, spec, setting):
         self.spec = spec
@@ -133,11 +139,13 @@ class Nodding:
         return STOP if seconds < self.spec.wait_duration else None
 
 
-class Unsure(GoalCheckerSpec):
-    component = "odd:UnsureChecker"
+class NotBoolean(GoalCheckerSpec):
+    """Goal checker that returns a string instead of a Boolean."""
+
+    component = "odd:NotBooleanChecker"
 
 
-class UnsureChecker:
+class NotBooleanChecker:
     def __init__(self, spec, setting):
         pass
 
@@ -148,14 +156,14 @@ class UnsureChecker:
         return "perhaps"
 
 
-class Still(InProcessStack):
-    """Does nothing."""
+class Stop(InProcessStack):
+    """Stack that stops the robot, and returns no valid decisions from tick 60 on."""
 
-    component = "odd:StillStack"
+    component = "odd:StopStack"
     patience: float = 1.0
 
 
-class StillStack:
+class StopStack:
     plan = goal = None
 
     def __init__(self, spec, setting):

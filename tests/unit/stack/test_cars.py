@@ -15,32 +15,33 @@ from simscen.stack.protocols import RobotModel
 from simscen.testing.flatland import box_robot
 
 CAR = RobotModel(box_robot(0.6, 0.4).footprint, None, 1.0, 1.0, 0.0, 1.5, 2.0, 2.0, 3.0, turning_radius=0.6)
-OPEN = CostmapView(np.zeros((80, 80), np.uint8), np.full((80, 80), 2.0, np.float32), 0.05, (-2.0, -2.0), 1)
+FREE_COSTMAP = CostmapView(np.zeros((80, 80), np.uint8), np.full((80, 80), 2.0, np.float32), 0.05, (-2.0, -2.0), 1)
 
 
 def line(start: float, end: float, yaw: float) -> np.ndarray:
+    """Return poses (21, 3) along x with a constant heading."""
     x = np.linspace(start, end, 21)
     return np.column_stack((x, np.zeros(21), np.full(21, yaw)))
 
 
-def test_cusps_are_where_forward_becomes_backward() -> None:
+def test_cusps_are_poses_between_forward_and_backward_motion() -> None:
     assert cusps(np.vstack((line(0, 1, 0.0), line(1, 0, 0.0)[1:], line(0, 1, 0.0)[1:]))).tolist() == [20, 40]
     assert cusps(line(1, 0, np.pi)).size == 0
     assert cusps(np.zeros((1, 3))).size == 0
 
 
-def test_distance_to_a_plan_is_lateral_and_beyond_its_end() -> None:
-    plan = FollowedPlan(Path(line(0, 1, 0.0)), 0.2, OPEN)
-    for pose, missed in ((Pose2(0.2, 0.1), False), (Pose2(0.4, 0.3), True), (Pose2(0.9, 0.0), False)):
+def test_plan_is_missed_beside_it_or_at_its_end() -> None:
+    plan = FollowedPlan(Path(line(0, 1, 0.0)), 0.2, FREE_COSTMAP)
+    for pose, is_missed in ((Pose2(0.2, 0.1), False), (Pose2(0.4, 0.3), True), (Pose2(0.9, 0.0), False)):
         plan.locate(pose)
-        assert plan.is_missed(pose) is missed
+        assert plan.is_missed(pose) is is_missed
     plan.locate(Pose2(1.0, 0.0))
     assert plan.is_missed(Pose2(1.0, 0.0))
 
 
-def test_the_smoother_keeps_a_car_on_its_curve_while_it_speeds_up() -> None:
+def test_smoother_keeps_the_curvature_of_a_car_while_it_accelerates() -> None:
     smoother = VelocitySmoother(SmootherSpec(), CAR, 0.05)
     for _ in range(5):
-        sent = smoother.smooth(Twist(0.8, 0.0, 0.4))
-        assert sent.wz / sent.vx == pytest.approx(0.5)
-    assert sent.vx < 0.8
+        command = smoother.smooth(Twist(0.8, 0.0, 0.4))
+        assert command.wz / command.vx == pytest.approx(0.5)
+    assert command.vx < 0.8

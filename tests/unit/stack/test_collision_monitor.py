@@ -1,4 +1,4 @@
-"""Tests of the collision monitor with exact answers."""
+"""Tests of the collision monitor: speed limits by the time before a collision, and silent lidars."""
 
 import math
 
@@ -16,7 +16,7 @@ from simscen.testing.flatland import TICK_RATE_HZ, box_robot, round_robot
 
 
 def scan(*points: tuple[float, float], tick: int = 0) -> Scan:
-    """A scan of one beam a point; the lidar is at the base."""
+    """Return a scan with one hit at each point, of a lidar at the origin of the base."""
     angles = np.array([math.atan2(y, x) for x, y in points])
     step = 1e-3
     ranges = np.full(7000, np.inf)
@@ -30,101 +30,102 @@ def monitor(robot: RobotModel | None = None, **options: float) -> CollisionMonit
 
 @pytest.mark.parametrize(("x", "scale"), [(2.0, 1.0), (0.22 + 0.02 + 0.125, 0.5), (0.23, 0.0)])
 def test_monitor_limits_the_speed_by_the_time_before_collision(x: float, scale: float) -> None:
-    guard = monitor()
-    guard.on_scan(scan((x, 0.0)), Pose2(0, 0))
-    allowed = guard.limit_command(Twist(0.5, 0.0, 0.0), Pose2(0, 0))
+    collision_monitor = monitor()
+    collision_monitor.on_scan(scan((x, 0.0)), Pose2(0, 0))
+    allowed = collision_monitor.limit_command(Twist(0.5, 0.0, 0.0), Pose2(0, 0))
     assert allowed.vx == pytest.approx(0.5 * scale, abs=0.5 / 8)
     assert allowed.vx <= 0.5 * scale + 1e-9 or scale == 1.0
 
 
 def test_monitor_allows_driving_away_from_a_near_obstacle() -> None:
-    guard = monitor()
-    guard.on_scan(scan((0.23, 0.0)), Pose2(0, 0))
-    assert guard.limit_command(Twist(-0.2), Pose2(0, 0)) == Twist(-0.2)
-    assert guard.limit_command(Twist(wz=1.0), Pose2(0, 0)) == Twist(wz=1.0)
+    collision_monitor = monitor()
+    collision_monitor.on_scan(scan((0.23, 0.0)), Pose2(0, 0))
+    assert collision_monitor.limit_command(Twist(-0.2), Pose2(0, 0)) == Twist(-0.2)
+    assert collision_monitor.limit_command(Twist(wz=1.0), Pose2(0, 0)) == Twist(wz=1.0)
 
 
 def test_monitor_includes_the_motion_since_the_scan() -> None:
-    guard = monitor()
-    guard.on_scan(scan((0.6, 0.0)), Pose2(5, 5, 1.0))
-    assert guard.limit_command(Twist(0.2), Pose2(5, 5, 1.0)) == Twist(0.2)
+    collision_monitor = monitor()
+    collision_monitor.on_scan(scan((0.6, 0.0)), Pose2(5, 5, 1.0))
+    assert collision_monitor.limit_command(Twist(0.2), Pose2(5, 5, 1.0)) == Twist(0.2)
     moved = Pose2(5, 5, 1.0).compose(Pose2(0.36, 0.0))
-    assert guard.limit_command(Twist(0.2), moved) == STOP
+    assert collision_monitor.limit_command(Twist(0.2), moved) == STOP
 
 
-def test_monitor_checks_the_swinging_corners_of_a_long_hull() -> None:
-    guard = monitor(box_robot())
-    guard.on_scan(scan((0.15, 0.19)), Pose2(0, 0))
-    assert guard.limit_command(Twist(wz=1.0), Pose2(0, 0)).wz < 0.5
-    assert guard.limit_command(Twist(0.3), Pose2(0, 0)).vx == 0.3
+def test_monitor_checks_the_corners_of_a_turning_rectangular_robot() -> None:
+    collision_monitor = monitor(box_robot())
+    collision_monitor.on_scan(scan((0.15, 0.19)), Pose2(0, 0))
+    assert collision_monitor.limit_command(Twist(wz=1.0), Pose2(0, 0)).wz < 0.5
+    assert collision_monitor.limit_command(Twist(0.3), Pose2(0, 0)).vx == 0.3
 
 
 def test_monitor_can_require_several_points() -> None:
-    guard = monitor(min_points=3)
-    guard.on_scan(scan((0.3, 0.0), (0.3, 0.01)), Pose2(0, 0))
-    assert guard.limit_command(Twist(0.5), Pose2(0, 0)) == Twist(0.5)
-    guard.on_scan(scan((0.3, 0.0), (0.3, 0.01), (0.3, -0.01)), Pose2(0, 0))
-    assert guard.limit_command(Twist(0.5), Pose2(0, 0)).vx < 0.5
+    collision_monitor = monitor(min_points=3)
+    collision_monitor.on_scan(scan((0.3, 0.0), (0.3, 0.01)), Pose2(0, 0))
+    assert collision_monitor.limit_command(Twist(0.5), Pose2(0, 0)) == Twist(0.5)
+    collision_monitor.on_scan(scan((0.3, 0.0), (0.3, 0.01), (0.3, -0.01)), Pose2(0, 0))
+    assert collision_monitor.limit_command(Twist(0.5), Pose2(0, 0)).vx < 0.5
 
 
-def test_source_times_out_without_scans_or_with_blind_scans() -> None:
-    guard = monitor(source_timeout=0.3)
-    guard.start(0)
-    guard.on_scan(scan((2.0, 0.0)), Pose2(0, 0))
-    assert not guard.is_silent(72)
-    assert guard.is_silent(73)
-    guard.on_scan(scan((2.0, 0.0), tick=100), Pose2(0, 0))
-    assert not guard.is_silent(172)
-    guard.on_scan(Scan("lidar", 180, np.full(9, np.nan), 0.0, 0.1, 0.05, 12.0), Pose2(0, 0))
-    assert guard.is_silent(181)
+def test_lidar_is_silent_after_its_timeout_without_scans_or_with_scans_without_returns() -> None:
+    collision_monitor = monitor(source_timeout=0.3)
+    collision_monitor.start(0)
+    collision_monitor.on_scan(scan((2.0, 0.0)), Pose2(0, 0))
+    assert not collision_monitor.is_silent(72)
+    assert collision_monitor.is_silent(73)
+    collision_monitor.on_scan(scan((2.0, 0.0), tick=100), Pose2(0, 0))
+    assert not collision_monitor.is_silent(172)
+    collision_monitor.on_scan(Scan("lidar", 180, np.full(9, np.nan), 0.0, 0.1, 0.05, 12.0), Pose2(0, 0))
+    assert collision_monitor.is_silent(181)
 
 
-def test_robot_waits_for_its_first_scan() -> None:
-    guard = monitor(source_timeout=0.3)
-    guard.start(12)
-    assert guard.is_silent(12)
-    assert guard.silence_reason(24) == "lidar `lidar` has been silent for 0.05 s; source_timeout is 0.3 s"
-    guard.on_scan(scan((2.0, 0.0), tick=10), Pose2(0, 0), 30)
-    assert not guard.is_silent(30)
-    guard.start(60)
-    assert not guard.is_silent(60)
+def test_lidar_is_silent_until_its_first_scan() -> None:
+    collision_monitor = monitor(source_timeout=0.3)
+    collision_monitor.start(12)
+    assert collision_monitor.is_silent(12)
+    assert collision_monitor.silence_reason(24) == "lidar `lidar` has been silent for 0.05 s; source_timeout is 0.3 s"
+    collision_monitor.on_scan(scan((2.0, 0.0), tick=10), Pose2(0, 0), 30)
+    assert not collision_monitor.is_silent(30)
+    collision_monitor.start(60)
+    assert not collision_monitor.is_silent(60)
 
 
-def test_silent_lidar_has_a_reason() -> None:
-    guard = monitor(source_timeout=0.3)
-    guard.start(0)
-    assert guard.silence_reason(240) == "lidar `lidar` has been silent for 1.00 s; source_timeout is 0.3 s"
-    guard.on_scan(scan((2.0, 0.0), tick=120), Pose2(0, 0), 240)
+def test_reason_names_the_lidar_and_why_it_is_silent() -> None:
+    collision_monitor = monitor(source_timeout=0.3)
+    collision_monitor.start(0)
+    assert collision_monitor.silence_reason(240) == "lidar `lidar` has been silent for 1.00 s; source_timeout is 0.3 s"
+    collision_monitor.on_scan(scan((2.0, 0.0), tick=120), Pose2(0, 0), 240)
     assert (
-        guard.silence_reason(241) == "scans of lidar `lidar` are 0.50 s old when they arrive; source_timeout is 0.3 s"
+        collision_monitor.silence_reason(241)
+        == "scans of lidar `lidar` are 0.50 s old when they arrive; source_timeout is 0.3 s"
     )
-    guard.on_scan(Scan("lidar", 300, np.full(9, np.nan), 0.0, 0.1, 0.05, 12.0), Pose2(0, 0), 300)
-    assert "blind for 0.75 s: its scans contain no returns" in guard.silence_reason(300)
-    assert "silent" in guard.silence_reason(400)
+    collision_monitor.on_scan(Scan("lidar", 300, np.full(9, np.nan), 0.0, 0.1, 0.05, 12.0), Pose2(0, 0), 300)
+    assert "blind for 0.75 s: its scans contain no returns" in collision_monitor.silence_reason(300)
+    assert "silent" in collision_monitor.silence_reason(400)
 
 
 @pytest.mark.parametrize("robot", [round_robot(), box_robot(1.0, 0.3)])
 def test_quick_check_brakes_for_moving_obstacles_like_the_full_check(
     robot: RobotModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    hasty, thorough = (CollisionMonitor(MonitorSpec(), robot, (), TICK_RATE_HZ) for _ in range(2))
-    monkeypatch.setattr(thorough, "_may_meet_moving", lambda *_: True)
-    rng, braked, spared = np.random.default_rng(4), 0, 0
+    with_quick_check, without_quick_check = (CollisionMonitor(MonitorSpec(), robot, (), TICK_RATE_HZ) for _ in range(2))
+    monkeypatch.setattr(without_quick_check, "_may_meet_moving", lambda *_: True)
+    rng, braked_count, skipped_count = np.random.default_rng(4), 0, 0
     for _ in range(400):
-        places, speeds = rng.normal(0.0, 1.2, (2, 2)), rng.normal(0.0, 0.7, (2, 2))
-        states = zip(places, speeds, (0.3, 0.1), strict=True)
+        positions, velocities = rng.normal(0.0, 1.2, (2, 2)), rng.normal(0.0, 0.7, (2, 2))
+        states = zip(positions, velocities, (0.3, 0.1), strict=True)
         moving = MovingObstacles(
             (MovingObstacle(complex(*xy), complex(*v), radius, 0.0, 0.0, 0.0) for xy, v, radius in states), 0.0
         )
-        wanted = Twist(*rng.normal(0.0, (0.5, 0.1, 0.8)).tolist())
-        hasty.set_moving_obstacles(moving)
-        thorough.set_moving_obstacles(moving)
-        allowed = thorough.limit_command(wanted, Pose2(0.0, 0.0))
-        assert hasty.limit_command(wanted, Pose2(0.0, 0.0)) == allowed
-        braked += allowed != wanted
-        spared += not hasty._may_meet_moving(wanted, MonitorSpec().time_before_collision)
-    assert braked > 10
-    assert spared > 100
+        command = Twist(*rng.normal(0.0, (0.5, 0.1, 0.8)).tolist())
+        with_quick_check.set_moving_obstacles(moving)
+        without_quick_check.set_moving_obstacles(moving)
+        allowed = without_quick_check.limit_command(command, Pose2(0.0, 0.0))
+        assert with_quick_check.limit_command(command, Pose2(0.0, 0.0)) == allowed
+        braked_count += allowed != command
+        skipped_count += not with_quick_check._may_meet_moving(command, MonitorSpec().time_before_collision)
+    assert braked_count > 10
+    assert skipped_count > 100
 
 
 @pytest.mark.parametrize(
@@ -134,8 +135,8 @@ def test_quick_check_brakes_for_moving_obstacles_like_the_full_check(
 def test_simulation_time_step_is_the_resolution_of_the_time_before_collision(
     step: float | None, free_time: float
 ) -> None:
-    """Contact after 0.4 s at 0.5 m/s: the last step before it counts."""
-    guard = monitor(**({} if step is None else {"simulation_time_step": step}))
-    guard.on_scan(scan((0.22 + 0.02 + 0.199, 0.0)), Pose2(0, 0))
-    allowed = guard.limit_command(Twist(0.5, 0.0, 0.0), Pose2(0, 0))
+    """At 0.5 m/s, the robot has contact after 0.4 s. The time of the last step before contact limits its speed."""
+    collision_monitor = monitor(**({} if step is None else {"simulation_time_step": step}))
+    collision_monitor.on_scan(scan((0.22 + 0.02 + 0.199, 0.0)), Pose2(0, 0))
+    allowed = collision_monitor.limit_command(Twist(0.5, 0.0, 0.0), Pose2(0, 0))
     assert allowed.vx == pytest.approx(0.5 * free_time / 0.5)

@@ -33,7 +33,7 @@ def test_navigator_visits_goals_in_order() -> None:
     assert len(d.events_of_kind("navigation.ended")) == 1
 
 
-def test_an_unmapped_obstacle_on_the_plan_is_driven_around_without_recovery() -> None:
+def test_navigator_drives_around_an_unmapped_obstacle_without_recovery() -> None:
     world = rooms()
     world.discs.append((7.5, 2.0, 0.3))
     d = start(world, grid=rooms()).run(60)
@@ -45,7 +45,7 @@ def test_an_unmapped_obstacle_on_the_plan_is_driven_around_without_recovery() ->
 
 def test_opened_path_is_taken_if_clearly_shorter() -> None:
     mapped = Flatland().room(10, 6)
-    mapped.boxes += [(4.9, 0.0, 5.0, 2.5), (4.9, 3.5, 5.0, 5.0)]  # a door, and a long way round by the top
+    mapped.boxes += [(4.9, 0.0, 5.0, 2.5), (4.9, 3.5, 5.0, 5.0)]  # a door, and a detour at the top
     world = Flatland([*mapped.boxes, DOOR])
     d = drive(
         world, Pose2(2.0, 1.0), Goal("g", Pose2(8.0, 1.0), timeout=90.0), grid=mapped.grid(BOUNDS), spec=ADVANCED
@@ -68,7 +68,7 @@ def test_cancel_stops_at_once_and_ends_the_task() -> None:
     assert d.stack.goal is None
 
 
-def test_a_new_goal_preempts_the_current_one_and_the_later_ones_follow() -> None:
+def test_new_goal_preempts_the_current_goal_and_the_later_goals_follow() -> None:
     d = start(rooms(), FAR, Goal("last", Pose2(1.0, 1.0))).run(2.0)
     d.stack.preempt(d.tick, Goal("new", Pose2(3.0, 5.0)))
     d.run(60)
@@ -76,7 +76,7 @@ def test_a_new_goal_preempts_the_current_one_and_the_later_ones_follow() -> None
     assert [e.name for e in d.events_of_kind("goal.reached")] == ["new", "last"]
 
 
-def test_a_task_that_has_ended_can_be_given_a_new_goal() -> None:
+def test_new_goal_after_the_end_of_a_task_is_reached() -> None:
     d = start(rooms(), Goal("a", Pose2(2.0, 1.0))).run(30)
     d.stack.preempt(d.tick, Goal("b", Pose2(1.0, 2.0)))
     d.run(30)
@@ -91,9 +91,9 @@ def test_replanning_at_a_rate_replans_at_that_rate() -> None:
 
 def test_nav2_replans_through_poses_at_a_third_of_its_usual_rate() -> None:
     spec = StackSpec(localizer=TRUTH, planner=OmplPlanner(type="rrt_connect", replanning="rate"))
-    through = [Goal("by", Pose2(3.0, 5.0), via=True, xy_tolerance=0.7), FAR]
+    goals = [Goal("by", Pose2(3.0, 5.0), via=True, xy_tolerance=0.7), FAR]
     assert reasons(start(rooms(), spec=spec).run(6.5)).count("rate") == 6
-    assert reasons(start(rooms(), *through, spec=spec).run(6.5)).count("rate") == 2
+    assert reasons(start(rooms(), *goals, spec=spec).run(6.5)).count("rate") == 2
 
 
 def test_navigator_drives_without_a_map() -> None:
@@ -118,10 +118,10 @@ def test_long_robot_drives_through_a_gap_ten_centimeters_wider() -> None:
     assert d.min_clearance > 0.02
 
 
-def test_the_same_seed_gives_the_same_drive_and_another_seed_may_not() -> None:
-    one, other = (start(rooms(), seed=3).run(10) for _ in range(2))
-    assert one.track == other.track
-    assert one.log == other.log
+def test_same_seed_gives_the_same_drive() -> None:
+    first, second = (start(rooms(), seed=3).run(10) for _ in range(2))
+    assert first.track == second.track
+    assert first.log == second.log
 
 
 def test_commands_respect_velocity_and_acceleration_limits() -> None:
@@ -152,22 +152,22 @@ def test_a_car_drives_to_a_goal_behind_it() -> None:
 def test_late_scans_mark_obstacles_at_their_true_position() -> None:
     world = Flatland(discs=[(3.0, 0.0, 0.3)])
     d = drive(world, Pose2(0, 0), Goal("g", Pose2(2.5, 0.0)), grid=None, robot=round_robot(speed=0.5))
-    late: list = []
+    scans: list = []
     scan, stack = d.scan, d.stack
-    d.scan = lambda: (late.append(scan()), late[max(0, len(late) - 4)])[1]  # 0.3 s old
+    d.scan = lambda: (scans.append(scan()), scans[max(0, len(scans) - 4)])[1]  # 0.3 s old
     d.run(3.0)
     view = stack.inner._costmaps.global_costmap.view
     columns = (view.costs == 254).nonzero()[1]
     x = view.origin[0] + (columns + 0.5) * view.resolution
     assert len(x)
-    assert x.min() > 2.6  # the disc begins at 2.7; 0.3 s at 0.5 m/s would have put it at 2.85 and later
+    assert x.min() > 2.6  # the disc begins at 2.7; an error of 0.3 s at 0.5 m/s would be 0.15 m
     assert x.min() < 2.75
 
 
-@pytest.mark.parametrize("off", [0.04, -0.04])
-def test_navigator_passes_a_wall_displaced_by_centimeters(off: float) -> None:
-    """As for a robot whose estimate is wrong by as much; it is configured for the shortest path, not for clearance."""
-    mapped, world = (Flatland([(2.5 + x, 2.7, 9.5, 2.8)]).room(12, 5) for x in (0.0, off))
+@pytest.mark.parametrize("offset", [0.04, -0.04])
+def test_navigator_passes_a_wall_displaced_by_centimeters(offset: float) -> None:
+    """An error of the pose estimate has the same effect. The planner prefers short paths to clearance."""
+    mapped, world = (Flatland([(2.5 + x, 2.7, 9.5, 2.8)]).room(12, 5) for x in (0.0, offset))
     spec = StackSpec(
         profile="advanced", localizer=TRUTH, planner={"type": "medial_axis", "cost_travel_multiplier": 0.2}
     )
@@ -186,18 +186,18 @@ def test_slow_measured_motion_counts_as_rest() -> None:
         min_theta_velocity_threshold=0.3,
     )
     d = start(rooms(), spec=spec)
-    controller, given = d.stack.inner._navigator._controller, list[Twist]()
+    controller, twists = d.stack.inner._navigator._controller, list[Twist]()
     command = controller.command
 
-    def record(pose: Pose2, twist: Twist, *rest: object) -> Twist:
-        given.append(twist)
-        return command(pose, twist, *rest)
+    def record(pose: Pose2, twist: Twist, *args: object) -> Twist:
+        twists.append(twist)
+        return command(pose, twist, *args)
 
     controller.command = record
     d.run(1.0)
-    given.clear()
-    for moving in (Twist(0.1, -0.2, 0.3), Twist(0.2, 0.1, -0.4), Twist(-0.2, -0.3, 0.0)):
-        d._move = lambda _command, _dt, moving=moving: setattr(d, "twist", moving)
+    twists.clear()
+    for twist in (Twist(0.1, -0.2, 0.3), Twist(0.2, 0.1, -0.4), Twist(-0.2, -0.3, 0.0)):
+        d._move = lambda _command, _dt, twist=twist: setattr(d, "twist", twist)
         d.run(0.2)
-    measured = list(dict.fromkeys(given))[1:]  # the first one is from before
+    measured = list(dict.fromkeys(twists))[1:]  # the first twist was measured before
     assert measured == [STOP, Twist(0.2, 0.0, -0.4), Twist(-0.2, -0.3, 0.0)]

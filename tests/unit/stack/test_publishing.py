@@ -17,7 +17,7 @@ FRAMES = Frames(Pose2(0.0, 0.0), Pose2(0.0, 0.0))
 
 
 class ChangingCostmap:
-    """A costmap that has changed each time it is asked for."""
+    """Costmap with a new revision in each view."""
 
     def __init__(self, frequency: float, cells: int = 100) -> None:
         self.publish_frequency, self._revision, self._shape = frequency, 0, (cells, 1)
@@ -29,8 +29,8 @@ class ChangingCostmap:
         return CostmapView(zeros.astype(np.uint8), zeros.astype(np.float32), 0.05, (0.0, 0.0), self._revision)
 
 
-def published(costmaps: Any, seconds: float = 10.0) -> dict[str, int]:
-    """How often each costmap is published."""
+def publication_counts(costmaps: Any, seconds: float = 10.0) -> dict[str, int]:
+    """Return how often each costmap is published."""
     publisher = Publisher(TICK_RATE_HZ, SimpleNamespace(), SimpleNamespace())  # type: ignore[arg-type]
     counts = {"global": 0, "local": 0}
     for tick in range(0, round(seconds * TICK_RATE_HZ), 12):
@@ -44,18 +44,18 @@ def published(costmaps: Any, seconds: float = 10.0) -> dict[str, int]:
     [((0.5, 1.0), (5, 10)), ((2.0, 5.0), (20, 50)), ((0.0, 1.0), (0, 10)), ((0.5, 0.0), (5, 0))],
 )
 def test_costmaps_are_published_at_their_publish_frequency(frequencies, expected) -> None:
-    each, other = map(ChangingCostmap, frequencies)
-    found = published(SimpleNamespace(global_costmap=each, local_costmap=other))
-    assert (found["global"], found["local"]) == expected
+    global_costmap, local_costmap = map(ChangingCostmap, frequencies)
+    counts = publication_counts(SimpleNamespace(global_costmap=global_costmap, local_costmap=local_costmap))
+    assert (counts["global"], counts["local"]) == expected
 
 
 def test_large_costmaps_are_published_less_often() -> None:
     large = ChangingCostmap(5.0, cells=250_000)
-    found = published(SimpleNamespace(global_costmap=large, local_costmap=ChangingCostmap(5.0)))
-    assert found == {"global": 5, "local": 50}
+    counts = publication_counts(SimpleNamespace(global_costmap=large, local_costmap=ChangingCostmap(5.0)))
+    assert counts == {"global": 5, "local": 50}
 
 
-def test_the_default_rates_are_half_of_nav2() -> None:
+def test_default_publish_frequencies_are_half_of_those_of_nav2() -> None:
     """nav2_params.yaml has 1 Hz and 2 Hz."""
     assert (Costmap().publish_frequency, LocalCostmap().publish_frequency) == (0.5, 1.0)
     assert LocalCostmap().with_defaults_from(Costmap()).publish_frequency == 1.0

@@ -1,4 +1,4 @@
-"""Tests of the velocity smoother with exact answers."""
+"""Tests of the limits of the velocity smoother."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ def test_smoother_limits_acceleration_and_brakes_at_full_deceleration() -> None:
     assert smoother.smooth(Twist(wz=1.0)).wz == pytest.approx(0.32)
 
 
-def test_the_smoother_passes_zero_before_it_reverses() -> None:
+def test_smoother_stops_before_it_reverses() -> None:
     smoother = VelocitySmoother(SmootherSpec(), round_robot(), 0.05)
     smoother.reset(Twist(0.05))
     assert smoother.smooth(Twist(-0.5)).vx == 0.0

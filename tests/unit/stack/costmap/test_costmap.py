@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from room_costmaps import BOUNDS, ROBOT, at, costmap, scan_of
+from room_costmaps import BOUNDS, ROBOT, cost_and_distance_at, costmap, scan_of
 from scipy.ndimage import distance_transform_edt
 
 from simscen.core.environment.costmap_filters import Zones
@@ -40,13 +40,13 @@ def test_costmaps_of_one_map_have_independent_distances() -> None:
             map_ = LayeredCostmap(Spec(inflation_radius=0.2), Surroundings(robot, grid, TICK_RATE_HZ, keepout=keepout))
             distance = distance_transform_edt(map_.view.costs != 254) * 0.05
             assert np.allclose(map_.view.distance, np.minimum(distance, radius + 0.5), atol=1e-6)
-            assert at(map_, 4.3, 3.1)[0] == (254 if keepout else 0)
+            assert cost_and_distance_at(map_, 4.3, 3.1)[0] == (254 if keepout else 0)
 
 
 def test_costs_follow_nav2s_formula_between_the_inscribed_and_the_inflation_radius() -> None:
     map_ = costmap(Flatland().room(8, 6))
     for x in (0.1, 0.3, 0.45, 0.6, 0.75):
-        cost, distance = at(map_, x, 3.0)
+        cost, distance = cost_and_distance_at(map_, x, 3.0)
         expected = 253 if distance <= 0.22 else int(252 * math.exp(-3.0 * (distance - 0.22)))
         assert cost == (expected if distance <= 0.70 else 0)
 
@@ -55,8 +55,8 @@ def test_unknown_cells_stay_unknown_unless_the_robot_would_touch_a_wall_there() 
     cells = np.full((40, 40), -1, dtype=np.int8)
     cells[20, 20] = 100
     map_ = LayeredCostmap(Spec(), Surroundings(ROBOT, OccupancyGrid(cells, 0.05), TICK_RATE_HZ))
-    assert at(map_, 1.025, 1.125)[0] == 253
-    assert at(map_, 1.025, 1.725)[0] == 255
+    assert cost_and_distance_at(map_, 1.025, 1.125)[0] == 253
+    assert cost_and_distance_at(map_, 1.025, 1.725)[0] == 255
 
 
 def test_a_turned_map_is_sampled_into_an_unturned_costmap() -> None:
@@ -88,14 +88,14 @@ def test_distances_far_from_changes_are_unchanged(group: int) -> None:
     map_, text, rng = costmap(world, spec), [], np.random.default_rng(5)
     places = rng.uniform((0.5, 0.5), (7.5, 5.5), (60, 2)) @ (1, 1j)
     for _ in range(12):
-        revision, before = map_.revision, [at(map_, each.real, each.imag)[1] for each in places]
+        revision, before = map_.revision, [cost_and_distance_at(map_, each.real, each.imag)[1] for each in places]
         for _ in range(2):
             x, y = rng.uniform((1.0, 1.0), (7.0, 5.0))
             seen = Flatland(world.boxes, [(x + 0.7, y, 0.02), (x, y - 1.1, 0.05)])
             map_.update(Pose2(x, y), scan_of(seen, Pose2(x, y), noise=0.03))
         for place, distance in zip(places, before, strict=True):
             text.append(map_.changed_near(revision, np.array([place]), 0.4))
-            assert text[-1] or min(distance, 0.4) == min(at(map_, place.real, place.imag)[1], 0.4)
+            assert text[-1] or min(distance, 0.4) == min(cost_and_distance_at(map_, place.real, place.imag)[1], 0.4)
     assert 0.02 < np.mean(text) < 0.5
     assert map_.changed_near(map_.revision - 100, places, 0.4)
     assert not map_.changed_near(map_.revision, places, 0.4)
@@ -114,7 +114,7 @@ def test_rolling_window_follows_the_robot_and_keeps_its_obstacles() -> None:
     map_ = costmap(None, Spec(rolling_size=8.0))
     world = Flatland(discs=[(2.0, 0.5, 0.1)])
     map_.update(Pose2(0.0, 0.0), scan_of(world, Pose2(0.0, 0.0)))
-    assert at(map_, 1.9, 0.475)[0] == 254
+    assert cost_and_distance_at(map_, 1.9, 0.475)[0] == 254
     map_.update(Pose2(3.0, -2.0), scan_of(Flatland(), Pose2(3.0, -2.0), range_max=0.5))
     view = map_.view
     assert view.origin == pytest.approx((-1.0, -6.0), abs=0.06)
@@ -130,8 +130,8 @@ def test_obstacles_outside_the_rolling_window_are_forgotten() -> None:
 
 def test_keepout_zones_are_walls() -> None:
     map_ = costmap(Flatland().room(8, 6), keepout=(((3, 2), (5, 2), (5, 4), (3, 4)),))
-    assert at(map_, 4.0, 3.0) == (254, 0.0)
-    assert at(map_, 2.87, 3.0)[0] == 253
+    assert cost_and_distance_at(map_, 4.0, 3.0) == (254, 0.0)
+    assert cost_and_distance_at(map_, 2.87, 3.0)[0] == 253
 
 
 def test_pose_fits_on_the_map_unless_it_is_in_a_wall() -> None:
@@ -177,19 +177,19 @@ def test_switched_zones_give_the_costmaps_with_and_without_them() -> None:
 def test_zones_can_be_switched_in_a_rolling_window() -> None:
     map_ = costmap(None, Spec(rolling_size=6.0, track_unknown_space=False))
     map_.set_zones(Zones(keepout=(((1.0, 0.5), (2.0, 0.5), (2.0, 1.5), (1.0, 1.5)),)))
-    assert at(map_, 1.5, 1.0)[0] == 254
+    assert cost_and_distance_at(map_, 1.5, 1.0)[0] == 254
     map_.set_zones(Zones())
-    assert at(map_, 1.5, 1.0)[0] == 0
+    assert cost_and_distance_at(map_, 1.5, 1.0)[0] == 0
 
 
 def test_unknown_space_is_free_where_it_is_not_tracked() -> None:
     cells = np.full((40, 40), -1, dtype=np.int8)
     cells[20, 20] = 100
     surroundings = Surroundings(ROBOT, OccupancyGrid(cells, 0.05), TICK_RATE_HZ)
-    assert at(LayeredCostmap(Spec(), surroundings), 1.025, 1.825)[0] == 255
-    assert at(LayeredCostmap(Spec(track_unknown_space=False), surroundings), 1.025, 1.825)[0] == 0
-    assert at(costmap(None), 5.0, 5.0)[0] == 255
-    assert at(costmap(None, Spec(track_unknown_space=False)), 5.0, 5.0)[0] == 0
+    assert cost_and_distance_at(LayeredCostmap(Spec(), surroundings), 1.025, 1.825)[0] == 255
+    assert cost_and_distance_at(LayeredCostmap(Spec(track_unknown_space=False), surroundings), 1.025, 1.825)[0] == 0
+    assert cost_and_distance_at(costmap(None), 5.0, 5.0)[0] == 255
+    assert cost_and_distance_at(costmap(None, Spec(track_unknown_space=False)), 5.0, 5.0)[0] == 0
 
 
 @pytest.mark.parametrize("inflation_radius", [0.7, 1.0])  # 1.0 m is the maximum distance
@@ -204,16 +204,16 @@ def test_beam_through_unknown_space_makes_it_known(inflation_radius: float) -> N
     for each in (known, map_):
         each.update(pose, scan_of(world, pose))
     for x, y in ((4.0, 0.5), (5.5, 1.0), (4.0, 3.5), (3.0, 0.6)):
-        assert at(map_, x, y) == at(known, x, y)
-    assert at(map_, 4.0, 5.0)[0] == 255  # out of reach
+        assert cost_and_distance_at(map_, x, y) == cost_and_distance_at(known, x, y)
+    assert cost_and_distance_at(map_, 4.0, 5.0)[0] == 255  # out of reach
 
 
 def test_rolling_window_keeps_known_cells() -> None:
     map_ = costmap(None, Spec(rolling_size=8.0))
     map_.update(Pose2(0.0, 0.0), scan_of(Flatland(), Pose2(0.0, 0.0)))
     map_.update(Pose2(1.5, 0.0), scan_of(Flatland(), Pose2(1.5, 0.0)))
-    assert at(map_, -1.0, 0.0)[0] == 0
-    assert at(map_, 5.0, 0.0)[0] == 255
+    assert cost_and_distance_at(map_, -1.0, 0.0)[0] == 0
+    assert cost_and_distance_at(map_, 5.0, 0.0)[0] == 255
 
 
 @pytest.mark.parametrize(("threshold", "lethal"), [(None, (65, 100)), (100, (100,)), (30, (30, 64, 65, 100))])

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from room_costmaps import at, costmap, scan_of
+from room_costmaps import cost_and_distance_at, costmap, scan_of
 
 from simscen.core.geometry import Pose2
 from simscen.core.messages.sensor_data import Scan
@@ -18,8 +18,8 @@ def test_a_hit_is_marked_up_to_the_obstacle_range_and_not_beyond() -> None:
     map_ = costmap(world)
     world.discs += [(4.0, 3.0, 0.1), (7.0, 3.0, 0.1)]
     map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
-    assert at(map_, 3.92, 3.0)[0] == 254
-    assert at(map_, 6.92, 3.0)[0] == 0
+    assert cost_and_distance_at(map_, 3.92, 3.0)[0] == 254
+    assert cost_and_distance_at(map_, 6.92, 3.0)[0] == 0
 
 
 def test_removed_obstacle_is_cleared_and_the_map_restored() -> None:
@@ -62,7 +62,7 @@ def test_only_valid_beams_clear_cells(ranges: float, inf_is_valid: bool, cleared
     map_.update(Pose2(2.0, 3.0), seen)
     blind = Scan("lidar", 1, np.full(360, ranges), seen.angle_min, seen.angle_increment, 0.05, 12.0)
     map_.update(Pose2(2.0, 3.0), blind)
-    assert (at(map_, 3.92, 3.0)[0] != 254) == cleared
+    assert (cost_and_distance_at(map_, 3.92, 3.0)[0] != 254) == cleared
 
 
 @pytest.mark.parametrize(("yaw", "cleared"), [(0.0, True), (0.5, False), (math.pi / 2, False), (math.pi, False)])
@@ -73,7 +73,7 @@ def test_a_single_beam_clears_only_the_cells_that_it_crosses(yaw: float, cleared
     map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
     beam = Scan("lidar", 1, np.array([10.0]), 0.0, 2 * math.pi, 0.05, 12.0)  # of a lidar with `beams: 1`
     map_.update(Pose2(2.0, 3.0, yaw), beam)
-    assert (at(map_, 3.92, 3.0)[0] != 254) == cleared
+    assert (cost_and_distance_at(map_, 3.92, 3.0)[0] != 254) == cleared
 
 
 def test_an_obstacle_beyond_the_ray_tracing_range_persists() -> None:
@@ -83,7 +83,7 @@ def test_an_obstacle_beyond_the_ray_tracing_range_persists() -> None:
     map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
     world.discs.pop()
     map_.update(Pose2(0.6, 3.0), scan_of(world, Pose2(0.6, 3.0)))
-    assert at(map_, 3.92, 3.0)[0] == 254
+    assert cost_and_distance_at(map_, 3.92, 3.0)[0] == 254
 
 
 def test_clearing_removes_unseen_obstacles_and_keeps_visible_ones() -> None:
@@ -94,8 +94,8 @@ def test_clearing_removes_unseen_obstacles_and_keeps_visible_ones() -> None:
     world.discs = [(1.5, 3.0, 0.1)]
     map_.update(Pose2(0.6, 3.0), scan_of(world, Pose2(0.6, 3.0)))
     map_.clear()
-    assert at(map_, 3.92, 3.0)[0] != 254
-    assert at(map_, 1.42, 3.0)[0] == 254
+    assert cost_and_distance_at(map_, 3.92, 3.0)[0] != 254
+    assert cost_and_distance_at(map_, 1.42, 3.0)[0] == 254
 
 
 @pytest.mark.parametrize("within", [math.inf, 3.0])
@@ -106,12 +106,12 @@ def test_clearing_keeps_near_obstacles_outside_the_field_of_view(within: float) 
     full = scan_of(Flatland().room(8, 6), Pose2(3.9, 3.0))
     ahead = replace(full, ranges=full.ranges[45:-45], angle_min=full.angle_min + 45 * full.angle_increment)
     map_.update(Pose2(3.9, 3.0), ahead)
-    assert at(map_, 3.22, 3.0)[0] == at(map_, 1.48, 3.0)[0] == 254
+    assert cost_and_distance_at(map_, 3.22, 3.0)[0] == cost_and_distance_at(map_, 1.48, 3.0)[0] == 254
     map_.clear(within)
-    assert at(map_, 3.22, 3.0)[0] == 254
-    assert at(map_, 1.48, 3.0)[0] != 254
+    assert cost_and_distance_at(map_, 3.22, 3.0)[0] == 254
+    assert cost_and_distance_at(map_, 1.48, 3.0)[0] != 254
     map_.update(Pose2(3.9, 3.0), full)
-    assert at(map_, 3.22, 3.0)[0] != 254
+    assert cost_and_distance_at(map_, 3.22, 3.0)[0] != 254
 
 
 def test_clearing_keeps_unseen_obstacles_within_the_given_distance() -> None:
@@ -122,7 +122,7 @@ def test_clearing_keeps_unseen_obstacles_within_the_given_distance() -> None:
     ahead = replace(full, ranges=full.ranges[45:-45], angle_min=full.angle_min + 45 * full.angle_increment)
     map_.update(Pose2(3.9, 3.0), ahead)
     map_.clear(unseen_margin=3.0)
-    assert at(map_, 1.48, 3.0)[0] == 254
+    assert cost_and_distance_at(map_, 1.48, 3.0)[0] == 254
 
 
 def test_clearing_around_the_robot_keeps_distant_obstacles() -> None:
@@ -131,10 +131,10 @@ def test_clearing_around_the_robot_keeps_distant_obstacles() -> None:
     map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
     blind = scan_of(world, Pose2(2.0, 3.0))
     map_.update(Pose2(2.0, 3.0), replace(blind, ranges=np.full_like(blind.ranges, np.nan)))
-    assert (at(map_, 3.92, 3.0)[0], at(map_, 2.0, 4.12)[0]) == (254, 254)
+    assert (cost_and_distance_at(map_, 3.92, 3.0)[0], cost_and_distance_at(map_, 2.0, 4.12)[0]) == (254, 254)
     map_.clear(1.5)
-    assert at(map_, 3.92, 3.0)[0] == 254
-    assert at(map_, 2.0, 4.12)[0] != 254
+    assert cost_and_distance_at(map_, 3.92, 3.0)[0] == 254
+    assert cost_and_distance_at(map_, 2.0, 4.12)[0] != 254
 
 
 def test_costmap_is_cleared_around_the_robot_although_one_of_its_lidars_is_silent() -> None:
@@ -145,10 +145,10 @@ def test_costmap_is_cleared_around_the_robot_although_one_of_its_lidars_is_silen
     map_.update(Pose2(2.0, 3.0), replace(blind, sensor="rear"))  # its last scan
     map_.update(Pose2(6.0, 3.0), scan_of(world, Pose2(6.0, 3.0)))
     map_.update(Pose2(6.0, 3.0), blind)
-    assert (at(map_, 2.0, 4.12)[0], at(map_, 6.0, 4.12)[0]) == (254, 254)
+    assert (cost_and_distance_at(map_, 2.0, 4.12)[0], cost_and_distance_at(map_, 6.0, 4.12)[0]) == (254, 254)
     map_.clear(1.5)
-    assert at(map_, 2.0, 4.12)[0] == 254
-    assert at(map_, 6.0, 4.12)[0] != 254
+    assert cost_and_distance_at(map_, 2.0, 4.12)[0] == 254
+    assert cost_and_distance_at(map_, 6.0, 4.12)[0] != 254
 
 
 def test_cells_under_the_robot_are_free() -> None:
@@ -157,4 +157,4 @@ def test_cells_under_the_robot_are_free() -> None:
     world.discs.append((2.3, 3.0, 0.1))
     map_.update(Pose2(2.0, 3.0), scan_of(world, Pose2(2.0, 3.0)))
     map_.update(Pose2(2.2, 3.0), scan_of(Flatland(), Pose2(2.2, 3.0), range_max=0.06))
-    assert at(map_, 2.2, 3.0)[0] != 254
+    assert cost_and_distance_at(map_, 2.2, 3.0)[0] != 254

@@ -1,6 +1,6 @@
 """Tests that each parameter of the stack changes a decision of the stack in a scene.
 
-The parameters of controllers are tested in test_every_field_of_a_controller_counts.py.
+The parameters of controllers are tested in test_controller_parameters_have_an_effect.py.
 """
 
 import re
@@ -10,7 +10,7 @@ from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, NamedTuple, Union, get_args, get_origin
 
-import othervalues
+import other_values
 import pytest
 import scenes
 from pydantic import BaseModel, ValidationError
@@ -29,19 +29,21 @@ from simscen.spec.registry import all_types
 Data = dict[str, Any]
 TRUTH: Data = {"localizer": {"type": "ground_truth"}, "planner": {"type": "navfn"}}
 BLIND: Data = {**TRUTH, "costmap": {"obstacle_max_range": 0.05}}
-"""Planner and controller that do not see obstacles."""
+"""Costmaps contain no obstacles of the lidar, so that only the collision monitor reacts to them."""
 
 
 class Part(NamedTuple):
-    """Part of the specification of the stack: the path to it, and the specifications and scenes for its tests."""
+    """Part of the stack's specification, and the specifications and scenes with which its fields are tested."""
 
     keys: tuple[str | int, ...]
+    """Keys that lead to the part."""
     kind: type[BaseModel]
     tries: tuple[tuple[Data, Scene], ...]
+    """Specifications and scenes for all fields that are not in `special`."""
     special: dict[str, tuple[tuple[Data, Scene], ...]] = {}
-    """Other specifications and scenes, by field, for fields without an effect in those of `tries`."""
+    """Specifications and scenes for fields that have no effect in those of `tries`."""
     values: dict[str, list[Any]] = {}
-    """Values to try, by field, for fields whose default values to try are unsuitable."""
+    """Values for fields for which the values of `other_value_groups` are unsuitable."""
 
 
 def amcl(**fields: Any) -> Data:
@@ -60,8 +62,8 @@ def recovery(*behaviors: str | Data, **fields: Any) -> Data:
     return {**TRUTH, "recovery": {"behaviors": list(behaviors), "wait_duration": 0.4, **fields}}
 
 
-def of_planner(kind: str) -> dict[str, tuple[tuple[Data, Scene], ...]]:
-    """Return specifications and scenes for the fields that all planners have."""
+def planner_fields(kind: str) -> dict[str, tuple[tuple[Data, Scene], ...]]:
+    """Return the specifications and scenes, by field, for the fields that all planners have."""
     fields = {"type": kind}
     impatient = {**planner(**fields), "progress_checker": {"movement_time_allowance": 0.3}}
     return {
@@ -74,16 +76,20 @@ def of_planner(kind: str) -> dict[str, tuple[tuple[Data, Scene], ...]]:
     }
 
 
-LOST: Data = {"laser_model_type": "likelihood_field_prob", "update_min_d": 0.05}
-RANDOM: Data = {
+PROB_MODEL: Data = {"laser_model_type": "likelihood_field_prob", "update_min_d": 0.05}
+AS_AMCL: Data = {
     "sigma_hit": 0.2, "likelihood_exponent": 1.0, "beams_beyond_the_map": "miss", "map_trust_none": 0.0,
     "map_trust_full": 0.0, "match_scans": False, "settling_distance": 0.0, "relocalization": "random",
     "sure_update_interval": 1,
 }  # fmt: skip
-"""Parameters with which scan-matching AMCL is plain AMCL."""
-SMALL: Data = {**TRUTH, "costmap": {"rolling_size": 8.0}}
-SEEN = ((TRUTH, scenes.through_door), (SMALL, scenes.without_map), (TRUTH, scenes.obstacles_in_depth_image))
-SEEN_BY_A_CAMERA = ("min_obstacle_height", "max_obstacle_height", "max_ground_slope")
+"""Parameters that disable what scan-matching AMCL adds to AMCL."""
+ROLLING: Data = {**TRUTH, "costmap": {"rolling_size": 8.0}}
+MARKING_SCENES = (
+    (TRUTH, scenes.through_door),
+    (ROLLING, scenes.without_map),
+    (TRUTH, scenes.obstacles_in_depth_image),
+)
+CAMERA_FIELDS = ("min_obstacle_height", "max_obstacle_height", "max_ground_slope")
 STRICT: Data = {**TRUTH, "goal_checker": {"well_inside": 0.5}}
 DENOISE = {"enabled": True, "minimal_group_size": 6}
 PARTS = [
@@ -93,16 +99,16 @@ PARTS = [
         # With at most 120 particles, KLD sampling draws the maximum for all values of these two parameters.
         **dict.fromkeys(("pf_err", "pf_z"), ((plain_amcl(max_particles=2000), scenes.changed_room),)),
         "selective_resampling": ((plain_amcl(max_beams=5), scenes.changed_room),),
-        "recovery_alpha_slow": ((plain_amcl(**LOST, recovery_alpha_fast=0.9), scenes.kidnapped),),
-        "recovery_alpha_fast": ((plain_amcl(**LOST, recovery_alpha_slow=0.01), scenes.kidnapped),),
+        "recovery_alpha_slow": ((plain_amcl(**PROB_MODEL, recovery_alpha_fast=0.9), scenes.kidnapping),),
+        "recovery_alpha_fast": ((plain_amcl(**PROB_MODEL, recovery_alpha_slow=0.01), scenes.kidnapping),),
         **dict.fromkeys(
             ("z_short", "z_max", "lambda_short"), ((plain_amcl(laser_model_type="beam"), scenes.changed_room),)
         ),
         **dict.fromkeys(
             ("beam_skip_distance", "beam_skip_threshold", "beam_skip_error_threshold"),
-            ((plain_amcl(**LOST, do_beamskip=True, beam_skip_threshold=0.9), scenes.changed_room),),
+            ((plain_amcl(**PROB_MODEL, do_beamskip=True, beam_skip_threshold=0.9), scenes.changed_room),),
         ),
-        "do_beamskip": ((plain_amcl(**LOST, beam_skip_threshold=0.9), scenes.changed_room),),
+        "do_beamskip": ((plain_amcl(**PROB_MODEL, beam_skip_threshold=0.9), scenes.changed_room),),
     }, {"laser_min_range": [0.5, 1.5], "laser_max_range": [0.5, 1.5], "min_particles": [100],
         "laser_likelihood_max_dist": [0.2]}),
     Part(("localizer",), ScanMatchingAmcl, (
@@ -110,8 +116,8 @@ PARTS = [
         "alpha5": ((amcl(robot_model="omni", match_scans=False), scenes.changed_room),),
         "min_particles": ((amcl(min_particles=20), scenes.changed_room),),
         "selective_resampling": ((amcl(max_beams=5, likelihood_exponent=0.1), scenes.changed_room),),
-        "recovery_alpha_slow": ((amcl(**LOST, **RANDOM, recovery_alpha_fast=0.9), scenes.kidnapped),),
-        "recovery_alpha_fast": ((amcl(**LOST, **RANDOM, recovery_alpha_slow=0.01), scenes.kidnapped),),
+        "recovery_alpha_slow": ((amcl(**PROB_MODEL, **AS_AMCL, recovery_alpha_fast=0.9), scenes.kidnapping),),
+        "recovery_alpha_fast": ((amcl(**PROB_MODEL, **AS_AMCL, recovery_alpha_slow=0.01), scenes.kidnapping),),
         "relocalization": ((amcl(), scenes.unknown_start),),
         "match_scans": ((amcl(), scenes.wheel_slip),),
         **dict.fromkeys(("z_short", "z_max", "lambda_short"), ((amcl(laser_model_type="beam"), scenes.changed_room),)),
@@ -124,18 +130,20 @@ PARTS = [
         "laser_likelihood_max_dist": [0.2]}),
     Part(("localizer",), localizers.Ekf, (({"localizer": {"type": "ekf"}}, scenes.wheel_slip),)),
     Part(("localizer",), SlipEkf, (({"localizer": {"type": "slip_ekf"}}, scenes.wheel_slip),)),
-    Part(("costmap",), costmaps.Costmap, SEEN, {
-        "rolling_size": ((SMALL, scenes.without_map),),
-        **dict.fromkeys(SEEN_BY_A_CAMERA, ((TRUTH, scenes.obstacles_in_depth_image),)),
-        **dict.fromkeys(("raytrace_min_range", "inf_is_valid", "track_unknown_space"), ((SMALL, scenes.without_map),)),
+    Part(("costmap",), costmaps.Costmap, MARKING_SCENES, {
+        "rolling_size": ((ROLLING, scenes.without_map),),
+        **dict.fromkeys(CAMERA_FIELDS, ((TRUTH, scenes.obstacles_in_depth_image),)),
+        **dict.fromkeys(
+            ("raytrace_min_range", "inf_is_valid", "track_unknown_space"), ((ROLLING, scenes.without_map),)
+        ),
     }, {"min_obstacle_height": [0.3], "obstacle_min_range": [1.0], "raytrace_min_range": [2.0]}),
     Part(("costmap", "denoise_layer"), costmaps.DenoiseLayer, (
         ({**TRUTH, "costmap": {"denoise_layer": {"enabled": True}}}, scenes.through_door),
         ({**TRUTH, "costmap": {"denoise_layer": DENOISE}}, scenes.through_door)), {
         "enabled": (({**TRUTH, "costmap": {"denoise_layer": {"minimal_group_size": 20}}}, scenes.through_door),)}),
-    Part(("local_costmap",), costmaps.LocalCostmap, SEEN, {
-        **dict.fromkeys(("raytrace_min_range", "inf_is_valid"), ((SMALL, scenes.without_map),)),
-        **dict.fromkeys(SEEN_BY_A_CAMERA, ((TRUTH, scenes.obstacles_in_depth_image),)),
+    Part(("local_costmap",), costmaps.LocalCostmap, MARKING_SCENES, {
+        **dict.fromkeys(("raytrace_min_range", "inf_is_valid"), ((ROLLING, scenes.without_map),)),
+        **dict.fromkeys(CAMERA_FIELDS, ((TRUTH, scenes.obstacles_in_depth_image),)),
     }, {
         "denoise_layer": [{"enabled": True, "minimal_group_size": 20}], "obstacle_min_range": [1.0],
         "raytrace_min_range": [2.0],
@@ -159,7 +167,7 @@ PARTS = [
     }, {"behaviors": [["wait"], ["spin"], ["backup"], ["clear_costmap"], ["retrace"]]}),
     Part(("recovery", "behaviors", 0), behaviors.Spin, (
         (recovery({"type": "spin"}), scenes.closed_door),), {
-        "simulate_ahead_time": ((recovery({"type": "spin"}), scenes.little_room_to_turn),)}, {
+        "simulate_ahead_time": ((recovery({"type": "spin"}), scenes.small_turning_space),)}, {
         "simulate_ahead_time": [0.3]}),
     Part(("recovery", "behaviors", 0), behaviors.Wait, ((recovery({"type": "wait"}), scenes.closed_door),)),
     Part(("recovery", "behaviors", 0), behaviors.BackUp, (
@@ -181,7 +189,7 @@ PARTS = [
         "profile": ["nav2"]}),
     Part(("planner",), planners.OmplPlanner, (
         (planner(), scenes.plan_past_box),), {
-        **of_planner("bit_star"),
+        **planner_fields("bit_star"),
         "max_iterations": ((planner(type="rrt_connect"), scenes.plan_past_box),),
         "improving_iterations": ((planner(type="rrt_star", improving_iterations=60), scenes.plan_past_box),),
         "range": ((planner(type="rrt_connect"), scenes.plan_past_box),),
@@ -189,16 +197,16 @@ PARTS = [
         "state_space": ((planner(), scenes.plan_past_box), (planner(state_space="se2"), scenes.plan_past_box)),
     }, {"max_iterations": [1, 3], "improving_iterations": [5, 30]}),
     Part(("planner",), MedialAxisPlanner, ((planner(type="medial_axis"), scenes.plan_past_box),), {
-        **of_planner("medial_axis"),
+        **planner_fields("medial_axis"),
         "state_space": (
             (planner(type="medial_axis"), scenes.plan_past_box),
             (planner(type="medial_axis", state_space="se2"), scenes.plan_past_box),
         ),
     }, {"max_iterations": [1, 3]}),
-    Part(("planner",), planners.Navfn, ((planner(type="navfn"), scenes.plan_past_box),), of_planner("navfn")),
-    Part(("planner",), planners.Smac2d, ((planner(type="smac_2d"), scenes.plan_past_box),), of_planner("smac_2d")),
+    Part(("planner",), planners.Navfn, ((planner(type="navfn"), scenes.plan_past_box),), planner_fields("navfn")),
+    Part(("planner",), planners.Smac2d, ((planner(type="smac_2d"), scenes.plan_past_box),), planner_fields("smac_2d")),
 ]  # fmt: skip
-ELSEWHERE = {
+TESTED_BY = {
     "Amcl.parameters": "tests/diagnostics/meaningless/deprecated_amcl_parameters.scenario.yaml",
     "StackSpec.keepout": "tests/scenarios/test_masks.py",
     "StackSpec.speed_zones": "tests/unit/run/test_costmap_filters.py",
@@ -244,16 +252,16 @@ ELSEWHERE = {
     "SimpleGoalChecker.xy_goal_tolerance": "tests/unit/run/test_goal_tolerances.py",
     "SimpleGoalChecker.yaw_goal_tolerance": "tests/unit/run/test_goal_tolerances.py",
 }
-"""Fields without an effect in these scenes, and the tests in which they have one."""
+"""Fields without an effect in these scenes, and the files with their tests."""
 
 
-def left_out(kind: type[BaseModel], name: str) -> bool:
-    """Return whether a field is not tested here: it has its own test, or another value selects another model."""
-    return f"{kind.__name__}.{name}" in ELSEWHERE or (name == "type" and kind is not planners.OmplPlanner)
+def is_excluded(kind: type[BaseModel], name: str) -> bool:
+    """Return whether a field is not tested here: it has its own test, or it is a `type` that selects the model."""
+    return f"{kind.__name__}.{name}" in TESTED_BY or (name == "type" and kind is not planners.OmplPlanner)
 
 
-TESTED_ELSEWHERE = {planners.PlannerSpec, ControllerSpec, controllers.GoalCheckerSpec, SpeedZone, SpeedMask}
-"""Models that are tested with each planner and goal checker, and those of controllers and zones."""
+EXCLUDED_MODELS = {planners.PlannerSpec, ControllerSpec, controllers.GoalCheckerSpec, SpeedZone, SpeedMask}
+"""Base models, which are tested with each planner and goal checker, and models of controllers and zones."""
 
 
 def models_in(kind: Any) -> Iterator[type[BaseModel]]:
@@ -268,7 +276,7 @@ def models_in(kind: Any) -> Iterator[type[BaseModel]]:
 
 
 class FieldValues(NamedTuple):
-    """Field of a part with values, one of which must change a decision."""
+    """Field of a part with values of which at least one must change a decision."""
 
     part: Part
     name: str
@@ -283,13 +291,13 @@ def field_values() -> Iterator[FieldValues]:
     """Yield all fields that are tested here, with their values."""
     for part in PARTS:
         for name, field in part.kind.model_fields.items():
-            if left_out(part.kind, name):
+            if is_excluded(part.kind, name):
                 continue
             if name in part.values:
-                found = [part.values[name]]
+                groups = [part.values[name]]
             else:
-                found = othervalues.others(field.annotation, field.default)
-            yield from (FieldValues(part, name, values) for values in found)
+                groups = other_values.other_value_groups(field.annotation, field.default)
+            yield from (FieldValues(part, name, values) for values in groups)
 
 
 def with_value(start: Any, keys: tuple[str | int, ...], name: str, value: Any) -> Any:
@@ -299,14 +307,14 @@ def with_value(start: Any, keys: tuple[str | int, ...], name: str, value: Any) -
     first, *rest = keys
     if isinstance(first, int):
         inner = with_value(start[first], tuple(rest), name, value)
-        return [inner if number == first else each for number, each in enumerate(start)]
+        return [inner if index == first else item for index, item in enumerate(start)]
     return {**start, first: with_value(start.get(first, {}), tuple(rest), name, value)}
 
 
 class ReferenceDecisions:
-    """Decisions in a scene with an unchanged specification. They are computed when they are needed, and cached."""
+    """Decisions in a scene with the unchanged specification, computed lazily and cached."""
 
-    known: dict[tuple[str, str], "ReferenceDecisions"] = {}
+    cache: dict[tuple[str, str], "ReferenceDecisions"] = {}
 
     def __init__(self, data: Data, scene: Scene) -> None:
         self._decisions: list[object] = []
@@ -315,20 +323,20 @@ class ReferenceDecisions:
     @classmethod
     def of(cls, data: Data, scene: Scene) -> "ReferenceDecisions":
         key = (repr(data), scene.__name__)
-        if key not in cls.known:
-            cls.known[key] = cls(data, scene)
-        return cls.known[key]
+        if key not in cls.cache:
+            cls.cache[key] = cls(data, scene)
+        return cls.cache[key]
 
     def __iter__(self) -> Iterator[object]:
-        number = 0
+        index = 0
         while True:
-            if number == len(self._decisions):
+            if index == len(self._decisions):
                 try:
                     self._decisions.append(hash(next(self._remaining)))
                 except StopIteration:
                     return
-            yield self._decisions[number]
-            number += 1
+            yield self._decisions[index]
+            index += 1
 
 
 def changes_a_decision(field: FieldValues, value: Any) -> bool:
@@ -340,8 +348,10 @@ def changes_a_decision(field: FieldValues, value: Any) -> bool:
             continue
         if spec == StackSpec.model_validate(start):
             continue
-        decisions = (hash(each) for each in scene(spec))
-        if any(one != another for one, another in zip_longest(decisions, ReferenceDecisions.of(start, scene))):
+        decisions = (hash(decision) for decision in scene(spec))
+        if any(
+            decision != reference for decision, reference in zip_longest(decisions, ReferenceDecisions.of(start, scene))
+        ):
             return True
     return False
 
@@ -355,31 +365,31 @@ def test_another_value_changes_a_decision(field: FieldValues) -> None:
     assert any(changes_a_decision(field, value) for value in field.values)
 
 
-def test_unchanged_values_change_no_decision() -> None:
-    """Otherwise, the tests above would pass without an effect of the field."""
+def test_equal_specifications_give_equal_decisions() -> None:
+    """Otherwise, the test above would pass for fields without an effect."""
     scene = scenes.obstacle_not_on_map
     assert [*scene(StackSpec.model_validate(amcl()))] == [*scene(StackSpec.model_validate(amcl()))]
 
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.kind.__name__)
-def test_every_field_is_tried(part: Part) -> None:
-    tried = {field.name for field in FIELD_VALUES if field.part is part}
-    holding = {name for name, field in part.kind.model_fields.items() if any(models_in(field.annotation))}
-    elsewhere = {name for name in part.kind.model_fields if left_out(part.kind, name)}
-    assert part.kind.model_fields.keys() <= tried | elsewhere | holding
+def test_every_field_is_tested_or_excluded(part: Part) -> None:
+    tested = {field.name for field in FIELD_VALUES if field.part is part}
+    containers = {name for name, field in part.kind.model_fields.items() if any(models_in(field.annotation))}
+    excluded = {name for name in part.kind.model_fields if is_excluded(part.kind, name)}
+    assert part.kind.model_fields.keys() <= tested | excluded | containers
 
 
-def test_every_model_is_tried() -> None:
-    """Models of the stack and of the shipped components."""
+def test_every_model_has_a_part() -> None:
+    """This includes the models of the stack and of all shipped components."""
     groups = ("localizer", "planner", "behavior", "goal_checker")
     roots = [StackSpec, *(entry.load() for group in groups for entry in all_types(group))]
-    holding = {
-        kind for root in roots for kind in models_in(root) if any(not left_out(kind, n) for n in kind.model_fields)
+    models = {
+        kind for root in roots for kind in models_in(root) if any(not is_excluded(kind, n) for n in kind.model_fields)
     }
-    assert holding - TESTED_ELSEWHERE == {part.kind for part in PARTS}
+    assert models - EXCLUDED_MODELS == {part.kind for part in PARTS}
 
 
-@pytest.mark.parametrize("field", ELSEWHERE)
-def test_every_excluded_parameter_names_its_test(field: str) -> None:
-    text = (Path(__file__).parents[3] / ELSEWHERE[field]).read_text(encoding="utf-8")
+@pytest.mark.parametrize("field", TESTED_BY)
+def test_named_test_file_of_an_excluded_field_mentions_the_field(field: str) -> None:
+    text = (Path(__file__).parents[3] / TESTED_BY[field]).read_text(encoding="utf-8")
     assert re.search(rf"\b{field.partition('.')[2]}\b", text)
