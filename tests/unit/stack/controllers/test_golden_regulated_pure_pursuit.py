@@ -1,4 +1,4 @@
-"""Tests of commands against values computed by hand from Nav2's formulas: golden/regulated_pure_pursuit.yaml."""
+"""Tests of regulated pure pursuit against golden/regulated_pure_pursuit.yaml, computed by hand from Nav2's formulas."""
 
 from pathlib import Path
 from typing import Any
@@ -20,13 +20,13 @@ from simscen.stack.protocols import NavigationFailure, Surroundings
 from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot, setting
 
 CASES = yaml.safe_load((Path(__file__).parent / "golden/regulated_pure_pursuit.yaml").read_text(encoding="utf-8"))
-PLAIN = {"use_velocity_scaled_lookahead_dist": False, "slow_down_ahead": False}
+NAV2_OPTIONS = {"use_velocity_scaled_lookahead_dist": False, "slow_down_ahead": False}
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])
 def test_commands_match_the_formulas(case: dict[str, Any]) -> None:
     robot = round_robot(**{"speed": 1.0, **case.get("robot", {})})
-    controller = RegulatedPurePursuit(Spec(**{**PLAIN, **case.get("options", {})}), setting(robot))
+    controller = RegulatedPurePursuit(Spec(**{**NAV2_OPTIONS, **case.get("options", {})}), setting(robot))
     points = np.array(case["path"], dtype=np.float64)
     headings = np.arctan2(*np.diff(points, axis=0)[:, ::-1].T)
     controller.set_path(Plan(np.column_stack((points, np.append(headings, headings[-1])))))
@@ -38,9 +38,9 @@ def test_commands_match_the_formulas(case: dict[str, Any]) -> None:
     expect = case["expect"]
     assert case["origin"]
     if "error" in expect:
-        with pytest.raises(NavigationFailure) as failed:
+        with pytest.raises(NavigationFailure) as failure:
             controller.command(pose, twist, view, goal)
-        assert failed.value.code is ErrorCode[expect["error"]]
+        assert failure.value.code is ErrorCode[expect["error"]]
         return
     command = controller.command(pose, twist, view, goal)
     assert command.vy == 0.0

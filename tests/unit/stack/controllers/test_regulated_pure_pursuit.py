@@ -1,3 +1,5 @@
+"""Tests of regulated pure pursuit: curvature, regulated speed, turning in place, and obstacles."""
+
 import math
 
 import numpy as np
@@ -16,7 +18,7 @@ from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot, settin
 
 ROBOT = round_robot(speed=1.0)
 FAR = Goal("far", Pose2(8.0, 0.0, 0.0))
-PLAIN = {"use_velocity_scaled_lookahead_dist": False, "lookahead_dist": 0.6}
+FIXED_LOOKAHEAD = {"use_velocity_scaled_lookahead_dist": False, "lookahead_dist": 0.6}
 
 
 def view_of(*boxes: tuple[float, float, float, float]) -> CostmapView:
@@ -25,7 +27,7 @@ def view_of(*boxes: tuple[float, float, float, float]) -> CostmapView:
 
 
 def rpp(path: np.ndarray, **options: object) -> RegulatedPurePursuit:
-    controller = RegulatedPurePursuit(Spec(**{**PLAIN, **options}), setting(ROBOT))
+    controller = RegulatedPurePursuit(Spec(**{**FIXED_LOOKAHEAD, **options}), setting(ROBOT))
     controller.set_path(Path(path))
     return controller
 
@@ -53,10 +55,12 @@ def test_speed_is_proportional_to_curvature_radius_below_the_regulated_radius() 
 def test_speed_near_a_wall_is_scaled_down_to_the_minimum() -> None:
     wall = view_of((-3.0, 0.42, 9.0, 0.6))
     row = round(0 / 0.05 + 4.0 / 0.05)
-    near = float(wall.distance[row, 80])
-    assert rpp(line()).command(Pose2(1.01, 0.01, 0), Twist(), wall, FAR).vx == pytest.approx(0.5 * near / 0.6, rel=1e-3)
-    tight = view_of((-3.0, 0.30, 9.0, 0.6))
-    assert rpp(line()).command(Pose2(1.01, 0.01, 0), Twist(), tight, FAR).vx == pytest.approx(0.25, abs=0.01)
+    distance = float(wall.distance[row, 80])
+    assert rpp(line()).command(Pose2(1.01, 0.01, 0), Twist(), wall, FAR).vx == pytest.approx(
+        0.5 * distance / 0.6, rel=1e-3
+    )
+    near_wall = view_of((-3.0, 0.30, 9.0, 0.6))
+    assert rpp(line()).command(Pose2(1.01, 0.01, 0), Twist(), near_wall, FAR).vx == pytest.approx(0.25, abs=0.01)
 
 
 def test_robot_slows_down_toward_the_end_of_the_path() -> None:
@@ -74,25 +78,25 @@ def test_robot_first_turns_to_a_path_behind_it_with_bounded_acceleration() -> No
     assert abs(command.wz) == pytest.approx(3.2 * 0.05)
 
 
-def test_turning_in_place_can_be_disabled() -> None:
+def test_robot_drives_on_if_turning_in_place_is_disabled() -> None:
     assert rpp(line(), use_rotate_to_heading=False).command(Pose2(1, 0, 1.2), Twist(), view_of(), FAR).vx > 0.0
 
 
 def test_the_lookahead_grows_with_speed_between_its_bounds() -> None:
     options = {"use_velocity_scaled_lookahead_dist": True}
-    for speed, reach in ((0.0, 0.3), (0.4, 0.6), (0.9, 0.9)):
+    for speed, lookahead in ((0.0, 0.3), (0.4, 0.6), (0.9, 0.9)):
         command = rpp(line(y=0.1), **options).command(Pose2(1, 0, 0), Twist(speed), view_of(), FAR)
-        assert command.wz / command.vx == pytest.approx(2 * 0.1 / reach**2)
+        assert command.wz / command.vx == pytest.approx(2 * 0.1 / lookahead**2)
 
 
 def test_robot_slows_down_before_an_obstacle_and_then_fails() -> None:
     wall = view_of((3.0, -4.0, 3.2, 4.0))
     controller = rpp(line(), use_cost_regulated_linear_velocity_scaling=False)
     speeds = []
-    with pytest.raises(NavigationFailure) as failed:
+    with pytest.raises(NavigationFailure) as failure:
         for x in np.arange(1.0, 3.0, 0.05):
             speeds.append(controller.command(Pose2(float(x), 0.0, 0.0), Twist(0.5), wall, FAR).vx)
-    assert failed.value.code == ErrorCode.NO_VALID_CONTROL
+    assert failure.value.code == ErrorCode.NO_VALID_CONTROL
     assert speeds[0] == 0.5
     assert 0.1 <= speeds[-1] < 0.2
     assert speeds == sorted(speeds, reverse=True)
@@ -107,21 +111,25 @@ def test_robot_at_the_goal_turns_to_its_heading_and_stops() -> None:
 
 
 def test_carrot_moves_nearer_if_the_arc_would_cut_a_corner() -> None:
-    """The path goes ahead and then left around a pillar; the arc to a far carrot leads through it."""
-    up = np.arange(0.05, 3.0, 0.05)
-    corner = np.vstack((line(1.0), np.column_stack((np.full_like(up, 1.0), up, np.full_like(up, np.pi / 2)))))
+    """The path leads around a pillar on the left. The arc to a distant carrot leads through the pillar."""
+    y = np.arange(0.05, 3.0, 0.05)
+    corner = np.vstack((line(1.0), np.column_stack((np.full_like(y, 1.0), y, np.full_like(y, np.pi / 2)))))
     pillar = view_of((0.45, 0.30, 0.70, 0.55))
-    here = Pose2(0.3, 0.0, 0.0)
-    far = {"lookahead_dist": 1.2, "rotate_to_heading_min_angle": 1.5, "max_allowed_time_to_collision_up_to_carrot": 4.0}
-    cutting = rpp(corner, **far).command(here, Twist(), view_of(), FAR)
-    keeping = rpp(corner, **far).command(here, Twist(), pillar, FAR)
-    assert cutting.wz / cutting.vx > 0.8
-    assert keeping.vx >= 0.25
-    assert keeping.wz / keeping.vx < 0.4
+    pose = Pose2(0.3, 0.0, 0.0)
+    options = {
+        "lookahead_dist": 1.2,
+        "rotate_to_heading_min_angle": 1.5,
+        "max_allowed_time_to_collision_up_to_carrot": 4.0,
+    }
+    without_pillar = rpp(corner, **options).command(pose, Twist(), view_of(), FAR)
+    with_pillar = rpp(corner, **options).command(pose, Twist(), pillar, FAR)
+    assert without_pillar.wz / without_pillar.vx > 0.8
+    assert with_pillar.vx >= 0.25
+    assert with_pillar.wz / with_pillar.vx < 0.4
 
 
 def test_robot_pushed_past_the_end_of_its_path_reverses_at_normal_speed() -> None:
-    """A robot that moved out of the way at its goal has to drive 0.5 m again."""
+    """The robot has evaded an obstacle at its goal, and has to drive 0.5 m back."""
     goal, controller = Goal("g", Pose2(2.0, 0.0)), rpp(line(2.0))
     controller.command(Pose2(1.95, 0.0, 0.0), Twist(0.1), view_of(), goal)
     command = controller.command(Pose2(2.5, 0.0, math.pi), Twist(0.1), view_of(), goal)

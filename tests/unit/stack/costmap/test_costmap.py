@@ -16,20 +16,21 @@ from simscen.stack.costmap.layered_costmap import LayeredCostmap
 from simscen.stack.protocols import Surroundings
 from simscen.testing.flatland import TICK_RATE_HZ, Flatland, round_robot
 
-REACH = 0.72  # circumscribed radius + 0.5 m
+MAX_DISTANCE_M = 0.72  # circumscribed radius + 0.5 m
 
 
-def full(lethal: np.ndarray) -> np.ndarray:
-    return np.minimum(distance_transform_edt(~lethal) * 0.05, REACH)
+def distances_to(lethal: np.ndarray) -> np.ndarray:
+    """Return the limited distance in m of each cell to the nearest lethal cell, by SciPy."""
+    return np.minimum(distance_transform_edt(~lethal) * 0.05, MAX_DISTANCE_M)
 
 
-def test_distances_of_the_map_are_those_between_cell_centers() -> None:
+def test_distances_are_between_cell_centers() -> None:
     view = costmap(Flatland().room(8, 6)).view
     lethal = view.costs == 254
-    cells, here = np.argwhere(lethal), np.array([60, 80])
-    brute = np.sqrt(((cells - here) ** 2).sum(axis=1)).min() * 0.05
-    assert view.distance[60, 80] == pytest.approx(min(brute, REACH), abs=1e-6)
-    assert np.allclose(view.distance, full(lethal), atol=1e-6)
+    cells, cell = np.argwhere(lethal), np.array([60, 80])
+    expected = np.sqrt(((cells - cell) ** 2).sum(axis=1)).min() * 0.05
+    assert view.distance[60, 80] == pytest.approx(min(expected, MAX_DISTANCE_M), abs=1e-6)
+    assert np.allclose(view.distance, distances_to(lethal), atol=1e-6)
 
 
 def test_costmaps_of_one_map_have_independent_distances() -> None:
@@ -43,7 +44,7 @@ def test_costmaps_of_one_map_have_independent_distances() -> None:
             assert cost_and_distance_at(map_, 4.3, 3.1)[0] == (254 if keepout else 0)
 
 
-def test_costs_follow_nav2s_formula_between_the_inscribed_and_the_inflation_radius() -> None:
+def test_costs_follow_the_formula_of_nav2_up_to_the_inflation_radius() -> None:
     map_ = costmap(Flatland().room(8, 6))
     for x in (0.1, 0.3, 0.45, 0.6, 0.75):
         cost, distance = cost_and_distance_at(map_, x, 3.0)
@@ -51,7 +52,7 @@ def test_costs_follow_nav2s_formula_between_the_inscribed_and_the_inflation_radi
         assert cost == (expected if distance <= 0.70 else 0)
 
 
-def test_unknown_cells_stay_unknown_unless_the_robot_would_touch_a_wall_there() -> None:
+def test_unknown_cells_stay_unknown_unless_the_robot_would_touch_a_wall_on_them() -> None:
     cells = np.full((40, 40), -1, dtype=np.int8)
     cells[20, 20] = 100
     map_ = LayeredCostmap(Spec(), Surroundings(ROBOT, OccupancyGrid(cells, 0.05), TICK_RATE_HZ))
@@ -78,39 +79,41 @@ def test_incrementally_updated_distances_equal_a_full_computation() -> None:
         world.discs = [(*rng.uniform((1, 1), (7, 5)), 0.2) for _ in range(4)]
         pose = Pose2(1.0 + 0.5 * k, 3.0, 0.3 * k)
         map_.update(pose, scan_of(world, pose, noise=0.01))
-        assert np.allclose(map_.view.distance, full(map_.view.costs == 254), atol=1e-6)
+        assert np.allclose(map_.view.distance, distances_to(map_.view.costs == 254), atol=1e-6)
         assert map_.obstacle_cell_count == np.count_nonzero(map_.view.costs == 254) - walls
 
 
 @pytest.mark.parametrize("group", [1, 3])
-def test_distances_far_from_changes_are_unchanged(group: int) -> None:
+def test_distances_change_only_at_points_that_are_near_reported_changes(group: int) -> None:
     world, spec = Flatland().room(8, 6), Spec(denoise_layer={"enabled": group > 1, "minimal_group_size": group})
-    map_, text, rng = costmap(world, spec), [], np.random.default_rng(5)
-    places = rng.uniform((0.5, 0.5), (7.5, 5.5), (60, 2)) @ (1, 1j)
+    map_, has_changed, rng = costmap(world, spec), [], np.random.default_rng(5)
+    points = rng.uniform((0.5, 0.5), (7.5, 5.5), (60, 2)) @ (1, 1j)
     for _ in range(12):
-        revision, before = map_.revision, [cost_and_distance_at(map_, each.real, each.imag)[1] for each in places]
+        revision, before = map_.revision, [cost_and_distance_at(map_, point.real, point.imag)[1] for point in points]
         for _ in range(2):
             x, y = rng.uniform((1.0, 1.0), (7.0, 5.0))
-            seen = Flatland(world.boxes, [(x + 0.7, y, 0.02), (x, y - 1.1, 0.05)])
-            map_.update(Pose2(x, y), scan_of(seen, Pose2(x, y), noise=0.03))
-        for place, distance in zip(places, before, strict=True):
-            text.append(map_.changed_near(revision, np.array([place]), 0.4))
-            assert text[-1] or min(distance, 0.4) == min(cost_and_distance_at(map_, place.real, place.imag)[1], 0.4)
-    assert 0.02 < np.mean(text) < 0.5
-    assert map_.changed_near(map_.revision - 100, places, 0.4)
-    assert not map_.changed_near(map_.revision, places, 0.4)
+            world_with_discs = Flatland(world.boxes, [(x + 0.7, y, 0.02), (x, y - 1.1, 0.05)])
+            map_.update(Pose2(x, y), scan_of(world_with_discs, Pose2(x, y), noise=0.03))
+        for point, distance in zip(points, before, strict=True):
+            has_changed.append(map_.changed_near(revision, np.array([point]), 0.4))
+            assert has_changed[-1] or min(distance, 0.4) == min(
+                cost_and_distance_at(map_, point.real, point.imag)[1], 0.4
+            )
+    assert 0.02 < np.mean(has_changed) < 0.5
+    assert map_.changed_near(map_.revision - 100, points, 0.4)
+    assert not map_.changed_near(map_.revision, points, 0.4)
 
 
 def test_change_of_the_whole_costmap_is_a_change_near_every_point() -> None:
-    map_, place = costmap(Flatland().room(8, 6)), np.array([4.0 + 3.0j])
+    map_, point = costmap(Flatland().room(8, 6)), np.array([4.0 + 3.0j])
     for change in (map_.clear, lambda: map_.set_zones(Zones((((1, 1), (2, 1), (2, 2)),)))):
         revision = map_.revision
         change()
-        assert map_.changed_near(revision, place, 0.1)
-        assert not map_.changed_near(map_.revision, place, 0.1)
+        assert map_.changed_near(revision, point, 0.1)
+        assert not map_.changed_near(map_.revision, point, 0.1)
 
 
-def test_rolling_window_follows_the_robot_and_keeps_its_obstacles() -> None:
+def test_rolling_window_follows_the_robot() -> None:
     map_ = costmap(None, Spec(rolling_size=8.0))
     world = Flatland(discs=[(2.0, 0.5, 0.1)])
     map_.update(Pose2(0.0, 0.0), scan_of(world, Pose2(0.0, 0.0)))
@@ -128,7 +131,7 @@ def test_obstacles_outside_the_rolling_window_are_forgotten() -> None:
     assert not (map_.view.costs == 254).any()
 
 
-def test_keepout_zones_are_walls() -> None:
+def test_keepout_zones_are_lethal_and_inflated() -> None:
     map_ = costmap(Flatland().room(8, 6), keepout=(((3, 2), (5, 2), (5, 4), (3, 4)),))
     assert cost_and_distance_at(map_, 4.0, 3.0) == (254, 0.0)
     assert cost_and_distance_at(map_, 2.87, 3.0)[0] == 253
@@ -156,21 +159,21 @@ def test_revision_increases_with_each_change() -> None:
 ZONES = (((3.0, 2.0), (5.0, 2.0), (5.0, 4.0), (3.0, 4.0)),)
 
 
-def test_switched_zones_give_the_costmaps_with_and_without_them() -> None:
+def test_switching_zones_on_and_off_equals_costmaps_with_and_without_zones() -> None:
     world = Flatland().room(8, 6)
-    plain, zoned, switched = costmap(world), costmap(world, keepout=ZONES), costmap(world)
+    without_zones, with_zones, switched = costmap(world), costmap(world, keepout=ZONES), costmap(world)
     world.discs = [(2.0, 3.0, 0.2)]
     scan = scan_of(world, Pose2(1.0, 3.0))
-    for map_ in (plain, zoned, switched):
+    for map_ in (without_zones, with_zones, switched):
         map_.update(Pose2(1.0, 3.0), scan)
     revision, cells = switched.view.revision, switched.obstacle_cell_count
     switched.set_zones(Zones(keepout=ZONES))
-    assert np.array_equal(switched.view.costs, zoned.view.costs)
-    assert np.array_equal(switched.view.distance, zoned.view.distance)
-    assert switched.view.revision > revision, "who follows a plan looks at it again"
+    assert np.array_equal(switched.view.costs, with_zones.view.costs)
+    assert np.array_equal(switched.view.distance, with_zones.view.distance)
+    assert switched.view.revision > revision, "a changed revision causes a new check of the plan"
     assert switched.obstacle_cell_count == cells + 40 * 40
     switched.set_zones(Zones())
-    assert np.array_equal(switched.view.costs, plain.view.costs)
+    assert np.array_equal(switched.view.costs, without_zones.view.costs)
     assert switched.obstacle_cell_count == cells
 
 
@@ -182,7 +185,7 @@ def test_zones_can_be_switched_in_a_rolling_window() -> None:
     assert cost_and_distance_at(map_, 1.5, 1.0)[0] == 0
 
 
-def test_unknown_space_is_free_where_it_is_not_tracked() -> None:
+def test_unknown_space_is_free_if_it_is_not_tracked() -> None:
     cells = np.full((40, 40), -1, dtype=np.int8)
     cells[20, 20] = 100
     surroundings = Surroundings(ROBOT, OccupancyGrid(cells, 0.05), TICK_RATE_HZ)
@@ -193,19 +196,19 @@ def test_unknown_space_is_free_where_it_is_not_tracked() -> None:
 
 
 @pytest.mark.parametrize("inflation_radius", [0.7, 1.0])  # 1.0 m is the maximum distance
-def test_beam_through_unknown_space_makes_it_known(inflation_radius: float) -> None:
+def test_beams_make_unknown_cells_free(inflation_radius: float) -> None:
     world = Flatland().room(8, 6)
     spec = Spec(inflation_radius=inflation_radius)
-    known = costmap(world, spec)
+    from_known_map = costmap(world, spec)
     grid = world.grid(BOUNDS)
-    map_ = LayeredCostmap(spec, Surroundings(ROBOT, OccupancyGrid(np.where(grid.cells, 100, -1).astype(np.int8), 0.05,
-                                                             grid.origin), TICK_RATE_HZ))  # fmt: skip
+    unknown_grid = OccupancyGrid(np.where(grid.cells, 100, -1).astype(np.int8), 0.05, grid.origin)
+    from_unknown_map = LayeredCostmap(spec, Surroundings(ROBOT, unknown_grid, TICK_RATE_HZ))
     pose = Pose2(4.0, 1.0)
-    for each in (known, map_):
-        each.update(pose, scan_of(world, pose))
+    for costmap_ in (from_known_map, from_unknown_map):
+        costmap_.update(pose, scan_of(world, pose))
     for x, y in ((4.0, 0.5), (5.5, 1.0), (4.0, 3.5), (3.0, 0.6)):
-        assert cost_and_distance_at(map_, x, y) == cost_and_distance_at(known, x, y)
-    assert cost_and_distance_at(map_, 4.0, 5.0)[0] == 255  # out of reach
+        assert cost_and_distance_at(from_unknown_map, x, y) == cost_and_distance_at(from_known_map, x, y)
+    assert cost_and_distance_at(from_unknown_map, 4.0, 5.0)[0] == 255  # beyond the ray-tracing range
 
 
 def test_rolling_window_keeps_known_cells() -> None:
@@ -221,14 +224,14 @@ def test_rolling_window_keeps_known_cells() -> None:
 def test_lethal_cost_threshold_is_the_lowest_occupancy_of_an_obstacle(threshold, lethal, keepout) -> None:
     cells = np.zeros((40, 40), dtype=np.int8)
     occupancies = (1, 30, 64, 65, 100)
-    for number, occupancy in enumerate(occupancies):
-        cells[10, 5 + 5 * number] = occupancy
+    for index, occupancy in enumerate(occupancies):
+        cells[10, 5 + 5 * index] = occupancy
     spec = Spec() if threshold is None else Spec(lethal_cost_threshold=threshold)
     grid = OccupancyGrid(cells, 0.05)
-    for _ in range(2):  # the second one uses what the first one has cached
+    for _ in range(2):  # the second costmap uses cached data of the first one
         view = LayeredCostmap(spec, Surroundings(ROBOT, grid, TICK_RATE_HZ, keepout=keepout)).view
-        found = tuple(each for number, each in enumerate(occupancies) if view.costs[10, 5 + 5 * number] == 254)
-        assert found == lethal
+        marked = tuple(occupancy for index, occupancy in enumerate(occupancies) if view.costs[10, 5 + 5 * index] == 254)
+        assert marked == lethal
 
 
 def test_costmaps_of_one_map_have_their_own_threshold() -> None:

@@ -22,26 +22,26 @@ def scan_of(world: Flatland, pose: Pose2, noise: float) -> Scan:
     return Scan("lidar", 0, np.where(ranges > 12.0, np.inf, ranges), -math.pi, step, 0.05, 12.0)
 
 
-PICTURE = """
+CELLS = """
 #.....##...
 .#.....#...
 ......#....
 ...........
 #..........
 """
-MARKED = np.array([[c == "#" for c in row] for row in PICTURE.split()])
+MARKED = np.array([[c == "#" for c in row] for row in CELLS.split()])
 NO_WALLS = np.zeros_like(MARKED)
 
 
 @pytest.mark.parametrize(
-    ("size", "connectivity", "left"),
+    ("size", "connectivity", "remaining"),
     [(1, 8, 7), (2, 8, 6), (3, 8, 4), (5, 8, 0), (2, 4, 3), (3, 4, 3), (4, 4, 0)],
 )
-def test_groups_of_fewer_cells_are_left_out(size: int, connectivity: int, left: int) -> None:
+def test_groups_below_the_minimal_size_are_removed(size: int, connectivity: int, remaining: int) -> None:
     spec = DenoiseLayer(enabled=True, minimal_group_size=size, group_connectivity_type=connectivity)
-    kept = remove_small_groups(MARKED, NO_WALLS, spec)
-    assert kept.sum() == left
-    assert not (kept & ~MARKED).any()
+    result = remove_small_groups(MARKED, NO_WALLS, spec)
+    assert result.sum() == remaining
+    assert not (result & ~MARKED).any()
 
 
 def test_cell_next_to_a_wall_belongs_to_its_group() -> None:
@@ -53,7 +53,7 @@ def test_cell_next_to_a_wall_belongs_to_its_group() -> None:
 
 
 def test_incremental_updates_equal_a_full_computation() -> None:
-    """What is computed again around changed cells is what a costmap of the same marks shows."""
+    """A costmap that is updated around changed cells equals a costmap that is computed anew from the same marks."""
     rng = np.random.default_rng(5)
     world = Flatland(discs=[(x, y, 0.03) for x, y in rng.uniform(-3, 3, (12, 2)).tolist() if math.hypot(x, y) > 1])
     spec = Spec(denoise_layer=DenoiseLayer(enabled=True, minimal_group_size=4), rolling_size=8.0)

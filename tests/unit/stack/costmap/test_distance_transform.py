@@ -1,3 +1,5 @@
+"""Tests of the distance transform against SciPy."""
+
 import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
@@ -10,10 +12,10 @@ from simscen.stack.costmap.distance_transform import squared_distance_blocks, sq
 def test_distances_in_blocks_match_scipy(shape):
     marked = np.random.default_rng(4).random(shape) < 0.02
     marked[0, 0] = True
-    whole = np.full(shape, -1.0)
+    distances = np.full(shape, -1.0)
     for rows, squared in squared_distance_blocks(marked):
-        whole[rows] = np.sqrt(squared)
-    assert np.array_equal(whole, distance_transform_edt(~marked))
+        distances[rows] = np.sqrt(squared)
+    assert np.array_equal(distances, distance_transform_edt(~marked))
 
 
 @pytest.mark.parametrize("block_size", [1, 1000, distance_transform.BLOCK_SIZE])
@@ -25,8 +27,8 @@ def test_limited_distances_match_scipy_for_each_block_size(shape, reach, block_s
     monkeypatch.setattr(distance_transform, "BLOCK_SIZE", block_size)
     marked = np.random.default_rng(5).random(shape) < 0.01
     marked[-1, -1] = True
-    whole = np.rint(distance_transform_edt(~marked) ** 2)
-    assert np.array_equal(squared_distances_within(marked, reach), np.where(whole <= reach**2, whole, reach**2 + 1))
+    squared = np.rint(distance_transform_edt(~marked) ** 2)
+    assert np.array_equal(squared_distances_within(marked, reach), np.where(squared <= reach**2, squared, reach**2 + 1))
 
 
 def test_distances_without_marked_cells_are_at_the_limit():

@@ -1,4 +1,4 @@
-"""Tests of the local costmap during corrections of the localizer."""
+"""Tests of the local costmap: jumps of the localizer, rolling, size, inherited parameters, zones, and clearing."""
 
 import math
 from itertools import pairwise
@@ -26,55 +26,58 @@ CORRIDOR = Flatland().room(14, 1.6)
 START, GOAL = Pose2(1.0, 0.8), Goal("g", Pose2(12.0, 0.8), timeout=60.0)
 
 
-class Corrected:
-    """Adds a jump to the true pose that a stack receives from `at` s on, but not to its odometry."""
+class JumpingLocalizer:
+    """Stack wrapper that adds a jump to the localizer's pose from `at` s on, but not to the odometry."""
 
     def __init__(self, drive: Drive, at: float, jump: Pose2) -> None:
         self.stack, self._at, self._jump = drive.stack, at * TICK_RATE_HZ, jump
 
     def decide(self, tick: int, readings: Readings) -> Decision:
-        return self.stack.decide(tick, tuple(self._told(one) if tick >= self._at else one for one in readings))
+        return self.stack.decide(
+            tick, tuple(self._add_jump(reading) if tick >= self._at else reading for reading in readings)
+        )
 
-    def _told(self, reading: object) -> object:
+    def _add_jump(self, reading: object) -> object:
         if not isinstance(reading, Odometry) or reading.sensor != "ground_truth":
             return reading
         return Odometry(reading.sensor, reading.tick, self._jump.compose(reading.pose), reading.twist)
 
 
-def jumped(jump: Pose2, seconds: float) -> Drive:
-    """A drive along a corridor whose localizer jumps after three seconds."""
+def drive_with_jump(jump: Pose2, seconds: float) -> Drive:
+    """Return a drive along a corridor in which the localizer jumps after three seconds."""
     d = drive(CORRIDOR, START, GOAL, grid=CORRIDOR.grid((-0.5, -0.5, 14.5, 2.1)))
-    d.stack = Corrected(d, 3.0, jump)
+    d.stack = JumpingLocalizer(d, 3.0, jump)
     return d.run(seconds)
 
 
 def costmaps(d: Drive) -> Costmaps:
-    stack = d.stack.stack if isinstance(d.stack, Corrected) else d.stack
+    stack = d.stack.stack if isinstance(d.stack, JumpingLocalizer) else d.stack
     return stack.inner._costmaps
 
 
-def lethal(view: CostmapView) -> np.ndarray:
-    """Points (n, 2) of the centers of lethal cells."""
+def lethal_points(view: CostmapView) -> np.ndarray:
+    """Return the centers (n, 2) of the lethal cells."""
     cells = np.argwhere(view.costs == 254)
     return (cells[:, ::-1] + 0.5) * view.resolution + view.origin
 
 
 @pytest.mark.parametrize("jump", [Pose2(0.0, 0.3), Pose2(0.0, -0.3), Pose2(0.3, 0.0), Pose2(0.0, 0.0, 0.05)])
 def test_localizer_jump_changes_neither_local_costmap_nor_command(jump: Pose2) -> None:
-    d = jumped(jump, 4.5)
-    ghosts = CORRIDOR.distance(lethal(costmaps(d).local_costmap.view))  # here the odom frame is the true one
-    assert len(ghosts) > 50
-    assert np.abs(ghosts).max() < 0.1
+    d = drive_with_jump(jump, 4.5)
+    # In this drive, the odom frame is the true frame.
+    wall_distances = CORRIDOR.distance(lethal_points(costmaps(d).local_costmap.view))
+    assert len(wall_distances) > 50
+    assert np.abs(wall_distances).max() < 0.1
     robot, period = d.robot, CONTROL_PERIOD_TICKS / TICK_RATE_HZ
-    driven = d.commands[TICK_RATE_HZ * 5 // 2 // 6 :]
-    for before, now in pairwise(driven):
-        assert abs(now.vx - before.vx) <= max(robot.linear_acceleration, robot.linear_deceleration) * period + 1e-9
-        assert abs(now.wz - before.wz) <= robot.angular_acceleration * period + 1e-9
+    commands = d.commands[TICK_RATE_HZ * 5 // 2 // 6 :]
+    for before, after in pairwise(commands):
+        assert abs(after.vx - before.vx) <= max(robot.linear_acceleration, robot.linear_deceleration) * period + 1e-9
+        assert abs(after.wz - before.wz) <= robot.angular_acceleration * period + 1e-9
 
 
 def test_robot_follows_its_plan_at_the_corrected_pose_after_a_jump() -> None:
-    """Told that it is 0.1 m left of where it thought, it drives as far to the right."""
-    d = jumped(Pose2(0.0, 0.1), 12.0)
+    """After a jump of 0.1 m to the left, the robot drives 0.1 m to the right."""
+    d = drive_with_jump(Pose2(0.0, 0.1), 12.0)
     assert d.track[-1].y == pytest.approx(0.7, abs=0.03)
 
 
@@ -85,11 +88,11 @@ def test_local_costmap_rolls_with_the_robot_without_the_map() -> None:
     height, width = view.costs.shape
     middle = view.origin[0] + width * view.resolution / 2, view.origin[1] + height * view.resolution / 2
     assert math.dist(middle, d.pose[:2]) < 0.4
-    assert np.abs(CORRIDOR.distance(lethal(view))).max() < 0.1
-    assert (mapped.distance(lethal(costmaps(d).global_costmap.view)) < 0.05).all()
+    assert np.abs(CORRIDOR.distance(lethal_points(view))).max() < 0.1
+    assert (mapped.distance(lethal_points(costmaps(d).global_costmap.view)) < 0.05).all()
 
 
-def test_local_costmap_has_the_values_of_nav2_or_the_given_ones() -> None:
+def test_local_costmap_has_the_size_and_resolution_of_nav2_or_the_given_values() -> None:
     def shape(**options: float) -> tuple[tuple[int, int], float]:
         spec = StackSpec(localizer=TRUTH, local_costmap=LocalCostmap(**options))
         view = costmaps(drive(CORRIDOR, START, GOAL, grid=None, spec=spec)).local_costmap.view
@@ -109,36 +112,36 @@ def test_local_costmap_of_a_fast_robot_covers_its_lookahead() -> None:
 
 def test_local_costmap_inherits_unset_parameters() -> None:
     shared = Costmap(inflation_radius=0.3, obstacle_max_range=1.0)
-    with_own_default = shared.model_copy(update={"publish_frequency": 1.0})
-    assert LocalCostmap(track_unknown_space=True).with_defaults_from(shared) == with_own_default
-    own = LocalCostmap(inflation_radius=0.5, update_frequency=10.0).with_defaults_from(shared)
-    assert (own.inflation_radius, own.obstacle_max_range, own.update_frequency) == (0.5, 1.0, 10.0)
+    expected = shared.model_copy(update={"publish_frequency": 1.0})
+    assert LocalCostmap(track_unknown_space=True).with_defaults_from(shared) == expected
+    overridden = LocalCostmap(inflation_radius=0.5, update_frequency=10.0).with_defaults_from(shared)
+    assert (overridden.inflation_radius, overridden.obstacle_max_range, overridden.update_frequency) == (0.5, 1.0, 10.0)
 
 
 def test_local_costmap_has_keepout_zones_at_their_estimated_position() -> None:
     d = drive(CORRIDOR, START, GOAL, grid=CORRIDOR.grid((-0.5, -0.5, 14.5, 2.1)))
     zone = ((3.0, 0.0), (3.4, 0.0), (3.4, 0.4), (3.0, 0.4))
     d.stack.inner.set_zones(0, Zones(keepout=(zone,)))
-    d.stack = Corrected(d, 3.0, Pose2(0.2, 0.0))
-    for end, shift in ((2.9, 0.0), (4.0, 0.2)):
-        d.run(end - d.tick / TICK_RATE_HZ)
-        points = lethal(costmaps(d).local_costmap.view)
+    d.stack = JumpingLocalizer(d, 3.0, Pose2(0.2, 0.0))
+    for end_s, shift in ((2.9, 0.0), (4.0, 0.2)):
+        d.run(end_s - d.tick / TICK_RATE_HZ)
+        points = lethal_points(costmaps(d).local_costmap.view)
         inside = points[(points[:, 1] > 0.1) & (points[:, 1] < 0.38)]
         assert inside[:, 0].min() == pytest.approx(3.0 - shift, abs=0.06)
         assert inside[:, 0].max() == pytest.approx(3.4 - shift, abs=0.06)
 
 
 def test_obstacles_behind_the_robot_outside_the_field_of_view_are_kept() -> None:
-    """A post that it has passed is a meter behind the hull, in the blind quarter of a lidar of 270 degrees."""
+    """The robot has passed a post, which is 1 m behind the hull, in the blind sector of a lidar with 270 degrees."""
     world = Flatland(discs=[(2.0, 0.45, 0.05)])
     grid = Flatland().grid((-0.5, -2.0, 9.5, 2.0))
     d = drive(world, Pose2(0.5, 0.0), Goal("g", Pose2(8.0, 0.0)), grid=grid, field_of_view=1.5 * math.pi)
     while d.pose.x < 3.2:
         d.run(0.1)
-    kept = costmaps(d)
-    for forget in (kept.clear_local, kept.clear_around, kept.clear):
-        forget()
-        assert np.hypot(*(lethal(kept.local_costmap.view) - (2.0, 0.45)).T).min() < 0.1
+    maps = costmaps(d)
+    for clear in (maps.clear_local, maps.clear_around, maps.clear):
+        clear()
+        assert np.hypot(*(lethal_points(maps.local_costmap.view) - (2.0, 0.45)).T).min() < 0.1
 
 
 def test_windows_and_zones_follow_a_robot_without_a_lidar() -> None:

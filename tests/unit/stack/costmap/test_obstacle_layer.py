@@ -1,3 +1,5 @@
+"""Tests of the geometry of marking and clearing: crossed cells, visible cells, hits, and blind scans."""
+
 import math
 from dataclasses import replace
 
@@ -14,13 +16,13 @@ from simscen.stack.costmap.obstacle_layer import crossed_cells, hit_points, in_v
 FRAME = GridFrame((-4.0, -4.0), 0.05, (160, 160))
 
 
-def walked(scan: Scan, base: Pose2, spec: Spec) -> set[tuple[int, int]]:
-    """The cells that beams pass through, by walking along each in steps of a millimeter."""
+def cells_along_beams(scan: Scan, base: Pose2, spec: Spec) -> set[tuple[int, int]]:
+    """Return the cells that the beams cross, found by steps of 1 mm along each beam."""
     lidar = base.compose(scan.mount)
     cells: set[tuple[int, int]] = set()
     for angle, length in zip(scan.angles() + lidar.yaw, scan.ranges, strict=True):
-        along = np.arange(0.0, min(length, spec.raytrace_max_range), 0.001)
-        points = np.column_stack((lidar.x + along * math.cos(angle), lidar.y + along * math.sin(angle)))
+        distances = np.arange(0.0, min(length, spec.raytrace_max_range), 0.001)
+        points = np.column_stack((lidar.x + distances * math.cos(angle), lidar.y + distances * math.sin(angle)))
         cells |= set(map(tuple, FRAME.cells(points).tolist()))
     return cells
 
@@ -33,19 +35,19 @@ def test_crossed_cells_equal_those_of_fine_steps_along_the_beams(beams: int) -> 
     cells = np.argwhere(np.ones(FRAME.shape, dtype=bool))
     centers = FRAME.points(np.arange(len(cells)))
     found = {tuple(cell) for cell in cells[crossed_cells(centers, FRAME.resolution, scan, base, spec)[0]].tolist()}
-    truth = walked(scan, base, spec)
+    expected = cells_along_beams(scan, base, spec)
     points, _ = hit_points(scan, base, 0.0, 99.0)
     ends = {tuple(cell) for cell in FRAME.cells(np.column_stack((points.real, points.imag))).tolist()}
-    # Cells at a beam's end may go either way: marking comes after clearing. Near the lidar many beams share a cell.
+    # Cells at the end of a beam may differ, as marking follows clearing. Near the lidar, many beams share a cell.
     lidar = base.compose(scan.mount)
-    far = {c for c in truth if np.hypot(*(FRAME.centers(np.array([c]))[0] - lidar[:2])) > 0.3}
-    assert len(found - truth) <= 0.01 * len(truth)
-    missed = {c for c in far - found if all(max(abs(c[0] - e[0]), abs(c[1] - e[1])) > 1 for e in ends)}
-    assert len(missed) <= 0.03 * len(far)
+    distant = {c for c in expected if np.hypot(*(FRAME.centers(np.array([c]))[0] - lidar[:2])) > 0.3}
+    assert len(found - expected) <= 0.01 * len(expected)
+    missed = {c for c in distant - found if all(max(abs(c[0] - e[0]), abs(c[1] - e[1])) > 1 for e in ends)}
+    assert len(missed) <= 0.03 * len(distant)
 
 
 @pytest.mark.parametrize("beams", [200, 271])
-def test_a_lidar_that_counts_its_beams_clockwise_sees_the_same_cells(beams: int) -> None:
+def test_lidar_with_clockwise_beams_sees_the_same_cells(beams: int) -> None:
     spec, base, edge = Spec(), Pose2(0.31, -0.22, 0.7), math.radians(135)
     step, ranges = 2 * edge / (beams - 1), 2.0 + np.sin(0.1 * np.arange(beams))
     scan = Scan("l", 0, ranges, -edge, step, 0.05, 12.0, Pose2(0.1, 0.05, 0.2))
@@ -53,19 +55,20 @@ def test_a_lidar_that_counts_its_beams_clockwise_sees_the_same_cells(beams: int)
     cells = np.argwhere(np.ones(FRAME.shape, dtype=bool))
     x, y = base.compose(scan.mount).inverse().apply(FRAME.centers(cells)).T
     bearing = np.abs(np.arctan2(y, x))
-    for each in (scan, clockwise):
-        is_seen = in_view(cells, FRAME, each, base)
+    for lidar_scan in (scan, clockwise):
+        is_seen = in_view(cells, FRAME, lidar_scan, base)
         assert is_seen[bearing < edge + 0.49 * step].all()
         assert not is_seen[bearing > edge + 0.51 * step].any()
     centers = FRAME.points(np.arange(len(cells)))
-    crossed, also_crossed = (
-        crossed_cells(centers, FRAME.resolution, each, base, spec)[0] for each in (scan, clockwise)
+    crossed, crossed_clockwise = (
+        crossed_cells(centers, FRAME.resolution, lidar_scan, base, spec)[0] for lidar_scan in (scan, clockwise)
     )
     assert len(crossed) > 1000
-    assert len(np.setxor1d(crossed, also_crossed)) <= 0.01 * len(crossed)  # cells that only the first beam touches
+    # Only cells at the edge of the first beam differ.
+    assert len(np.setxor1d(crossed, crossed_clockwise)) <= 0.01 * len(crossed)
 
 
-def test_hits_are_points_in_the_map() -> None:
+def test_hit_points_are_in_the_map_frame() -> None:
     ranges = np.array([1.0, np.inf, np.nan, 2.0, 9.0, -np.inf])
     scan = Scan("l", 0, ranges, 0.0, math.pi / 2, 0.05, 12.0, Pose2(0.1, 0, 0))
     points, _ = hit_points(scan, Pose2(1.0, 1.0, math.pi / 2), 0.0, 2.5)
