@@ -22,6 +22,7 @@ from simscen.loading.yaml.tree import value_position
 from simscen.model.stack import StackSpec
 from simscen.record.localization_logs.read import LocalizationLog, read_localization_log
 from simscen.record.localization_logs.rows import TICK_RATE_HZ
+from simscen.report.display_text import number_with_noun
 from simscen.stack.protocols import RobotModel, Surroundings
 
 MIN_COMPARED_FRACTION = 0.99
@@ -145,7 +146,8 @@ def _lines(localized: LocalizationResult, errors: PoseErrors | None, lost_distan
     """Return the printed lines. `lost_distance` is the error in m above which the robot counts as lost."""
     x, y, yaw = localized.poses[-1].tolist()
     seconds = localized.times[-1] - localized.times[0]
-    lines = [f"{localized.scan_count} scans in {seconds:.1f} s; final belief ({x:.2f}, {y:.2f}, {yaw:.3f})"]
+    scans = number_with_noun(localized.scan_count, "scan")
+    lines = [f"{scans} in {seconds:.1f} s; final belief ({x:.2f}, {y:.2f}, {yaw:.3f})"]
     if errors is None:
         return [*lines, "no reference to compare with"]
     figures = errors.figures()
