@@ -24,7 +24,7 @@ _NOT_FOUND = "no such file or directory"
 
 
 class UnusableFile(Exception):
-    """A file cannot be found, is not allowed, or cannot be read. The message never contains content of the file."""
+    """A file cannot be found, may not be read, or cannot be read. The message never contains content of the file."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         self.hint = hint
@@ -76,12 +76,13 @@ class AllowedFolders:
 
         base:            folder of the file that contains the URI
         allow_absolute:  whether absolute paths are accepted (xacro and Gazebo write them)
-        is_preferred:    whether a path is returned even if the URI also fits paths before it, for which this is False
+        is_preferred:    called for each existing path in order. The first path with True is returned; without such a
+                         path, the first existing path.
 
         Raises UnusableFile, or NoSuchFile if the file does not exist.
         """
         if not uri or INVALID_IN_PATHS.search(uri):
-            raise UnusableFile("control character in the uri" if uri else "the uri is empty")
+            raise UnusableFile("the URI contains a control character" if uri else "the URI is empty")
         if len(uri) > MAX_PATH_LENGTH:
             raise UnusableFile("not a usable path")
         if "://" in uri and not uri.startswith(SCHEMES) and parse_fuel_uri(uri) is None:
@@ -92,7 +93,7 @@ class AllowedFolders:
         if not allow_absolute and PurePosixPath(uri.removeprefix("file://")).is_absolute():
             raise UnusableFile("absolute paths are not read", "write it relative to this file")
         real_base, tried = Path(os.path.realpath(base)), []
-        first: Path | None = None
+        first: Path | None = None  # first existing path
         for folder, candidate in candidate_paths(uri, real_base, self._tree, self.packages):
             # Other folders could be links, and hints must not reveal their content.
             if folder in (real_base, *self.search_folders):
@@ -110,14 +111,14 @@ class AllowedFolders:
 
     @staticmethod
     def resolve_parent(path: Path) -> Path:
-        """Return a path with the symbolic links of its folder resolved; the file itself may still be a link."""
+        """Return a path with the symbolic links of the folder resolved. The file itself can still be a link."""
         return Path(os.path.realpath(path.parent)) / path.name
 
     def package_folder(self, name: str, near: Path) -> Path:
         """Return the folder of the ROS package `name` for a file in the folder `near`; see `uris.candidate_paths`.
 
-        A folder with a package.xml comes before others with this name, such as those of headers (`include/name`), of
-        Python modules, and of builds. Raises UnusableFile, or NoSuchFile if there is no such package.
+        A folder with a package.xml has priority over other folders with this name, such as `include/name`, folders of
+        Python modules, and build folders. Raises UnusableFile, or NoSuchFile if there is no such package.
         """
         if name in self.packages:
             return self.packages[name]
@@ -139,11 +140,11 @@ class AllowedFolders:
     def resolve(self, path: Path) -> Path:
         """Return the path of a file or folder without symbolic links.
 
-        Raises UnusableFile if it is not in an allowed folder, or NoSuchFile if it does not exist.
+        Raises UnusableFile if the path is not in an allowed folder, or NoSuchFile if the path does not exist.
         """
         if len(str(path)) > MAX_PATH_LENGTH or "\0" in str(path):
             raise UnusableFile("not a usable path")
-        # Check the path without access to the disk first, so that it does not reveal whether files outside exist.
+        # First check the path without access to the disk, so that messages do not reveal whether other files exist.
         self._require_inside(Path(os.path.normpath(path)))
         try:
             real = Path(os.path.realpath(path, strict=True))
@@ -155,7 +156,7 @@ class AllowedFolders:
     def check_file(self, path: Path, max_bytes: int) -> Path:
         """Return the real path of a file.
 
-        Raises UnusableFile as `resolve` does, or if it is not a regular file of at most `max_bytes`.
+        Raises UnusableFile as `resolve` does, or if the path is not a regular file of at most `max_bytes`.
         """
         real = self.resolve(path)
         try:
@@ -190,7 +191,7 @@ class AllowedFolders:
 
         `base` is the folder of the file that contains the URI.
         """
-        similar = next((found for folder, path in tried if (found := find_similar_name(folder, path))), None)
+        similar = next((match for folder, path in tried if (match := find_similar_name(folder, path))), None)
         if similar:
             return f"did you mean `{similar}`?"
         if parse_fuel_uri(uri) and not self.search_folders:
@@ -221,21 +222,21 @@ def _to_unusable_file(error: OSError) -> UnusableFile:
 
 
 def find_similar_name(folder: Path, path: Path) -> str | None:
-    """Return the existing path in `folder` that a misspelled `path` probably means, relative to `folder`, or None.
+    """Return the existing path in `folder` that is similar to the missing `path`, relative to `folder`; otherwise None.
 
-    Capitalization and the suffix of a mesh may differ. Symbolic links are not followed.
+    Capitalization and the suffix of a mesh can differ. Symbolic links are not followed.
     """
     current, parts = folder, path.relative_to(folder).parts if path.is_relative_to(folder) else ("..",)
     for part in parts:
-        found = None if part == ".." else _match_entry(current, part)
-        if found is None or (current / found).is_symlink():
+        entry = None if part == ".." else _match_entry(current, part)
+        if entry is None or (current / entry).is_symlink():
             return None
-        current /= found
+        current /= entry
     return current.relative_to(folder).as_posix()
 
 
 def _match_entry(folder: Path, name: str) -> str | None:
-    """Return the entry of a folder with this name, other capitalization, or another mesh suffix; None without one."""
+    """Return the entry of a folder with this name, other capitalization, or another mesh suffix; None if missing."""
     try:
         entries = sorted(entry.name for entry in folder.iterdir())
     except OSError:

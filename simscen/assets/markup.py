@@ -20,9 +20,9 @@ _COMMENT = re.compile(
     rb"<!\[CDATA\[.*?(?:\]\]>|\Z)|(?P<declaration><\?xml\s.*?\?>)|<\?.*?(?:\?>|\Z)|<!--(?P<text>.*?)(?:-->|\Z)",
     re.DOTALL,
 )
-"""Comment with the group `text`, or XML declaration with the group `declaration`.
+"""Comment (group `text`) or XML declaration (group `declaration`).
 
-CDATA sections and processing instructions match without these groups.
+CDATA sections and other processing instructions also match, without these groups, so that their content is skipped.
 """
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
@@ -31,7 +31,7 @@ class MalformedXml(Exception):
     """A text is not well-formed XML, or contains XML that is not allowed.
 
     line, col:  position of the problem, both from 1
-    source:     text of the line, "" if it is not shown
+    source:     text of the line for messages; "" if unknown or too long
     """
 
     def __init__(self, message: str, line: int, col: int, source: str = "", hint: str = "") -> None:
@@ -133,10 +133,10 @@ def parse(data: bytes, source: Source, kind: type[ElementT]) -> ElementT:
 
 
 def blank_invalid_markup(data: bytes) -> bytes:
-    """Return the XML text with spaces in place of markup that XML forbids, but the parsers of Gazebo and ROS accept.
+    """Return the XML text without invalid markup that the parsers of Gazebo and ROS accept.
 
-    This markup is `--` in comments, and an XML declaration that is not at the start, such as below a comment or an
-    empty line. All positions stay the same.
+    Invalid are `--` in comments, and an XML declaration that is not at the start, such as below a comment or an empty
+    line. Spaces replace this markup, so that all positions stay the same.
     """
     start = len(_BYTE_ORDER_MARK) if data.startswith(_BYTE_ORDER_MARK) else 0
 

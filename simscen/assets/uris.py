@@ -1,4 +1,4 @@
-"""Paths at which the file of a Gazebo or ROS URI (model://, package://, file://, Fuel) may be found."""
+"""Candidate paths for the file of a Gazebo or ROS URI (model://, package://, file://, Fuel)."""
 
 import itertools
 import os
@@ -18,7 +18,7 @@ SCHEMES = (*PACKAGE_SCHEMES, "file://")
 MAX_NAME_CHARS = 255
 """Maximum length of the name of a package: the usual limit of file systems for the name of a folder."""
 MAX_MANIFEST_BYTES = 1 << 16
-"""Number of bytes of a package.xml that are read to find the `<name>`."""
+"""Number of bytes at the start of a package.xml in which `<name>` is searched."""
 _FUEL = re.compile(
     r"https?://(?P<server>(?:fuel|app|api)\.(?:gazebosim|ignitionrobotics)\.org)/(?:\d+\.\d+/)?"
     r"(?P<owner>[^/]+)/(?P<kind>models|worlds)/(?P<name>[^/]+)(?:/(?P<version>\d+|tip))?(?:/(?:files/)?(?P<rest>.*))?"
@@ -43,26 +43,26 @@ class FuelUri:
     rest: str
 
     def candidate_paths_in(self, folder: Path) -> Iterator[Path]:
-        """Yield the paths at which `folder` may contain a copy of the model or file.
+        """Yield the paths at which `folder` can contain a copy of the model or file, existing or not.
 
-        The folder may be a cache of Fuel (~/.gz/fuel) or contain models by name. The newest version comes first.
+        The folder can be a cache of Fuel (~/.gz/fuel) or contain models by name. The newest version comes first.
         """
         spellings = [self.name, self.name.lower()]
         for name in dict.fromkeys([*spellings, *(name.replace(" ", "_") for name in spellings)]):
             for owner in dict.fromkeys((self.owner, self.owner.lower())):
-                cached = folder / self.server / owner / self.kind / name
-                yield from (version / self.rest for version in self._versions(cached))
+                model_folder = folder / self.server / owner / self.kind / name
+                yield from (version / self.rest for version in self._version_folders(model_folder))
             yield folder / name / self.rest
 
-    def _versions(self, cached: Path) -> list[Path]:
-        """Return the folders of the requested version, or of all versions, of a model in a cache of Fuel."""
+    def _version_folders(self, model_folder: Path) -> list[Path]:
+        """Return the folder of the requested version of a model in a cache of Fuel; otherwise, of all versions."""
         if self.version not in ("", "tip"):
-            return [cached / self.version]
+            return [model_folder / self.version]
         try:
-            numbers = sorted(int(entry.name) for entry in cached.iterdir() if entry.name.isdecimal())
+            numbers = sorted(int(entry.name) for entry in model_folder.iterdir() if entry.name.isdecimal())
         except OSError:
             return []
-        return [cached / str(number) for number in reversed(numbers)]
+        return [model_folder / str(number) for number in reversed(numbers)]
 
 
 def parse_fuel_uri(uri: str) -> FuelUri | None:
@@ -77,7 +77,7 @@ def parse_fuel_uri(uri: str) -> FuelUri | None:
 class FolderTree:
     """Folders up to two levels below the `roots`, the allowed folders (see `AllowedFolders`).
 
-    They are listed only once, at the first search for a package.
+    The folders are listed only once, at the first search for a package.
     """
 
     def __init__(self, roots: tuple[Path, ...]) -> None:
@@ -92,21 +92,21 @@ class FolderTree:
 
     @cached_on_instance
     def find(self, name: str) -> tuple[Path, ...]:
-        """Return what is called `name` two or three levels below a root, the upper level first."""
+        """Return the files and folders called `name` two or three levels below a root, the upper level first."""
         return tuple(folder / name for folder in self._folders if os.path.lexists(f"{folder}/{name}"))
 
     @cached_property
     def packages(self) -> dict[str, list[Path]]:
-        """The roots and the folders below that have a package.xml, by the name of the package, the upper ones first."""
-        found: dict[str, list[Path]] = {}
+        """The roots and lower folders with a package.xml, by name of the package, upper levels first."""
+        packages: dict[str, list[Path]] = {}
         for folder in (*self.roots, *self._folders):
             if os.path.lexists(f"{folder}/package.xml"):
-                found.setdefault(_manifest_name(folder / "package.xml"), []).append(folder)
-        return found
+                packages.setdefault(_manifest_name(folder / "package.xml"), []).append(folder)
+        return packages
 
 
 def _subfolders(folder: Path) -> list[Path]:
-    """Return the subfolders of a folder, sorted; [] if it cannot be read."""
+    """Return the subfolders of a folder, sorted; [] if the folder cannot be read."""
     try:
         with os.scandir(folder) as entries:
             # Unlike the methods of `entry` and Path, isdir never raises, for example for a loop of links.
@@ -118,21 +118,21 @@ def _subfolders(folder: Path) -> list[Path]:
 def candidate_paths(
     uri: str, base: Path, tree: FolderTree, packages: Mapping[str, Path]
 ) -> Iterator[tuple[Path, Path]]:
-    """Yield pairs (folder, path in it) at which the file of a URI may be found, the preferred one first.
+    """Yield (searched folder, path in this folder) of the candidates for the file of a URI, the preferred one first.
 
     `base` is the folder of the file that contains the URI. The search folders are all roots of the `tree` except the
     first.
 
-    - model:// and package:// with a name in `packages`: only that folder.
+    - model:// and package:// with a name in `packages`: only the folder of this package.
     - model:// and package:// with another name: the search folders, then `_package_folders`.
-    - file:// and paths: relative to `base`, then to the search folders. The path of a file:// URI may start with the
+    - file:// and paths: relative to `base`, then to the search folders. The path of a file:// URI can start with the
       name of a search folder (`file://models/crate` in a folder `models`).
     - Fuel: the search folders.
     """
-    address, search = parse_fuel_uri(uri), tree.roots[1:]
-    if address is not None:
-        for folder in search:
-            yield from ((folder, place) for place in address.candidate_paths_in(folder))
+    fuel_uri, search_folders = parse_fuel_uri(uri), tree.roots[1:]
+    if fuel_uri is not None:
+        for folder in search_folders:
+            yield from ((folder, path) for path in fuel_uri.candidate_paths_in(folder))
         return
     scheme = next((scheme for scheme in SCHEMES if uri.startswith(scheme)), "")
     rest = uri.removeprefix(scheme)
@@ -142,28 +142,28 @@ def candidate_paths(
         if name in packages:
             yield packages[name], packages[name] / below.lstrip("/")
             return
-        yield from ((folder, folder / path) for folder in search)
+        yield from ((folder, folder / path) for folder in search_folders)
         if is_package_name(name):
             yield from ((folder, folder / below.lstrip("/")) for folder in _package_folders(name, base, tree))
         return
     yield base, base / rest
     first, _, below = rest.partition("/")
-    for folder in search:
+    for folder in search_folders:
         yield folder, folder / rest
         if scheme and below and folder.name == first:
             yield folder, folder / below
 
 
 def is_package_name(name: str) -> bool:
-    """Return whether a name consists of the characters of ROS package names (REP 144), and fits into a file name."""
+    """Return whether a name has only characters of ROS package names (REP 144), and at most MAX_NAME_CHARS."""
     return len(name) <= MAX_NAME_CHARS and name.replace("_", "").replace("-", "").isalnum()
 
 
 def _package_folders(name: str, near: Path, tree: FolderTree) -> Iterator[Path]:
-    """Yield folders that may be the ROS package `name`, to which a file in the folder `near` refers.
+    """Yield folders that can be the ROS package `name`, to which a file in the folder `near` refers.
 
-    First come folders of this name: `near`, its parents, their subfolders, and folders up to three levels below the
-    roots. Then come folders whose package.xml has this name.
+    First come folders with this name: `near` and its parents, subfolders of these folders, and folders up to three
+    levels below the roots. Then come folders whose package.xml has this name.
     """
     for folder in (near, *near.parents):
         if folder.name == name:

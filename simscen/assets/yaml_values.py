@@ -23,7 +23,8 @@ UNITS = {
 def parse_yaml_values(content: bytes, evaluate: Callable[[str], float]) -> object:
     """Return the value of a YAML 1.1 document. Raises UnusableFile if it is invalid, too deep, or contains aliases.
 
-    A number may have a unit of UNITS as its tag, such as `!degrees 90`. `evaluate` returns the number of its text.
+    A number can have a unit of UNITS as tag, such as `!degrees 90`. `evaluate` converts the text of such a number, for
+    example an expression of xacro.
     """
     try:
         return _Loader(content, evaluate).get_single_data()

@@ -24,6 +24,7 @@ MAX_CACHED_WORLDS = 8
 class TextChecks:
     """Loads and checks versions of the text of one file.
 
+    file:     edited file
     lenient:  value of the option --lenient
     stack:    stack that replaces the stack of the scenario; None to keep it
     cache:    cache of built worlds and shortest paths
@@ -45,15 +46,17 @@ class TextChecks:
     def problems(self, text: str) -> list[Problem]:
         """Return all problems of a text, in the order of the file."""
         try:
-            found = self._scenario_problems(text) if self.file.kind == "scenario" else self._world_problems(text)
+            problems = self._scenario_problems(text) if self.file.kind == "scenario" else self._world_problems(text)
         except InvalidInput as error:
-            found = error.problems
-        return sorted(dict.fromkeys(found))
+            problems = error.problems
+        return sorted(dict.fromkeys(problems))
 
     def _scenario_problems(self, text: str) -> list[Problem]:
         checked = [
-            VariationProblems(one.variation, one.varied_paths, [*one.notes, *world_problems(one, self.cache)])
-            for one in self.load(text)
+            VariationProblems(
+                scenario.variation, scenario.varied_paths, [*scenario.notes, *world_problems(scenario, self.cache)]
+            )
+            for scenario in self.load(text)
         ]
         return merge_problems(checked)
 

@@ -40,19 +40,22 @@ class EditedFile:
 
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-NEW = ""
-"""Version of a file that does not exist."""
+NEW_FILE_VERSION = ""
+"""Version of a file that does not exist yet."""
 
 
 class Content(NamedTuple):
-    """Text of a file with \\n as line breaks, and its version: a hash of all bytes, or NEW if there is no file."""
+    """Text of a file with \\n as line breaks, and the version of the file.
+
+    The version is a hash of all bytes, or NEW_FILE_VERSION if there is no file.
+    """
 
     text: str
     version: str
 
 
-class ChangedMeanwhile(Exception):
-    """The file was changed, created, or deleted after the editor read it. `content` is its current content."""
+class FileChanged(Exception):
+    """The file was changed, created, or deleted after the editor read it. `content` is the content of the file now."""
 
     def __init__(self, message: str, content: Content) -> None:
         super().__init__(message)
@@ -90,7 +93,7 @@ class Document:
     def save(self, text: str, version: str, overwrite: bool = False) -> str:
         """Replace the content of the file atomically and return its new version.
 
-        `version` is the version that was edited. Raises ChangedMeanwhile if the file now has another version and
+        `version` is the version that was edited. Raises FileChanged if the file now has another version and
         `overwrite` is False. Raises UsageError if the file cannot be written, or the text is not valid Unicode.
         """
         if not overwrite:
@@ -111,20 +114,24 @@ class Document:
         return _version(data)
 
     def _require_version(self, version: str) -> None:
+        """Raise FileChanged if the file has another version, and UsageError if the file cannot be read."""
         try:
             raw = self.path.read_bytes()
-            now = _version(raw)
+            current = _version(raw)
         except (FileNotFoundError, NotADirectoryError):
-            raw, now = b"", NEW
+            raw, current = b"", NEW_FILE_VERSION
         except OSError as error:
             raise UsageError(f"{self.display_name}: cannot be read: {error.strerror or error}") from error
-        if now == version:
+        if current == version:
             return
         text = decode(raw, self.display_name)
-        what = "was created" if version == NEW else "was deleted" if now == NEW else "was changed by another program"
+        if version == NEW_FILE_VERSION:
+            change = "was created"
+        else:
+            change = "was deleted" if current == NEW_FILE_VERSION else "was changed by another program"
         hint = "reload it, or overwrite it with your text"
-        message = f"{self.display_name} {what} since it was opened here; {hint}"
-        raise ChangedMeanwhile(message, Content(text if isinstance(text, str) else "", now))
+        message = f"{self.display_name} {change} since it was opened here; {hint}"
+        raise FileChanged(message, Content(text if isinstance(text, str) else "", current))
 
 
 def _version(raw: bytes) -> str:

@@ -15,7 +15,7 @@ from simscen.loading.yaml.tree import Key
 MAX_DEPTH = 4
 """Maximum number of levels of nested fields in a form."""
 MAX_ITEMS = 12
-"""Maximum number of items for which a list has fields. A longer list has none."""
+"""Maximum number of items of a list with fields. A longer list has no fields."""
 MAX_TEXT_FIELD_CHARACTERS = 60
 """Maximum length of a string in a single-line field."""
 FIRST_VALUE_OF_KEY = {
@@ -25,17 +25,17 @@ FIRST_VALUE_OF_KEY = {
     "through": [[0, 0]],
     "points": [[0, 0], [1, 0]],
 }
-"""Initial values of new keys, by key. They have priority over the schema."""
+"""Initial values of new keys, by key. These values have priority over the schema."""
 
 Keys = tuple[Key, ...]
 _EXAMPLE_OF_QUANTITY = re.compile(r"\s*\((?:[a-z ]+), e\.g\. ([^)]*)\)$")
 
 
 def form_data(kind: str, text: str, data: Any, keys: Keys) -> dict[str, Any]:
-    """Return the form of the value at `keys` as JSON data: its help, its fields, and the keys that can be added.
+    """Return the form of the value at `keys` as JSON data: help, fields, and the keys that can be added.
 
-    `data` is the content of the `text`, including content that it inherits from other files. The form of the complete
-    file (`keys` are empty) has no nested fields.
+    `data` is the content of the `text`, including content that the text inherits from other files. The form of the
+    complete file (`keys` are empty) has no nested fields.
     """
     root = schema_of_kind(kind)
     schema = schema_at(root, keys, data)
@@ -53,49 +53,49 @@ class _Form:
     def field(self, keys: Keys, schema: Schema, value: Any, required: bool, depth: int) -> dict[str, Any]:
         """Return the field of the value at `keys`, including nested fields. `depth` is 0 for the top-level field."""
         help_, example = _help_and_example(schema)
-        written = None if self._source is None or not keys else source_at(self._source, keys)
+        node = None if self._source is None or not keys else source_at(self._source, keys)
         base = {
             "key": str(keys[-1]) if keys else "",
             "keys": list(keys),
             "help": help_,
             "example": example,
             "required": required,
-            "written": written is not None or not keys,
+            "written": node is not None or not keys,
         }
         if isinstance(value, dict):
             return {**base, "type": "group", **self._group(keys, schema, value, depth)}
         if isinstance(value, list):
             return {**base, "type": "list", **self._list(keys, schema, value, depth)}
-        return {**base, **self._scalar(schema, value, written)}
+        return {**base, **self._scalar(schema, value, node)}
 
     def _group(self, keys: Keys, schema: Schema, value: dict[str, Any], depth: int) -> dict[str, Any]:
         """Return the part of a field that describes a mapping: nested fields, and keys that can be added."""
-        needed = set(schema.get("required", []))
-        shown = [] if depth >= self._max_depth else list(value)
+        required_keys = set(schema.get("required", []))
+        shown_keys = [] if depth >= self._max_depth else list(value)
         if depth == 0 and not keys:
-            shown = [key for key in value if not isinstance(value[key], dict | list)]
+            shown_keys = [key for key in value if not isinstance(value[key], dict | list)]
         fields = []
-        for key in shown:
+        for key in shown_keys:
             child = resolve_schema(self._root, child_schema(schema, key), value[key])
-            fields.append(self.field((*keys, key), child, value[key], key in needed, depth + 1))
+            fields.append(self.field((*keys, key), child, value[key], key in required_keys, depth + 1))
         return {"fields": fields, "addable": self._addable(keys, schema, value)}
 
     def _addable(self, keys: Keys, schema: Schema, value: dict[str, Any]) -> list[dict[str, Any]]:
         """Return the keys that can be added to a mapping, with their help and initial value."""
         # Keys that exclude each other, such as kinds of triggers, are alternatives with one required key.
-        alternatives = [one.get("required", []) for one in schema.get("oneOf", []) if isinstance(one, dict)]
+        alternatives = [each.get("required", []) for each in schema.get("oneOf", []) if isinstance(each, dict)]
         choices = [required[0] for required in alternatives if len(required) == 1]
         has_choice = any(choice in value for choice in choices)
-        found = []
-        for key, one in schema.get("properties", {}).items():
+        addable = []
+        for key, key_schema in schema.get("properties", {}).items():
             if key in value or key.endswith("+") or (key in choices and has_choice):
                 continue
-            child = resolve_schema(self._root, one, None)
+            child = resolve_schema(self._root, key_schema, None)
             initial = _first_value(self._root, child, key)
             if initial is None or (not keys and isinstance(initial, dict | list)):
                 continue
-            found.append({"key": key, "help": _help_and_example(child)[0], "value": initial})
-        return found
+            addable.append({"key": key, "help": _help_and_example(child)[0], "value": initial})
+        return addable
 
     def _list(self, keys: Keys, schema: Schema, value: list[Any], depth: int) -> dict[str, Any]:
         """Return the part of a field that describes a list: a nested field for each item."""
@@ -107,8 +107,11 @@ class _Form:
             fields.append(self.field((*keys, index), child, item, required=False, depth=depth + 1))
         return {"fields": fields, "addable": []}
 
-    def _scalar(self, schema: Schema, value: Any, written: SourceNode | None) -> dict[str, Any]:
-        """Return the part of a field that describes a scalar. `written` is its syntax node; None if it is inherited."""
+    def _scalar(self, schema: Schema, value: Any, node: SourceNode | None) -> dict[str, Any]:
+        """Return the part of a field that describes a scalar.
+
+        `node` is the syntax node of the scalar; None if the file inherits the scalar.
+        """
         if isinstance(value, float) and not math.isfinite(value):
             value = str(value)  # JSON has no such numbers
         if "enum" in schema:
@@ -120,8 +123,8 @@ class _Form:
             is_long = "\n" in text.strip() or len(text) > MAX_TEXT_FIELD_CHARACTERS
             return {"type": "long text" if is_long else "text", "value": text}
         raw = "" if value is None else str(value)
-        if written is not None and written.kind == "scalar" and not written.style:
-            raw = self._text[written.start : written.end]
+        if node is not None and node.kind == "scalar" and not node.style:
+            raw = self._text[node.start : node.end]
         return {"type": "number", "value": raw}
 
 
@@ -148,8 +151,8 @@ def _first_value(root: Schema, schema: Schema, key: str = "", depth: int = 0) ->
             return "new"
         case "array":
             item = resolve_schema(root, child_schema(schema, 0), None)
-            one = _first_value(root, item, "", depth + 1) if depth < MAX_DEPTH else None
-            return None if one is None else [one] * max(1, schema.get("minItems", 1))
+            first = _first_value(root, item, "", depth + 1) if depth < MAX_DEPTH else None
+            return None if first is None else [first] * max(1, schema.get("minItems", 1))
         case "object":
             return _first_mapping(root, schema, depth)
     return None
@@ -159,12 +162,12 @@ def _first_mapping(root: Schema, schema: Schema, depth: int) -> dict[str, Any] |
     """Return a mapping with the required keys; None if a required key has no simple value."""
     if depth >= MAX_DEPTH:
         return None
-    properties, made = schema.get("properties", {}), dict[str, Any]()
+    properties, mapping = schema.get("properties", {}), dict[str, Any]()
     for key in schema.get("required", []):
-        made[key] = _first_value(root, resolve_schema(root, properties.get(key, {}), {}), key, depth + 1)
-        if made[key] is None:
+        mapping[key] = _first_value(root, resolve_schema(root, properties.get(key, {}), {}), key, depth + 1)
+        if mapping[key] is None:
             return None
-    return made
+    return mapping
 
 
 def _first_number(schema: Schema) -> float:
@@ -176,7 +179,7 @@ def _first_number(schema: Schema) -> float:
 
 
 def _help_and_example(schema: Schema) -> tuple[str, str]:
-    """Return the description of a value without its example, and the example, such as "0.5 m"; "" if missing."""
+    """Return (description of a value without the example, example such as "0.5 m"), each "" if missing."""
     paragraphs = str(schema.get("description", "")).split("\n\n")
     text = "\n\n".join(" ".join(part.split()) for part in paragraphs).strip()
     match = _EXAMPLE_OF_QUANTITY.search(text)

@@ -14,9 +14,9 @@ from simscen.loading.builders import world_from_file
 from simscen.loading.files.single_files import load_world_file
 
 LIDAR_HEIGHT_M = 0.2
-"""Height of the horizontal section through the world from which its map is made."""
+"""Height of the horizontal section of the world that becomes the map."""
 PREFERRED_CLEARANCE_M = 0.5
-"""Minimum distance of start and goal from walls, if possible. Otherwise smaller distances are tried."""
+"""Minimum distance of start and goal from walls. If no position has this distance, smaller distances are tried."""
 MAX_CANDIDATES = 200
 """Maximum number of free positions from which start and goal are chosen."""
 
@@ -54,9 +54,9 @@ pass:
 
 
 def _start_and_goal(built: BuiltWorld) -> tuple[Pose2, Pose2]:
-    """Return a free start, and the farthest free goal that a path leads to (the start if there is none).
+    """Return a free start, and the farthest free goal with a path from the start.
 
-    Without free space, both are the origin.
+    If there is no such goal, the goal is the start. Without free space, start and goal are the origin.
     """
     points = _free_points(built)
     if not len(points):
@@ -79,19 +79,19 @@ def _free_points(built: BuiltWorld) -> Array:
     free = np.pad(grid.cells == FREE, 1)
     clearance = ndimage.distance_transform_edt(free)[1:-1, 1:-1] * grid.resolution
     for min_clearance in (PREFERRED_CLEARANCE_M, PREFERRED_CLEARANCE_M / 2, 0.0):
-        cells = _in_bounds(np.argwhere(clearance > min_clearance), built)
+        cells = _cells_in_bounds(np.argwhere(clearance > min_clearance), built)
         if len(cells):
             chosen = cells[np.linspace(0, len(cells) - 1, min(MAX_CANDIDATES, len(cells))).astype(np.int64)]
             return np.round(grid.center_of(chosen), 2)
     return np.zeros((0, 2))
 
 
-def _in_bounds(cells: npt.NDArray[np.int64], built: BuiltWorld) -> npt.NDArray[np.int64]:
+def _cells_in_bounds(cells: npt.NDArray[np.int64], built: BuiltWorld) -> npt.NDArray[np.int64]:
     """Return the cells (n, 2) inside the bounds of the world; all cells if the world has a map."""
     if built.world.grid is not None:
         return cells
     left, low, right, high = built.world.bounds
     x, y = built.map.center_of(cells).T
-    inside: npt.NDArray[np.bool_] = (x > left) & (x < right) & (y > low) & (y < high)
-    chosen: npt.NDArray[np.int64] = cells[inside]
-    return chosen
+    is_inside: npt.NDArray[np.bool_] = (x > left) & (x < right) & (y > low) & (y < high)
+    cells_inside: npt.NDArray[np.int64] = cells[is_inside]
+    return cells_inside

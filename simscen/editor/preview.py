@@ -23,13 +23,14 @@ OUTLINE_STEP_M = 0.05
 MAX_LEGS = 40
 """Maximum number of legs (paths from the start to a goal or between goals) of each robot."""
 MAX_CLEARANCE_M = 1000.0
-"""Maximum clearance that is shown."""
+"""Maximum clearance that the preview contains."""
 
 
 def preview_data(checks: TextChecks, text: str) -> dict[str, Any]:
-    """Return JSON data: footprint, legs, and clearances at the start and the goals, by path of the robot in the file.
+    """Return the preview as JSON data: `robots`, and `reason`.
 
-    If the text has problems, there are no robots, and `reason` is the first problem.
+    `robots` has, by path of the robot in the file, the footprint, the legs, and the clearances at the start and the
+    goals. If the text has problems, `robots` is empty, and `reason` is a message with the first problem.
     """
     try:
         loaded = checks.load(text)[0]
@@ -50,7 +51,7 @@ def _robot_data(loaded: LoadedScenario, checks: TextChecks) -> dict[str, Any]:
     scene = Scene(loaded, blocking_world(loaded, world), size, checks.cache)
     goals = scenario_goals(loaded.spec)[: len(loaded.spec.goals)]
     stops = [scene.start, *(goal.pose for goal in goals)]
-    # Without immovable bodies, the tuple stays the same: the cache of shortest paths compares identities.
+    # The cache of shortest paths compares identities. Without immovable bodies, the tuple must therefore be the same.
     immovable = scene.immovable_bodies
     solids = (*scene.world.solids, *immovable) if immovable else scene.world.solids
     paths = checks.cache.shortest_paths(
@@ -65,7 +66,7 @@ def _robot_data(loaded: LoadedScenario, checks: TextChecks) -> dict[str, Any]:
 
 
 def _leg(paths: ShortestPaths, start: Pose2, goal: Pose2) -> dict[str, Any]:
-    """Return the points and the length in m of the shortest path; without one, a straight line and the length None."""
+    """Return the points and the length in m of the shortest path; without a path, the ends of the leg and None."""
     path = paths.path(start, goal)
     if path is None:
         return {"points": [[start.x, start.y], [goal.x, goal.y]], "length": None}
@@ -75,7 +76,7 @@ def _leg(paths: ShortestPaths, start: Pose2, goal: Pose2) -> dict[str, Any]:
 def _clearance(paths: ShortestPaths, size: RobotSize, pose: Pose2) -> float | None:
     """Return the distance in m from the footprint at a pose to the nearest solid; None above MAX_CLEARANCE_M.
 
-    The distance is negative if both overlap.
+    The distance is negative if footprint and solid overlap.
     """
     if size.radius is not None:
         nearest = float(paths.clearances(np.array([[pose.x, pose.y]]))[0]) - size.radius

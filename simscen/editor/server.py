@@ -1,4 +1,4 @@
-"""Local HTTP server of the editor. It answers only requests with its secret token in the URL."""
+"""Local HTTP server of the editor. The server answers only requests with the secret token in the URL."""
 
 import json
 import re
@@ -48,14 +48,20 @@ class Response(NamedTuple):
 class EditorServer(ThreadingHTTPServer):
     """HTTP server of the editor, only for programs on this machine.
 
-    It serves the session of the main file, and sessions of all world files to which the main file has referred. The
-    page of world file number n has the path `world-n/`; its session starts when the page is first requested.
+    The server has a session for the main file, and a session for each world file to which the main file has referred.
+    The page of world file number n has the path `world-n/`. The session of a world file starts with the first request
+    for this page.
+
+    session:  session of the main file
+    token:    secret first part of the path of all URLs
+    hosts:    accepted values of the HTTP header Host
+    files:    files of the editor page, by name
     """
 
     daemon_threads = True
 
     def __init__(self, session: EditorSession, port: int = 0) -> None:
-        """Listen on the port; 0 selects a free one. Raises OSError if the port is in use."""
+        """Listen on `port`; 0 selects a free port. Raises OSError if the port is in use."""
         super().__init__((ADDRESS, port), _Handler)
         self.session, self.token = session, secrets.token_urlsafe(24)
         self._worlds: list[Path] = []
@@ -117,26 +123,26 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Send a file of the editor page or the replay page of a run."""
-        if (requested := self._authorized()) is not None:
-            self._send(self._file(*requested))
+        if (target := self._authorize()) is not None:
+            self._send(self._file(*target))
 
     def do_POST(self) -> None:
         """Answer a JSON request of the page, one of the `requests` of a session."""
         body = self._body()
-        if (requested := self._authorized()) is None:
+        if (target := self._authorize()) is None:
             return
         if body is None:
             self._send(_error("the request is too large, or has no length", HTTPStatus.REQUEST_ENTITY_TOO_LARGE))
         elif self.headers.get_content_type() != "application/json":
             self._send(_error("requests must be JSON", HTTPStatus.UNSUPPORTED_MEDIA_TYPE))
         else:
-            self._send(_response(*requested, body))
+            self._send(_response(*target, body))
 
     def log_message(self, format: str, *args: Any) -> None:
         """Print nothing, because the URL contains the token."""
 
-    def _authorized(self) -> tuple[EditorSession, str] | None:
-        """Return the session of a request and the path within this session.
+    def _authorize(self) -> tuple[EditorSession, str] | None:
+        """Check that a request is allowed, and return its session and its path within the session.
 
         If the request is not allowed, send an error and return None.
         """
@@ -152,13 +158,13 @@ class _Handler(BaseHTTPRequestHandler):
             message = "wrong or missing token; use the address that simscen edit printed"
             self._send(_error(message, HTTPStatus.FORBIDDEN))
             return None
-        requested = self.server.resolve(name)
-        if requested is None:
+        target = self.server.resolve(name)
+        if target is None:
             self._send(_error("there is no such file to edit", HTTPStatus.NOT_FOUND))
-        return requested
+        return target
 
     def _body(self) -> bytes | None:
-        """Return the body of a request; None if it is too large or has no length."""
+        """Return the body of a request; None if the body is too large or has no length."""
         length = self.headers.get("Content-Length", "")
         if not re.fullmatch("[0-9]{1,9}", length) or int(length) > MAX_REQUEST_BYTES:
             self.close_connection = True
@@ -196,13 +202,13 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def _replay(session: EditorSession, number: int) -> Response:
-    """Return the replay page of a run. Its Content-Security-Policy is read from the page."""
+    """Return the replay page of a run, with the Content-Security-Policy that the page itself states."""
     trial = session.runs.trial(number)
     if trial is None or not trial.replay.is_file():
         return _error("there is no such replay", HTTPStatus.NOT_FOUND)
     page = trial.replay.read_bytes()
-    own = _POLICY_OF_PAGE.search(page[:4096].decode(errors="replace"))
-    policy = unescape(own[1]) if own else "default-src 'none'"
+    match = _POLICY_OF_PAGE.search(page[:4096].decode(errors="replace"))
+    policy = unescape(match[1]) if match else "default-src 'none'"
     return Response(page, "text/html", policy=f"{policy}; frame-ancestors 'self'")
 
 

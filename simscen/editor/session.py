@@ -1,7 +1,7 @@
 """Session of the editor: answers the requests of the editor page about one file.
 
-The page holds the edited text, and sends it as `text` with the requests about it. The page also shows a map of the
-world.
+The page holds the edited text, and sends this text as `text` with each request that needs it. The page also shows a
+map of the world.
 """
 
 import threading
@@ -13,7 +13,7 @@ from typing import Any
 
 from simscen.core.errors import InvalidInput, Problem
 from simscen.editor.checking import TextChecks
-from simscen.editor.document import NEW, ChangedMeanwhile, Content, Document, EditedFile
+from simscen.editor.document import NEW_FILE_VERSION, Content, Document, EditedFile, FileChanged
 from simscen.editor.forms import form_data
 from simscen.editor.map_view.background import Backgrounds
 from simscen.editor.map_view.map_edits import read_edits, read_keys
@@ -32,7 +32,7 @@ from simscen.run.process.jobs import Backend
 Data = dict[str, Any]
 """JSON object."""
 CommandResolver = Callable[[LoadedScenario], tuple[LoadedScenario, list[Problem]]]
-"""Function that adds the commands of external stacks to a scenario. It returns the scenario and the problems found."""
+"""Function that adds the commands of external stacks to a scenario, and returns the new scenario and any problems."""
 
 
 class RequestRefused(Exception):
@@ -46,8 +46,8 @@ class RequestRefused(Exception):
 class EditorSession:
     """Answers the requests about one edited file.
 
-    `requests` maps the name of each request to its method, with JSON data as argument and result. The methods raise
-    RequestRefused if a request cannot be answered.
+    `requests` maps the name of each request to the method that answers the request. These methods take and return JSON
+    data, and raise RequestRefused if they cannot answer a request.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class EditorSession:
         self._backend_factory, self._lenient, self._resolve_commands = backend_factory, lenient, resolve_commands
         self._stack = stack
         self._document = Document(file.path, file.display_name)
-        self._opened = Content(new_text, NEW) if new_text else self._document.read()
+        self._content = Content(new_text, NEW_FILE_VERSION) if new_text else self._document.read()
         self._backgrounds = Backgrounds(file.root, file.world_path)
         self._checks, self._preview_checks = (TextChecks(file, lenient, stack) for _ in range(2))
         self._scene_lock, self._check_lock, self._preview_lock = threading.Lock(), threading.Lock(), threading.Lock()
@@ -98,15 +98,15 @@ class EditorSession:
 
     def open(self, _: Data) -> Data:
         """Return the text of the file, or the last text if the file can no longer be read."""
-        if self._opened.version != NEW:
+        if self._content.version != NEW_FILE_VERSION:
             with suppress(InvalidInput, OSError):
-                self._opened = self._document.read()
+                self._content = self._document.read()
         return self._opened_data()
 
     def reload(self, _: Data) -> Data:
         """Read the file again, and return its text."""
         try:
-            self._opened = self._document.read()
+            self._content = self._document.read()
         except InvalidInput as error:
             raise RequestRefused(_first_message(error.problems)) from error
         return self._opened_data()
@@ -131,11 +131,11 @@ class EditorSession:
         """Return the problems of the text, with the IDs of the affected objects on the map."""
         text = _text(request)
         with self._check_lock:
-            found = self._checks.problems(text)
+            problems = self._checks.problems(text)
         parts = scene_parts(self.file, text)
         objects = [] if parts is None else map_objects(parts)
         source = parse_source(text)
-        return {"problems": [self._problem_data(one, objects, source, text) for one in found]}
+        return {"problems": [self._problem_data(problem, objects, source, text) for problem in problems]}
 
     def edit(self, request: Data) -> Data:
         """Return the text after `edits` on the map or in a form."""
@@ -164,16 +164,16 @@ class EditorSession:
     def save(self, request: Data) -> Data:
         """Write the text to the file, and return the new version.
 
-        The request is refused if the version of the file is not `version` and `overwrite` is false.
+        The request is refused if the file has another version than `version`, unless `overwrite` is true.
         """
         text, version = _text(request), request.get("version")
         try:
-            saved = self._document.save(text, str(version), request.get("overwrite") is True)
-        except ChangedMeanwhile as error:
-            theirs = {"text": error.content.text, "version": error.content.version}
-            raise RequestRefused(str(error), 409, theirs) from error
-        self._opened = Content(text, saved)
-        return {"version": saved}
+            new_version = self._document.save(text, str(version), request.get("overwrite") is True)
+        except FileChanged as error:
+            current = {"text": error.content.text, "version": error.content.version}
+            raise RequestRefused(str(error), 409, current) from error
+        self._content = Content(text, new_version)
+        return {"version": new_version}
 
     def run(self, request: Data) -> Data:
         """Start a run of the scenario or its first variation. The request is refused if the text has errors."""
@@ -207,6 +207,7 @@ class EditorSession:
         return self.runs.trial(number) if isinstance(number, int) else None
 
     def _edited_text(self, request: Data, edits: Any) -> str:
+        """Return the text of a request after `edits`, a list of changes (see `read_edits`)."""
         text = _text(request)
         try:
             return apply_edits(text, read_edits(edits, text, self.file.kind))
@@ -215,29 +216,29 @@ class EditorSession:
 
     def _opened_data(self) -> Data:
         """Return the answer to `open` and `reload`."""
-        content = self._opened
+        content = self._content
         return {
             "name": self.file.display_name,
             "kind": self.file.kind,
             "text": content.text,
             "version": content.version,
-            "is_new": content.version == NEW,
+            "is_new": content.version == NEW_FILE_VERSION,
             "stack": "" if self._stack is None else self._stack.name,
         }
 
     def _problem_data(self, problem: Problem, objects: list[MapObject], source: SourceNode | None, text: str) -> Data:
         """Return a problem as JSON data. `source` is the syntax tree of the text; None if the text is invalid."""
-        is_own = problem.path == self.file.display_name
+        is_in_file = problem.path == self.file.display_name
         return {
             "path": problem.path,
-            "line": problem.line if is_own else 0,
-            "col": problem.col if is_own else 0,
-            "where": f"{problem.line}:{problem.col}" if is_own else f"{problem.path}:{problem.line}",
+            "line": problem.line if is_in_file else 0,
+            "col": problem.col if is_in_file else 0,
+            "where": f"{problem.line}:{problem.col}" if is_in_file else f"{problem.path}:{problem.line}",
             "code": problem.code,
             "severity": problem.severity,
             "message": problem.message,
             "hint": problem.hint,
-            "object": object_id_at_problem(problem, objects, source, text) if is_own else "",
+            "object": object_id_at_problem(problem, objects, source, text) if is_in_file else "",
         }
 
 

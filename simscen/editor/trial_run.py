@@ -1,4 +1,4 @@
-"""Trial runs of the text in the editor, which need not be saved."""
+"""Trial runs of the text in the editor, saved or not."""
 
 import shutil
 import tempfile
@@ -80,10 +80,11 @@ class TrialRuns:
         self._backend_factory = backend_factory
         self._folder: Path | None = None
         self._trials: list[TrialRun] = []
-        self._start_lock, self._run_lock = threading.Lock(), threading.Lock()  # of `start`, and of the run in progress
+        self._start_lock = threading.Lock()
+        self._run_lock = threading.Lock()  # held by the run in progress
 
     def start(self, loaded: LoadedScenario) -> TrialRun:
-        """Cancel all earlier runs, start a run in a thread, and return it."""
+        """Cancel all earlier runs, start a run in a thread, and return the new run."""
         with self._start_lock:
             for trial in self._trials:
                 trial.is_canceled = True
@@ -109,7 +110,7 @@ class TrialRuns:
             self._run_lock.release()
 
     def _run(self, loaded: LoadedScenario, trial: TrialRun) -> None:
-        """Wait for earlier runs, simulate a scenario, and write its progress and result to `trial`."""
+        """Wait for earlier runs, simulate a scenario, and write progress and result to `trial`."""
 
         def listen(event: SessionEvent) -> None:
             if trial.is_canceled:

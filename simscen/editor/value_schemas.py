@@ -45,14 +45,14 @@ def schema_at(root: Schema, keys: Sequence[Key], data: Any) -> Schema:
 
 
 def child_schema(schema: Schema, key: Key) -> Schema:
-    """Return the schema of the value or item at `key` of a mapping or list; {} if the schema has none."""
+    """Return the schema of the value or item at `key` of a mapping or list; {} for an unknown key."""
     if isinstance(key, int):
         prefix = schema.get("prefixItems", [])
-        found = prefix[key] if key < len(prefix) else schema.get("items", {})
+        child = prefix[key] if key < len(prefix) else schema.get("items", {})
     else:
         patterns = list(schema.get("patternProperties", {}).values())
-        found = schema.get("properties", {}).get(key) or (patterns[0] if patterns else {})
-    return found if isinstance(found, dict) else {}
+        child = schema.get("properties", {}).get(key) or (patterns[0] if patterns else {})
+    return child if isinstance(child, dict) else {}
 
 
 def resolve_schema(root: Schema, schema: Schema, data: Any) -> Schema:
@@ -62,7 +62,7 @@ def resolve_schema(root: Schema, schema: Schema, data: Any) -> Schema:
             target = root["$defs"][schema["$ref"].rpartition("/")[2]]
             schema = {**target, **{key: value for key, value in schema.items() if key != "$ref"}}
         elif "if" in schema and "else" in schema:
-            branch = schema["then" if _applies(schema["if"], data) else "else"]
+            branch = schema["then" if _meets_condition(schema["if"], data) else "else"]
             schema = _merge_branch(schema, branch, ("if", "then", "else"))
         elif branch := next(_applicable_branches(root, schema, data), None):
             schema = _merge_branch(schema, branch, ("allOf", "oneOf", "anyOf"))
@@ -83,41 +83,42 @@ def value_at(data: Any, keys: Sequence[Key]) -> Any:
     return data
 
 
-def _merge_branch(schema: Schema, branch: Schema, without: tuple[str, ...]) -> Schema:
-    """Return the schema without the keys `without`, merged with a branch. The schema's own description has priority."""
-    outer = {key: value for key, value in schema.items() if key not in without}
+def _merge_branch(schema: Schema, branch: Schema, removed_keys: tuple[str, ...]) -> Schema:
+    """Return the schema without `removed_keys`, merged with a branch. The description of the schema has priority."""
+    outer = {key: value for key, value in schema.items() if key not in removed_keys}
     description = outer.get("description") or branch.get("description", "")
     return {**outer, **branch, "description": description}
 
 
 def _applicable_branches(root: Schema, schema: Schema, data: Any) -> Iterator[Schema]:
-    """Yield the branches of allOf, oneOf, and anyOf that apply to the data.
+    """Yield the branches of allOf, oneOf, and anyOf that apply to the data, the best branch first.
 
-    The best branch comes first: `then` of each true condition, references to schemas with the `type` of the data, and
-    the first reference as a fallback.
+    The order is: `then` of each true condition, references to schemas with the `type` of the data, and the first
+    reference as a fallback.
     """
-    unions = [one for key in ("allOf", "oneOf", "anyOf") for one in schema.get(key, []) if isinstance(one, dict)]
-    conditional = [union for union in unions if "if" in union and "then" in union]
-    yield from (one["then"] for one in conditional if _applies(one["if"], data))
-    plain = [union for union in unions if "$ref" in union]
-    for one in plain:
-        target = root["$defs"][one["$ref"].rpartition("/")[2]]
-        kind = target.get("properties", {}).get("type", {})
-        written = value_at(data, ("type",))
-        if written is not None and written in (kind.get("const"), *kind.get("enum", [])):
-            yield one
-    yield from plain[:1]
+    branches = [each for key in ("allOf", "oneOf", "anyOf") for each in schema.get(key, []) if isinstance(each, dict)]
+    conditional = [branch for branch in branches if "if" in branch and "then" in branch]
+    yield from (branch["then"] for branch in conditional if _meets_condition(branch["if"], data))
+    references = [branch for branch in branches if "$ref" in branch]
+    for reference in references:
+        target = root["$defs"][reference["$ref"].rpartition("/")[2]]
+        type_schema = target.get("properties", {}).get("type", {})
+        type_name = value_at(data, ("type",))
+        if type_name is not None and type_name in (type_schema.get("const"), *type_schema.get("enum", [])):
+            yield reference
+    yield from references[:1]
 
 
-def _applies(condition: Schema, data: Any) -> bool:
+def _meets_condition(condition: Schema, data: Any) -> bool:
     """Return whether the data meet an `if` of a schema. Supports the keywords of simscen's schemas."""
-    wanted = condition.get("type")
-    if wanted is not None and not isinstance(data, _TYPES[wanted]):
+    json_type = condition.get("type")
+    if json_type is not None and not isinstance(data, _TYPES[json_type]):
         return False
     if any(value_at(data, (key,)) is None for key in condition.get("required", [])):
         return False
     names = condition.get("propertyNames", {}).get("enum")
     if names is not None and isinstance(data, dict) and not all(key in names for key in data):
         return False
-    constants = {key: one["const"] for key, one in condition.get("properties", {}).items() if "const" in one}
+    properties = condition.get("properties", {})
+    constants = {key: schema["const"] for key, schema in properties.items() if "const" in schema}
     return all(value_at(data, (key,)) in (None, constant) for key, constant in constants.items())

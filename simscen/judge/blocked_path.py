@@ -28,8 +28,8 @@ def diagnose_blocked_path(
 ) -> Diagnosis:
     """Return a sentence on the narrowest passage of the shortest path to `goal` that objects narrow or close.
 
-    Objects close a passage if the inscribed circle of the robot does not fit through. They narrow it if the
-    circumscribed circle does not fit, so that the robot cannot turn there.
+    Objects close a passage if the inscribed circle of the robot does not fit through. Objects narrow a passage if the
+    circumscribed circle does not fit through, so that the robot cannot turn there.
     """
     circumscribed_radius = max((math.hypot(x, y) for x, y in case.footprint), default=case.inscribed_radius)
     robot_width, turning_width = 2 * case.inscribed_radius, 2 * circumscribed_radius

@@ -68,7 +68,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    """Return a collector for a scenario file that is to be collected; None for any other file."""
+    """Return a collector for a requested scenario file; None for any other file."""
     if not file_path.name.endswith(SUFFIXES) or not _is_requested(file_path, parent):
         return None
     from simscen.pytesting.scenario_items import ScenarioFile

@@ -86,10 +86,7 @@ class Simscen:
     """Value of the fixture `simscen`. Runs scenarios in the process of the test."""
 
     def __init__(self, folder: Path, out: Path, world_path: Sequence[Path] = ()) -> None:
-        """Take the folder to which paths of scenarios are relative, and the folder for logs.
-
-        `world_path` are additional folders with worlds and models.
-        """
+        """Set the folder of relative scenario paths, the folder `out` for logs, and additional folders with worlds."""
         self._folder, self._out, self._world_path = folder, out, world_path
         self._runs = 0
 
@@ -129,8 +126,8 @@ class ScenarioFile(pytest.File):
     def _items(self) -> Iterator[pytest.Item]:
         config = self.config
         root, world_path = default_root([self.path]), config.getini("simscen_world_path")
-        chosen = config.getoption("--simscen-stack") or config.getini("simscen_stack")
-        checker = FileChecker(root, world_path, fast=True, stacks=parse_stacks(chosen, root, world_path))
+        stacks = config.getoption("--simscen-stack") or config.getini("simscen_stack")
+        checker = FileChecker(root, world_path, fast=True, stacks=parse_stacks(stacks, root, world_path))
         options = SessionOptions(seed=_seed(config), repeat=config.getoption("--simscen-repeat"))
         for choice in checker.choices:
             scenarios, problems = checker.check_scenario(self.path, choice)
@@ -145,7 +142,7 @@ class ScenarioRun(pytest.Item):
     """Test item for one run of a scenario."""
 
     def __init__(self, *, scenario: LoadedScenario, seed: int, **kwargs: Any) -> None:
-        """Take the scenario, the seed, and the arguments of `pytest.Item`."""
+        """Create an item from the scenario, the seed, and the arguments of `pytest.Item`."""
         super().__init__(**kwargs)
         self._scenario, self._seed = scenario, seed
 
@@ -189,20 +186,20 @@ class ScenarioRun(pytest.Item):
 def _raise_errors(problems: list[Problem], root: Path) -> None:
     """Raise InvalidInput if there is a problem with severity error. Ignore warnings.
 
-    Paths in `problems` are relative to `root`, and in InvalidInput to the working folder.
+    Paths in `problems` are relative to `root`. Paths in InvalidInput are relative to the working folder.
     """
     if errors := [problem for problem in problems if problem.severity == "error"]:
         raise InvalidInput(relative_to_working_folder(errors, root))
 
 
 def _seed(config: pytest.Config) -> int | None:
-    """Return the seed from the command line or the ini option; None to use the scenario's own. Raises UsageError."""
-    given: int | None = config.getoption("--simscen-seed")
-    setting = config.getini("simscen_seed")
-    if given is not None or not setting:
-        return given
+    """Return the seed of the command line or the ini option; None for the seeds of the scenarios. Raises UsageError."""
+    option: int | None = config.getoption("--simscen-seed")
+    ini_value = config.getini("simscen_seed")
+    if option is not None or not ini_value:
+        return option
     try:
-        return positive_number(setting)
+        return positive_number(ini_value)
     except ArgumentTypeError as error:
         raise UsageError(f"simscen_seed: {error}") from error
 
@@ -218,7 +215,7 @@ class ScenarioFailed(AssertionError):
     """A run failed unexpectedly or was aborted."""
 
     def __init__(self, run: RunFinished) -> None:
-        """Take the finished run."""
+        """Create the error for a finished run."""
         self.run = run
         super().__init__(_cause(run))
 
@@ -226,8 +223,8 @@ class ScenarioFailed(AssertionError):
 def failure_representation(run: RunFinished) -> Any:
     """Return pytest's representation of a failed run, with the lines that `simscen run` prints for the run."""
     lines = [f"{plain_text(line).removeprefix('      ')}\n" for line in violation_lines(run)]
-    first = next((complaint.line for complaint in reported_violations(run) if not complaint.is_warning), 0)
-    # The class is not public in pytest, but it is the only form in which xdist sends a failure to the controller.
+    first = next((violation.line for violation in reported_violations(run) if not violation.is_warning), 0)
+    # This class is not public in pytest, but xdist sends a failure to the controller only as this class.
     crash = ReprFileLocation(path=scenario_file(run), lineno=first or 1, message=_cause(run))
     return ReprExceptionInfo(ReprTraceback([ReprEntryNative(lines)], extraline=None, style="native"), crash)
 
@@ -236,4 +233,4 @@ def _cause(run: RunFinished) -> str:
     """Return the first cause of the failure in one line."""
     if run.outcome is Outcome.ERROR:
         return error_summary(run)
-    return next((complaint.message for complaint in reported_violations(run) if not complaint.is_warning), "failed")
+    return next((violation.message for violation in reported_violations(run) if not violation.is_warning), "failed")

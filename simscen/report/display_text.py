@@ -127,8 +127,8 @@ Role = Literal["plain", "name", "good", "bad", "warning", "quiet"]
 class StyledText:
     """Part of a line with a role.
 
-    `file` is the path that the text links to; "" for no link. `is_shell` marks a shell command. If it is wrapped, each
-    line except the last ends with a backslash.
+    `file` is the path that the text links to; "" for no link. `is_shell` marks a shell command. If the command is
+    wrapped, each line except the last ends with a backslash.
     """
 
     text: str

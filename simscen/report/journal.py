@@ -162,7 +162,7 @@ def require_unlocked(folder: Path) -> None:
 
 
 def _lock(file: int, folder: Path) -> None:
-    """Lock the journal with the descriptor `file` until it is closed. Raises UsageError if it is already locked."""
+    """Lock the journal until the descriptor `file` is closed. Raises UsageError if another process has locked it."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

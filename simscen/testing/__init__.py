@@ -1,4 +1,4 @@
-"""Contract tests for plug-ins: they check that a component, such as a planner, keeps the rules of its protocol.
+"""Contract tests for plug-ins. They check that a component, such as a planner, keeps the rules of the protocol.
 
 A promise is one rule. A contract is the set of all promises of one kind of component.
 

@@ -25,8 +25,16 @@ from simscen.model.robot import Differential
 class FakeStage:
     """Fake of core.stage.Stage, the interface of triggers and actions to a run.
 
-    Tests set the fields to the situation of the run. `calls` are the recorded calls of methods that would change the
-    world, as tuples of method name and arguments.
+    Tests set the fields to describe a situation in the run.
+
+    robot:      true pose of the robot
+    twist:      true velocity of the robot in the base frame
+    clearance:  true distance in m from the robot to the nearest obstacle; None before the first measurement
+    scans:      tick of the newest scan, by name of the lidar
+    travelled:  driven distance in m
+    objects:    pose of each object, by name; None for an object that does not exist
+    motions:    (path, time in s since the start of the motion) of each moving object, by name
+    calls:      recorded calls of methods that would change the world: (method name, arguments …)
     """
 
     tick: int = 0
@@ -59,7 +67,7 @@ class FakeStage:
         return self
 
     def region(self, name: str) -> Polygon:
-        """Return the corners of a region; without an entry in `regions`, a square of 2 m at the origin."""
+        """Return the corners of a region; without an entry in `regions`, a square of 2 m by 2 m around the origin."""
         return self.regions.get(name, ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
 
     def object(self, name: str) -> Pose2 | None:
@@ -67,7 +75,7 @@ class FakeStage:
         return self.objects.get(name, Pose2(0.5, 0.5, 0.0))
 
     def motion(self, name: str) -> tuple[MotionPath, float] | None:
-        """Return the entry of an object in `motions`: its path, and the time in s since its start."""
+        """Return the entry of an object in `motions`; None for an object that does not move."""
         return self.motions.get(name)
 
     def mass(self, name: str) -> float:
@@ -148,9 +156,9 @@ DIFFERENTIAL_DRIVE = Differential(type="differential", wheel_separation=0.3, whe
 
 
 class FakeSensorView:
-    """Fake of sensors.sensor.SensorView, the interface of sensors to the simulation. The robot drives a circle.
+    """Fake of sensors.sensor.SensorView, the interface of sensors to the simulation. The robot drives in a circle.
 
-    Tests set the time `seconds`.
+    Tests set `seconds`, the time since the start of the run in s.
     """
 
     seconds = 0.0
@@ -180,13 +188,13 @@ class FakeSensorView:
         return tuple(speed * self.seconds / DIFFERENTIAL_DRIVE.wheel_radius for speed in (left, right))
 
     def touching(self) -> bool:
-        """Return whether the bumper touches something: in every second with an odd number."""
+        """Return whether the bumper touches an object: False in the first second, True in the second one, and so on."""
         return int(self.seconds) % 2 == 1
 
     def image(
         self, mount: Pose3, width: int, height: int, field_of_view: float, far: float
     ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
-        """Return a gray image, and depths of 2 m or `far`, whichever is less."""
+        """Return a gray image (height, width, 3), and depths (height, width) of 2 m, or of `far` if `far` is less."""
         return np.full((height, width, 3), 128, np.uint8), np.full((height, width), min(2.0, far), np.float32)
 
 
@@ -196,6 +204,6 @@ class SquareRoomRays(RayCaster):
     def cast(self, origins: Array, directions: Array, reach: float = math.inf) -> Array:
         """Return the ranges (n,) in m of rays from `origins` (n, 3) along `directions` (n, 3); inf beyond `reach`."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            walls = (np.sign(directions[:, :2]) * ROOM_HALF_WIDTH_M - origins[:, :2]) / directions[:, :2]
-        far: Array = np.nanmin(np.where(walls > 0, walls, np.inf), axis=1)
-        return np.where(far <= reach, far, np.inf)
+            wall_distances = (np.sign(directions[:, :2]) * ROOM_HALF_WIDTH_M - origins[:, :2]) / directions[:, :2]
+        ranges: Array = np.nanmin(np.where(wall_distances > 0, wall_distances, np.inf), axis=1)
+        return np.where(ranges <= reach, ranges, np.inf)

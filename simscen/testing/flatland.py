@@ -1,6 +1,6 @@
-"""Planar world of boxes and discs, and drives (trips) through it without a physics engine, for tests of stacks.
+"""Planar world of boxes and discs, and drives through this world without a physics engine, for tests of stacks.
 
-Closed formulas give distances and ranges, independent of the tested code.
+Distances and ranges are computed with closed formulas, which are independent of the tested code.
 """
 
 import math
@@ -58,7 +58,7 @@ def box_robot(length: float = 0.42, width: float = 0.31, speed: float = 2.0) -> 
 
 
 def setting(robot: RobotModel, *, name: str = "test") -> Setting:
-    """Return the Setting of a component `name` without a map: control at 20 Hz, costmap cells of 5 cm."""
+    """Return the Setting for a component called `name`: no map, control at 20 Hz, costmap cells of 5 cm."""
     surroundings = Surroundings(robot, None, TICK_RATE_HZ, lidars=("lidar",))
     return Setting(surroundings, name, Streams(1), CONTROL_PERIOD_TICKS / TICK_RATE_HZ, 0.05)
 
@@ -81,7 +81,10 @@ class Flatland:
         return self
 
     def grid(self, bounds: tuple[float, float, float, float], resolution: float = 0.05) -> OccupancyGrid:
-        """Return the map of `bounds` (min x, min y, max x, max y). Cells with centers in obstacles are occupied."""
+        """Return the map of the area `bounds` (min x, min y, max x, max y) in m, with cells of `resolution` m.
+
+        A cell is occupied if its center is in an obstacle.
+        """
         columns, rows = (round((bounds[i + 2] - bounds[i]) / resolution) for i in (0, 1))
         y, x = (np.indices((rows, columns)) + 0.5) * resolution
         distance = self.distance(np.column_stack(((x + bounds[0]).ravel(), (y + bounds[1]).ravel())))
@@ -105,19 +108,20 @@ class Flatland:
     def cast(self, origin: tuple[float, float], angles: Array) -> Array:
         """Return ranges (n,) in m of rays from `origin` (x, y) at world `angles` (n,) in rad; inf without a hit."""
         c, s = np.cos(angles), np.sin(angles)
-        best = np.full(len(angles), np.inf)
+        nearest = np.full(len(angles), np.inf)
         with np.errstate(divide="ignore", invalid="ignore"):
             for ax, ay, bx, by in self.boxes:
                 tx = np.sort(np.stack(((ax - origin[0]) / c, (bx - origin[0]) / c)), axis=0)
                 ty = np.sort(np.stack(((ay - origin[1]) / s, (by - origin[1]) / s)), axis=0)
                 near, far = np.maximum(tx[0], ty[0]), np.minimum(tx[1], ty[1])
-                best = np.where((near <= far) & (far > 0), np.minimum(best, np.maximum(near, 0)), best)
+                nearest = np.where((near <= far) & (far > 0), np.minimum(nearest, np.maximum(near, 0)), nearest)
             for x, y, radius in self.discs:
                 dx, dy = x - origin[0], y - origin[1]
                 along, across = dx * c + dy * s, dx * s - dy * c
-                half = np.sqrt(radius**2 - across**2)
-                best = np.where((half >= 0) & (along > 0), np.minimum(best, along - half), best)
-        return best
+                half_chord = np.sqrt(radius**2 - across**2)
+                is_hit = (half_chord >= 0) & (along > 0)
+                nearest = np.where(is_hit, np.minimum(nearest, along - half_chord), nearest)
+        return nearest
 
     def clearance(self, robot: RobotModel, pose: Pose2) -> float:
         """Return the distance in m from the robot's footprint to the nearest surface; 0 or negative in contact."""
@@ -125,21 +129,24 @@ class Flatland:
             return float(self.distance(np.array([[pose.x, pose.y]]))[0]) - robot.radius
         corners = np.array(robot.footprint)
         t = np.linspace(0, 1, 21)[:, None]
-        edge = np.concatenate([a + t * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
-        return float(self.distance(pose.apply(edge)).min())
+        outline = np.concatenate([a + t * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
+        return float(self.distance(pose.apply(outline)).min())
 
 
 @dataclass
 class Drive:
-    """Simulated drive (trip) of a robot that a stack controls, with perfect odometry and a noisy lidar.
+    """Simulated drive of a robot that a stack controls, with perfect odometry and a noisy lidar.
 
-    world:      obstacles
-    pose:       true pose
-    noise:      standard deviation of ranges in m
-    range_max:  maximum range of the lidar in m
-    twist:      true velocity in the base frame
-    is_blind:   whether the lidar returns no scans
-    odometry:   names of the odometry sensors
+    world:          obstacles
+    pose:           true pose
+    beams:          number of beams of the lidar
+    field_of_view:  angle in rad that the beams cover
+    noise:          standard deviation of ranges in m
+    range_max:      maximum range of the lidar in m
+    tick:           current tick
+    twist:          true velocity in the base frame
+    is_blind:       whether the lidar returns no scans
+    odometry:       names of the odometry sensors
 
     The recorded values are `log` (events of the stack), `track` (true poses), `commands`, `plans`, and `min_clearance`
     (minimum clearance in m).
@@ -167,7 +174,10 @@ class Drive:
         self.min_clearance = math.inf
 
     def run(self, seconds: float, until: str = "navigation.ended") -> "Drive":
-        """Simulate these seconds, or until an event of the kind `until` ("" for no event). Return this drive."""
+        """Simulate `seconds`, or less if the stack reports an event of the kind `until`. Return this drive.
+
+        With `until` "", no event ends the simulation.
+        """
         end = self.tick + round(seconds * TICK_RATE_HZ)
         while self.tick < end:
             if any(event.kind == until for event in self.step()):
@@ -192,8 +202,8 @@ class Drive:
 
     def scan(self) -> Scan:
         """Return the noisy scan at the current pose."""
-        full = self.field_of_view >= 2 * math.pi - 1e-9
-        step = self.field_of_view / (self.beams if full else self.beams - 1)
+        is_full_circle = self.field_of_view >= 2 * math.pi - 1e-9
+        step = self.field_of_view / (self.beams if is_full_circle else self.beams - 1)
         first = -self.field_of_view / 2
         angles = first + step * np.arange(self.beams, dtype=np.float64) + self.pose.yaw
         ranges = self.world.cast((self.pose.x, self.pose.y), angles)
@@ -225,7 +235,7 @@ class Drive:
 
     @property
     def result(self) -> str:
-        """Result of the navigation, such as "SUCCEEDED"; "" if it has not ended."""
+        """Result of the navigation, such as "SUCCEEDED"; "" before its end."""
         return self.events_of_kind("navigation.ended")[-1].name if self.events_of_kind("navigation.ended") else ""
 
 
@@ -240,9 +250,10 @@ def drive(
     stop_on_failure: bool = True,
     **options: Any,
 ) -> Drive:
-    """Return a drive from `start` to the goals, before its first step. The default stack knows the true poses.
+    """Return a drive from `start` to the goals, before the first step.
 
-    `grid` is the map; None for mapless navigation. `options` are fields of Drive.
+    `grid` is the map; None for mapless navigation. The default `spec` is a stack that knows the true poses. `options`
+    are fields of Drive.
     """
     from simscen.stack.build import build_stack
 

@@ -1,6 +1,6 @@
 """Pytest plug-in for contracts: `pytest --simscen-contract my_package:MyPlanner` checks all promises of a component.
 
-A promise is one rule of the component's protocol, such as "the same seed gives the same path".
+A promise is one rule of the protocol of the component, such as "the same seed gives the same path".
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from simscen.testing.contracts.base import Promise
 
 pytest_plugins = ("simscen.pytesting.plugin",)
-"""Plug-in that collects scenario files. pytest loads it by this name, because this package must not import it."""
+"""Plug-in that collects scenario files. pytest loads the plug-in by name, because this package must not import it."""
 
 _PROMISES: pytest.StashKey[list[Promise]] = pytest.StashKey()
 
@@ -74,7 +74,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Add one test item for each promise before other plug-ins select items. Each component has a collector."""
+    """Add one test item for each promise, before other plug-ins select items. Each component has its own collector."""
     limit = config.getoption("--simscen-contract-limit")
     collectors: dict[str, SubjectCollector] = {}
     for promise in config.stash.get(_PROMISES, []):
@@ -104,7 +104,7 @@ class PromiseItem(pytest.Item):
         self._promise.check(self._limit)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """Return the observation, the promise, and the traceback if the component raised an exception."""
+        """Return the observation and the promise; if the component raised an exception, also the traceback."""
         from simscen.testing.contracts.base import PromiseBroken
 
         if not isinstance(excinfo.value, PromiseBroken):

@@ -29,7 +29,7 @@ BOXES = np.array([
 """Boxes (left, bottom, right, top) in m: four outer walls, and obstacles in the room."""
 WAYPOINTS = ((-2.5, -1.8), (0.8, -2.9), (0.9, -0.4), (3.9, -0.2), (2.6, 1.7), (0.3, 2.4), (0.1, 0.6), (-2.2, 1.0),
          (-2.0, 3.2), (-4.2, 3.0), (-4.1, 0.8), (-2.4, 0.2))  # fmt: skip
-"""Waypoints (x, y) in m of a drive, which returns from the last to the first one."""
+"""Waypoints (x, y) in m of a drive. After the last waypoint, the first waypoint follows again."""
 ROBOT = RobotModel(
     footprint=((0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)),
     radius=0.2,
@@ -50,8 +50,8 @@ def grid(resolution: float = 0.05) -> OccupancyGrid:
     x = np.arange(-5.2 + resolution / 2, 5.2, resolution)
     y = np.arange(-4.2 + resolution / 2, 4.2, resolution)[:, None]
     half = resolution / 2
-    solid = sum((x + half > b[0]) & (x - half < b[2]) & (y + half > b[1]) & (y - half < b[3]) for b in BOXES)
-    cells = np.where(np.asarray(solid) > 0, OCCUPIED, FREE).astype(np.int8)
+    box_count = sum((x + half > b[0]) & (x - half < b[2]) & (y + half > b[1]) & (y - half < b[3]) for b in BOXES)
+    cells = np.where(np.asarray(box_count) > 0, OCCUPIED, FREE).astype(np.int8)
     return OccupancyGrid(cells, resolution, Pose2(-5.2, -4.2, 0.0))
 
 
@@ -112,7 +112,7 @@ def surroundings() -> Surroundings:
 
 
 def build_localizer(spec: LocalizerSpec, estimate: Estimate, seed: int) -> Localizer:
-    """Build the localizer of a specification for the room, with this initial pose estimate."""
+    """Build the localizer of a specification for the room. `estimate` is the initial pose estimate."""
     setting = Setting(surroundings(), "localizer", Streams(seed), estimate=estimate)
     localizer: Localizer = spec.implementation()(spec, setting)
     return localizer
@@ -123,13 +123,13 @@ class Noise:
     """Standard deviations of sensor errors.
 
     lidar:                 ranges in m
-    translation:           odometry distance in m, after 1 m
-    rotation:              odometry yaw in rad, after a turn by 1 rad
-    drift:                 odometry yaw in rad, after 1 m
+    translation:           distance of the odometry in m, after 1 m
+    rotation:              yaw of the odometry in rad, after a turn by 1 rad
+    drift:                 yaw of the odometry in rad, after 1 m
     gyro:                  yaw rate in rad/s
     gyro_bias:             constant error of the yaw rate in rad/s
 
-    Odometry errors grow with the square root of the distance or turn.
+    The standard deviation of odometry errors grows with the square root of the distance or turn.
     """
 
     lidar: float = 0.01
@@ -146,7 +146,7 @@ DEFAULT_NOISE = Noise()
 def run_localizer(
     subject: Localizer, drive: RoomDrive, seed: int, noise: Noise = DEFAULT_NOISE, *, imu: bool = False
 ) -> list[Belief]:
-    """Send noisy readings of the drive to a localizer; return its belief (pose estimate) after each odometry reading.
+    """Send noisy readings of the drive to a localizer, and return the belief after each odometry reading.
 
     With `imu`, the localizer also receives yaw rates.
     """

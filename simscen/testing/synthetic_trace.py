@@ -20,7 +20,7 @@ TICK_RATE_HZ, TRUTH_PERIOD_TICKS, SCAN_PERIOD_TICKS, BELIEF_PERIOD_TICKS = 240, 
 def synthetic_trace(description: Mapping[str, Any]) -> Trace:
     """Return a trace with true poses at 40 Hz, and scans and beliefs at 10 Hz.
 
-    Keys of the description, with times t in s:
+    Keys of the description, with times t in s, positions in m, and yaw in rad:
 
     seconds:    duration
     truth:      true poses as waypoints [t, x, y, yaw], which are interpolated linearly
@@ -28,8 +28,8 @@ def synthetic_trace(description: Mapping[str, Any]) -> Trace:
     clearance:  list of [t, meters], or one number
     scans:      intervals [from, to] of t with scans
     events:     list of [t, kind, name, {data}]
-    plans:      list of [t, [[x, y], …]]
-    objects:    {name: waypoints}
+    plans:      list of [t, points [[x, y], …] of the plan]
+    objects:    poses of each object as {name: waypoints}
     ended:      reason why the run ended; null for a truncated log
     """
     end = round(description["seconds"] * TICK_RATE_HZ)
@@ -63,7 +63,10 @@ def _poses_at(waypoints: Sequence[Sequence[float]], ticks: Ticks) -> Samples:
 
 
 def _velocity(truth: Samples) -> Array:
-    """Return velocities (n, 3) vx, vy, wz in the base frame from each sample to the next. The last one is repeated."""
+    """Return velocities (n, 3) vx, vy, wz in the base frame from each sample to the next.
+
+    The last velocity is repeated, so that each sample has a velocity.
+    """
     if len(truth) < 2:
         return np.zeros((len(truth), 3))
     step = np.diff(truth.ticks) / TICK_RATE_HZ
@@ -110,7 +113,10 @@ def _events(description: Mapping[str, Any], end: int) -> tuple[Event, ...]:
 
 
 def _path_points(points: Sequence[Sequence[float]]) -> Array:
-    """Return the poses (n, 3) of a path through points [x, y]. Yaw is the direction to the next point, if any."""
+    """Return the poses (n, 3) of a path through points [x, y]. Yaw is the direction to the next point.
+
+    The last pose has the yaw of the previous pose; a single pose has yaw 0.
+    """
     xy = np.array(points, dtype=np.float64)[:, :2]
     steps = np.diff(xy, axis=0)
     yaw = np.arctan2(steps[:, 1], steps[:, 0])
@@ -118,7 +124,7 @@ def _path_points(points: Sequence[Sequence[float]]) -> Array:
 
 
 def synthetic_case(description: Mapping[str, Any]) -> Case:
-    """Return a case. The keys of the description are fields of Case. These fields have another form:
+    """Return a case. The keys of the description are fields of Case. These fields have a simpler form:
 
     start:         [x, y, yaw]
     goals, sent:   list of {name, pose: [x, y, yaw], other fields of Goal}
@@ -146,7 +152,7 @@ def synthetic_case(description: Mapping[str, Any]) -> Case:
         ),
         masks={name: MaskBlocks(**_mask(mask)) for name, mask in description.get("masks", {}).items()},
         expected=description.get("expected", {}),
-        disturbances=tuple(Disturbance(**ordered) for ordered in description.get("disturbances", [])),
+        disturbances=tuple(Disturbance(**values) for values in description.get("disturbances", [])),
     )
 
 

@@ -62,10 +62,10 @@ class InvalidTarget(Exception):
 
 
 def contracts_of(spec: Any, subject: str = "", robots: dict[str, RobotModel] | None = None) -> list[Contract]:
-    """Return the contracts of the component that `spec` specifies; for some kinds one per robot.
+    """Return the contracts of the component that `spec` specifies.
 
-    `subject` is the name of the component in reports. `robots` are robots by name, by default ROBOTS, for the
-    kinds with one contract per robot. Raises InvalidTarget if `spec` is not a specification.
+    Planners, controllers, and behaviors have one contract for each robot in `robots` (robots by name, by default
+    ROBOTS). `subject` is the name of the component in reports. Raises InvalidTarget if `spec` is not a specification.
     """
     for kind, contract in _CONTRACTS_PER_ROBOT.items():
         if isinstance(spec, kind):
@@ -120,9 +120,10 @@ def _specification_classes(component: str) -> Sequence[Any]:
 
 
 def specification_of(component_class: Any, component: str) -> Any:
-    """Return the specification class of a component: the class itself, or else the type of its first argument.
+    """Return the specification class of a component.
 
-    `component` is the name of the class in messages. Raises InvalidTarget if this type is not a specification.
+    If `component_class` is not a specification, return the annotation of its first argument. `component` is the name
+    of the class in messages. Raises InvalidTarget if this annotation is not a specification either.
     """
     if not inspect.isclass(component_class):
         raise InvalidTarget(f"{component} is not a class")
@@ -144,7 +145,7 @@ def specification_of(component_class: Any, component: str) -> Any:
 
 
 def _instance(model: Any, values: Any, target: str) -> Any:
-    """Return the specification of class `model` with these values. `target` is its name in messages.
+    """Return the specification of class `model` with these values. `target` is the name of the component in messages.
 
     Raises InvalidTarget for invalid values.
     """

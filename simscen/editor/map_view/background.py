@@ -15,7 +15,7 @@ from simscen.loading.builders import load_map, world_from_file
 from simscen.loading.loaded import LoadedWorld
 
 SECTION_HEIGHT_M = 0.2
-"""Height of the horizontal section through an SDF world, as of a lidar."""
+"""Height of the horizontal section through an SDF world that the map shows: the usual height of a lidar."""
 MAX_IMAGE_SIDE_PX = 2048
 """Maximum width and height of the image of a map. Larger maps are scaled down."""
 MAX_SEGMENTS = 40_000
@@ -49,7 +49,7 @@ class Backgrounds:
             return {"id": "", "bounds": None}
         if self._cached_files != files:
             self._cached = {"id": str(hash(files)), "bounds": None}
-            with suppress(InvalidInput):  # `validate` reports it
+            with suppress(InvalidInput):  # TextChecks reports the problem
                 self._cached |= _image_part(load_map(source.map)) if source.map else self._segments_part(source)
             self._cached_files = files
         return self._cached

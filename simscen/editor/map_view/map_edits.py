@@ -66,18 +66,18 @@ def _pose_edits(
             yield SetValue((*keys, "yaw"), yaw if "yaw" in node.entries else degrees_text(yaw))
         return
     pose: dict[str, Any] = {"x": x, "y": y} if not yaw else {"x": x, "y": y, "yaw": degrees_text(yaw)}
-    above = None if source is None or node is not None else source_at(source, keys[:-1])
-    if above is not None and above.kind == "scalar" and keys[-1] == "pose":
+    parent = None if source is None or node is not None else source_at(source, keys[:-1])
+    if parent is not None and parent.kind == "scalar" and keys[-1] == "pose":
         yield SetValue(keys[:-1], {"pose": pose})  # the name of a place instead of a goal
     else:
         yield SetValue(keys, pose, order)
 
 
 def _list_edits(keys: Keys, numbers: dict[int, float], source: SourceNode | None) -> Iterator[Edit]:
-    """Yield edits that set numbers of a list such as [x, y] or [t, x, y, yaw]. `numbers` are the new ones by index.
+    """Yield edits that set numbers of a list such as [x, y] or [t, x, y, yaw]. `numbers` are the new numbers by index.
 
-    If the text has no list at `keys`, `numbers` become a new list. Then raises EditRefused if index 0 is missing, as
-    the time t of a keyframe is.
+    If the text has no list at `keys`, `numbers` become a new list. Raises EditRefused if the new list would lack index
+    0. This is the case for a keyframe, because a change of a keyframe does not contain the time t.
     """
     node = None if source is None else source_at(source, keys)
     if node is not None and node.kind == "sequence":
@@ -95,7 +95,7 @@ def degrees_text(yaw: float) -> str:
 
 
 def read_keys(value: Any) -> Keys:
-    """Return the keys in a request. Raises EditRefused if they are not a list of strings and indices."""
+    """Return the keys in a request. Raises EditRefused if `value` is not a list of strings and indices."""
     if not isinstance(value, list) or not all(
         isinstance(key, str) or (isinstance(key, int) and not isinstance(key, bool) and key >= 0) for key in value
     ):
@@ -104,7 +104,7 @@ def read_keys(value: Any) -> Keys:
 
 
 def _number(change: dict[str, Any], key: str) -> float:
-    """Return the value of a key of a change. Raises EditRefused if it is not a finite number."""
+    """Return the number at a key of a change. Raises EditRefused if the value is not a finite number."""
     value = change.get(key)
     if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
         raise EditRefused(f"a change needs a number `{key}`")

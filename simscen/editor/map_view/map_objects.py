@@ -1,7 +1,7 @@
 """Objects on the map of the editor, and functions that read positions, outlines, and paths from the data of a file.
 
-The data are dicts, lists, and scalars. They need not be valid; values that cannot be read are ignored. `keys` are the
-path to a value in the file.
+The data are dicts, lists, and scalars, and can be invalid. Values that cannot be read are ignored. `keys` are the path
+to a value in the file.
 """
 
 import math
@@ -18,7 +18,8 @@ Notation = Literal["pose", "point", "keyframe"]
 """Notation of a position in the file: mapping with x, y, and yaw; list [x, y]; or list [t, x, y, yaw]."""
 Corners = list[tuple[float, float]]
 """Corners (x, y) of a polygon in m."""
-CIRCLE_CORNERS = 24
+CIRCLE_CORNER_COUNT = 24
+"""Number of corners of the polygon that represents a circle."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Handle:
 
 @dataclass(frozen=True)
 class MapObject:
-    """Object on the map and in the list of objects. Without handles and region, it is only in the list.
+    """Object on the map and in the list of objects. An object without handles and region is only in the list.
 
     Attributes:
         keys: Path to the value that defines the object.
@@ -56,8 +57,8 @@ class MapObject:
         radius: Radius in m of a circle around the first handle; None for no circle.
         radius_keys: Path to the radius if it can be changed; otherwise ().
         region: Name of the region that the object refers to; "" for none.
-        follows: Name of the moving object at the center of the circle; "" if the center is the first handle.
-        moves_as_one: Whether dragging the object moves all its handles.
+        center_object: Name of the moving object at the center of the circle; "" if the center is the first handle.
+        moves_as_one: Whether dragging the object moves all handles.
         origin: Start (x, y) in m of the line, before the first handle; None if the line starts at the first handle.
         points_keys: Path to the list of the handles if handles can be added and removed; otherwise ().
         width: Width of the line in m.
@@ -72,7 +73,7 @@ class MapObject:
     radius: float | None = None
     radius_keys: Keys = ()
     region: str = ""
-    follows: str = ""
+    center_object: str = ""
     moves_as_one: bool = False
     origin: tuple[float, float] | None = None
     points_keys: Keys = ()
@@ -85,11 +86,11 @@ Places = Mapping[str, tuple[float, float, float]]
 
 def number(value: Any) -> float | None:
     """Return a finite number, or a quantity such as "2 cm" in SI units; None for other values."""
-    found = si_number(value)
-    if not isinstance(found, int | float) or isinstance(found, bool):
+    result = si_number(value)
+    if not isinstance(result, int | float) or isinstance(result, bool):
         return None
     try:
-        return float(found) if math.isfinite(found) else None
+        return float(result) if math.isfinite(result) else None
     except OverflowError:  # an integer that is larger than any float
         return None
 
@@ -107,8 +108,8 @@ def mapping(value: Any) -> dict[str, Any]:
 def pose_handle(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
     """Return the handle for a pose or the name of a place, as a tuple; () for other values."""
     if isinstance(value, str):
-        found = places.get(value)
-        return (Handle(keys, "pose", *found, value),) if found else ()
+        place = places.get(value)
+        return (Handle(keys, "pose", *place, value),) if place else ()
     x, y, yaw = (number(mapping(value).get(key, default)) for key, default in (("x", None), ("y", None), ("yaw", 0.0)))
     return () if x is None or y is None else (Handle(keys, "pose", x, y, yaw or 0.0),)
 
@@ -116,15 +117,15 @@ def pose_handle(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
 def point_handles(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
     """Return the handles for a list of points [x, y] or names of places. Other items are ignored."""
     return tuple(
-        handle for index, one in enumerate(items(value)) for handle in point_handle(one, (*keys, index), places)
+        handle for index, point in enumerate(items(value)) for handle in point_handle(point, (*keys, index), places)
     )
 
 
 def point_handle(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
     """Return the handle for a point [x, y] or the name of a place, as a tuple; () for other values."""
     if isinstance(value, str):
-        found = places.get(value)
-        return (Handle(keys, "point", found[0], found[1], None, value),) if found else ()
+        place = places.get(value)
+        return (Handle(keys, "point", place[0], place[1], None, value),) if place else ()
     axes = [number(axis) for axis in items(value)]
     if len(axes) != 2 or axes[0] is None or axes[1] is None:
         return ()
@@ -133,31 +134,31 @@ def point_handle(value: Any, keys: Keys, places: Places) -> tuple[Handle, ...]:
 
 def keyframe_handles(value: Any, keys: Keys) -> tuple[Handle, ...]:
     """Return the handles for a list of keyframes [t, x, y, yaw]. Other items are ignored."""
-    found = []
-    for index, one in enumerate(items(value)):
-        axes = [number(axis) for axis in items(one)]
-        if len(axes) == 4 and axes[1] is not None and axes[2] is not None:
-            found.append(Handle((*keys, index), "keyframe", axes[1], axes[2], axes[3] or 0.0))
-    return tuple(found)
+    handles = []
+    for index, keyframe in enumerate(items(value)):
+        numbers = [number(item) for item in items(keyframe)]
+        if len(numbers) == 4 and numbers[1] is not None and numbers[2] is not None:
+            handles.append(Handle((*keys, index), "keyframe", numbers[1], numbers[2], numbers[3] or 0.0))
+    return tuple(handles)
 
 
-def outline(thing: Mapping[str, Any]) -> list[Corners]:
+def outline(data: Mapping[str, Any]) -> list[Corners]:
     """Return the outline of a `box`, `cylinder`, or `polygon` in the frame of the object; [] without these keys."""
-    box = [number(side) for side in items(thing.get("box"))]
+    box = [number(side) for side in items(data.get("box"))]
     if len(box) == 3 and box[0] and box[1]:
         x, y = box[0] / 2, box[1] / 2
         return [[(-x, -y), (x, -y), (x, y), (-x, y)]]
-    cylinder = [number(side) for side in items(thing.get("cylinder"))]
+    cylinder = [number(side) for side in items(data.get("cylinder"))]
     if cylinder and cylinder[0]:
         return [circle(cylinder[0])]
-    corners = point_handles(thing.get("polygon"), (), {})
+    corners = point_handles(data.get("polygon"), (), {})
     return [[(corner.x, corner.y) for corner in corners]] if len(corners) > 2 else []
 
 
 def circle(radius: float) -> Corners:
     """Return a circle around the origin as a polygon. The radius is in m."""
-    turns = [2 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS)]
-    return [(radius * math.cos(turn), radius * math.sin(turn)) for turn in turns]
+    angles = [2 * math.pi * k / CIRCLE_CORNER_COUNT for k in range(CIRCLE_CORNER_COUNT)]
+    return [(radius * math.cos(angle), radius * math.sin(angle)) for angle in angles]
 
 
 def motion_path(
@@ -173,6 +174,6 @@ def motion_path(
         line: Literal["open", "closed"] = "closed" if motion.get("repeat") == "loop" and start is None else "open"
         yield MapObject(keys, "path", label, through, line=line, origin=start, points_keys=(*keys, "through"))
     elif keyframes := keyframe_handles(motion.get("keyframes"), (*keys, "keyframes")):
-        times = [number(one[0]) for one in map(items, items(motion.get("keyframes"))) if one]
-        begins_there = times[0] == 0
-        yield MapObject(keys, "path", label, keyframes, line="open", origin=None if begins_there else start)
+        times = [number(keyframe[0]) for keyframe in map(items, items(motion.get("keyframes"))) if keyframe]
+        starts_at_keyframe = times[0] == 0
+        yield MapObject(keys, "path", label, keyframes, line="open", origin=None if starts_at_keyframe else start)

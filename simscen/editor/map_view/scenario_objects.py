@@ -1,6 +1,6 @@
 """Functions that read the objects on the map from the data of a scenario: robots, goals, events, zones, faults.
 
-The data are dicts, lists, and scalars. They need not be valid. `keys` are the path to a value in the file.
+The data are dicts, lists, and scalars, and can be invalid. `keys` are the path to a value in the file.
 """
 
 from collections.abc import Iterator
@@ -41,19 +41,19 @@ def scenario_objects(data: dict[str, Any], places: Places) -> Iterator[MapObject
         yield from _robot(mapping(data.get("robot")), ("robot",), "robot", places)
         yield from _goals(data.get("goals"), ("goals",), "", places)
     for name, robot in robots.items():
-        own: Keys = ("robots", name)
-        yield from _robot(mapping(robot), own, f"robot {name}", places)
-        yield from _goals(mapping(robot).get("goals"), (*own, "goals"), f"{name}: ", places)
-        yield from _zones(mapping(robot), own, f"{name}: ")
-        yield from _faults(mapping(robot), own, places)
+        robot_keys: Keys = ("robots", name)
+        yield from _robot(mapping(robot), robot_keys, f"robot {name}", places)
+        yield from _goals(mapping(robot).get("goals"), (*robot_keys, "goals"), f"{name}: ", places)
+        yield from _zones(mapping(robot), robot_keys, f"{name}: ")
+        yield from _faults(mapping(robot), robot_keys, places)
     for index, event in enumerate(map(mapping, items(data.get("events")))):
-        own = ("events", index)
+        event_keys: Keys = ("events", index)
         label = str(event.get("name", f"event-{index + 1}"))
-        yield MapObject(own, "event", label)
-        yield from _event(event, own, label, places)
+        yield MapObject(event_keys, "event", label)
+        yield from _event(event, event_keys, label, places)
         for step_index, step in enumerate(map(mapping, items(event.get("then")))):
             step_label = str(step.get("name", f"{label} then {step_index + 1}"))
-            yield from _event(step, (*own, "then", step_index), step_label, places)
+            yield from _event(step, (*event_keys, "then", step_index), step_label, places)
     yield from _zones(data, (), "")
     yield from _faults(data, (), places)
     for index, criterion in enumerate(map(mapping, items(data.get("pass")))):
@@ -66,31 +66,31 @@ def scenario_objects(data: dict[str, Any], places: Places) -> Iterator[MapObject
 def _robot(robot: dict[str, Any], keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
     """Yield a robot, and its initial pose estimate if the scenario sets it."""
     yield MapObject(keys, "robot", label, pose_handle(robot.get("pose"), (*keys, "pose"), places))
-    own = (*keys, "initial_estimate")
-    if estimate := pose_handle(robot.get("initial_estimate"), own, places):
-        yield MapObject(own, "estimate", f"initial estimate of {label}", estimate)
+    estimate_keys = (*keys, "initial_estimate")
+    if estimate := pose_handle(robot.get("initial_estimate"), estimate_keys, places):
+        yield MapObject(estimate_keys, "estimate", f"initial estimate of {label}", estimate)
 
 
 def _goals(value: Any, keys: Keys, prefix: str, places: Places) -> Iterator[MapObject]:
     """Yield an object for each goal in a list. `prefix` is the beginning of the label."""
     for index, goal in enumerate(items(value)):
-        own = (*keys, index)
+        goal_keys = (*keys, index)
         pose = goal if isinstance(goal, str) else mapping(goal).get("pose")
         default = pose if isinstance(pose, str) else f"goal-{index + 1}"
         name = str(mapping(goal).get("name", default))
         label = prefix + (name if name.startswith("goal") else f"goal {name}")
         radius = number(mapping(goal).get("xy_tolerance"))
-        radius_keys = (*own, "xy_tolerance") if radius is not None else ()
-        handle = pose_handle(pose, (*own, "pose"), places)
-        yield MapObject(own, "goal", label, handle, radius=radius, radius_keys=radius_keys)
+        radius_keys = (*goal_keys, "xy_tolerance") if radius is not None else ()
+        handle = pose_handle(pose, (*goal_keys, "pose"), places)
+        yield MapObject(goal_keys, "goal", label, handle, radius=radius, radius_keys=radius_keys)
 
 
 def _event(event: dict[str, Any], keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
     """Yield the objects for the triggers and actions of an event."""
     yield from _triggers(event.get("when"), (*keys, "when"), f"trigger of {label}", places)
-    actions, own = event.get("do"), (*keys, "do")
-    written = [((*own, index), action) for index, action in enumerate(items(actions))]
-    for action_keys, action in [(own, actions)] if isinstance(actions, dict) else written:
+    actions, do_keys = event.get("do"), (*keys, "do")
+    listed = [((*do_keys, index), action) for index, action in enumerate(items(actions))]
+    for action_keys, action in [(do_keys, actions)] if isinstance(actions, dict) else listed:
         for kind, value in mapping(action).items():
             yield from _action(kind, mapping(value), (*action_keys, kind), label, places)
 
@@ -102,16 +102,16 @@ def _action(kind: str, action: dict[str, Any], keys: Keys, event: str, places: P
     if kind == "spawn":
         yield MapObject(keys, "spawn", name or kind, handle, outline(action))
     elif kind == "pedestrian":
-        points = (*keys, "goals")
-        goals = point_handles(action.get("goals"), points, places)
+        goals_keys = (*keys, "goals")
+        goals = point_handles(action.get("goals"), goals_keys, places)
         body = [circle(number(action.get("radius")) or PERSON_RADIUS_M)]
-        yield MapObject(keys, "person", name or kind, (*handle, *goals), body, "open", points_keys=points)
+        yield MapObject(keys, "person", name or kind, (*handle, *goals), body, "open", points_keys=goals_keys)
     elif kind in KIND_OF_POSE_ACTION:
         label = f"goal {name}" if kind == "new_goal" else f"{kind} {name}".strip()
         yield MapObject(keys, KIND_OF_POSE_ACTION[kind], f"{label} of {event}", handle)
     elif kind == "move":
-        found = list(motion_path(action, keys, f"path of {name}", places))
-        yield from found or [MapObject(keys, "action", f"move {name}")]
+        paths = list(motion_path(action, keys, f"path of {name}", places))
+        yield from paths or [MapObject(keys, "action", f"move {name}")]
     elif kind != "robot":
         yield replace(_area_action(action, keys, places), label=f"{kind} {name}".strip())
 
@@ -119,35 +119,35 @@ def _action(kind: str, action: dict[str, Any], keys: Keys, event: str, places: P
 def _area_action(action: dict[str, Any], keys: Keys, places: Places) -> MapObject:
     """Return an object without label for an action in a region or a circle."""
     region = action.get("region", action.get("start"))
+    region_name = region if isinstance(region, str) else ""
     center = point_handle(action.get("at"), (*keys, "at"), places)
     radius = number(action.get("radius")) if center else None
     radius_keys = (*keys, "radius") if radius is not None else ()
-    named = region if isinstance(region, str) else ""
-    return MapObject(keys, "action", "", center, radius=radius, radius_keys=radius_keys, region=named)
+    return MapObject(keys, "action", "", center, radius=radius, radius_keys=radius_keys, region=region_name)
 
 
 def _triggers(value: Any, keys: Keys, label: str, places: Places) -> Iterator[MapObject]:
     """Yield objects for the regions and circles of a trigger, including nested triggers."""
     for kind, condition in mapping(value).items():
-        own, said = (*keys, kind), mapping(condition)
+        trigger_keys, arguments = (*keys, kind), mapping(condition)
         if kind in COMBINED_TRIGGERS:
             for index, part in enumerate(items(condition)):
-                yield from _triggers(part, (*own, index), label, places)
+                yield from _triggers(part, (*trigger_keys, index), label, places)
         elif kind == "not":
-            yield from _triggers(condition, own, f"{label} (not)", places)
+            yield from _triggers(condition, trigger_keys, f"{label} (not)", places)
         elif kind == "robot_in":
-            yield MapObject(own, "trigger", label, region=str(said.get("region", "")))
+            yield MapObject(trigger_keys, "trigger", label, region=str(arguments.get("region", "")))
         elif kind == "robot_within":
-            center = point_handle(said.get("of"), (*own, "of"), places)
+            center = point_handle(arguments.get("of"), (*trigger_keys, "of"), places)
             yield MapObject(
-                own,
+                trigger_keys,
                 "trigger",
                 label,
                 center,
-                radius=number(said.get("distance")),
-                radius_keys=(*own, "distance"),
-                region=str(said.get("region", "")),
-                follows=str(said.get("object", "")),
+                radius=number(arguments.get("distance")),
+                radius_keys=(*trigger_keys, "distance"),
+                region=str(arguments.get("region", "")),
+                center_object=str(arguments.get("object", "")),
             )
 
 
@@ -155,23 +155,23 @@ def _zones(data: dict[str, Any], keys: Keys, prefix: str) -> Iterator[MapObject]
     """Yield the keepout and speed zones of the stack in the data of a scenario or robot."""
     stack = mapping(data.get("stack"))
     for index, region in enumerate(items(stack.get("keepout"))):
-        own = (*keys, "stack", "keepout", index)
-        yield MapObject(own, "keepout", f"{prefix}keepout zone {region}", region=str(region))
+        zone_keys = (*keys, "stack", "keepout", index)
+        yield MapObject(zone_keys, "keepout", f"{prefix}keepout zone {region}", region=str(region))
     for index, zone in enumerate(map(mapping, items(stack.get("speed_zones")))):
-        own, region = (*keys, "stack", "speed_zones", index), str(zone.get("region", ""))
-        yield MapObject(own, "speed zone", f"{prefix}speed zone {region}", region=region)
+        zone_keys, region = (*keys, "stack", "speed_zones", index), str(zone.get("region", ""))
+        yield MapObject(zone_keys, "speed zone", f"{prefix}speed zone {region}", region=region)
 
 
 def _faults(data: dict[str, Any], keys: Keys, places: Places) -> Iterator[MapObject]:
     """Yield the faults of a scenario or robot, and the objects for their triggers."""
     for index, fault in enumerate(map(mapping, items(data.get("faults")))):
-        own = (*keys, "faults", index)
+        fault_keys = (*keys, "faults", index)
         label = str(fault.get("name", f"{fault.get('sensor', 'fault')} {_kind(fault, FaultEntry)}"))
-        yield MapObject(own, "fault", label)
-        yield from _triggers(fault.get("when"), (*own, "when"), f"trigger of {label}", places)
+        yield MapObject(fault_keys, "fault", label)
+        yield from _triggers(fault.get("when"), (*fault_keys, "when"), f"trigger of {label}", places)
 
 
 def _kind(entry: dict[str, Any], model: type[Choice]) -> str:
-    """Return the kind of a criterion or fault: its first key that is not a modifier of its `model`."""
+    """Return the kind of a criterion or fault: the first key that is not a modifier of `model`."""
     modifiers = model.known_keys() - model.choices().keys() | {"robot"}
     return next((key for key in entry if key not in modifiers), "entry")

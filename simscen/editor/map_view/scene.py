@@ -1,4 +1,4 @@
-"""Scene that the editor page shows for a text: objects of the scenario and of its world, and the background."""
+"""Scene that the editor page shows for a text: objects of the scenario and of the world, and the background."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,11 +23,12 @@ MAX_OBJECTS = 3000
 
 @dataclass(frozen=True)
 class SceneParts:
-    """The edited text, and the world that it contains or refers to.
+    """The edited text, and the world that the text contains or refers to.
 
     Attributes:
+        file: Edited file.
         text: Text in the editor.
-        tree: Syntax tree of the text, including content that it inherits from other files.
+        tree: Syntax tree of the text, including content that the text inherits from other files.
         assets: Reader of the files that the text refers to.
         world: World of the scenario, or the edited world; None if it cannot be read.
         is_inline: Whether the world is defined in the text, not in another file.
@@ -50,7 +51,7 @@ class SceneParts:
 
 
 def scene_parts(file: EditedFile, text: str) -> SceneParts | None:
-    """Read a text and the world that it refers to. Return None if the text is not a YAML mapping."""
+    """Read a text, and the world that the text contains or refers to. Return None if the text is not a YAML mapping."""
     library = file.library(text)
     tree, _ = library.read(file.path, defaults=file.kind == "scenario")
     if not isinstance(tree, MappingNode):
@@ -67,7 +68,7 @@ def scene_parts(file: EditedFile, text: str) -> SceneParts | None:
             spec = check(WorldSpec, node)
             world = None if isinstance(spec, list) else assets.complete_world(spec, node, file.path)
     except (InvalidInput, OSError):
-        pass  # `validate` reports it
+        pass  # TextChecks reports the problem
     return SceneParts(file, text, tree, assets, world, is_inline)
 
 
@@ -75,10 +76,10 @@ def map_objects(parts: SceneParts) -> list[MapObject]:
     """Return at most MAX_OBJECTS objects, for the map and the list of objects."""
     places = world_places(parts.world_data)
     if parts.file.kind == "world":
-        found = list(world_objects(parts.world_data, (), places))
+        objects = list(world_objects(parts.world_data, (), places))
     else:
-        found = [*scenario_objects(parts.tree.plain, places), *world_objects(parts.world_data, ("world",), places)]
-    return found[:MAX_OBJECTS]
+        objects = [*scenario_objects(parts.tree.plain, places), *world_objects(parts.world_data, ("world",), places)]
+    return objects[:MAX_OBJECTS]
 
 
 def scene_data(parts: SceneParts, backgrounds: Backgrounds) -> dict[str, Any]:
@@ -88,9 +89,9 @@ def scene_data(parts: SceneParts, backgrounds: Backgrounds) -> dict[str, Any]:
         "kind": parts.file.kind,
         "objects": [_object_data(map_object, parts, source) for map_object in map_objects(parts)],
         "regions": {
-            one.label: [[handle.x, handle.y] for handle in one.handles]
-            for one in world_objects(parts.world_data, (), {})
-            if one.kind == "region" and one.label
+            region.label: [[handle.x, handle.y] for handle in region.handles]
+            for region in world_objects(parts.world_data, (), {})
+            if region.kind == "region" and region.label
         },
         "places": sorted(world_places(parts.world_data)),
         "inline": parts.is_inline,
@@ -100,32 +101,32 @@ def scene_data(parts: SceneParts, backgrounds: Backgrounds) -> dict[str, Any]:
 
 
 def _world_file(parts: SceneParts) -> str:
-    """Return the name of the world file; "" if it is the edited file, a map, or an SDF file."""
+    """Return the name of the world file; "" for an inline world, the edited file, a ROS map, or an SDF file."""
     if parts.is_inline or parts.world is None:
         return ""
     name = parts.assets.library.sandbox.display_name(parts.world.path)
     return "" if name == parts.file.display_name or parts.world.spec is None else name
 
 
-def _object_data(one: MapObject, parts: SceneParts, source: SourceNode | None) -> dict[str, Any]:
-    is_here, line = _editable_and_line(one.keys, parts, source)
+def _object_data(map_object: MapObject, parts: SceneParts, source: SourceNode | None) -> dict[str, Any]:
+    is_editable, line = _editable_and_line(map_object.keys, parts, source)
     return {
-        "id": "/".join(map(str, one.keys)) or "settings",
-        "keys": list(one.keys),
-        "kind": one.kind,
-        "label": one.label,
-        "handles": [_handle_data(handle) for handle in one.handles],
-        "parts": [[[round(x, 4), round(y, 4)] for x, y in part] for part in one.parts],
-        "line": one.line,
-        "radius": one.radius,
-        "radius_keys": list(one.radius_keys),
-        "region": one.region,
-        "follows": one.follows,
-        "whole": one.moves_as_one,
-        "origin": one.origin,
-        "points_keys": list(one.points_keys),
-        "width": one.width,
-        "editable": is_here,
+        "id": "/".join(map(str, map_object.keys)) or "settings",
+        "keys": list(map_object.keys),
+        "kind": map_object.kind,
+        "label": map_object.label,
+        "handles": [_handle_data(handle) for handle in map_object.handles],
+        "parts": [[[round(x, 4), round(y, 4)] for x, y in part] for part in map_object.parts],
+        "line": map_object.line,
+        "radius": map_object.radius,
+        "radius_keys": list(map_object.radius_keys),
+        "region": map_object.region,
+        "follows": map_object.center_object,
+        "whole": map_object.moves_as_one,
+        "origin": map_object.origin,
+        "points_keys": list(map_object.points_keys),
+        "width": map_object.width,
+        "editable": is_editable,
         "at": line,
     }
 
@@ -142,7 +143,7 @@ def _handle_data(handle: Handle) -> dict[str, Any]:
 
 
 def _editable_and_line(keys: Keys, parts: SceneParts, source: SourceNode | None) -> tuple[bool, int]:
-    """Return whether the object at `keys` can be edited in this text, and its line; 0 if it is in another file.
+    """Return (True if the object at `keys` can be edited in this text, line of the object; 0 in another file).
 
     `source` is the syntax tree of the text without inherited content; None if the text is invalid.
     """
@@ -150,17 +151,17 @@ def _editable_and_line(keys: Keys, parts: SceneParts, source: SourceNode | None)
         return False, 0
     find_position = key_position if keys and isinstance(keys[-1], str) else value_position
     position = find_position(parts.tree, keys)
-    is_here = position.path == parts.file.display_name and source_at(source, keys) is not None
-    line = position.line if is_here and keys else 0
-    if any(isinstance(key, int) for key in keys):  # an item of an inherited list cannot be changed here
-        return is_here, line
+    is_in_text = position.path == parts.file.display_name and source_at(source, keys) is not None
+    line = position.line if is_in_text and keys else 0
+    if any(isinstance(key, int) for key in keys):  # an item of an inherited list cannot be changed in this text
+        return is_in_text, line
     return True, line
 
 
 def object_id_at_problem(problem: Problem, objects: Sequence[MapObject], source: SourceNode | None, text: str) -> str:
-    """Return the ID of the object to which a problem in the text belongs; "" if there is none.
+    """Return the ID of the object to which a problem in the text belongs; "" if there is no such object.
 
-    If several objects contain the problem, the one with the shortest YAML is chosen. A problem at a key belongs to the
+    If several objects contain the problem, return the object with the shortest YAML. A problem at a key belongs to the
     value in the same line. `source` is the syntax tree of `text`.
     """
     if not problem.line or source is None:
@@ -169,8 +170,8 @@ def object_id_at_problem(problem: Problem, objects: Sequence[MapObject], source:
     line_start = sum(map(len, lines[: problem.line - 1]))
     index = line_start + max(problem.col - 1, 0)
     line_end = line_start + len(lines[problem.line - 1].rstrip("\r\n\x85\u2028\u2029"))
-    nodes = [(node, one) for one in objects if one.keys and (node := source_at(source, one.keys)) is not None]
-    enclosing = [(node.end - node.start, one) for node, one in nodes if node.start <= index <= node.end]
-    following = [(node.end - node.start, one) for node, one in nodes if index < node.start <= line_end]
-    found = enclosing or following
-    return "/".join(map(str, min(found, key=lambda each: each[0])[1].keys)) if found else ""
+    nodes = [(node, each.keys) for each in objects if each.keys and (node := source_at(source, each.keys)) is not None]
+    enclosing = [(node.end - node.start, keys) for node, keys in nodes if node.start <= index <= node.end]
+    following = [(node.end - node.start, keys) for node, keys in nodes if index < node.start <= line_end]
+    candidates = enclosing or following
+    return "/".join(map(str, min(candidates, key=lambda candidate: candidate[0])[1])) if candidates else ""

@@ -16,14 +16,14 @@ from simscen.loading.yaml.tree import Key
 INDENT = 2
 """Number of spaces by which nested lines are indented."""
 _DASHES = re.compile(r" *(?:- +)*-(?!\S)")
-"""Pattern of the start of a line with a list item: the dashes of the item and of lists that begin in the same line."""
+"""Start of a line with list items. Nested lists can begin in the same line, each with a dash."""
 
 
 def insert_entry(text: str, mapping: SourceNode, key: str, value: Any, order: Sequence[str] = ()) -> Splice:
     """Return the splice that adds a key with a value to a mapping.
 
-    `order` is the preferred order of keys. The key is inserted after its last predecessor in `order` that the mapping
-    has; without a predecessor, before its first successor; without both, at the end.
+    `order` is the preferred order of keys. The key is inserted after the last key of the mapping that precedes it in
+    `order`; without such a key, before the first key that follows it in `order`; otherwise, at the end.
     """
     if not mapping.entries:
         return Splice(mapping.start, mapping.end, flow_text({key: value}))
@@ -53,34 +53,34 @@ def insert_item(text: str, sequence: SourceNode, value: Any, index: int | None =
     items = sequence.items
     if not items:
         return Splice(sequence.start, sequence.end, f"[{flow_text(value)}]")
-    at_end = index is None or index >= len(items)
-    like = items[-1] if at_end else items[index or 0]
+    is_at_end = index is None or index >= len(items)
+    neighbor = items[-1] if is_at_end else items[index or 0]
     if sequence.is_flow:
-        if at_end:
-            return Splice(like.end, like.end, _separator(text, items) + flow_text(value))
-        return Splice(like.start, like.start, f"{flow_text(value)}, ")
-    dash = _dash_before(text, like.start)
+        if is_at_end:
+            return Splice(neighbor.end, neighbor.end, _separator(text, items) + flow_text(value))
+        return Splice(neighbor.start, neighbor.start, f"{flow_text(value)}, ")
+    dash = _find_dash(text, neighbor.start)
     indent = column(text, dash)
-    item = f"- {_block_value(text, value, like, indent + INDENT)}"
-    if at_end:
-        place = line_end(text, like.end)
+    item = f"- {_block_value(text, value, neighbor, indent + INDENT)}"
+    if is_at_end:
+        position = line_end(text, neighbor.end)
         gap = "\n\n" if len(items) > 1 and _has_blank_line(text, items[-2].end, dash) else "\n"
-        return Splice(place, place, gap + " " * indent + item)
-    place = line_start(text, dash)
-    return Splice(place, place, " " * indent + item + "\n")
+        return Splice(position, position, gap + " " * indent + item)
+    position = line_start(text, dash)
+    return Splice(position, position, " " * indent + item + "\n")
 
 
-def _dash_before(text: str, start: int) -> int:
+def _find_dash(text: str, start: int) -> int:
     """Return the index of the dash of the list item whose value begins at `start`.
 
     Anchors, tags, and comments can be between the dash and the value.
     """
     end = start
-    while (found := _DASHES.match(text, line_start(text, end), end)) is None:
+    while (match := _DASHES.match(text, line_start(text, end), end)) is None:
         end = line_start(text, end) - 1
         if end < 0:
             raise EditRefused("a list item has no dash at the start of a line; edit the text")
-    return found.end() - 1
+    return match.end() - 1
 
 
 def _block_entry(key: str, value: Any, indent: int) -> str:
@@ -91,13 +91,13 @@ def _block_entry(key: str, value: Any, indent: int) -> str:
     return f"{string_text(key)}: {flow_text(value)}"
 
 
-def _block_value(text: str, value: Any, like: SourceNode, indent: int) -> str:
-    """Return the text of a new list item in the style of the sibling `like`."""
-    if like.kind != "mapping" or like.is_flow or not isinstance(value, dict) or not value:
+def _block_value(text: str, value: Any, sibling: SourceNode, indent: int) -> str:
+    """Return the text of a new list item in the style of another item of the list."""
+    if sibling.kind != "mapping" or sibling.is_flow or not isinstance(value, dict) or not value:
         return flow_text(value)
     lines = []
     for key, part in value.items():
-        entry = like.entries.get(key)
+        entry = sibling.entries.get(key)
         if entry is not None and not entry.value.is_flow and entry.value.kind == "mapping" and isinstance(part, dict):
             inner = _block_value(text, part, entry.value, indent + INDENT)
             lines.append(f"{string_text(key)}:\n{' ' * (indent + INDENT)}{inner}")
@@ -117,9 +117,9 @@ def _has_blank_line(text: str, start: int, end: int) -> bool:
 
 
 def remove_part(text: str, source: SourceNode, keys: tuple[Key, ...]) -> Splice:
-    """Return the splice that removes the entry or item at `keys`. Raises EditRefused if the text does not contain it.
+    """Return the splice that removes the entry or item at `keys`. `source` is the syntax tree of the text.
 
-    `source` is the syntax tree of the text.
+    Raises EditRefused if the text does not contain this entry or item.
     """
     parent, node = source_at(source, keys[:-1]), source_at(source, keys)
     if not keys or parent is None or node is None:
@@ -128,7 +128,7 @@ def remove_part(text: str, source: SourceNode, keys: tuple[Key, ...]) -> Splice:
         assert isinstance(keys[-1], int)
         parts = [(item.start, item.end) for item in parent.items]
         if not parent.is_flow:
-            dashes = [_dash_before(text, start) for start, _ in parts]
+            dashes = [_find_dash(text, start) for start, _ in parts]
             parts = [(dash, max(end, dash + 1)) for dash, (_, end) in zip(dashes, parts, strict=True)]
         number = keys[-1]
     else:
@@ -138,8 +138,8 @@ def remove_part(text: str, source: SourceNode, keys: tuple[Key, ...]) -> Splice:
         return _remove_from_flow(text, parent, parts, number)
     if len(parts) == 1:
         empty = "[]" if parent.kind == "sequence" else "{}"
-        owner = source_at(source, keys[:-2])
-        key_end = owner.entries[str(keys[-2])].end if len(keys) > 1 and owner and owner.kind == "mapping" else 0
+        outer = source_at(source, keys[:-2])
+        key_end = outer.entries[str(keys[-2])].end if len(keys) > 1 and outer and outer.kind == "mapping" else 0
         if key_end and text[key_end : parent.start].strip() == ":":
             return Splice(key_end, parent.end, f": {empty}")
         return Splice(parent.start, parent.end, empty)
@@ -147,9 +147,9 @@ def remove_part(text: str, source: SourceNode, keys: tuple[Key, ...]) -> Splice:
 
 
 def _remove_from_flow(text: str, parent: SourceNode, parts: list[tuple[int, int]], number: int) -> Splice:
-    """Return the splice that removes the part `number` of a flow list or mapping, including a comma.
+    """Return the splice that removes the part with index `number` from a flow list or mapping, including a comma.
 
-    `parts` are the start and end of all parts.
+    `parts` are (start, end) of all parts.
     """
     start, end = parts[number]
     if len(parts) == 1:
@@ -162,9 +162,9 @@ def _remove_from_flow(text: str, parent: SourceNode, parts: list[tuple[int, int]
 
 
 def _remove_from_block(text: str, parts: list[tuple[int, int]], number: int) -> Splice:
-    """Return the splice that removes the part `number` of a block list or mapping.
+    """Return the splice that removes the part with index `number` from a block list or mapping.
 
-    `parts` are the start and end of all parts.
+    `parts` are (start, end) of all parts.
     """
     start, end = parts[number]
     begin = line_start(text, start)

@@ -19,7 +19,7 @@ class Splice(NamedTuple):
 
 
 def apply_splices(text: str, splices: Sequence[Splice]) -> str:
-    """Return a text after all splices. Splices must not overlap; their indices refer to the original text."""
+    """Return a text after all splices. Splices must not overlap. The indices of all splices refer to `text`."""
     for splice in sorted(splices, reverse=True):
         text = text[: splice.start] + splice.text + text[splice.end :]
     return text
@@ -37,10 +37,10 @@ def line_start(text: str, index: int) -> int:
 
 def line_end(text: str, index: int) -> int:
     """Return the index of the line break at the end of the line that contains `index`, or the end of the text."""
-    found = text.find("\n", index)
-    return len(text) if found < 0 else found
+    line_break = text.find("\n", index)
+    return len(text) if line_break < 0 else line_break
 
 
 def column(text: str, index: int) -> int:
-    """Return the number of characters before `index` in its line."""
+    """Return the number of characters between the start of the line and `index`."""
     return index - line_start(text, index)

@@ -19,8 +19,8 @@ from simscen.loading.yaml.tree import Key
 class SetValue:
     """Edit that sets the value at `keys`, and creates the missing mappings that contain it.
 
-    `order` lists the top-level keys in their usual order. A new key is inserted according to it, also in nested
-    mappings with the same keys, such as `robots.a`.
+    `order` lists the top-level keys of the file in their usual order. A new key is inserted according to this order,
+    also in nested mappings with the same keys, such as `robots.a`.
     """
 
     keys: tuple[Key, ...]
@@ -32,7 +32,7 @@ class SetValue:
 class AddItem:
     """Edit that inserts an item into the list at `keys` before the item `index`, or at the end for None.
 
-    A missing list is created. `order` is that of SetValue.
+    A missing list is created. `order` is as in SetValue.
     """
 
     keys: tuple[Key, ...]
@@ -66,11 +66,11 @@ def apply_edits(text: str, edits: Sequence[Edit]) -> str:
 
 
 def _independent_splices(text: str, source: SourceNode, edits: Sequence[Edit]) -> list[Splice]:
-    """Return the splices of the first edits of `edits`, up to the first one that does not replace another scalar.
+    """Return the splices of the first edits, as long as each edit replaces a scalar that no edit before replaced.
 
-    They can be applied together, because none of them changes the syntax tree `source`.
+    These splices can be applied together, because they do not change the structure of the syntax tree `source`.
     """
-    found: list[Splice] = []
+    splices: list[Splice] = []
     for edit in edits:
         if not isinstance(edit, SetValue) or isinstance(edit.value, dict | list):
             break
@@ -78,14 +78,14 @@ def _independent_splices(text: str, source: SourceNode, edits: Sequence[Edit]) -
         if node is None or node.kind != "scalar":
             break
         splice = _replacement(text, node, edit.value)
-        if any(other.start < splice.end and splice.start < other.end for other in found):
+        if any(other.start < splice.end and splice.start < other.end for other in splices):
             break
-        found.append(splice)
-    return found
+        splices.append(splice)
+    return splices
 
 
 def _splice(text: str, source: SourceNode, edit: Edit) -> Splice:
-    """Return the splice that makes an edit. Raises EditRefused if it is impossible."""
+    """Return the splice that makes an edit. Raises EditRefused if the edit is impossible."""
     match edit:
         case SetValue(keys, value, order):
             return _set_value(text, source, keys, value, order)
@@ -101,7 +101,7 @@ def _splice(text: str, source: SourceNode, edit: Edit) -> Splice:
 
 
 def _set_value(text: str, source: SourceNode, keys: tuple[Key, ...], value: Any, order: tuple[str, ...]) -> Splice:
-    """Return the splice that replaces a value, or inserts it into the innermost existing mapping."""
+    """Return the splice that replaces a value, or inserts a new value into the innermost existing mapping."""
     if (node := source_at(source, keys)) is not None:
         return _replacement(text, node, value)
     for depth in range(len(keys) - 1, -1, -1):
@@ -136,19 +136,19 @@ def _replacement(text: str, node: SourceNode, value: Any) -> Splice:
 
 
 def _require_only_edits(old: str, new: str, edits: Sequence[Edit]) -> None:
-    """Raise EditRefused if the new text differs from the old text by more than the edits."""
+    """Raise EditRefused if the content of the new text is not the content of the old text after the edits."""
     before, after = parse_yaml(old, "")[0], parse_yaml(new, "")[0]
     if before is None or after is None:
         raise EditRefused("this cannot be changed on the map; edit the text")
-    wanted = before.plain
+    expected = before.plain
     for edit in edits:
-        wanted = _edited_data(wanted, edit)
-    if not is_same_value(after.plain, wanted):
+        expected = _edited_data(expected, edit)
+    if not is_same_value(after.plain, expected):
         raise EditRefused("this cannot be changed on the map without changing other values; edit the text")
 
 
 def _edited_data(plain: Any, edit: Edit) -> Any:
-    """Return the parsed content after an edit. `plain` is changed, unless the edit replaces it completely."""
+    """Return the parsed content after an edit. `plain` is changed in place, unless the edit replaces all of it."""
     holder = {"": plain}
     node: Any = holder
     path: list[Key] = ["", *edit.keys]

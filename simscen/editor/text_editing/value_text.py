@@ -1,4 +1,4 @@
-"""Conversion of values to YAML text, if possible in the notation of the text that they replace."""
+"""Conversion of values to YAML text, if possible in the notation of the replaced text."""
 
 import json
 import math
@@ -9,14 +9,14 @@ from typing import Any
 from simscen.loading.yaml.parser import parse_yaml
 from simscen.spec.quantities import NUMBER_AND_UNIT_PATTERN, UNITS, si_number
 
-LINE_WIDTH = 120
+MAX_LINE_CHARACTERS = 120
 """Maximum number of characters in a line of a folded block scalar (`>`)."""
 MAX_DECIMALS = 6
 """Maximum number of decimal places of a number."""
 MAX_PADDED_DECIMALS = 3
 """Maximum number of decimal places to which trailing zeros are added."""
 NUMBER_TOLERANCE = 2e-6
-"""Difference up to which two numbers count as equal, in the unit of their text."""
+"""Difference up to which two numbers count as equal, in the unit of the text."""
 
 _PLAIN_NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.([0-9]*))?|\.([0-9]+))")
 _INFINITE_NUMBERS = {"nan": ".nan", "inf": ".inf", "-inf": "-.inf"}
@@ -27,9 +27,9 @@ _UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u
 def flow_text(value: Any) -> str:
     """Return a value as YAML on one line, with lists in brackets and mappings in braces."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{string_text(str(key))}: {flow_text(one)}" for key, one in value.items()) + "}"
+        return "{" + ", ".join(f"{string_text(str(key))}: {flow_text(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(flow_text(one) for one in value) + "]"
+        return "[" + ", ".join(flow_text(item) for item in value) + "]"
     return scalar_text(value)
 
 
@@ -84,29 +84,29 @@ def number_text(value: float, decimals: int = 0) -> str:
     return text.removeprefix("-") if float(text) == 0 else text
 
 
-def is_same_value(found: Any, wanted: Any) -> bool:
+def is_same_value(value: Any, other: Any) -> bool:
     """Return whether two values are equal. Numbers and quantities with units are compared with a tolerance."""
-    if isinstance(found, dict) and isinstance(wanted, dict):
-        return found.keys() == wanted.keys() and all(is_same_value(found[key], wanted[key]) for key in found)
-    if isinstance(found, list) and isinstance(wanted, list):
-        return len(found) == len(wanted) and all(map(is_same_value, found, wanted))
-    if found == wanted or found is wanted:
-        return isinstance(found, bool) == isinstance(wanted, bool)
-    if isinstance(found, bool) or isinstance(wanted, bool):
+    if isinstance(value, dict) and isinstance(other, dict):
+        return value.keys() == other.keys() and all(is_same_value(value[key], other[key]) for key in value)
+    if isinstance(value, list) and isinstance(other, list):
+        return len(value) == len(other) and all(map(is_same_value, value, other))
+    if value == other or value is other:
+        return isinstance(value, bool) == isinstance(other, bool)
+    if isinstance(value, bool) or isinstance(other, bool):
         return False
-    numbers = si_number(found), si_number(wanted)
+    numbers = si_number(value), si_number(other)
     if not all(isinstance(number, int | float) for number in numbers):
         return False
-    scale = max(_scale(found) or 1.0, _scale(wanted) or 1.0)
+    scale = max(_scale(value) or 1.0, _scale(other) or 1.0)
     return math.isclose(*numbers, rel_tol=1e-9, abs_tol=NUMBER_TOLERANCE * scale)
 
 
 def _quoted_text(text: str) -> str:
-    return _UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", json.dumps(text, ensure_ascii=False))
+    return _UNPRINTABLE.sub(lambda match: f"\\u{ord(match[0]):04x}", json.dumps(text, ensure_ascii=False))
 
 
 def string_text(text: str) -> str:
-    """Return a string as YAML, without quotes if that is valid in block and flow style."""
+    """Return a string as YAML, without quotes if the plain string is valid in block and flow style."""
     if "\n" in text or _UNPRINTABLE.search(text) or text != text.strip():
         return _quoted_text(text)
     tree, problems = parse_yaml(f"[{{k: {text}}}, {{{text}: 1}}]", "")
@@ -131,7 +131,7 @@ def _block_scalar_text(value: str, old: str, indent: int) -> str | None:
     if not body.strip() or header[1:] not in ("", "-"):
         return None
     header = header[0] if value.endswith("\n") else f"{header[0]}-"
-    lines = body.split("\n") if header[0] == "|" else _folded_lines(body, LINE_WIDTH - indent)
+    lines = body.split("\n") if header[0] == "|" else _folded_lines(body, MAX_LINE_CHARACTERS - indent)
     text = "\n".join([header, *(" " * indent + line if line else "" for line in lines)])
     tree, problems = parse_yaml(f"{' ' * (indent - 1)}? key\n{' ' * (indent - 1)}: {text}\n", "")
     is_same = not problems and tree is not None and tree.plain == {"key": value}

@@ -145,8 +145,8 @@ def _by_scenario(pairs: Iterable[Pair]) -> dict[str, list[Pair]]:
 def _samples(completed: Sequence[Pair], same_arrival: Sequence[Pair], names: Iterable[str]) -> Iterator[PairedSample]:
     """Yield the samples to test: the pass rate of all runs, and the pass rate and each metric by scenario.
 
-    `completed` are the pairs without errors. `same_arrival` are those of them in which the same robots reach their last
-    goals in both runs.
+    `completed` are the pairs without errors. `same_arrival` are the completed pairs in which the same robots reach
+    their last goals in both runs.
     """
     scenarios = _by_scenario(completed)
     if len(scenarios) > 1:

@@ -9,7 +9,7 @@ from simscen.core.statistics import wilson_interval
 
 @dataclass(frozen=True)
 class SessionSummary:
-    """Statistics of a session. A value is None if no run has it.
+    """Statistics of a session. A value is None if no run has the required metric.
 
     Attributes:
         runs: Number of runs that were neither skipped nor left unfinished because the session ended.

@@ -131,7 +131,7 @@ def draw_fault_bands(canvas: Canvas, scene: Scene) -> Iterator[Label]:
 
 
 def draw_faults(canvas: Canvas, scene: Scene) -> Iterator[Label]:
-    """Draw an amber bolt where the robot was when a fault started, and a gray one where it was when the fault ended."""
+    """Draw a bolt at the position of the robot at the start (amber) and at the end (gray) of each fault."""
     trace = scene.trace
     for start, end, name in _faults(scene):
         bolts = [(start, f"{name} from", palette.AMBER), (end, f"{name} over,", palette.FAINT_INK)]

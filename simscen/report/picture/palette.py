@@ -79,7 +79,7 @@ DARK = {
 def css_variables() -> str:
     """Return both themes as CSS variables (`--good`, …).
 
-    The attribute `data-theme` of the root element selects a theme. Without it, the setting of the browser does.
+    The attribute `data-theme` of the root element selects a theme. The default is the setting of the browser.
     """
     light, dark = ("".join(f"--{name}:{value};" for name, value in theme.items()) for theme in (LIGHT, DARK))
     return (

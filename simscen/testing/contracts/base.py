@@ -30,7 +30,7 @@ T = TypeVar("T")
 
 
 class PromiseBroken(AssertionError):
-    """A component breaks a promise of its protocol. The message says what was observed."""
+    """A component breaks a promise of its protocol. The message states the observation."""
 
 
 def require(condition: object, observation: str) -> None:
@@ -107,7 +107,7 @@ def reseed_global_generators() -> None:
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raise PromiseBroken if the block takes longer. In other threads than the main thread, there is no limit."""
+    """Raise PromiseBroken if the block takes longer than `seconds`. The limit works only in the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -132,16 +132,16 @@ class ComponentContract(Contract):
     robot: RobotModel = field(kw_only=True)
 
     def build(self) -> Any:
-        """Build a new component with a fixed seed and without a map. Raises PromiseBroken if that fails."""
+        """Build a new component with a fixed seed and without a map. Raises PromiseBroken for any exception."""
         spec: Component = self.spec
         return call_component("is built", lambda: spec.implementation()(spec, setting(self.robot, name=self.role)))
 
 
 def call_component(action: str, call: Callable[..., T], *args: Any, **kwargs: Any) -> T:
-    """Call a method of a component, and return its result.
+    """Call a method of a component, and return the result.
 
     Raises NavigationFailure if the component fails with an ErrorCode, and PromiseBroken for any other exception.
-    `action` describes the call in the message, such as "plans" in "raises TypeError when it plans".
+    `action` describes the call in messages, such as "plans" in "raises TypeError when it plans".
     """
     try:
         return call(*args, **kwargs)

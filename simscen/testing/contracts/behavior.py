@@ -52,7 +52,7 @@ class BehaviorContract(ComponentContract):
         return track
 
     def command(self, behavior: Behavior, pose: Pose2, view: CostmapView, seconds: float) -> Twist | None:
-        """Return the next command after checking it (see checked_command); None if the behavior is done.
+        """Return the next command, checked by `checked_command`; None if the behavior is done.
 
         `seconds` is the time since the start of the behavior.
         """
@@ -61,14 +61,14 @@ class BehaviorContract(ComponentContract):
 
     @promise
     def it_ends(self) -> None:
-        """Given free space then it is done or fails within two simulated minutes, also when it is started again."""
+        """Given free space then the behavior is done or fails within two simulated minutes, also if started again."""
         behavior, view = self.build(), self.view()
         for _ in range(2):
             self.simulate(behavior, view)
 
     @promise
     def it_has_a_name(self) -> None:
-        """Given a behavior then it has a name for events and criteria."""
+        """Given any situation then the behavior has a name for events and criteria."""
         name = call_component("returns its name", lambda: self.build().name)
         require(isinstance(name, str) and name, f"is called {name!r}")
 
@@ -79,9 +79,9 @@ class BehaviorContract(ComponentContract):
         for gap in (0.08, 0.15, 0.3, 0.6):
             view = self.view(self.robot.circumscribed_radius + gap)
             for pose in self.simulate(self.build(), view):
-                free = bool(footprint.free(view, np.array([pose]))[0])
+                is_free = bool(footprint.free(view, np.array([pose]))[0])
                 require(
-                    free, f"drives into a wall with {gap:g} m of space: ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f})"
+                    is_free, f"drives into a wall with {gap:g} m of space: ({pose.x:.2f}, {pose.y:.2f}, {pose.yaw:.2f})"
                 )
 
     @promise
@@ -92,7 +92,7 @@ class BehaviorContract(ComponentContract):
 
     @promise
     def a_costmap_is_not_changed(self) -> None:
-        """Given a costmap then it is not changed."""
+        """Given a costmap then the behavior does not change the costmap."""
         view = self.view(0.6)
         untouched = copy_costmap(view)
         self.simulate(self.build(), view)

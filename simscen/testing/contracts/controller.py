@@ -31,9 +31,9 @@ GOAL = Goal("g", Pose2(7.0, 3.0, 1.0))
 PATH_POINTS = np.column_stack((np.arange(1.0, 7.01, 0.05), np.full(121, 3.0), np.zeros(121)))
 """Poses (121, 3) of the straight path to GOAL."""
 SPEED_TOLERANCE = 1e-6
-"""Rounding error by which a command may exceed a limit, in m/s and rad/s."""
+"""Maximum excess of a command over a limit by rounding errors, in m/s and rad/s."""
 GOAL_TOLERANCE, DWELL_S = 0.25, 3.0
-"""Maximum error in m and rad at the goal, and time at the goal after which a drive ends."""
+"""Maximum error at the goal in m and rad, and time at the goal after which a drive ends."""
 
 
 class ControllerContract(ComponentContract):
@@ -52,7 +52,7 @@ class ControllerContract(ComponentContract):
         return controller
 
     def command(self, controller: Controller, pose: Pose2, twist: Twist, view: CostmapView) -> Twist:
-        """Return the command at this pose and velocity after checking it (see checked_command)."""
+        """Return the command at this pose and velocity, checked by `checked_command`."""
         command = call_component("computes a command", lambda: controller.command(pose, twist, view, GOAL))
         return checked_command(command, self.robot)
 
@@ -72,7 +72,7 @@ class ControllerContract(ComponentContract):
 
     @promise
     def it_follows_the_path_to_its_end_and_turns_to_the_goals_heading(self) -> None:
-        """Given a free path then the robot reaches its end and heading, and deviates from it by at most 0.3 m."""
+        """Given a free path then the robot ends at the goal pose, and deviates from the path by at most 0.3 m."""
         track = self.drive(self.controller_on_path(), self.view(), Pose2(1.0, 3.1, 0.0), 40)
         distance, turn = track[-1].distance(GOAL.pose), abs(wrap(track[-1].yaw - GOAL.pose.yaw))
         require(distance < GOAL_TOLERANCE, f"ends {distance:.2f} m from the end of the path after 40 s")
@@ -91,7 +91,7 @@ class ControllerContract(ComponentContract):
 
     @promise
     def a_speed_limit_is_kept_and_lifted(self) -> None:
-        """Given a speed limit then no command is faster; given no limit then it drives at its full speed again."""
+        """Given a speed limit then no command is faster; given no limit then the robot drives at full speed again."""
         controller, view = self.controller_on_path(), self.view()
         require(
             math.isfinite(controller.full_speed) and controller.full_speed > 0, f"full speed {controller.full_speed!r}"
@@ -106,7 +106,7 @@ class ControllerContract(ComponentContract):
 
     @promise
     def a_command_is_collision_free_or_it_fails_with_no_valid_control(self) -> None:
-        """Given an obstacle ahead then the command is collision-free for 0.5 s, or it fails with NO_VALID_CONTROL."""
+        """Given an obstacle ahead then the command is collision-free for 0.5 s, or the error is NO_VALID_CONTROL."""
         front = max(x for x, _ in self.robot.footprint)
         footprint, pose = Footprint(self.robot, 0.05), Pose2(2.0, 3.0, 0.0)
         for gap in (0.02, 0.1, 0.3, 0.6):
@@ -117,8 +117,8 @@ class ControllerContract(ComponentContract):
             except NavigationFailure as failure:
                 require_no_valid_control(failure)
             else:
-                free = footprint.free(view, poses_along(pose, command, np.linspace(0, 0.5, 11))).all()
-                require(free, f"commands {tuple(command)} with an obstacle {gap:g} m ahead")
+                is_free = footprint.free(view, poses_along(pose, command, np.linspace(0, 0.5, 11))).all()
+                require(is_free, f"commands {tuple(command)} with an obstacle {gap:g} m ahead")
 
     @promise
     def it_never_drives_into_a_wall_across_its_path(self) -> None:
@@ -144,7 +144,7 @@ class ControllerContract(ComponentContract):
 
     @promise
     def an_empty_path_is_an_invalid_path(self) -> None:
-        """Given a path without points then it fails with INVALID_PATH."""
+        """Given a path without points then the controller fails with INVALID_PATH."""
         controller = self.build()
         try:
             call_component("receives an empty path", lambda: controller.set_path(Path()))
@@ -155,7 +155,7 @@ class ControllerContract(ComponentContract):
 
     @promise
     def path_and_costmap_are_not_changed_and_the_costmap_is_not_kept(self) -> None:
-        """Given a path and a costmap then they are not changed, and later changes of the costmap have no effect."""
+        """Given path and costmap then both are not changed, and later changes of the costmap have no effect."""
         view, controller, path = self.view(), self.build(), Path(PATH_POINTS.copy())
         other, pose = self.controller_on_path(), Pose2(1, 3)
         controller.set_path(path)
@@ -184,14 +184,14 @@ def checked_command(command: Twist, robot: RobotModel) -> Twist:
     """Return the command. Raises PromiseBroken unless it is a finite Twist within the limits of the robot."""
     require(isinstance(command, Twist), f"commands {type(command).__name__}, not a Twist")
     require(all(map(math.isfinite, command)), f"commands {tuple(command)}")
-    within = -robot.max_reverse - SPEED_TOLERANCE <= command.vx <= robot.max_linear + SPEED_TOLERANCE
-    within = (
-        within
+    is_within_limits = (
+        -robot.max_reverse - SPEED_TOLERANCE <= command.vx <= robot.max_linear + SPEED_TOLERANCE
         and abs(command.vy) <= robot.max_lateral + SPEED_TOLERANCE
         and abs(command.wz) <= robot.max_angular + SPEED_TOLERANCE
     )
-    require(within, f"commands {tuple(command)}, beyond the limits of the base: {robot.max_linear:g} m/s forward, "
-           f"{robot.max_reverse:g} backward, {robot.max_lateral:g} sideways, {robot.max_angular:g} rad/s")  # fmt: skip
+    require(is_within_limits,
+            f"commands {tuple(command)}, beyond the limits of the base: {robot.max_linear:g} m/s forward, "
+            f"{robot.max_reverse:g} backward, {robot.max_lateral:g} sideways, {robot.max_angular:g} rad/s")  # fmt: skip
     return command
 
 
@@ -206,5 +206,5 @@ def move(pose: Pose2, twist: Twist) -> Pose2:
 
 
 def require_no_valid_control(failure: NavigationFailure) -> None:
-    """Raise PromiseBroken if the failure has another error code than NO_VALID_CONTROL."""
+    """Raise PromiseBroken if the error code of the failure is not NO_VALID_CONTROL."""
     require(failure.code == ErrorCode.NO_VALID_CONTROL, f"fails with {failure.code.name}, not with NO_VALID_CONTROL")

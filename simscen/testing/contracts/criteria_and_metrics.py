@@ -29,7 +29,8 @@ DRIVE_TRACE: dict[str, Any] = {
 }
 """Descriptions for `synthetic_case` and `synthetic_trace`: one goal, and a drive to this goal.
 
-The drive does not start at the origin and turns past ±π, so that a component that normalizes the poses changes them.
+The drive does not start at the origin, and the yaw passes ±π. A component that normalizes poses in place therefore
+changes the trace, which a promise forbids.
 """
 STATIONARY_TRACE: dict[str, Any] = {"seconds": 2, "truth": [[0, 0, 0]], "belief": None, "scans": []}
 TRUNCATED_TRACE: dict[str, Any] = {**DRIVE_TRACE, "seconds": 3, "ended": None, "events": DRIVE_TRACE["events"][:2]}
@@ -69,7 +70,7 @@ class CriterionContract(Contract):
 
     @promise
     def a_margin_has_the_sign_of_the_status(self) -> None:
-        """Given a finding that passes then its margin is not negative; given one that fails then it is negative."""
+        """Given a finding that passes then its margin is not negative; of a finding that fails, it is negative."""
         for label, description in TRACES.items():
             for finding in self.findings(synthetic_trace(description), synthetic_case(CASE), label):
                 if finding.margin is None or finding.status not in (Status.PASS, Status.FAIL):
@@ -90,7 +91,7 @@ class CriterionContract(Contract):
 
     @promise
     def a_trace_is_not_changed(self) -> None:
-        """Given a trace and a case then they are not changed, because other criteria use them."""
+        """Given a trace and a case then both are not changed, because other criteria use them as well."""
         trace, case = synthetic_trace(DRIVE_TRACE), synthetic_case(CASE)
         before = copy.deepcopy((trace, case))
         self.findings(trace, case, "a drive")
@@ -112,7 +113,7 @@ class MetricContract(Contract):
     role = "metric"
 
     def measure(self, description: dict[str, Any], label: str) -> float | str:
-        """Return the value of the metric, or the reason why there is none. `label` is the trace's name in messages."""
+        """Return the value of the metric, or why it is undefined. `label` is the name of the trace in messages."""
         value: float | str = call_component(
             f"measures {label}", self.spec.measure, synthetic_trace(description), synthetic_case(CASE)
         )
@@ -138,7 +139,7 @@ class MetricContract(Contract):
 
     @promise
     def a_trace_is_not_changed(self) -> None:
-        """Given a trace and a case then they are not changed, because criteria use them."""
+        """Given a trace and a case then both are not changed, because criteria use them as well."""
         trace, case = synthetic_trace(DRIVE_TRACE), synthetic_case(CASE)
         before = copy.deepcopy((trace, case))
         call_component("measures a drive", self.spec.measure, trace, case)

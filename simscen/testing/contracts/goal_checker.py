@@ -14,11 +14,11 @@ GOAL = Goal("g", Pose2(2.0, -1.0, 0.5), xy_tolerance=0.25, yaw_tolerance=0.25)
 CALL_COUNT = 40
 """Number of calls of a goal checker in 2 s at 20 Hz."""
 VELOCITIES = (STOP, Twist(0.3), Twist(0.0, 0.0, 0.8), Twist(-0.2, 0.0, -0.4))
-"""Velocities of the robot at which goal checkers are called."""
+"""Velocities of the robot in calls of goal checkers."""
 
 
 class GoalCheckerContract(ComponentContract):
-    """Contract of a goal checker, for poses at GOAL, outside its tolerances, and far away."""
+    """Contract of a goal checker, for poses at GOAL, outside the tolerances of GOAL, and far away."""
 
     role = "goal_checker"
 

@@ -29,12 +29,12 @@ NO_NOISE = Noise(lidar=0, translation=0, rotation=0, drift=0, gyro=0, gyro_bias=
 
 @cache
 def short_drive() -> RoomDrive:
-    """Return a drive of six seconds through the room of synthetic_room.py."""
+    """Return a drive of 6 s through the room of synthetic_room.py."""
     return drive(6.0)
 
 
 def start_estimate() -> Estimate:
-    """Return the true start pose of the short drive as initial estimate, with standard deviations."""
+    """Return the true start pose of the short drive as initial pose estimate, with standard deviations."""
     return Estimate(Pose2(*short_drive().truth[0]), (0.1, 0.1, 0.05))
 
 
@@ -65,10 +65,12 @@ class LocalizerContract(Contract):
     @promise
     def without_motion_the_belief_does_not_drift(self) -> None:
         """Given no motion and exact readings then the belief stays within 5 cm and 0.03 rad of the true pose."""
-        still = drive_along(np.tile(short_drive().truth[:1], (400, 1)))
+        standstill = drive_along(np.tile(short_drive().truth[:1], (400, 1)))
         start = Estimate(start_estimate().pose, (0.02, 0.02, 0.01))
-        beliefs = call_component("localizes", lambda: run_localizer(self.build_at(start), still, 1, NO_NOISE, imu=True))
-        error = pose_errors(beliefs, still.truth)
+        beliefs = call_component(
+            "localizes", lambda: run_localizer(self.build_at(start), standstill, 1, NO_NOISE, imu=True)
+        )
+        error = pose_errors(beliefs, standstill.truth)
         offset, turn = float(np.abs(error[:, :2]).max()), float(np.abs(error[:, 2]).max())
         require(offset < 0.05, f"drifts by {offset:.3f} m while the robot stands")
         require(turn < 0.03, f"drifts by {turn:.3f} rad while the robot stands")
@@ -135,26 +137,26 @@ class LocalizerContract(Contract):
     @promise
     def a_reset_forgets_everything(self) -> None:
         """Given a reset then the belief is within three standard deviations of the estimate."""
-        used = self.build_at(Estimate(Pose2(3, 3, 3)))
+        subject = self.build_at(Estimate(Pose2(3, 3, 3)))
         whole = short_drive()
         first_part = RoomDrive(whole.truth[:80], whole.steps[:80], whole.ranges[:20])
-        call_component("localizes", lambda: run_localizer(used, first_part, 1, imu=True))
-        call_component("is reset", lambda: used.reset(start_estimate()))
-        require_near_start(valid_belief(used), "after a reset")
-        send_odometry(used, 0, Pose2(-8, 4, 2))
-        require_near_start(valid_belief(used), "after a reset and the first odometry")
+        call_component("localizes", lambda: run_localizer(subject, first_part, 1, imu=True))
+        call_component("is reset", lambda: subject.reset(start_estimate()))
+        require_near_start(valid_belief(subject), "after a reset")
+        send_odometry(subject, 0, Pose2(-8, 4, 2))
+        require_near_start(valid_belief(subject), "after a reset and the first odometry")
 
 
 def require_near_start(belief: Belief, when: str) -> None:
-    """Raise PromiseBroken if the belief is over three standard deviations from `start_estimate()`.
+    """Raise PromiseBroken if the belief is more than three standard deviations from `start_estimate()`.
 
     `when` is the end of the message, such as "after a reset".
     """
     start = start_estimate()
     assert start.pose is not None
     x, y, yaw = np.abs(tuple(start.pose.between(belief.pose))).tolist()
-    close = max(x, y) <= 3 * start.std[0] and yaw <= 3 * start.std[2]
-    require(close, f"believes to be at {belief.pose} {when}, but was reset to {start.pose}")
+    is_near = max(x, y) <= 3 * start.std[0] and yaw <= 3 * start.std[2]
+    require(is_near, f"believes to be at {belief.pose} {when}, but was reset to {start.pose}")
 
 
 def send_odometry(subject: Localizer, number: int, pose: Pose2) -> None:
@@ -187,7 +189,7 @@ def valid_belief(subject: Localizer) -> Belief:
 
 
 def _invalid_ranges(seed: int) -> Array:
-    """Return ranges (BEAMS,) of a scan, most of them invalid. There are different ranges for each seed from 0 to 13."""
+    """Return the ranges (BEAMS,) of a scan, most of them invalid. Each `seed` from 0 to 13 gives different ranges."""
     rng = np.random.default_rng(seed)
     kinds = [np.nan, np.inf, -np.inf, 0.0, -5.0, 1e300, 12.0, 0.05, 3.0]
     mixed = rng.choice([np.nan, np.inf, -1.0, 1e9, 2.0, 0.3], BEAMS)

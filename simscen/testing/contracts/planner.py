@@ -32,7 +32,7 @@ IMPOSSIBLE_REQUESTS = (
     (START, Pose2(8.05, 5), ErrorCode.GOAL_OCCUPIED),
     (START, Pose2(15, 3.5), ErrorCode.NO_VALID_PATH),
 )
-"""Start, goal, and expected error code of requests that no planner can fulfill."""
+"""(start, goal, expected error code) of requests that no planner can fulfill."""
 
 
 @cache
@@ -61,7 +61,7 @@ class PlannerContract(ComponentContract):
     def plan(
         self, planner: Planner, view: CostmapView, seed: int, start_and_goal: tuple[Pose2, Pose2] = (START, GOAL)
     ) -> Array:
-        """Return the points (n, 3) of a plan. Raises PromiseBroken if they have a wrong shape or are not finite."""
+        """Return the points (n, 3) of a plan. Raises PromiseBroken if the result is not a Path with finite points."""
         path = call_component("plans", lambda: planner.plan(view, *start_and_goal, seed))
         require(isinstance(path, Path), f"returns {type(path).__name__}, not a Path")
         points = path.points
@@ -72,7 +72,7 @@ class PlannerContract(ComponentContract):
 
     @promise
     def success_begins_at_the_start_and_ends_near_the_goal(self) -> None:
-        """Given a path then it begins at the start and ends within the tolerance of the goal."""
+        """Given a reachable goal then the path begins at the start and ends within the tolerance of the goal."""
         for seed in (1, 2, 3):
             points = self.plan(self.build(), self.view(), seed)
             offset = float(np.hypot(*(points[0, :2] - START[:2])))
@@ -86,8 +86,8 @@ class PlannerContract(ComponentContract):
     @promise
     def points_are_at_most_a_tenth_of_a_meter_apart(self) -> None:
         """Given a path then consecutive points are at most 0.1 m apart."""
-        widest = float(np.hypot(*np.diff(self.plan(self.build(), self.view(), 1)[:, :2], axis=0).T).max(initial=0.0))
-        require(widest <= MAX_POINT_SPACING_M + 1e-9, f"two points are {widest:.3f} m apart")
+        max_gap = float(np.hypot(*np.diff(self.plan(self.build(), self.view(), 1)[:, :2], axis=0).T).max(initial=0.0))
+        require(max_gap <= MAX_POINT_SPACING_M + 1e-9, f"two points are {max_gap:.3f} m apart")
 
     @promise
     def the_footprint_is_never_on_a_lethal_cell(self) -> None:
@@ -98,12 +98,12 @@ class PlannerContract(ComponentContract):
             points = self.plan(self.build(), view, seed)
             in_collision = ~footprint.free(view, points)
             in_collision[0] = False
-            at = points[in_collision.argmax()].round(3).tolist()
-            require(not in_collision.any(), f"the robot is in collision at {at} (x, y, yaw)")
+            pose = points[in_collision.argmax()].round(3).tolist()
+            require(not in_collision.any(), f"the robot is in collision at {pose} (x, y, yaw)")
 
     @promise
     def an_impossible_request_fails_with_its_error_code(self) -> None:
-        """Given a start or goal outside the map or in an obstacle, or no path, then it fails with the error code."""
+        """Given a request without a solution then the planner fails with the error code of IMPOSSIBLE_REQUESTS."""
         for start, goal, code in IMPOSSIBLE_REQUESTS:
             try:
                 self.plan(self.build(), self.view(), 1, (start, goal))
@@ -122,7 +122,7 @@ class PlannerContract(ComponentContract):
 
     @promise
     def a_costmap_is_neither_changed_nor_kept(self) -> None:
-        """Given a costmap then it is not changed, and later changes of this costmap do not affect later plans."""
+        """Given a costmap then the planner does not change it, and later changes of it do not affect later plans."""
         planner, view, untouched = self.build(), self.view(), self.view()
         first = self.plan(planner, view, 1)
         require(are_equal_costmaps(view, untouched), "changes the costmap")

@@ -22,12 +22,16 @@ from simscen.sensors.sensor import Sensor, SensorSetting
 from simscen.testing.contracts.base import Contract, call_component, promise, require
 from simscen.testing.fakes import DIFFERENTIAL_DRIVE, FakeSensorView, SquareRoomRays
 
+SENSOR_NAME = "tested_sensor"
+"""Name of the tested sensor, and of the sensor of the readings that a fault receives."""
 READINGS: dict[str, Callable[[int], Reading]] = {
-    "Scan": lambda k: Scan("it", 24 * k, np.linspace(0.5, 5.0, 60) + 0.01 * k, -3.0, 0.1, 0.05, 8.0),
-    "Odometry": lambda k: Odometry("it", 24 * k, Pose2(0.05 * k, 0.01 * k, 0.02 * k), Twist(0.5, 0.0, 0.2)),
-    "Imu": lambda k: Imu("it", 24 * k, (0.0, 0.0, 0.2), (0.1, 0.0, 9.81)),
-    "Bump": lambda k: Bump("it", 24 * k, k % 2 == 0),
-    "Image": lambda k: Image("it", 24 * k, np.full((4, 6, 3), k % 200, np.uint8), np.full((4, 6), 2.0, np.float32)),
+    "Scan": lambda k: Scan(SENSOR_NAME, 24 * k, np.linspace(0.5, 5.0, 60) + 0.01 * k, -3.0, 0.1, 0.05, 8.0),
+    "Odometry": lambda k: Odometry(SENSOR_NAME, 24 * k, Pose2(0.05 * k, 0.01 * k, 0.02 * k), Twist(0.5, 0.0, 0.2)),
+    "Imu": lambda k: Imu(SENSOR_NAME, 24 * k, (0.0, 0.0, 0.2), (0.1, 0.0, 9.81)),
+    "Bump": lambda k: Bump(SENSOR_NAME, 24 * k, k % 2 == 0),
+    "Image": lambda k: Image(
+        SENSOR_NAME, 24 * k, np.full((4, 6, 3), k % 200, np.uint8), np.full((4, 6), 2.0, np.float32)
+    ),
 }
 """Functions that return the k-th reading of each type. There is a reading every 24 ticks."""
 FAULT_READING_COUNT = 40
@@ -36,15 +40,15 @@ GRID = OccupancyGrid(np.where(np.eye(20, dtype=bool), OCCUPIED, FREE).astype(np.
 
 
 class FakeSensorSimulator:
-    """Fake of faults.base.SensorSimulator, with which a fault can simulate a displaced sensor or missing objects."""
+    """Fake of faults.base.SensorSimulator, with which a fault simulates a displaced sensor or ignores objects."""
 
     def distances(self, scan: Scan, error: Pose3 | None = None, without: Collection[str] = ()) -> Array:
-        """Return ranges of 2 m for the actual sensor mount and all objects, otherwise of 4 m."""
+        """Return ranges of 2 m; with a displaced mount or without some objects, of 4 m."""
         return np.full(len(scan.ranges), 2.0 if error is None and not without else 4.0)
 
     def image(self, error: Pose3) -> Image:
         """Return a gray image."""
-        return Image("it", 0, np.full((4, 6, 3), 90, np.uint8), np.full((4, 6), 3.0, np.float32))
+        return Image(SENSOR_NAME, 0, np.full((4, 6, 3), 90, np.uint8), np.full((4, 6), 3.0, np.float32))
 
 
 class FaultContract(Contract):
@@ -111,12 +115,12 @@ class FaultContract(Contract):
         """Given the same inputs and random generator then the outputs are bit-identical."""
         for kind in sorted(self.spec.affects):
             one, other = (self.outputs(kind) for _ in range(2))
-            same = len(one) == len(other) and all(map(are_identical, one, other))
-            require(same, f"returns different outputs for the same {kind} and generator")
+            is_same = len(one) == len(other) and all(map(are_identical, one, other))
+            require(is_same, f"returns different outputs for the same {kind} and generator")
 
     @promise
     def a_reading_is_never_changed(self) -> None:
-        """Given a reading then it is not changed, because the log contains it."""
+        """Given a reading then the fault does not change it, because the log contains it."""
         for kind in sorted(set(self.spec.affects) & set(READINGS)):
             effect = self.start(kind)
             for k in range(FAULT_READING_COUNT):
@@ -127,7 +131,7 @@ class FaultContract(Contract):
 
     @promise
     def its_end_leaves_an_effect_or_nothing(self) -> None:
-        """Given the end of a fault then it returns its remaining FaultEffect, or None."""
+        """Given the end of a fault then `end` returns the remaining FaultEffect, or None."""
         for kind in sorted(self.spec.affects):
             remaining = call_component("ends", self.start(kind).end)
             require(remaining is None or isinstance(remaining, FaultEffect), f"leaves {remaining!r}")
@@ -148,11 +152,9 @@ def _belief(number: int) -> Belief:
     return Belief(pose, 0.01 * np.eye(3), pose.compose(odometry.inverse()), updated=24 * number)
 
 
-SENSOR_NAME = "it"
-"""Name of the tested sensor."""
 READING_COUNT = 20
 FIELDS_WITH_NAN = ("ranges", "depth")
-"""Fields of readings that may be infinite or nan, for beams and pixels without a return."""
+"""Fields of readings that can be infinite or nan, for beams and pixels without a return."""
 
 
 class SensorContract(Contract):
@@ -170,7 +172,7 @@ class SensorContract(Contract):
         return call_component("is built", lambda: self.spec.implementation()(self.spec, setting)), view, period
 
     def measure(self, sensor: Sensor, view: FakeSensorView, period: int) -> list[Reading]:
-        """Return READING_COUNT readings from the first period on. `view` and `period` are as in `build`."""
+        """Return READING_COUNT readings, one for each period. `view` and `period` are those of `build`."""
         readings = []
         for k in range(1, READING_COUNT + 1):
             view.seconds = k * period / 240
@@ -179,7 +181,7 @@ class SensorContract(Contract):
 
     @promise
     def a_reading_has_the_declared_type_name_and_tick(self) -> None:
-        """Given a reading then it has the type of the specification, the name of the sensor, and its tick."""
+        """Given a tick then the reading has this tick, the type of the specification, and the name of the sensor."""
         sensor, view, period = self.build()
         require(sensor.name == SENSOR_NAME, f"is called {sensor.name!r}, not {SENSOR_NAME!r}")
         require(sensor.period == period, f"has a period of {sensor.period!r} ticks, not {period}")
@@ -208,7 +210,7 @@ class SensorContract(Contract):
 
     @promise
     def a_reading_does_not_change_after_it_was_given(self) -> None:
-        """Given a returned reading then later readings do not change it."""
+        """Given a returned reading then later calls of the sensor do not change this reading."""
         sensor, view, period = self.build()
         first = self.measure(sensor, view, period)
         original = copy.deepcopy(first)

@@ -37,14 +37,14 @@ class DecisionCheckingStack:
         self.stack = stack
 
     def decide(self, tick: int, readings: Readings) -> Decision:
-        """Return the decision of the stack. Raises PromiseBroken if it is invalid, or if the stack changes a scan."""
+        """Return the decision of the stack. Raises PromiseBroken for an invalid decision or a changed scan."""
         ranges = [reading.ranges.copy() for reading in readings if isinstance(reading, Scan)]
         decision = call_component("decides", lambda: self.stack.decide(tick, readings))
         require(isinstance(decision, Decision), f"returns {type(decision).__name__}, not a Decision")
         require(all(map(math.isfinite, decision.command)), f"commands {tuple(decision.command)}")
         scans = [reading for reading in readings if isinstance(reading, Scan)]
-        unchanged = all(np.array_equal(a, b.ranges, equal_nan=True) for a, b in zip(ranges, scans, strict=True))
-        require(unchanged, "changes the ranges of a scan")
+        is_unchanged = all(np.array_equal(a, b.ranges, equal_nan=True) for a, b in zip(ranges, scans, strict=True))
+        require(is_unchanged, "changes the ranges of a scan")
         for event in decision.events:
             require(isinstance(event, Event) and isinstance(event.kind, EventKind), f"reports {event!r}, not an Event")
             require(event.tick == tick, f"reports at tick {tick} the event {event.kind} of tick {event.tick}")
@@ -56,13 +56,13 @@ class DecisionCheckingStack:
 
 @dataclass(frozen=True, eq=False)
 class StackContract(Contract):
-    """Contract of a stack in a room of 6 m by 4 m. `robot` is by default a round robot."""
+    """Contract of a stack in a room of 6 m by 4 m. `robot` is the driving robot; None for a round robot."""
 
     role = "stack"
     robot: RobotModel | None = None
 
     def new_drive(self, *goals: Goal, discs: tuple[tuple[float, float, float], ...] = ()) -> Drive:
-        """Return a drive to the goals before its first step. `discs` are unmapped round obstacles (x, y, radius)."""
+        """Return a drive to the goals before the first step. `discs` are unmapped obstacles (x, y, radius) in m."""
         robot, world = self.robot or round_robot(), Flatland().room(6, 4)
         grid = world.grid((-0.5, -0.5, 6.5, 4.5))
         world.discs += discs
@@ -109,9 +109,9 @@ class StackContract(Contract):
         require(
             d.result == "SUCCEEDED", f"navigation ends with {d.result or 'nothing'} after {d.tick / TICK_RATE_HZ:.0f} s"
         )
-        ended = len(d.commands) - 1
+        end_index = len(d.commands) - 1
         d.run(0.5, until="")
-        require(set(d.commands[ended:]) == {STOP}, "commands a velocity after the end of its task")
+        require(set(d.commands[end_index:]) == {STOP}, "commands a velocity after the end of its task")
         require(d.stack.goal is None, "has a goal after the end of its task")
 
     @promise
@@ -119,9 +119,9 @@ class StackContract(Contract):
         """Given a canceled task then task and goal end as canceled, and the command is zero from the next step on."""
         d = self.new_drive(FAR_GOAL, NEAR_GOAL).run(2)
         call_component("is canceled", lambda: d.stack.cancel(d.tick))
-        canceled_at = len(d.commands)
+        cancel_index = len(d.commands)
         d.run(0.5, until="")
-        require(set(d.commands[canceled_at:]) == {STOP}, "commands a velocity after it was canceled")
+        require(set(d.commands[cancel_index:]) == {STOP}, "commands a velocity after it was canceled")
         require(names_of_kind(d, "goal.canceled") == ["far"], "does not report that its goal is canceled")
         require(names_of_kind(d, "navigation.ended") == ["CANCELED"], "does not end its task as CANCELED")
 

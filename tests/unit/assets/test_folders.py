@@ -106,8 +106,8 @@ def test_file_with_a_no_break_space_in_its_name_is_found(folders: AllowedFolders
 @pytest.mark.parametrize(
     ("written", "why"),
     [
-        ("", "the uri is empty"),
-        ("a\nb", "control character in the uri"),
+        ("", "the URI is empty"),
+        ("a\nb", "the URI contains a control character"),
         ("a" * 1001, "not a usable path"),
         ("https://example.org/a.stl", "only model://, package://, file://, Fuel and relative paths are read"),
         ("package://", "the name of a model is missing"),

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from simscen.core.errors import InvalidInput, UsageError
-from simscen.editor.document import NEW, ChangedMeanwhile, Document
+from simscen.editor.document import NEW_FILE_VERSION, Document, FileChanged
 from simscen.loading.yaml.textfile import decode
 
 
@@ -34,7 +34,7 @@ def test_file_that_changed_on_disk_is_not_overwritten(tmp_path: Path) -> None:
     document = Document(file, "a.yaml")
     _, version = document.read()
     file.write_text("a: 2\n")
-    with pytest.raises(ChangedMeanwhile, match="was changed by another program") as refused:
+    with pytest.raises(FileChanged, match="was changed by another program") as refused:
         document.save("a: 3\n", version)
     assert refused.value.content.text == "a: 2\n"
     assert file.read_text() == "a: 2\n"
@@ -46,12 +46,12 @@ def test_new_file_does_not_overwrite_a_file_created_meanwhile(tmp_path: Path) ->
     file = tmp_path / "a.yaml"
     document = Document(file, "a.yaml")
     file.write_text("theirs\n")
-    with pytest.raises(ChangedMeanwhile, match="was created"):
-        document.save("mine\n", NEW)
+    with pytest.raises(FileChanged, match="was created"):
+        document.save("mine\n", NEW_FILE_VERSION)
     file.unlink()
-    version = document.save("mine\n", NEW)
+    version = document.save("mine\n", NEW_FILE_VERSION)
     file.unlink()
-    with pytest.raises(ChangedMeanwhile, match="was deleted"):
+    with pytest.raises(FileChanged, match="was deleted"):
         document.save("mine\n", version)
     document.save("mine\n", version, overwrite=True)
     assert file.read_text() == "mine\n"
@@ -71,7 +71,7 @@ def test_missing_folder_is_an_error_with_a_reason(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")
     with pytest.raises(UsageError, match="cannot be written"):
-        Document(blocked / "a.yaml", "a.yaml").save("a: 1\n", NEW)
+        Document(blocked / "a.yaml", "a.yaml").save("a: 1\n", NEW_FILE_VERSION)
 
 
 def test_file_that_changes_while_it_is_read_is_not_overwritten(tmp_path: Path, monkeypatch) -> None:
@@ -86,7 +86,7 @@ def test_file_that_changes_while_it_is_read_is_not_overwritten(tmp_path: Path, m
     monkeypatch.setattr("simscen.editor.document.decode", decode_slowly)
     text, version = document.read()
     assert text == "mine\n"
-    with pytest.raises(ChangedMeanwhile) as refused:
+    with pytest.raises(FileChanged) as refused:
         document.save("mine, edited\n", version)
     assert refused.value.content.text == "theirs\n"
     assert file.read_text() == "theirs\n"
@@ -113,12 +113,12 @@ def test_unreadable_file_is_not_replaced_by_a_new_one(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr(Path, "read_bytes", refuse)
     with pytest.raises(UsageError, match=r"a\.yaml: cannot be read: Permission denied"):
-        Document(file, "a.yaml").save("mine\n", NEW)
+        Document(file, "a.yaml").save("mine\n", NEW_FILE_VERSION)
     assert file.read_text() == "theirs\n"
 
 
 def test_text_with_a_lone_surrogate_is_not_saved(tmp_path: Path) -> None:
     file = tmp_path / "a.yaml"
     with pytest.raises(UsageError, match=r"U\+D800 is not a valid character"):
-        Document(file, "a.yaml").save("x: \ud800\n", NEW)
+        Document(file, "a.yaml").save("x: \ud800\n", NEW_FILE_VERSION)
     assert not file.exists()
