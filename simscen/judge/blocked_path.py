@@ -43,9 +43,9 @@ def diagnose_blocked_path(
     width, passage = min(narrowed, key=lambda pair: (pair[0], pair[1].width))
     blocking = _blocking_objects(passage, objects, max(robot_width, width + NEGLIGIBLE_WIDTH_M))
     verb = "closes" if width < robot_width else "narrows"
-    named = " and ".join(each.describe(trace) for each in blocking)
+    names = " and ".join(each.describe(trace) for each in blocking)
     text = (
-        f"{named} {verb if len(blocking) == 1 else verb[:-1]} {passage.description} on the shortest path: "
+        f"{names} {verb if len(blocking) == 1 else verb[:-1]} {passage.description} on the shortest path: "
         f"{f'{width:.2f} m are' if width >= NEGLIGIBLE_WIDTH_M else 'nothing is'} left, "
         f"the robot is {robot_width:.2f} m wide"
     )

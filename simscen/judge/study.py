@@ -204,8 +204,8 @@ def _effect(values: Sequence[Any], margins: Sequence[float]) -> tuple[float, flo
     if all(map(_is_number, numbers)):
         if len(set(numbers)) < 2:  # such as 1 m and 100 cm
             return None
-        found = stats.spearmanr(numbers, margins)
-        return float(found.statistic), float(found.pvalue), True
+        correlation = stats.spearmanr(numbers, margins)
+        return float(correlation.statistic), float(correlation.pvalue), True
     groups: dict[str, list[float]] = defaultdict(list)
     for text, margin in zip(texts, margins, strict=True):
         groups[text].append(margin)

@@ -51,7 +51,11 @@ def compare_sessions(
 
     `sessions` are the results and `folders` the output folders, by name of the session.
     """
-    runs = [replace(run, key=comparison_key(run.key, name)) for name, own in sessions.items() for run in own]
+    runs = [
+        replace(run, key=comparison_key(run.key, name))
+        for name, session_runs in sessions.items()
+        for run in session_runs
+    ]
     return _compare(runs, folders, significance)
 
 
@@ -246,8 +250,8 @@ def comparison_data(comparison: Comparison) -> dict[str, Any]:
     return {
         "baseline": comparison.baseline,
         "stacks": [
-            {"name": name, "given": given, **asdict(comparison.total(name))}
-            for name, given in comparison.stacks.items()
+            {"name": name, "given": value, **asdict(comparison.total(name))}
+            for name, value in comparison.stacks.items()
         ],
         "scenarios": [
             {"scenario": scenario, "stacks": {name: asdict(one) for name, one in row.items()}}

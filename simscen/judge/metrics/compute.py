@@ -78,16 +78,19 @@ def compute_metrics(trace: Trace, case: Case, coverage: LogCoverage = COMPLETE_C
         (_EVENT_METRICS, lambda: _event_metrics(trace)),
         (POSE_METRICS, lambda: pose_metrics(trace)),
     )
-    found: Values = {}
+    computed: Values = {}
     for names, compute in groups:
-        found |= _compute_or_explain(names, compute)
-    found |= {name: reason for name in METRICS if (reason := _insufficient_evidence(METRICS[name].evidence, coverage))}
-    return _metric_values({name: found[name] for name in METRICS})
+        computed |= _compute_or_explain(names, compute)
+    for name, metric in METRICS.items():
+        if reason := _insufficient_evidence(metric.evidence, coverage):
+            computed[name] = reason
+    return _metric_values({name: computed[name] for name in METRICS})
 
 
-def _metric_values(found: Values) -> MetricValues:
-    values = {name: None if isinstance(value, str) else value for name, value in found.items()}
-    return MetricValues(values, {name: value for name, value in found.items() if isinstance(value, str)})
+def _metric_values(computed: Values) -> MetricValues:
+    """Separate the numbers from the reasons for undefined metrics."""
+    values = {name: None if isinstance(value, str) else value for name, value in computed.items()}
+    return MetricValues(values, {name: value for name, value in computed.items() if isinstance(value, str)})
 
 
 def _compute_or_explain(names: Sequence[str], compute: Callable[[], Values]) -> Values:
@@ -118,15 +121,15 @@ def barn_score(success: bool, seconds: float, reference_length: float) -> float:
 def _navigation_metrics(trace: Trace, case: Case, length: float) -> Values:
     shortest, unknown_reason = shortest_path_length(trace, case)
     success, seconds = _success(trace, case), _time_to_goal(trace, case)
-    found: Values = {
+    metrics: Values = {
         "success": float(success) if goal_outcomes(trace, case) else NO_GOALS,
         "path_length": length,
         "time_to_goal": seconds,
     }
     if unknown_reason:
-        return {**found, **dict.fromkeys(_SHORTEST_PATH_METRICS, unknown_reason)}
+        return {**metrics, **dict.fromkeys(_SHORTEST_PATH_METRICS, unknown_reason)}
     return {
-        **found,
+        **metrics,
         "barn_score": _barn_score(case, success, seconds, shortest),
         "shortest_length": shortest,
         "path_length_ratio": length / shortest,
@@ -257,15 +260,15 @@ def _value(entry: AnyMeasure, trace: Trace, case: Case, coverage: LogCoverage) -
     if reason := _insufficient_evidence(frozenset(Evidence) if required is None else required, coverage):
         return reason
     try:
-        found = entry.measure.measure(trace, case)
+        value = entry.measure.measure(trace, case)
     except MissingEvidence as missing:
         return str(missing)
     except Exception as error:  # a plug-in can raise anything
         place = exception_place(error, type(entry.measure).__module__)
         message = f"metric {entry.kind}: {type(error).__name__}: {error}, at {place}{entry.plugin_suffix}"
         raise InvalidTrace(message) from error
-    if isinstance(found, str) and found:
-        return found
-    if isinstance(found, bool) or not isinstance(found, int | float) or not math.isfinite(found):
-        raise InvalidTrace(f"metric {entry.kind} is not a finite number: {found!r}{entry.plugin_suffix}")
-    return float(found)
+    if isinstance(value, str) and value:
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InvalidTrace(f"metric {entry.kind} is not a finite number: {value!r}{entry.plugin_suffix}")
+    return float(value)

@@ -147,16 +147,16 @@ class LocalizerContract(Contract):
         require_near_start(valid_belief(subject), "after a reset and the first odometry")
 
 
-def require_near_start(belief: Belief, when: str) -> None:
+def require_near_start(belief: Belief, occasion: str) -> None:
     """Raise PromiseBroken if the belief is more than three standard deviations from `start_estimate()`.
 
-    `when` is the end of the message, such as "after a reset".
+    `occasion` is the end of the message, such as "after a reset".
     """
     start = start_estimate()
     assert start.pose is not None
     x, y, yaw = np.abs(tuple(start.pose.between(belief.pose))).tolist()
     is_near = max(x, y) <= 3 * start.std[0] and yaw <= 3 * start.std[2]
-    require(is_near, f"believes to be at {belief.pose} {when}, but was reset to {start.pose}")
+    require(is_near, f"believes to be at {belief.pose} {occasion}, but was reset to {start.pose}")
 
 
 def send_odometry(subject: Localizer, number: int, pose: Pose2) -> None:
