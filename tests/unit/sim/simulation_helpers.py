@@ -23,14 +23,14 @@ def box(name, x, y, length, width, height=1.0, yaw=0.0):
 
 
 def measure_motion(simulation, ticks, every=6):
-    """Step the simulation; return the heading turned in rad (full turns count) and the path driven in m."""
-    turned = length = 0.0
+    """Step the simulation; return the change of heading in rad, with full turns, and the path length in m."""
+    rotation = length = 0.0
     before = simulation.truth().pose.plane
     for _ in range(ticks // every):
         simulation.step(every)
         now = simulation.truth().pose.plane
         step = before.between(now)
-        turned += step.yaw
+        rotation += step.yaw
         length += math.hypot(step.x, step.y)
         before = now
-    return turned, length
+    return rotation, length

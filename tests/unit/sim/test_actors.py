@@ -1,3 +1,5 @@
+"""Tests of movable objects: scripted paths, pushes, spawning, and removal."""
+
 import math
 
 import pytest
@@ -59,7 +61,7 @@ def test_a_cart_pushes_a_crate_along(simulate):
 
 
 def test_friction_stops_a_pushed_crate(simulate):
-    """v²/2µg with the friction of both: 0.6 on the ground's 1.0."""
+    """The distance is v²/2µg; µ is the product of the friction of the crate, 0.6, and of the ground, 1.0."""
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), mass=10.0)])
     simulation.push_object("crate", (10.0, 0.0))
     simulation.step(480)

@@ -12,13 +12,13 @@ def test_bodies_do_not_meet_within_the_guaranteed_time():
     for _ in range(300):
         scripted = BoundingDiscs(rng.uniform(-2, 2, (3, 2)), rng.uniform(0.1, 0.3, 3), rng.uniform(0, 2, 3))
         pushable = BoundingDiscs(rng.uniform(-2, 2, (4, 2)), rng.uniform(0.1, 0.3, 4), rng.uniform(0, 1, 4))
-        found = find_candidates(scripted, pushable, hit_speed=1.5)
-        assert 0 < found.seconds <= SPEED_HORIZON_S
-        apart = np.linalg.norm(scripted.centers[:, None] - pushable.centers, axis=2)
-        reach = scripted.radii[:, None] + pushable.radii + found.seconds * (scripted.speeds[:, None] + 1.5)
-        for mover, pushed in np.argwhere(apart < reach).tolist():
-            assert mover in found.scripted
-            assert pushed in found.pushable
+        candidates = find_candidates(scripted, pushable, hit_speed=1.5)
+        assert 0 < candidates.seconds <= SPEED_HORIZON_S
+        distances = np.linalg.norm(scripted.centers[:, None] - pushable.centers, axis=2)
+        reach = scripted.radii[:, None] + pushable.radii + candidates.seconds * (scripted.speeds[:, None] + 1.5)
+        for mover, pushed in np.argwhere(distances < reach).tolist():
+            assert mover in candidates.scripted
+            assert pushed in candidates.pushable
 
 
 def test_distant_bodies_are_skipped_and_jumping_bodies_are_checked():

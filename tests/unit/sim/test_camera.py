@@ -1,3 +1,5 @@
+"""Tests of color and depth images."""
+
 import math
 
 import numpy as np
@@ -56,11 +58,14 @@ def test_two_images_of_the_same_scene_are_equal(simulate):
 def test_camera_does_not_change_the_motion(simulate):
     path = MotionPath((0.0, 1.0), (Pose2(5, 0), Pose2(3, 0)))
     cart = Body("cart", (box("cart", 0, 0, 0.2, 2, 2),), Pose3(5), path=path)
-    seen, unseen = (
+    with_images, without_images = (
         simulate(solids=[box("wall", 1.5, 0.5, 0.1, 1)], bodies=[cart], drive=(0.5, 0.0, 0.3), has_images=has_images)
         for has_images in (True, False)
     )
     for _ in range(60):
-        seen.step(6)
-        unseen.step(6)
-        assert seen.truth() == unseen.truth() and seen.robot.collisions() == unseen.robot.collisions()
+        with_images.step(6)
+        without_images.step(6)
+        assert (
+            with_images.truth() == without_images.truth()
+            and with_images.robot.collisions() == without_images.robot.collisions()
+        )

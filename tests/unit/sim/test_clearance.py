@@ -47,10 +47,10 @@ def test_clearance_of_a_round_robot_to_a_post(simulate):
 
 @pytest.mark.parametrize("yaw", [0.0, 0.3, 0.8, 1.5])
 def test_clearance_of_a_rectangular_robot_between_boxes(simulate, yaw):
-    others = [(1.2, 0.7, 0.5, 0.3, 0.2), (-0.9, -0.6, 0.2, 0.2, 0.9), (0.2, 1.1, 1.0, 0.1, 0.0)]
-    solids = [box(f"box{k}", *values[:4], yaw=values[4]) for k, values in enumerate(others)]
+    rectangles = [(1.2, 0.7, 0.5, 0.3, 0.2), (-0.9, -0.6, 0.2, 0.2, 0.9), (0.2, 1.1, 1.0, 0.1, 0.0)]
+    solids = [box(f"box{k}", *values[:4], yaw=values[4]) for k, values in enumerate(rectangles)]
     hull = Polygon(_corners(0, 0, 0.9, 0.6, yaw))
-    expected = hull.distance(unary_union([Polygon(_corners(*values)) for values in others]))
+    expected = hull.distance(unary_union([Polygon(_corners(*values)) for values in rectangles]))
     simulation = simulate("amr", solids, pose=Pose2(0.0, 0.0, yaw))
     assert simulation.truth().clearance == pytest.approx(expected, abs=MILLIMETER)
 
@@ -72,7 +72,7 @@ def test_clearance_counts_distant_objects_as_soon_as_they_come_near(simulate):
     ball = Body("ball", (Solid(Sphere(0.15)),), Pose3(8.0, 0.0, 0.15), 1.0)
     simulation, nearest = simulate(bodies=[cart, ball]), []
     for tick in range(0, 240 * 12, 6):
-        if tick == 240 * 6:  # it has fallen asleep
+        if tick == 240 * 6:  # the ball has fallen asleep
             simulation.push_object("ball", (-2.0, 0.0))
         simulation.step(6)
         truth = simulation.truth()
@@ -121,6 +121,7 @@ def test_clearance_while_driving_equals_the_planar_distance(simulate):
 
 
 def _corners(x, y, length, width, yaw):
+    """Return the corners of a rotated rectangle around (x, y)."""
     c, s = math.cos(yaw), math.sin(yaw)
     half = [(a * length / 2, b * width / 2) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     return [(x + c * u - s * v, y + s * u + c * v) for u, v in half]

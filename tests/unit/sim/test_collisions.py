@@ -20,6 +20,7 @@ CART = (box("cart", 0, 0, 0.6, 0.6, 0.5),)
 
 
 def collisions(simulation, ticks, every=6):
+    """Step the simulation; return the collision events, which are read every `every` ticks."""
     events = []
     for _ in range(ticks // every):
         simulation.step(every)
@@ -27,7 +28,7 @@ def collisions(simulation, ticks, every=6):
     return events
 
 
-def started(events):
+def collision_starts(events):
     return [event for event in events if event.kind == "collision.started"]
 
 
@@ -62,7 +63,7 @@ def test_grazing_an_object_that_cannot_move_is_a_collision_caused_by_the_robot(s
     door = Body("door", (box("door", 0, 0, 8.0, 0.1),), Pose3(1.0, y))
     for name, objects in (("wall", {"solids": [wall]}), ("ramp", {"solids": [ramp]}), ("door", {"bodies": [door]})):
         simulation = simulate(**objects, pose=Pose2(0.0, 0.0, math.radians(2)), drive=(0.5, 0.0, 0.0))
-        (hit, *_) = started(collisions(simulation, 960))
+        (hit, *_) = collision_starts(collisions(simulation, 960))
         assert (hit.name, hit.data["robot_caused"]) == (name, True)
         assert hit.data["robot_speed"] < MIN_CAUSING_SPEED_M_S
 
@@ -70,7 +71,7 @@ def test_grazing_an_object_that_cannot_move_is_a_collision_caused_by_the_robot(s
 def test_cart_that_hits_a_stationary_robot_causes_the_collision_and_pushes_it(simulate):
     cart = Body("cart", CART, Pose3(-2.0), path=MotionPath((0.0, 4.0), (Pose2(-2, 0), Pose2(2, 0))))
     simulation = simulate(bodies=[cart])
-    (hit,) = started(collisions(simulation, 720))
+    (hit,) = collision_starts(collisions(simulation, 720))
     assert hit.name == "cart"
     assert hit.data["robot_caused"] is False
     assert hit.data["speed"] == pytest.approx(1.0, abs=0.01)
@@ -80,7 +81,7 @@ def test_cart_that_hits_a_stationary_robot_causes_the_collision_and_pushes_it(si
 
 
 def test_robot_that_hits_a_stationary_body_causes_the_collision(simulate):
-    (hit,) = started(collisions(simulate(bodies=[Body("cart", CART, Pose3(1.0))], drive=(0.5, 0.0, 0.0)), 720))
+    (hit,) = collision_starts(collisions(simulate(bodies=[Body("cart", CART, Pose3(1.0))], drive=(0.5, 0.0, 0.0)), 720))
     assert (hit.name, hit.data["robot_caused"]) == ("cart", True)
 
 
@@ -132,7 +133,7 @@ def test_collisions_equal_those_of_a_query_after_every_tick(simulate, monkeypatc
     skipping = run()
     monkeypatch.setattr("simscen.sim.contact.clearance.SPEED_HORIZON_S", -1.0)
     polling = run()
-    assert started(polling[0])
+    assert collision_starts(polling[0])
     assert skipping == polling
 
 
@@ -145,7 +146,7 @@ def test_thin_plate_at_maximum_speed_collides_with_the_robot(simulate, offset_ti
     start = offset_ticks / 240
     path = MotionPath((0.0, 4 / FAST_M_S), (Pose2(0, -2, 0), Pose2(0, 2, 0)), start=start)
     simulation = simulate(bodies=[Body("plate", THIN_PLATE, Pose3(0.0, -2.0), path=path)])
-    assert [hit.name for hit in started(collisions(simulation, 120))] == ["plate"]
+    assert [hit.name for hit in collision_starts(collisions(simulation, 120))] == ["plate"]
 
 
 @pytest.mark.parametrize("offset_ticks", [0.0, 0.25, 0.5, 0.75])
@@ -153,7 +154,7 @@ def test_thin_plate_rotating_at_maximum_speed_collides_with_the_robot(simulate, 
     seconds = math.pi / 2 * 0.51 / FAST_M_S
     path = MotionPath((0.0, seconds), (Pose2(0, -0.55, 0), Pose2(0, -0.55, math.pi / 2)), start=offset_ticks / 240)
     simulation = simulate(bodies=[Body("plate", THIN_PLATE, Pose3(0.0, -0.55), path=path)])
-    assert [hit.name for hit in started(collisions(simulation, 120))] == ["plate"]
+    assert [hit.name for hit in collision_starts(collisions(simulation, 120))] == ["plate"]
 
 
 def test_path_that_moves_a_body_too_far_in_one_tick_is_an_error(simulate):

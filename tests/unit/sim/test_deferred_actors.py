@@ -39,13 +39,14 @@ def random_path(rng, start, spread):
 
 
 def random_body(rng, name, start):
+    """Return a crate at `start`, with or without a path."""
     path = None if rng.random() < 0.3 else random_path(rng, start, rng.choice([1, 5]))
     return Body(name, CRATE, Pose3(*start), path=path)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_actors_whose_paths_come_within_reach_are_activated(simulate, seed):
-    """Compare with the distances of the paths at 101 times."""
+    """The expected distances are those of the paths at 101 times."""
     rng = random.Random(seed)
     bodies = [random_body(rng, f"{k}", (rng.uniform(-20, 20), rng.uniform(-20, 20))) for k in range(60)]
     simulation = simulate(bodies=bodies, pose=Pose2(100.0, 100.0), has_images=False)
@@ -53,21 +54,22 @@ def test_actors_whose_paths_come_within_reach_are_activated(simulate, seed):
     deferred, place = DeferredActors(actors), (rng.uniform(-5, 5), rng.uniform(-5, 5), 0.0)
     near, measured = deferred.activate_near([ProximityQuery(place, 3.0, 6.0)])
 
-    def nearest(actor: Actor) -> float:
+    def min_distance(actor: Actor) -> float:
+        """Return the minimum distance of the actor's bounding circle from `place` along its path in m."""
         if actor.path is None:
             return math.dist(actor.body.pose[:2], place[:2]) - actor.bounding_radius
         times = (k / 100 * actor.path.times[-1] for k in range(101))
         distances = (math.dist(pose_at(actor.path, actor.path.start + at)[:2], place[:2]) for at in times)
         return min(distances) - actor.bounding_radius
 
-    distances = {actor.body.name: nearest(actor) for actor in actors}
+    distances = {actor.body.name: min_distance(actor) for actor in actors}
     deviations = {actor.body.name: max(segment.deviation for segment in actor.segments) for actor in actors}
     names = {actor.body.name for actor in near}
     assert 0 < len(names) < 50
     assert {name for name, distance in distances.items() if distance <= 3.0 + REQUERY_DISTANCE_M} <= names
     assert {name for name in names if distances[name] > 3.2 + REQUERY_DISTANCE_M + deviations[name]} == set()
     assert {actor.body.name for actor in measured} >= {
-        n for n, d in distances.items() if 4.0 + deviations[n] < d <= 6.0
+        name for name, distance in distances.items() if 4.0 + deviations[name] < distance <= 6.0
     }
     assert not names & {actor.body.name for actor in measured}
     shifted = (place[0] + REQUERY_DISTANCE_M, *place[1:])
@@ -203,7 +205,7 @@ def test_steered_actor_is_not_deferred(simulate):
 
 
 def test_distance_to_a_deferred_actor_is_an_error(simulate):
-    """Otherwise, a collision with it could be missed."""
+    """Otherwise, a collision with a deferred actor could be missed."""
     simulation = simulate(bodies=[FAR], has_images=False)
     with pytest.raises(LookupError, match='"far" is not in the engine'):
         simulation._scene.actors.prepare_nearby(simulation.robot.base.id, (7.0, 0.0, 0.0), 2.0, 2.0, 0)

@@ -39,8 +39,8 @@ def test_robot_drives_straight_at_the_commanded_speed(simulate, robot):
 def test_turn_in_place_has_the_commanded_rate_and_stays_in_place(simulate, robot):
     simulation = simulate(robot, drive=(0.0, 0.0, 1.0))
     simulation.step(TICKS)
-    turned, _ = measure_motion(simulation, round(2 * math.pi * TICKS / 6) * 6)
-    assert turned == pytest.approx(2 * math.pi, rel=2e-3)
+    rotation, _ = measure_motion(simulation, round(2 * math.pi * TICKS / 6) * 6)
+    assert rotation == pytest.approx(2 * math.pi, rel=2e-3)
     pose = simulation.truth().pose
     assert math.hypot(pose.x, pose.y) < 5e-3
 
@@ -50,8 +50,8 @@ def test_turn_in_place_has_the_commanded_rate_and_stays_in_place(simulate, robot
 def test_a_circle_has_the_radius_of_speed_over_turn_rate(simulate, robot, speed, turn):
     simulation = simulate(robot, drive=(speed, 0.0, turn))
     simulation.step(2 * TICKS)
-    turned, length = measure_motion(simulation, 4 * TICKS)
-    assert length / turned == pytest.approx(speed / turn, rel=0.01)
+    rotation, length = measure_motion(simulation, 4 * TICKS)
+    assert length / rotation == pytest.approx(speed / turn, rel=0.01)
 
 
 def test_base_accelerates_and_brakes_at_its_limits(simulate):
@@ -80,8 +80,8 @@ def test_omnidirectional_base_drives_sideways_and_in_arcs(simulate):
     assert simulation.truth().twist == pytest.approx((0.3, 0.4, 0.0), abs=1e-6)
     simulation.drive(Twist(0.3, 0.4, 1.0))
     simulation.step(TICKS)
-    turned, length = measure_motion(simulation, 3 * TICKS)
-    assert length / turned == pytest.approx(0.5, rel=2e-3)
+    rotation, length = measure_motion(simulation, 3 * TICKS)
+    assert length / rotation == pytest.approx(0.5, rel=2e-3)
 
 
 def test_encoders_of_a_mecanum_base_count_two_wheels_in_diagonal_motion(simulate):
@@ -90,8 +90,8 @@ def test_encoders_of_a_mecanum_base_count_two_wheels_in_diagonal_motion(simulate
     simulation.step(2 * TICKS)
     before = simulation.encoders()
     simulation.step(TICKS)
-    rolled = [b - a for a, b in zip(before, simulation.encoders(), strict=True)]
-    assert rolled == pytest.approx([0.0, 0.6 / 0.0475, 0.6 / 0.0475, 0.0], abs=1e-4)
+    wheel_rotation = [b - a for a, b in zip(before, simulation.encoders(), strict=True)]
+    assert wheel_rotation == pytest.approx([0.0, 0.6 / 0.0475, 0.6 / 0.0475, 0.0], abs=1e-4)
     assert simulation.truth().twist == pytest.approx((0.3, 0.3, 0.0), abs=1e-6)
 
 
@@ -101,9 +101,9 @@ def test_encoders_of_a_mecanum_base_count_all_wheels_in_a_turn(simulate):
     simulation.step(2 * TICKS)
     before = simulation.encoders()
     simulation.step(TICKS)
-    rolled = [b - a for a, b in zip(before, simulation.encoders(), strict=True)]
+    wheel_rotation = [b - a for a, b in zip(before, simulation.encoders(), strict=True)]
     wheel = (0.235 + 0.15) / 0.0475
-    assert rolled == pytest.approx([-wheel, wheel, -wheel, wheel], rel=1e-4)
+    assert wheel_rotation == pytest.approx([-wheel, wheel, -wheel, wheel], rel=1e-4)
 
 
 def test_car_cannot_turn_in_place_or_tighter_than_its_steering_limit(simulate):
@@ -112,8 +112,8 @@ def test_car_cannot_turn_in_place_or_tighter_than_its_steering_limit(simulate):
     assert abs(simulation.truth().pose.yaw) < 1e-3
     simulation.drive(Twist(0.5, 0.0, 1.8))
     simulation.step(2 * TICKS)
-    turned, length = measure_motion(simulation, 4 * TICKS)
-    assert length / turned == pytest.approx(0.45 / math.tan(0.51), rel=0.01)
+    rotation, length = measure_motion(simulation, 4 * TICKS)
+    assert length / rotation == pytest.approx(0.45 / math.tan(0.51), rel=0.01)
 
 
 def test_a_car_drives_a_three_point_turn(simulate):
@@ -129,10 +129,10 @@ def test_skid_steered_robot_turns_less_than_its_wheels(simulate):
     simulation = simulate("jackal", drive=(0.0, 0.0, 1.0))
     simulation.step(TICKS)
     left, right = simulation.encoders()
-    turned, _ = measure_motion(simulation, 4 * TICKS)
+    rotation, _ = measure_motion(simulation, 4 * TICKS)
     after = simulation.encoders()
-    rolled = (after[1] - right - after[0] + left) * 0.098 / 0.37559
-    assert 1.2 < rolled / turned < 1.9
+    wheel_rotation = (after[1] - right - after[0] + left) * 0.098 / 0.37559
+    assert 1.2 < wheel_rotation / rotation < 1.9
     pose = simulation.truth().pose
     assert math.hypot(pose.x, pose.y) < 0.02
 
@@ -174,12 +174,12 @@ def test_push_moves_the_robot_in_its_direction(simulate):
 def test_a_push_in_free_flight_gives_the_robot_its_impulse(simulate):
     """Half a meter above the ground there is no friction: the change of momentum is the impulse."""
     simulation = simulate("turtlebot")
-    place, turn = pybullet.getBasePositionAndOrientation(
+    position, orientation = pybullet.getBasePositionAndOrientation(
         simulation.robot.base.id, physicsClientId=simulation._scene.client
     )
-    up = (place[0], place[1], place[2] + 0.5)
+    raised = (position[0], position[1], position[2] + 0.5)
     pybullet.resetBasePositionAndOrientation(
-        simulation.robot.base.id, up, turn, physicsClientId=simulation._scene.client
+        simulation.robot.base.id, raised, orientation, physicsClientId=simulation._scene.client
     )
     simulation.push_robot((0.9, 0.0))
     simulation.step(1)

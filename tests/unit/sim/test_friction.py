@@ -27,14 +27,14 @@ def test_four_braked_wheels_slide_for_v_squared_over_2_mu_g(simulate, friction):
     simulation.step(3 * TICKS)
     simulation.add_friction_patch("ice", FloorPatch(WHOLE_FLOOR, friction))
     start, speed = simulation.truth().pose.x, simulation.truth().twist.vx
-    rolled = simulation.encoders()[0]
+    encoder_start = simulation.encoders()[0]
     simulation.drive(STOP)
     simulation.step(5 * TICKS)
-    slid = simulation.truth().pose.x - start
-    braking = speed**2 / (2 * 3.0)  # the braking distance of the firmware, which odometry measures
-    assert slid == pytest.approx(speed**2 / (2 * friction * GRAVITY_M_S2), rel=0.03)
-    assert (simulation.encoders()[0] - rolled) * 0.098 == pytest.approx(braking, rel=0.25)
-    assert slid > 1.4 * braking
+    sliding_distance = simulation.truth().pose.x - start
+    braking_distance = speed**2 / (2 * 3.0)  # the braking distance of the firmware, which odometry measures
+    assert sliding_distance == pytest.approx(speed**2 / (2 * friction * GRAVITY_M_S2), rel=0.03)
+    assert (simulation.encoders()[0] - encoder_start) * 0.098 == pytest.approx(braking_distance, rel=0.25)
+    assert sliding_distance > 1.4 * braking_distance
 
 
 def test_spinning_wheels_accelerate_by_mu_g_and_odometry_counts_the_spin(simulate):
@@ -82,30 +82,32 @@ def test_distant_friction_patch_does_not_change_the_motion(simulate, robot):
 
 @pytest.mark.parametrize("share", [0.5, 2.0])
 def test_hull_slides_along_wall_by_coulombs_law(simulate, share):
-    """A robot on ice is pressed against a wall, and pushed along it with `share` of the friction that it can have."""
+    """A robot on ice is pressed against a wall, and pushed along it with `share` times the greatest friction force."""
     body = build_robot_body(robot_spec("jackal"))
     reach = max(x for x, _ in body.footprint)
     wall = box("wall", 1.0, 0.0, 1.0, 20.0)
     simulation = simulate(body, solids=[wall], pose=Pose2(0.5 - reach - 0.001, 0.0, 0.0))
     simulation.add_friction_patch("ice", FloorPatch(WHOLE_FLOOR, 0.0))
-    pressing = 0.5 * body.mass * GRAVITY_M_S2
-    along = share * body.hull_friction * pressing
+    normal_force = 0.5 * body.mass * GRAVITY_M_S2
+    lateral_force = share * body.hull_friction * normal_force
 
     def press(ticks):
         for _ in range(ticks):
-            simulation.push_robot((pressing / TICKS, along / TICKS))
+            simulation.push_robot((normal_force / TICKS, lateral_force / TICKS))
             simulation.step(1)
 
     press(TICKS // 4)
     before = simulation.truth().twist.vy
     press(TICKS)
-    gained = simulation.truth().twist.vy - before
-    assert gained == pytest.approx(max(0.0, along - body.hull_friction * pressing) / body.mass, abs=0.03)
+    speed_gain = simulation.truth().twist.vy - before
+    assert speed_gain == pytest.approx(
+        max(0.0, lateral_force - body.hull_friction * normal_force) / body.mass, abs=0.03
+    )
 
 
 @pytest.mark.parametrize("friction", [0.5, 1.5])
 def test_motors_of_planar_base_overcome_friction_of_hull_below_one(simulate, friction):
-    """Its motors press it against a wall with the force that they push it along with."""
+    """The motors press the base against the wall and push it along the wall with equal force."""
     body = replace(build_robot_body(robot_spec("omni")), hull_friction=friction)
     reach = max(x for x, _ in body.footprint)
     simulation = simulate(body, [box("wall", 1.0, 0.0, 1.0, 20.0)], pose=Pose2(0.499 - reach, 0.0, 0.0))

@@ -8,6 +8,7 @@ from simulation_helpers import box, robot_spec
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import Twist
+from simscen.core.geometry.meshes import drivable_solids
 from simscen.core.geometry.shapes import Body, Box, Mesh, Solid
 from simscen.sim.body.climb_limits import compute_climb_limits, grip_angle
 from simscen.sim.body.from_spec import build_robot_body
@@ -47,8 +48,8 @@ def pitch(pose):
     return math.asin(2 * (pose.qw * pose.qy - pose.qz * pose.qx))
 
 
-def drive_into(simulation, seconds):
-    """Step the simulation; return the names of the solids that the robot hits."""
+def drive_for(simulation, seconds):
+    """Step the simulation for `seconds`; return the names of the solids that the robot hits."""
     hit = []
     for _ in range(round(seconds * TICKS / 24)):
         simulation.step(24)
@@ -61,57 +62,57 @@ def drive_into(simulation, seconds):
 def test_robot_climbs_a_ramp_of_5_degrees_and_odometry_measures_along_it(on_ground, robot):
     simulation = on_ground(robot, [ramp(5)], drive=(0.4, 0.0, 0.0))
     start = simulation.encoders()[0]
-    assert drive_into(simulation, 4.5) == []
+    assert drive_for(simulation, 4.5) == []
     pose = simulation.truth().pose
-    up = (pose.x - RAMP_START_M) * math.tan(math.radians(5))
-    assert pose.z == pytest.approx(up, abs=2e-3)
+    height = (pose.x - RAMP_START_M) * math.tan(math.radians(5))
+    assert pose.z == pytest.approx(height, abs=2e-3)
     assert pitch(pose) == pytest.approx(-math.radians(5), abs=2e-3)
     radius = robot_spec(robot).drive.wheel_radius
-    along = RAMP_START_M + (pose.x - RAMP_START_M) / math.cos(math.radians(5))
-    assert (simulation.encoders()[0] - start) * radius == pytest.approx(along, rel=0.01)
+    distance = RAMP_START_M + (pose.x - RAMP_START_M) / math.cos(math.radians(5))
+    assert (simulation.encoders()[0] - start) * radius == pytest.approx(distance, rel=0.01)
     assert simulation.truth().clearance > 0.1  # a ramp that the robot can climb is no obstacle
 
 
 @pytest.mark.parametrize("robot", ["turtlebot", "amr"])
 def test_robot_collides_with_a_ramp_of_30_degrees(on_ground, robot):
     simulation = on_ground(robot, [ramp(30)], drive=(0.4, 0.0, 0.0))
-    assert "ramp" in drive_into(simulation, 4)
+    assert "ramp" in drive_for(simulation, 4)
     assert simulation.truth().pose.z < 0.02
 
 
 def test_robot_on_a_ramp_stays_at_rest(on_ground):
     simulation = on_ground("turtlebot", [ramp(5)], pose=Pose2(RAMP_START_M + 1.0, 0.2, math.pi / 2))
-    drive_into(simulation, 2)
+    drive_for(simulation, 2)
     pose = simulation.truth().pose
     assert pose.x == pytest.approx(RAMP_START_M + 1.0, abs=2e-3)
     assert pose.z == pytest.approx(math.tan(math.radians(5)), abs=2e-3)
-    assert pitch(pose) == pytest.approx(0.0, abs=2e-3)  # it faces across the slope, so it rolls instead
+    assert pitch(pose) == pytest.approx(0.0, abs=2e-3)  # the robot faces across the slope: the slope is a roll angle
 
 
 @pytest.mark.parametrize(
-    ("robot", "share", "over"),
+    ("robot", "share", "climbs"),
     [
         ("turtlebot", 0.9, True),
         ("turtlebot", 1.4, False),
         ("amr", 0.9, True),
         ("amr", 1.4, False),
-        ("jackal", 0.9, True),  # it climbs higher as well, because its rear wheels push
+        ("jackal", 0.9, True),  # the robot also climbs higher steps, because its rear wheels push
     ],
 )
-def test_driven_wheels_climb_steps_up_to_the_limit_of_their_friction(on_ground, robot, share, over):
+def test_driven_wheels_climb_steps_up_to_the_limit_of_their_friction(on_ground, robot, share, climbs):
     """Without a run-up, the limit is r (1 - 1 / sqrt(1 + mu²))."""
     body = build_robot_body(robot_spec(robot))
     step = share * compute_climb_limits(body).step
     simulation = on_ground(robot, [box("step", 1.0, 0, 1.0, 2, step)], pose=Pose2(0.3, 0, 0), drive=(0.05, 0, 0))
-    drive_into(simulation, 12)
-    assert (simulation.truth().pose.x > 0.7) == over
+    drive_for(simulation, 12)
+    assert (simulation.truth().pose.x > 0.7) == climbs
 
 
 def test_robot_drives_over_a_sill_of_6_mm_without_a_collision(on_ground):
     simulation = on_ground("turtlebot", [box("sill", RAMP_START_M, 0, 0.05, 2, 0.006)], drive=(0.4, 0, 0))
     heights = []
     for _ in range(30):
-        assert drive_into(simulation, 0.1) == []
+        assert drive_for(simulation, 0.1) == []
         heights.append(simulation.truth().pose.z)
     assert max(heights) == pytest.approx(0.006, abs=1e-3)
     assert simulation.truth().pose.x > 1.0
@@ -119,7 +120,7 @@ def test_robot_drives_over_a_sill_of_6_mm_without_a_collision(on_ground):
 
 def test_robot_collides_with_a_step_that_its_hull_cannot_pass(on_ground):
     simulation = on_ground("turtlebot", [box("step", 1.0, 0, 1, 2, 0.05)], drive=(0.4, 0, 0))
-    assert "step" in drive_into(simulation, 2)
+    assert "step" in drive_for(simulation, 2)
 
 
 @pytest.mark.parametrize(("share", "climbs"), [(0.9, False), (1.15, True)])
@@ -133,7 +134,7 @@ def test_robot_climbs_a_slope_only_with_enough_friction(on_ground, robot, share,
         low, high = (middle, high) if grip_angle(body, middle) < math.radians(degrees) else (low, middle)
     surface = ramp(degrees, friction=share * high)
     simulation = on_ground(robot, [surface], pose=Pose2(RAMP_START_M + 0.8, 0, 0), drive=(0.3, 0, 0))
-    drive_into(simulation, 2)
+    drive_for(simulation, 2)
     assert (simulation.truth().pose.x > RAMP_START_M + 0.8) == climbs
 
 
@@ -144,22 +145,20 @@ def test_robot_climbs_a_height_field_like_a_ramp(on_ground):
     number = np.arange(x.size, dtype=np.int32).reshape(x.shape)
     sw, se, nw, ne = (part.ravel() for rows in (number[:-1], number[1:]) for part in (rows[:, :-1], rows[:, 1:]))
     faces = np.concatenate((np.column_stack((sw, se, ne)), np.column_stack((sw, ne, nw))))
-    drivable_solids = Solid(Mesh(np.column_stack((x.ravel(), y.ravel(), z.ravel())), faces), Pose3(), "terrain")
-    simulation = on_ground("turtlebot", [drivable_solids], drive=(0.4, 0.0, 0.0))
-    assert drive_into(simulation, 5) == []
+    terrain = Solid(Mesh(np.column_stack((x.ravel(), y.ravel(), z.ravel())), faces), Pose3(), "terrain")
+    simulation = on_ground("turtlebot", [terrain], drive=(0.4, 0.0, 0.0))
+    assert drive_for(simulation, 5) == []
     assert simulation.truth().pose.z == pytest.approx(math.tan(math.radians(5)), abs=3e-3)
 
 
 def test_planar_base_is_stopped_by_a_ramp(on_ground):
     simulation = on_ground("omni", [ramp(10)], drive=(0.4, 0.0, 0.0))
-    assert "ramp" in drive_into(simulation, 4)
+    assert "ramp" in drive_for(simulation, 4)
     assert simulation.truth().pose.z == 0.0
 
 
 def test_walls_leave_the_ground_flat(simulate):
     """Walls contain no drivable surfaces."""
-    from simscen.core.geometry.meshes import drivable_solids
-
     mesh = merge_solids([box("wall", 1, 0, 0.1, 4), box("crate", -1, 0, 0.5, 0.5, 0.4), box("line", 0, 1, 1, 1, 0.004)])
     assert drivable_solids(mesh, 0.1) == frozenset()
     simulation = simulate(solids=[box("wall", 1, 0, 0.1, 4)], drive=(0.2, 0, 0))
@@ -174,14 +173,14 @@ def test_objects_and_robots_are_placed_on_top_of_a_platform(on_ground):
     crate = (Solid(Box((0.2, 0.2, 0.2)), Pose3(z=0.1), "crate"),)
     simulation.spawn(Body("crate", crate, Pose3(3.5, 0.5, 0.0), mass=2.0))
     simulation.place_robot(Pose2(2.8, -0.2, 0.5))
-    assert drive_into(simulation, 1) == []
+    assert drive_for(simulation, 1) == []
     assert simulation.truth().pose.z == pytest.approx(0.03, abs=1e-3)
     assert simulation.robot.objects()["crate"].z == pytest.approx(0.03, abs=2e-3)
 
 
 def test_imu_on_a_slope_measures_gravity_along_x(on_ground):
     simulation = on_ground("turtlebot", [ramp(5)], pose=Pose2(RAMP_START_M + 1.0, 0.0, 0.0))
-    drive_into(simulation, 1)
+    drive_for(simulation, 1)
     base_from_world = simulation.truth().pose.rotation().T
     assert (base_from_world @ (0.0, 0.0, 9.81))[0] == pytest.approx(9.81 * math.sin(math.radians(5)), abs=0.02)
 

@@ -1,3 +1,5 @@
+"""Tests of the reduction of convex hulls to fewer vertices."""
+
 import numpy as np
 import pytest
 import trimesh
@@ -8,12 +10,13 @@ from simscen.core.geometry.shapes import Body, Cylinder, Mesh, Solid
 from simscen.sim.body.outline import HULL_TOLERANCE_M, MAX_UNREDUCED_VERTICES, reduce_hull_vertices
 
 
-def mesh(made):
-    return Mesh(np.asarray(made.vertices, float), np.asarray(made.faces, np.int32))
+def mesh(surface):
+    """Return the mesh of a trimesh object."""
+    return Mesh(np.asarray(surface.vertices, float), np.asarray(surface.faces, np.int32))
 
 
 BALL = mesh(trimesh.creation.icosphere(subdivisions=5, radius=0.3))
-ROUND = {
+ROUND_SHAPES = {
     "ball": BALL,
     "long": Mesh(BALL.vertices * [12.0, 0.4, 0.7], BALL.faces),
     "ring": mesh(trimesh.creation.torus(0.5, 0.1, 64, 64)),
@@ -21,17 +24,17 @@ ROUND = {
 }
 
 
-@pytest.mark.parametrize("shape", ROUND)
+@pytest.mark.parametrize("shape", ROUND_SHAPES)
 def test_removed_vertices_are_within_a_millimeter_of_the_hull(shape):
     """Brute force: measure the distance of every vertex to each plane of the reduced hull."""
-    full = ROUND[shape].vertices
-    kept = reduce_hull_vertices(ROUND[shape])
-    assert len(kept) < len(ConvexHull(full).vertices) / 2
-    assert reduce_hull_vertices(ROUND[shape]) is kept
-    planes = ConvexHull(kept).equations
+    full = ROUND_SHAPES[shape].vertices
+    reduced = reduce_hull_vertices(ROUND_SHAPES[shape])
+    assert len(reduced) < len(ConvexHull(full).vertices) / 2
+    assert reduce_hull_vertices(ROUND_SHAPES[shape]) is reduced
+    planes = ConvexHull(reduced).equations
     assert max((planes[:, :3] @ point + planes[:, 3]).max() for point in full) <= HULL_TOLERANCE_M + 1e-9
     rows = {tuple(row) for row in full.tolist()}
-    assert all(tuple(row) in rows for row in kept.tolist())
+    assert all(tuple(row) in rows for row in reduced.tolist())
 
 
 def test_hull_with_few_corners_keeps_its_volume():

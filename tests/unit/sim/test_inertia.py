@@ -1,3 +1,5 @@
+"""Tests of mass, center of mass, and inertia of shapes."""
+
 import math
 
 import numpy as np

@@ -40,12 +40,14 @@ def drive(simulate, every, observe):
 
 def test_scan_does_not_depend_on_other_lidars(simulate):
     """Pushed objects leave their rest poses, and get new ones where they come to rest."""
-    other, resting = [], []
+    other_casters, resting = [], []
 
     def observe(simulation):
         rest_poses = simulation.robot.rest_poses
-        other or other.append(LiveRayCaster(RayScene(merge_solids([WALL])), simulation.robot, frozenset({"crate 1"})))
-        other[0].sweep(FAN, Pose3.from_rpy(0.0, 0.5, 0.3, 0.1, 0.2, 0.0), 9.0)
+        if not other_casters:
+            scene = RayScene(merge_solids([WALL]))
+            other_casters.append(LiveRayCaster(scene, simulation.robot, frozenset({"crate 1"})))
+        other_casters[0].sweep(FAN, Pose3.from_rpy(0.0, 0.5, 0.3, 0.1, 0.2, 0.0), 9.0)
         resting.append({name for name, pose in simulation.robot.objects().items() if rest_poses.get(name) == pose})
 
     _, expected = drive(simulate, 3612, lambda _: None)

@@ -35,7 +35,7 @@ def carts() -> list[Body]:
 
 
 def test_scan_equals_that_of_a_complete_scene(simulate, monkeypatch) -> None:
-    """Also with other queries at other places, and after an object gets a path."""
+    """This holds with other queries at other places as well, and after an object gets a path."""
     monkeypatch.setattr(ray_caster, "REFRESH_DISTANCE_M", 0.5)
     simulation, rng = simulate(solids=[WALL], bodies=carts(), drive=(0.02, 0.0, 0.1)), np.random.default_rng(2)
     robot, complete = simulation.robot, RayScene(merge_solids([WALL]))
@@ -46,7 +46,7 @@ def test_scan_equals_that_of_a_complete_scene(simulate, monkeypatch) -> None:
         if beat == 30:
             simulation.move("late", MotionPath((0.0, 8.0), (Pose2(-6.0, 6.0), Pose2(6.0, -6.0))))
         objects, pose = robot.objects(), simulation.base_pose()._replace(z=0.2)
-        complete.set_bodies({name: (MESH, there) for name, there in objects.items()}, {})
+        complete.set_bodies({name: (MESH, object_pose) for name, object_pose in objects.items()}, {})
         expected = complete.sweep(FAN, pose, RANGE_M)
         if beat % 2 == 1:
             queried.sweep(FAN, Pose3(*rng.uniform(-5, 5, 2).tolist(), 0.2), float(rng.uniform(1, 5)))
@@ -55,7 +55,7 @@ def test_scan_equals_that_of_a_complete_scene(simulate, monkeypatch) -> None:
         if beat % 10 == 0:
             assert np.array_equal(queried.cast(*FAN.at(pose), RANGE_M), complete.cast(*FAN.at(pose), RANGE_M))
         precomputed += type(objects) is PosesAtTick
-        in_range |= {name for name, there in objects.items() if math.dist(there[:2], pose[:2]) < RANGE_M}
+        in_range |= {name for name, position in objects.items() if math.dist(position[:2], pose[:2]) < RANGE_M}
         simulation.step(24)
     assert precomputed > 120, "poses are nearly always precomputed"
     assert in_range > {"shelf", "late"}

@@ -1,3 +1,5 @@
+"""Tests of convex hulls, footprints, and outlines of shapes."""
+
 import math
 
 import numpy as np
@@ -72,6 +74,6 @@ def test_outlines_are_those_of_the_solids_in_the_z_range():
     box = Box((0.4, 0.2, 0.2))
     solids = [Solid(box, Pose3.planar(Pose2(x, 0.0, 0.0), z)) for x, z in ((0.0, 0.5), (1.0, 0.5), (2.0, 3.0))]
     for _ in range(2):  # the second result is cached
-        here, there = (Polygon(outline).bounds for outline in outlines_in_z_range(solids, (0.0, 1.0)))
-        assert (here, there) == (pytest.approx((-0.2, -0.1, 0.2, 0.1)), pytest.approx((0.8, -0.1, 1.2, 0.1)))
+        first, second = (Polygon(outline).bounds for outline in outlines_in_z_range(solids, (0.0, 1.0)))
+        assert (first, second) == (pytest.approx((-0.2, -0.1, 0.2, 0.1)), pytest.approx((0.8, -0.1, 1.2, 0.1)))
     assert len(outlines_in_z_range(solids, (0.0, 4.0))) == 3

@@ -17,18 +17,19 @@ TICKS, GRAVITY_M_S2 = 240, 9.81
 
 def inertial_mass(body, payload):
     """Return the mass that the motors accelerate: robot, payload, and the inertia of wheels and rotors."""
-    turning = [wheel.inertia.tensor[1, 1] + wheel.rotor_inertia for wheel in body.wheels]
-    return body.mass + payload + sum(i / w.radius**2 for i, w in zip(turning, body.wheels, strict=True))
+    rotational_inertias = [wheel.inertia.tensor[1, 1] + wheel.rotor_inertia for wheel in body.wheels]
+    return body.mass + payload + sum(i / w.radius**2 for i, w in zip(rotational_inertias, body.wheels, strict=True))
 
 
-def force(body):
+def motor_force(body):
+    """Return the force of all wheels at the stall torque of their motors in N."""
     return sum(wheel.stall_torque / wheel.radius for wheel in body.wheels)
 
 
 def test_braking_distance_of_an_overloaded_robot_is_v_squared_over_2_a(simulate):
     body = build_robot_body(robot_spec("turtlebot"))
     payload = 20.0
-    deceleration = force(body) / inertial_mass(body, payload)
+    deceleration = motor_force(body) / inertial_mass(body, payload)
     assert deceleration < 0.5 * body.limits.linear_deceleration
     simulation = simulate(add_payload(body, payload, (-0.02, 0.0, 0.1)), drive=(0.5, 0.0, 0.0))
     simulation.step(4 * TICKS)
@@ -42,13 +43,13 @@ def test_weak_motors_accelerate_by_force_over_inertia(simulate):
     body = scale_motor_torque(build_robot_body(robot_spec("turtlebot")), 0.05)
     simulation = simulate(body, drive=(0.5, 0.0, 0.0))
     simulation.step(TICKS)
-    assert simulation.truth().twist.vx == pytest.approx(force(body) / inertial_mass(body, 0.0), rel=0.1)
+    assert simulation.truth().twist.vx == pytest.approx(motor_force(body) / inertial_mass(body, 0.0), rel=0.1)
 
 
 @pytest.mark.parametrize(("share", "climbs"), [(0.8, False), (1.3, True)])
 def test_weak_motors_climb_slopes_up_to_their_force_over_the_weight(simulate, share, climbs):
     original, slope = build_robot_body(robot_spec("turtlebot")), math.radians(5)
-    body = scale_motor_torque(original, share * math.sin(slope) * original.mass * GRAVITY_M_S2 / force(original))
+    body = scale_motor_torque(original, share * math.sin(slope) * original.mass * GRAVITY_M_S2 / motor_force(original))
     assert (compute_climb_limits(body).slope > slope) == climbs
     simulation = simulate(body, [ramp_solid((0.5, 0), (4.5, 0), 2, 4 * math.tan(slope), "ramp")], pose=Pose2(2, 0, 0),
                           drive=(0.3, 0, 0))  # fmt: skip

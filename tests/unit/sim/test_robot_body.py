@@ -1,3 +1,5 @@
+"""Tests of robot bodies that are built from robot specifications."""
+
 import pytest
 from shapely.geometry import Point, Polygon
 from simulation_helpers import robot_spec
@@ -46,15 +48,17 @@ def test_only_protruding_wheels_are_part_of_the_hull():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_lidar_of_a_shipped_robot_sees_robots_of_the_same_model(name):
-    plane = robot_spec(name).sensors["lidar"].lidar.mount.z
-    tall = [(part.z, part.z + (part.box[2] if part.box else part.cylinder[1])) for part in robot_spec(name).body]
-    assert any(bottom + 0.02 <= plane <= top - 0.02 for bottom, top in tall)
+    scan_height = robot_spec(name).sensors["lidar"].lidar.mount.z
+    z_ranges = [(part.z, part.z + (part.box[2] if part.box else part.cylinder[1])) for part in robot_spec(name).body]
+    assert any(bottom + 0.02 <= scan_height <= top - 0.02 for bottom, top in z_ranges)
 
 
 def test_two_wheeled_robot_gets_casters_of_which_one_touches_the_ground():
     body = build_robot_body(robot_spec("amr"))
-    lowest = sorted(caster.pose.z - caster.shape.radius for caster in body.casters if isinstance(caster.shape, Sphere))
-    assert lowest == pytest.approx([0.0, 0.001])
+    lowest_points = sorted(
+        caster.pose.z - caster.shape.radius for caster in body.casters if isinstance(caster.shape, Sphere)
+    )
+    assert lowest_points == pytest.approx([0.0, 0.001])
     assert all(Polygon(body.footprint).contains(Point(c.pose.x, c.pose.y)) for c in body.casters)
 
 

@@ -10,7 +10,7 @@ def test_pose_is_read_from_the_engine_once_per_tick(simulate, monkeypatch):
     simulation.truth()
     real = pybullet.getBasePositionAndOrientation
     monkeypatch.setattr(
-        "pybullet.getBasePositionAndOrientation", lambda *args, **more: calls.append(args) or real(*args, **more)
+        "pybullet.getBasePositionAndOrientation", lambda *args, **options: calls.append(args) or real(*args, **options)
     )
     for _ in range(10):
         simulation.step(6)

@@ -68,13 +68,13 @@ def test_clearance_between_two_robots_equals_brute_force(fleet):
 def test_collision_of_two_robots_names_the_other_robot_and_the_cause(fleet):
     simulation = fleet(a=("turtlebot", 0.0, 0.0, 0.0), b=("turtlebot", 1.0, 0.0, 0.0))
     drive(simulation, 720, a=FORWARD)
-    hit, was_hit = (simulation.robots[name].collisions()[0] for name in "ab")
-    assert (hit.name, was_hit.name) == ("b", "a")
-    assert hit.tick == was_hit.tick
-    assert hit.data["robot_caused"] and not was_hit.data["robot_caused"]
-    assert hit.data["speed"] == pytest.approx(was_hit.data["speed"], abs=1e-6)
-    assert hit.data["speed"] == pytest.approx(0.3, abs=0.03)
-    assert simulation.robots["b"].base_pose().x > 1.0, "it is pushed"
+    hit_of_a, hit_of_b = (simulation.robots[name].collisions()[0] for name in "ab")
+    assert (hit_of_a.name, hit_of_b.name) == ("b", "a")
+    assert hit_of_a.tick == hit_of_b.tick
+    assert hit_of_a.data["robot_caused"] and not hit_of_b.data["robot_caused"]
+    assert hit_of_a.data["speed"] == pytest.approx(hit_of_b.data["speed"], abs=1e-6)
+    assert hit_of_a.data["speed"] == pytest.approx(0.3, abs=0.03)
+    assert simulation.robots["b"].base_pose().x > 1.0, "robot b is pushed"
 
 
 def test_each_robot_is_an_object_for_the_other(fleet):
@@ -94,10 +94,10 @@ def test_distant_robots_do_not_change_any_bit_of_the_motion(fleet):
     single = fleet(walls, a=("turtlebot", 0.0, 0.0, 0.1))
     several = fleet(walls, b=("jackal", 40.0, 5.0, 1.0), a=("turtlebot", 0.0, 0.0, 0.1), aa=("amr", -30.0, 5.0, 1.0))
     turn = Twist(0.3, 0.0, 0.2)
-    first = drive(single, 2400, a=turn)
-    second = drive(several, 2400, a=turn, b=Twist(0.5, 0.0, 0.5), aa=FORWARD)
-    expected = [(one["a"].pose, one["a"].twist, one["a"].clearance) for one in first]
-    assert expected == [(one["a"].pose, one["a"].twist, one["a"].clearance) for one in second]
+    single_truths = drive(single, 2400, a=turn)
+    several_truths = drive(several, 2400, a=turn, b=Twist(0.5, 0.0, 0.5), aa=FORWARD)
+    expected = [(truths["a"].pose, truths["a"].twist, truths["a"].clearance) for truths in single_truths]
+    assert expected == [(truths["a"].pose, truths["a"].twist, truths["a"].clearance) for truths in several_truths]
 
 
 def test_order_of_robots_does_not_change_the_run(fleet):

@@ -23,7 +23,7 @@ def run(simulation, ticks, every=6):
         simulation.truth()
 
 
-def engine_pose(simulation, name):
+def engine_position(simulation, name):
     """Return the position of the center of mass of an object in the engine."""
     number = simulation._scene.actors._actors[name].id
     return pybullet.getBasePositionAndOrientation(number, physicsClientId=simulation._scene.client)[0]
@@ -39,13 +39,13 @@ def test_resting_object_does_not_creep(simulate):
 
 def test_resting_object_sleeps_from_the_first_tick(simulate):
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), 5.0), Body("ball", BALL, Pose3(3.0), 1.0)])
-    before = engine_pose(simulation, "crate"), engine_pose(simulation, "ball")
+    before = engine_position(simulation, "crate"), engine_position(simulation, "ball")
     run(simulation, 60)
-    assert (engine_pose(simulation, "crate"), engine_pose(simulation, "ball")) == before
+    assert (engine_position(simulation, "crate"), engine_position(simulation, "ball")) == before
 
 
 def test_unstable_object_tips_over(simulate):
-    """0.2 mrad beyond its balance, at less than 1 mm/s for the first quarter of a second."""
+    """The plank leans 0.2 mrad beyond its balance. It moves at less than 1 mm/s for the first quarter of a second."""
     plank, lean = (box("plank", 0, 0, 0.2, 0.2, 2.0),), math.atan2(0.1, 1.0) + 2e-4
     pose = Pose3.from_rpy(3.0, 0.0, 0.1 * math.sin(lean), 0.0, lean, 0.0)
     simulation = simulate(bodies=[Body("plank", plank, pose, 5.0)])
@@ -54,7 +54,7 @@ def test_unstable_object_tips_over(simulate):
 
 
 @pytest.mark.parametrize(
-    ("speeds", "rests"),
+    ("speeds", "is_resting"),
     [
         ([4e-5, 1e-5, 9e-5, 8e-5, 9e-5], True),
         ([1e-5, 2e-5, 3e-5, 4e-5, 5e-5], False),
@@ -62,13 +62,13 @@ def test_unstable_object_tips_over(simulate):
         ([0.0, 0.0, 0.0, 0.0, 0.0], True),
     ],
 )
-def test_resting_object_is_slow_and_not_accelerating_at_each_check(monkeypatch, speeds, rests):
-    seen = iter(speeds)
-    monkeypatch.setattr(pybullet, "getBaseVelocity", lambda *_: ((next(seen), 0.0, 0.0), (0.0, 0.0, 0.0)))
-    settling = RestDetector(0, [7])
+def test_resting_object_is_slow_and_not_accelerating_at_each_check(monkeypatch, speeds, is_resting):
+    remaining_speeds = iter(speeds)
+    monkeypatch.setattr(pybullet, "getBaseVelocity", lambda *_: ((next(remaining_speeds), 0.0, 0.0), (0.0, 0.0, 0.0)))
+    detector = RestDetector(0, [7])
     for _ in speeds:
-        settling.sample()
-    assert settling.resting_ids() == ({7} if rests else set())
+        detector.sample()
+    assert detector.resting_ids() == ({7} if is_resting else set())
 
 
 def test_slowly_rolling_object_keeps_rolling(simulate):
@@ -80,7 +80,7 @@ def test_slowly_rolling_object_keeps_rolling(simulate):
     number = simulation._scene.actors._actors["ball"].id
     pybullet.resetBaseVelocity(number, (0.1, 0, 0), (0, 1.0, 0), physicsClientId=simulation._scene.client)
     run(simulation, SETTLING_TICKS)
-    assert engine_pose(simulation, "ball")[0] == pytest.approx(2.5, abs=0.02)
+    assert engine_position(simulation, "ball")[0] == pytest.approx(2.5, abs=0.02)
 
 
 def test_slow_robot_wakes_and_pushes_a_sleeping_object(simulate):
@@ -99,10 +99,10 @@ def test_sleeping_poses_equal_those_of_the_engine(simulate):
         if tick == 240:
             simulation.drive(Twist(0.4, 0.0, 0.0))
         simulation.step(6)
-        x, y, _ = engine_pose(simulation, "crate")
+        x, y, _ = engine_position(simulation, "crate")
         pose = simulation.truth().objects["crate"]
-        upright = pose.apply([[0.0, 0.0, 0.2]])[0]
-        assert upright[:2] == pytest.approx([x, y], abs=1e-6)
+        center = pose.apply([[0.0, 0.0, 0.2]])[0]
+        assert center[:2] == pytest.approx([x, y], abs=1e-6)
     assert x > 1.65
 
 
@@ -142,9 +142,9 @@ FAR_CART = Body("far cart", CRATE, Pose3(-8.0), path=MotionPath((0.0, 60.0), (Po
 def test_object_sleeps_while_a_script_moves_a_distant_object(simulate):
     simulation = simulate(bodies=[Body("crate", CRATE, Pose3(2.0), 5.0), FAR_CART])
     run(simulation, SETTLING_TICKS)
-    before = engine_pose(simulation, "crate")
+    before = engine_position(simulation, "crate")
     run(simulation, 20 * 240)
-    assert engine_pose(simulation, "crate") == before
+    assert engine_position(simulation, "crate") == before
     assert simulation.object_pose("far cart").y == pytest.approx(2.5)
 
 
@@ -198,11 +198,11 @@ def test_object_is_pushed_away_by_a_scripted_placement(simulate):
 
 
 def test_ball_rolls_through_the_former_place_of_a_cart(simulate):
-    """The engine must have the current pose of the cart, not the one when an object last came near."""
+    """The engine must have the current pose of the cart, not the pose at the time when an object last came near."""
     path = MotionPath((0.0, 4.0, 8.0, 9.0), (Pose2(3, 3), Pose2(3, 9), Pose2(3, 9), Pose2(3, 9)))
     ball = Body("ball", BALL, Pose3(1.0, 3.0), 1.0)
     simulation = simulate(bodies=[ball, Body("cart", CRATE, Pose3(3.0, 3.0), path=path)])
     run(simulation, 4 * 240)
     simulation.push_object("ball", (1.0, 0.0))
     run(simulation, 4 * 240)
-    assert engine_pose(simulation, "ball")[0] > 3.5
+    assert engine_position(simulation, "ball")[0] > 3.5

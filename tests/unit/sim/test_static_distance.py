@@ -1,3 +1,5 @@
+"""Tests of the distance between a robot and the static world."""
+
 import math
 from dataclasses import replace
 
@@ -100,12 +102,12 @@ def test_distances_along_a_path_among_many_solids_equal_those_of_shapely():
     places = [Pose3.from_rpy(x, y, 0.5, 0.0, 0.0, yaw) for x, y, yaw in rng.uniform((0, 0, -3), (24, 24, 3), (160, 3))]
     mesh = merge_solids([Solid(kinds[k % 3], pose, str(k)) for k, pose in enumerate(places)])
     corners = mesh.vertices[mesh.faces]
-    plan = shapely.union_all(shapely.polygons(corners[np.ptp(corners[:, :, 2], axis=1) == 0][:, :, :2]))
+    floor_plan = shapely.union_all(shapely.polygons(corners[np.ptp(corners[:, :, 2], axis=1) == 0][:, :, :2]))
     poses = [Pose3(2.0, 2.0)]
     for turn in rng.normal(0.0, 0.15, 800).tolist():
-        following = poses[-1].compose(Pose3.from_rpy(0.06, 0.0, 0.0, 0.0, 0.0, turn))
-        poses.append(following if 0 < following.x < 24 and 0 < following.y < 24 else Pose3(*rng.uniform(0, 24, 2)))
-    expected = plan.distance(shapely.points([pose[:2] for pose in poses])) - 0.25
+        next_pose = poses[-1].compose(Pose3.from_rpy(0.06, 0.0, 0.0, 0.0, 0.0, turn))
+        poses.append(next_pose if 0 < next_pose.x < 24 and 0 < next_pose.y < 24 else Pose3(*rng.uniform(0, 24, 2)))
+    expected = floor_plan.distance(shapely.points([pose[:2] for pose in poses])) - 0.25
     expected[expected > 1.0] = math.inf
     query = StaticDistance(mesh, drum_robot(0.25, 1.2), 1.0)
     measured = np.array([query.distance(pose) for pose in poses])
@@ -221,10 +223,10 @@ def test_enclosure_along_a_line_equals_that_of_trimesh():
     """The result is None if the line meets a corner or passes through a hole."""
     rng = np.random.default_rng(8)
     block, ring = trimesh.creation.box((2.0, 2.0, 2.0)).subdivide(), trimesh.creation.annulus(0.5, 1.5, 3.0)
-    both = trimesh.util.concatenate([block, ring.apply_translation((1.0, 0.4, 0.3))])
+    combined = trimesh.util.concatenate([block, ring.apply_translation((1.0, 0.4, 0.3))])
     places = rng.uniform(-2.5, 2.5, (300, 3))
     inside = block.contains(places) | ring.contains(places)
-    found = [encloses_along_line(both.triangles, tuple(place)) for place in places.tolist()]
+    found = [encloses_along_line(combined.triangles, tuple(place)) for place in places.tolist()]
     assert 20 < inside.sum() < 280
     assert found == inside.tolist()
     assert encloses_along_line(block.triangles, (1.0, 1.0, 1.0)) is None  # a corner

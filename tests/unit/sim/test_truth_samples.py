@@ -40,10 +40,10 @@ def test_samples_evaluated_later_equal_immediate_truth(simulate, mass: float) ->
 
 def test_samples_among_sleeping_and_pushed_objects_equal_immediate_truth(simulate) -> None:
     crate = (Solid(Box((0.3, 0.3, 0.3))),)
-    lying = [Body(f"crate {k}", crate, Pose3(x, y, 0.15), 0.5) for k, (x, y) in enumerate([(3, 0), (2, 2), (0, 4)])]
+    crates = [Body(f"crate {k}", crate, Pose3(x, y, 0.15), 0.5) for k, (x, y) in enumerate([(3, 0), (2, 2), (0, 4)])]
     cart = Body("cart", (box("cart", 0, 0, 0.4, 0.4),), Pose3(-1.0, 4.0), path=MotionPath(
         (0.0, 8.0, 12.0), (Pose2(-1.0, 4.0), Pose2(-1.0, 4.0), Pose2(1.0, 4.0))))  # fmt: skip
-    eager, lazy = (simulate(bodies=[*lying, cart], drive=(0.5, 0.0, 0.0)) for _ in range(2))
+    eager, lazy = (simulate(bodies=[*crates, cart], drive=(0.5, 0.0, 0.0)) for _ in range(2))
     immediate, samples = [], []
     for _ in range(560):
         for simulation in (eager, lazy):
@@ -53,6 +53,6 @@ def test_samples_among_sleeping_and_pushed_objects_equal_immediate_truth(simulat
     assert [sample if isinstance(sample, Truth) else sample.truth() for sample in samples] == immediate
     assert [event.name for event in eager.robot.collisions()] == [event.name for event in lazy.robot.collisions()]
     first, last = (truth.objects for truth in (immediate[0], immediate[-1]))
-    assert last["crate 0"].x > first["crate 0"].x + 0.5  # by the robot
-    assert last["crate 2"].x > first["crate 2"].x + 0.5  # by the cart
+    assert last["crate 0"].x > first["crate 0"].x + 0.5  # pushed by the robot
+    assert last["crate 2"].x > first["crate 2"].x + 0.5  # pushed by the cart
     assert last["crate 1"] == first["crate 1"]

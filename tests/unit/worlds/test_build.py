@@ -1,3 +1,5 @@
+"""Tests of worlds that are built together with their map."""
+
 import pickle
 
 import numpy as np

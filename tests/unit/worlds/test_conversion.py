@@ -26,19 +26,21 @@ EMPTY = WorldSpec(simscen=1)
 NEAR = st.floats(-20, 20)
 
 
-def converted(*solids, bodies=(), height=0.2):
+def convert(*solids, bodies=(), height=0.2):
+    """Convert a world to YAML and load it again; return the loaded world and the list of changes."""
     conversion = convert_world(World("w", solids, bodies), height)
     return world_from_spec(conversion.merged_into(EMPTY), "w"), conversion.changes
 
 
 def assert_same_corners(solids, others, tolerance=1e-5):
-    """Each vertex of one has its own vertex of the other within the tolerance in m along each axis."""
+    """Assert that the vertices correspond one to one, within the tolerance in m along each axis."""
     distances = cdist(merge_solids(solids).vertices, merge_solids(others).vertices, "chebyshev")
     assert distances.shape[0] == distances.shape[1]
     assert distances[linear_sum_assignment(distances)].max() <= tolerance
 
 
 def section_of(solids, height):
+    """Return the union of the cross sections of the solids at a height in m."""
     rings = [
         Polygon(ring)
         for solid in solids
@@ -51,10 +53,10 @@ def section_of(solids, height):
 @given(st.tuples(*[st.floats(0.05, 3)] * 3), NEAR, NEAR, st.sampled_from(range(6)), st.floats(-math.pi, math.pi))
 def test_box_on_any_of_its_sides_is_converted_exactly(size, x, y, side, yaw):
     roll, pitch = [(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (0, 3)][side]
-    turned = Pose3.from_rpy(0, 0, 0, roll * math.pi / 2, pitch * math.pi / 2, yaw)
-    bottom = merge_solids([Solid(Box(size), turned)]).vertices[:, 2].min()
-    solid = Solid(Box(size), turned._replace(x=x, y=y, z=0.01 - float(bottom)), "crate")
-    world, changes = converted(solid)
+    rotated = Pose3.from_rpy(0, 0, 0, roll * math.pi / 2, pitch * math.pi / 2, yaw)
+    bottom = merge_solids([Solid(Box(size), rotated)]).vertices[:, 2].min()
+    solid = Solid(Box(size), rotated._replace(x=x, y=y, z=0.01 - float(bottom)), "crate")
+    world, changes = convert(solid)
     assert changes == []
     assert isinstance(world.solids[0].shape, Box)
     assert_same_corners(world.solids, [solid], 1e-4)
@@ -65,14 +67,14 @@ def test_cylinders_and_prisms_are_converted_exactly():
         Solid(Cylinder(0.3, 1.2), Pose3(1.0, 2.0, 0.6), "pillar"),
         Solid(Extrusion(((0, 0), (2, 0), (0, 1)), 0.8), Pose3.planar(Pose2(3, 1, 0.7), 0.5), "wedge"),
     )
-    world, changes = converted(*solids)
+    world, changes = convert(*solids)
     assert changes == []
     assert_same_corners(world.solids, solids)
     assert [solid.name for solid in world.solids] == ["pillar", "wedge"]
 
 
 def test_geometry_below_the_ground_is_cut_off():
-    world, changes = converted(
+    world, changes = convert(
         Solid(Box((1, 1, 1)), Pose3(z=0.25), "sunk"), Solid(Box((9, 9, 1)), Pose3(z=-0.5), "floor")
     )
     assert changes == ["floor: it is below the ground; it is left out"]
@@ -92,7 +94,7 @@ def test_geometry_below_the_ground_is_cut_off():
 )
 def test_tilted_or_round_solids_become_prisms_with_a_note(shape, pose, kind):
     solid = Solid(shape, pose, "thing")
-    world, changes = converted(solid, height=0.25)
+    world, changes = convert(solid, height=0.25)
     assert changes == [f"thing: {kind}; replaced by an upright prism over its cross section at 0.25 m"]
     before, after = section_of([solid], 0.25), section_of(world.solids, 0.25)
     assert before.symmetric_difference(after).area < 1e-4
@@ -101,7 +103,7 @@ def test_tilted_or_round_solids_become_prisms_with_a_note(shape, pose, kind):
 def test_mesh_of_upright_walls_is_converted_exactly():
     ring = triangulate(Extrusion(((0, 0), (5, 0), (5, 4), (3, 4), (3, 1), (0, 1)), 2.0))
     solid = Solid(Mesh(ring.vertices, ring.faces), Pose3.planar(Pose2(1, 2, 0.3)), "wall")
-    world, changes = converted(solid)
+    world, changes = convert(solid)
     assert changes == []
     assert_same_corners(world.solids, [solid])
 
@@ -109,7 +111,7 @@ def test_mesh_of_upright_walls_is_converted_exactly():
 def test_open_mesh_is_left_out_with_a_note():
     box = triangulate(Box((1, 1, 1)))
     solid = Solid(Mesh(box.vertices, box.faces[2:][:-1]), Pose3(z=0.5), "torn")
-    world, changes = converted(solid)
+    world, changes = convert(solid)
     assert world.solids == ()
     assert changes == ["torn: a mesh whose cross section at 0.2 m is not closed; it is left out"]
 
@@ -127,7 +129,7 @@ def test_bodies_keep_mass_and_motion():
     path = path_through_waypoints(start, [[4.0, 1.0], [4.0, 3.0]], 0.8, "back_and_forth")
     box = (Solid(Box((0.6, 0.4, 1.0)), Pose3(z=0.5)),)
     bodies = (Body("cart", box, Pose3.planar(start), 0.0, path), Body("bin", box, Pose3(x=3.0), 4.0))
-    world, changes = converted(bodies=bodies)
+    world, changes = convert(bodies=bodies)
     assert changes == []
     cart, bin_ = world.bodies
     assert bin_.mass == 4.0
@@ -143,7 +145,7 @@ def test_unsupported_motions_and_shapes_are_reported():
     offset_disc = (Solid(Cylinder(0.3, 1.0), Pose3(x=1.0, z=0.5)),)
     moving = Body("beside", offset_disc, Pose3(), 0.0, MotionPath((0.0, 1.0, 9.0), poses))
     table = Body("table", (*disc, Solid(Box((1, 1, 0.1)), Pose3(z=1.0))), Pose3(x=5.0), 3.0)
-    world, changes = converted(bodies=(moving, table))
+    world, changes = convert(bodies=(moving, table))
     assert changes == [
         "beside: it moves, but its shape is not at its origin; it is made static",
         "table: it could be pushed and has 2 shapes, but an object has only one shape; it is made static",
@@ -155,7 +157,7 @@ def test_unsupported_motions_and_shapes_are_reported():
 def test_loop_that_does_not_end_at_its_start_is_reported_with_the_reason():
     path = MotionPath((0.0, 1.0, 3.0), (Pose2(0, 0), Pose2(0, 0), Pose2(1, 0)), "loop")
     body = Body("cart", (Solid(Cylinder(0.3, 1.0), Pose3(z=0.5)),), Pose3(), 0.0, path)
-    world, [change] = converted(bodies=(body,))
+    world, [change] = convert(bodies=(body,))
     assert change.startswith("cart: its motion cannot be written as keyframes: the last keyframe of a loop must ")
     assert world.bodies[0].path is None
 
@@ -165,7 +167,7 @@ def test_motion_with_changing_speed_becomes_keyframes(mode):
     disc = (Solid(Cylinder(0.3, 1.0), Pose3(z=0.5)),)
     poses = (Pose2(0, 0), Pose2(1, 0), Pose2(2, 0.5, 1.0))
     path = MotionPath((0.0, 1.0, 9.0), poses, mode, ease="spline", phase=0.5)
-    world, changes = converted(bodies=(Body("moving", disc, Pose3.planar(pose_at(path, 0.0)), 0.0, path),))
+    world, changes = convert(bodies=(Body("moving", disc, Pose3.planar(pose_at(path, 0.0)), 0.0, path),))
     assert changes == []
     assert world.bodies[0].path == path
 
@@ -180,7 +182,7 @@ def test_additions_of_the_file_come_last():
 
 
 def test_friction_of_a_plate_is_kept():
-    world, changes = converted(Solid(Box((1.0, 1.0, 0.02)), Pose3(z=0.01), "plate", 0.3))
+    world, changes = convert(Solid(Box((1.0, 1.0, 0.02)), Pose3(z=0.01), "plate", 0.3))
     assert (world.solids[0].friction, changes) == (0.3, [])
 
 
@@ -205,13 +207,13 @@ def test_unsupported_shape_is_omitted_with_a_reason(shape, reason):
         Body("thin", (Solid(shape, pose),), Pose3(x=3.0), 2.0),
         Body("both", (Solid(shape, pose), Solid(Box((1, 1, 1)), Pose3(z=0.5))), Pose3(x=8.0), 2.0),
     )
-    world, changes = converted(*solids, bodies=bodies)
+    world, changes = convert(*solids, bodies=bodies)
     assert changes == [f"{name}: {reason}; it is left out" for name in ("plate", "thin", "both")]
     assert [solid.name for solid in world.solids] == ["crate"]
     assert [(body.name, body.mass) for body in world.bodies] == [("both", 2.0)]
 
 
 def test_mass_outside_the_range_of_world_files_is_reported():
-    world, changes = converted(bodies=(Body("heavy", (Solid(Box((1, 1, 1)), Pose3(z=0.5)),), Pose3(), 1e6),))
+    world, changes = convert(bodies=(Body("heavy", (Solid(Box((1, 1, 1)), Pose3(z=0.5)),), Pose3(), 1e6),))
     assert changes == ["heavy: its `mass` is not valid: input should be less than or equal to 100000; it is left out"]
     assert world.bodies == ()

@@ -1,3 +1,5 @@
+"""Tests of the summary of a world."""
+
 import pytest
 
 from simscen.core.environment.world_model import World

@@ -18,9 +18,9 @@ from simscen.worlds.raycasting.ray_scene import RayScene
 from simscen.worlds.routes.shortest_paths import legs_between
 from simscen.worlds.sdf import load_sdf
 
-DATA = Path(__file__).parents[3].parent / "shared" / "data"
+DATA = Path(__file__).parents[4] / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the third-party worlds are missing: see CONTRIBUTING.md")
-LIDAR = 0.18
+LIDAR_HEIGHT_M = 0.18
 
 
 def shipped_map(path):
@@ -29,6 +29,7 @@ def shipped_map(path):
 
 
 def free_poses(grid, count, seed):
+    """Return the centers (count, 2) of random cells with a clearance of more than 0.2 m."""
     from scipy import ndimage
 
     has_clearance = ndimage.distance_transform_edt(grid.cells == FREE) * grid.resolution > 0.2
@@ -37,6 +38,7 @@ def free_poses(grid, count, seed):
 
 
 def beams_from(points, count):
+    """Return the starts and directions of `count` beams all around each point."""
     angles = np.arange(count) * (2 * math.pi / count)
     directions = np.column_stack((np.cos(angles), np.sin(angles)))
     return np.repeat(points, count, axis=0), np.tile(directions, (len(points), 1))
@@ -59,7 +61,7 @@ def test_rays_in_tb3_sandbox_agree_with_its_shipped_map():
     grid = shipped_map(folder / "tb3_sandbox.yaml")
     points = free_poses(grid, 60, seed=1)
     starts, directions = beams_from(points, 90)
-    origins = np.column_stack((starts, np.full(len(starts), LIDAR)))
+    origins = np.column_stack((starts, np.full(len(starts), LIDAR_HEIGHT_M)))
     level = np.column_stack((directions, np.zeros(len(directions))))
     ranges = RayScene(merge_solids(world.solids)).cast(origins, level)
     assert (np.abs(ranges - ranges_on_map(grid, starts, directions)) < 0.15).mean() >= 0.92
@@ -69,7 +71,7 @@ def test_rays_in_tb3_sandbox_agree_with_its_shipped_map():
 def test_map_of_tb3_sandbox_agrees_with_the_shipped_map_where_a_robot_can_be():
     folder = DATA / "nav2_tb3_sandbox"
     world = load_sdf(folder / "worlds" / "tb3_sandbox.sdf.xacro", root=DATA, search=[folder / "models"], lenient=True)
-    built = build_world_and_map(world, LIDAR)
+    built = build_world_and_map(world, LIDAR_HEIGHT_M)
     shipped = shipped_map(folder / "tb3_sandbox.yaml")
     points = free_poses(shipped, 500, seed=2)
     assert (built.map.values_at(points) == FREE).mean() > 0.98

@@ -1,3 +1,5 @@
+"""Tests of the solids of walls."""
+
 import numpy as np
 import pytest
 import shapely

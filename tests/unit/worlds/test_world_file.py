@@ -1,3 +1,5 @@
+"""Tests of worlds from world files."""
+
 import math
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Tests of URDF output, which is read back equal."""
+"""Tests of URDF output: a robot that is read back from its URDF is the same."""
 
 import math
 from dataclasses import replace
@@ -20,24 +20,24 @@ def test_robot_read_back_from_its_urdf_is_the_same(tmp_path, name):
     spec = robot_spec(name)
     body = build_robot_body(spec)
     (tmp_path / "robot.urdf").write_text(to_urdf(body))
-    written = {"body": None, "mass": None, "urdf": "robot.urdf"}
-    again = build_robot_body(spec.model_copy(update=written), tmp_path / "x.robot.yaml", [tmp_path])
-    assert again.mass == pytest.approx(body.mass)
-    assert [(w.x, w.y, w.radius) for w in again.wheels] == [
+    urdf_fields = {"body": None, "mass": None, "urdf": "robot.urdf"}
+    read_back = build_robot_body(spec.model_copy(update=urdf_fields), tmp_path / "x.robot.yaml", [tmp_path])
+    assert read_back.mass == pytest.approx(body.mass)
+    assert [(w.x, w.y, w.radius) for w in read_back.wheels] == [
         pytest.approx((w.x, w.y, w.radius), abs=1e-6) for w in body.wheels
     ]
-    assert again.chassis.center == pytest.approx(body.chassis.center, abs=1e-6)
-    assert again.footprint == pytest.approx(np.array(body.footprint), abs=1e-6)
-    for original, read_back in zip(body.hull, again.hull, strict=False):
-        there = read_back.pose.apply(hull_points(read_back.shape))
-        assert original.pose.apply(hull_points(original.shape)) == pytest.approx(there, abs=1e-6)
+    assert read_back.chassis.center == pytest.approx(body.chassis.center, abs=1e-6)
+    assert read_back.footprint == pytest.approx(np.array(body.footprint), abs=1e-6)
+    for original, solid in zip(body.hull, read_back.hull, strict=False):
+        points = solid.pose.apply(hull_points(solid.shape))
+        assert original.pose.apply(hull_points(original.shape)) == pytest.approx(points, abs=1e-6)
 
 
 def test_omnidirectional_robot_from_urdf_touches_the_ground_and_drives_sideways(tmp_path, simulate):
     spec = robot_spec("omni")
     (tmp_path / "robot.urdf").write_text(to_urdf(build_robot_body(spec)))
-    written = {"body": None, "mass": None, "urdf": "robot.urdf"}
-    body = build_robot_body(spec.model_copy(update=written), tmp_path / "x.robot.yaml", [tmp_path])
+    urdf_fields = {"body": None, "mass": None, "urdf": "robot.urdf"}
+    body = build_robot_body(spec.model_copy(update=urdf_fields), tmp_path / "x.robot.yaml", [tmp_path])
     assert min((s.pose.apply(hull_points(s.shape))[:, 2]).min() for s in body.hull) == pytest.approx(0.0)
     simulation = simulate(body, drive=(0.0, 0.3, 0.0))
     simulation.step(480)
@@ -50,5 +50,5 @@ def test_orientation_of_a_shape_is_kept_at_every_pitch(roll, pitch, yaw):
     body = build_robot_body(robot_spec("turtlebot"))
     tilted = Solid(Box((0.1, 0.2, 0.3)), Pose3.from_rpy(0.0, 0.0, 0.5, roll, pitch, yaw), "mast")
     root = ET.fromstring(to_urdf(replace(body, hull=(tilted,))))
-    written = [float(word) for word in root.find("link/collision/origin").get("rpy").split()]
-    assert Pose3.from_rpy(0.0, 0.0, 0.0, *written).rotation() == pytest.approx(tilted.pose.rotation(), abs=1e-6)
+    rpy = [float(word) for word in root.find("link/collision/origin").get("rpy").split()]
+    assert Pose3.from_rpy(0.0, 0.0, 0.0, *rpy).rotation() == pytest.approx(tilted.pose.rotation(), abs=1e-6)

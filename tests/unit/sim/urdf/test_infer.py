@@ -1,3 +1,5 @@
+"""Tests of the drive, sensors, and limits that are inferred from a URDF."""
+
 import math
 from pathlib import Path
 
@@ -16,6 +18,8 @@ JACKAL = Path(__file__).parents[5] / "shared/data/jackal_urdf/jackal.urdf"
 
 @pytest.fixture
 def infer(tmp_path):
+    """Return a function that infers the robot specification of a URDF text."""
+
     def infer(text):
         (tmp_path / "robot.urdf").write_text(text)
         return infer_robot_spec(tmp_path / "robot.urdf", [tmp_path])
@@ -157,8 +161,12 @@ def test_wheels_may_be_round_meshes(tmp_path, stretch):
     assert drive.wheel_separation == pytest.approx(0.4)
 
 
-def add_joint(text, joint):
-    """Return a URDF with a joint and its link, a short cylinder along y unless COLLISION is something else."""
+def add_joint(text, replacements):
+    """Add a joint and its link to a URDF; the link is a short cylinder along y.
+
+    `replacements` are texts of the joint and their replacements. COLLISION and TYPE stand for the shape of the link
+    and the type of the joint.
+    """
     link = (
         '<link name="part">COLLISION<inertial><mass value="0.1"/></inertial></link><joint name="extra" TYPE>'
         '<parent link="base_link"/><child link="part"/><origin xyz="0.1 0.05 0.35"/><axis xyz="0 1 0"/>'
@@ -167,7 +175,7 @@ def add_joint(text, joint):
     cylinder = (
         '<collision><origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.02" length="0.04"/></geometry></collision>'
     )
-    for old, new in joint.items():
+    for old, new in replacements.items():
         link = link.replace(old, new)
     return text.replace("</robot>", link.replace("COLLISION", cylinder).replace("TYPE", 'type="continuous"'))
 

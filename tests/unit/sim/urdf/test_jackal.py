@@ -30,20 +30,20 @@ def jackal():
     simulation.close()
 
 
-def drive_until(simulation, done, command, seconds):
-    """Control at 20 Hz from the true pose; a robot that does not get there in time fails the test, and never hangs."""
+def drive_until(simulation, is_done, command, seconds):
+    """Send `command(pose)` at 20 Hz until `is_done(pose)` for the true pose; fail after `seconds`."""
     for _ in range(round(seconds * 20)):
-        if done(simulation.truth().pose.plane):
+        if is_done(simulation.truth().pose.plane):
             simulation.drive(Twist())
             simulation.step(120)
             return
         simulation.drive(command(simulation.truth().pose.plane))
         simulation.step(12)
-    pytest.fail(f"not there after {seconds} s: {simulation.truth().pose.plane}")
+    pytest.fail(f"not done after {seconds} s: {simulation.truth().pose.plane}")
 
 
 def test_the_jackal_drives_a_square_of_two_meters(jackal):
-    """With feedback from the true pose, as a controller would: four sides, four turns in place."""
+    """A controller with feedback from the true pose drives four sides and turns four times in place."""
     corners, odometer = [], jackal.encoders()
     for side in range(4):
         start, heading = jackal.truth().pose.plane, side * math.pi / 2
@@ -65,17 +65,17 @@ def test_the_jackal_drives_a_square_of_two_meters(jackal):
         assert math.hypot(corner.x - x, corner.y - y) < 0.15
     assert wrap(jackal.truth().pose.yaw) == pytest.approx(0.0, abs=0.05)
     left, right = (now - before for now, before in zip(jackal.encoders(), odometer, strict=True))
-    by_wheels = (right - left) * 0.098 / 0.37559
-    assert by_wheels > 1.15 * 2 * math.pi, "the wheels turn farther than the robot"
+    wheel_rotation = (right - left) * 0.098 / 0.37559
+    assert wheel_rotation > 1.15 * 2 * math.pi, "the wheels turn farther than the robot"
 
 
 def test_the_jackal_turns_in_place_and_its_wheels_slip(jackal):
     jackal.drive(Twist(0.0, 0.0, 1.0))
     jackal.step(240)
-    start, rolled = jackal.truth().pose, jackal.encoders()
+    start, encoders = jackal.truth().pose, jackal.encoders()
     jackal.step(480)
     end, after = jackal.truth().pose, jackal.encoders()
-    turned = math.remainder(end.yaw - start.yaw, 2 * math.pi)
-    by_wheels = (after[1] - rolled[1] - after[0] + rolled[0]) * 0.098 / 0.37559
+    rotation = math.remainder(end.yaw - start.yaw, 2 * math.pi)
+    wheel_rotation = (after[1] - encoders[1] - after[0] + encoders[0]) * 0.098 / 0.37559
     assert math.hypot(end.x - start.x, end.y - start.y) < 0.1
-    assert 1.2 < by_wheels / turned < 2.0
+    assert 1.2 < wheel_rotation / rotation < 2.0

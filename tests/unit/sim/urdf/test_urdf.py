@@ -1,4 +1,4 @@
-"""Tests of robots from URDF files, and of invalid URDFs (CASES 37-44, 50)."""
+"""Tests of robots from URDF files, and of invalid URDFs."""
 
 import os
 import struct
@@ -37,11 +37,13 @@ BOX = '<box size="0.5 0.36 0.2"/>'
 
 
 def robot(geometry=BOX, extra="", base=BASE):
+    """Return the URDF of a cart with two wheels; `extra` are further links and joints."""
     wheels = "".join(WHEEL.format(side=side, y=y) for side, y in (("left", 0.2), ("right", -0.2)))
     return f'<?xml version="1.0"?>\n<robot name="cart">{base.format(geometry=geometry)}{wheels}{extra}\n</robot>\n'
 
 
 def spec(drive=DIFFERENTIAL, urdf="robot.urdf", **fields):
+    """Return the specification of a robot with a URDF file."""
     return RobotSpec.model_validate(
         {"simscen": 1, "name": "cart", "urdf": urdf, "drive": drive, "limits": LIMITS, "sensors": {}, **fields}
     )
@@ -57,6 +59,8 @@ def read_mesh(path):
 
 @pytest.fixture
 def load(tmp_path):
+    """Return a function that builds the robot body of a URDF text."""
+
     def load(text, **fields):
         (tmp_path / "robot.urdf").write_bytes(text if isinstance(text, bytes) else text.encode())
         return build_robot_body(spec(**fields), tmp_path / "cart.robot.yaml", [tmp_path], read_mesh)
@@ -66,6 +70,8 @@ def load(tmp_path):
 
 @pytest.fixture
 def refusal(load):
+    """Return a function that returns the first problem of an invalid URDF text."""
+
     def refusal(text, **fields):
         with pytest.raises(InvalidInput) as caught:
             load(text, **fields)
@@ -123,7 +129,7 @@ def test_swivel_casters_of_a_differential_drive_are_not_steered_wheels(load):
         + WHEEL.format(side="rear", y=0).replace('link="base"', 'link="fork"').replace("0.05", "0.03")
     )
     body = load(robot(extra=caster))
-    assert [wheel.is_driven for wheel in body.wheels if wheel.is_driven] == [True, True]
+    assert sum(wheel.is_driven for wheel in body.wheels) == 2
     assert not any(wheel.is_steered for wheel in body.wheels)
 
 
@@ -185,15 +191,16 @@ def test_meshes_are_part_of_the_hull_as_their_convex_hull(load, tmp_path):
     simulation.close()
 
 
-def stl(claimed):
+def stl(triangle_count):
+    """Return a binary STL file of four triangles, whose header says `triangle_count`."""
     corners = [(0, 0, 0), (300, 0, 0), (0, 300, 0), (0, 0, 300)]
-    data = b"\0" * 80 + struct.pack("<I", claimed)
+    data = b"\0" * 80 + struct.pack("<I", triangle_count)
     for a, b, c in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)):
         data += struct.pack("<12fH", 0, 0, 1, *corners[a], *corners[b], *corners[c], 0)
     return data
 
 
-def test_37_a_missing_mesh_is_named_with_its_line(refusal):
+def test_a_missing_mesh_is_named_with_its_line(refusal):
     text = robot('<mesh filename="meshes/base.stl"/>')
     problem = refusal(text)
     assert (problem.path, problem.line) == ("robot.urdf", line_of(text, "meshes/base.stl"))
@@ -202,7 +209,7 @@ def test_37_a_missing_mesh_is_named_with_its_line(refusal):
 
 
 @pytest.mark.parametrize(
-    ("written", "why"),
+    ("uri", "reason"),
     [
         ("../secret.stl", "outside the scenario root"),
         ("/etc/passwd", "absolute paths are not read"),
@@ -212,54 +219,54 @@ def test_37_a_missing_mesh_is_named_with_its_line(refusal):
         ("http://example.org/base.stl", "only model://, package://, file://, Fuel and relative paths are read"),
     ],
 )
-def test_38_meshes_outside_the_root_are_not_opened(refusal, written, why):
-    problem = refusal(robot(f'<mesh filename="{written}"/>'))
-    assert why in problem.message
+def test_meshes_outside_the_root_are_not_opened(refusal, uri, reason):
+    problem = refusal(robot(f'<mesh filename="{uri}"/>'))
+    assert reason in problem.message
     assert problem.line > 1
 
 
-@pytest.mark.parametrize("written", ["package://cart/base.stl", "model://cart/base.stl", "file://cart/base.stl"])
-def test_mesh_is_found_by_every_uri_scheme_that_worlds_support(refusal, tmp_path, written):
+@pytest.mark.parametrize("uri", ["package://cart/base.stl", "model://cart/base.stl", "file://cart/base.stl"])
+def test_mesh_is_found_by_every_uri_scheme_that_worlds_support(refusal, tmp_path, uri):
     (tmp_path / "cart").mkdir()
     (tmp_path / "cart" / "base.stl").write_bytes(stl(4000))
-    assert "STL header says" in refusal(robot(f'<mesh filename="{written}"/>')).message
+    assert "STL header says" in refusal(robot(f'<mesh filename="{uri}"/>')).message
 
 
-def test_38_a_symbolic_link_out_of_the_root_is_not_followed(refusal, tmp_path):
+def test_a_symbolic_link_out_of_the_root_is_not_followed(refusal, tmp_path):
     (tmp_path / "base.stl").symlink_to("/etc/passwd")
     assert "outside the scenario root" in refusal(robot('<mesh filename="base.stl"/>')).message
 
 
-def test_39_a_folder_instead_of_a_urdf_is_refused(tmp_path):
+def test_a_folder_instead_of_a_urdf_is_refused(tmp_path):
     (tmp_path / "robot.urdf").mkdir()
     with pytest.raises(InvalidInput, match="not a regular file"):
         build_robot_body(spec(), tmp_path / "cart.robot.yaml", [tmp_path])
 
 
-def test_40_a_named_pipe_instead_of_a_mesh_is_refused(refusal, tmp_path):
+def test_a_named_pipe_instead_of_a_mesh_is_refused(refusal, tmp_path):
     os.mkfifo(tmp_path / "base.stl")
     assert "not a regular file" in refusal(robot('<mesh filename="base.stl"/>')).message
 
 
-def test_41_wrong_number_of_triangles_is_reported(refusal, tmp_path):
+def test_wrong_number_of_triangles_is_reported(refusal, tmp_path):
     (tmp_path / "base.stl").write_bytes(stl(4000))
     assert "STL header says 4000 triangles, file holds 4" in refusal(robot('<mesh filename="base.stl"/>')).message
 
 
-def test_42_a_doctype_is_refused(refusal):
+def test_a_doctype_is_refused(refusal):
     text = '<?xml version="1.0"?>\n<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]>\n<robot name="&x;"/>'
     problem = refusal(text)
     assert (problem.line, problem.message) == (2, "DOCTYPE not allowed")
 
 
 @pytest.mark.parametrize("text", [robot()[:400], b"\x7fELF\x02\x01\x01\x00\x00", b""])
-def test_43_invalid_xml_is_reported_with_its_line(refusal, text):
+def test_invalid_xml_is_reported_with_its_line(refusal, text):
     problem = refusal(text)
     assert "not well-formed XML" in problem.message
     assert problem.line >= 1
 
 
-def test_44_three_thousand_links_are_too_many(refusal):
+def test_three_thousand_links_are_too_many(refusal):
     problem = refusal(robot(extra="".join(f'<link name="l{k}"/>' for k in range(3000))))
     assert problem.message == "more than 200 links"
 
@@ -275,11 +282,11 @@ def test_44_three_thousand_links_are_too_many(refusal):
         ("", "<geometry> is empty"),
     ],
 )
-def test_50_impossible_shapes_are_refused_at_their_line(refusal, geometry, message):
+def test_impossible_shapes_are_refused_at_their_line(refusal, geometry, message):
     assert message in refusal(robot(geometry)).message
 
 
-def test_50_negative_masses_are_refused(refusal):
+def test_negative_masses_are_refused(refusal):
     assert "negative" in refusal(robot(base=BASE.replace('value="4"', 'value="-4"'))).message
 
 
@@ -300,9 +307,9 @@ def test_invalid_link_trees_are_refused(refusal, extra, message):
 
 
 def test_several_mistakes_are_reported_at_once(load):
-    bad = '<link name="{}"><collision><geometry><box size="0 1 1"/></geometry></collision></link>'
+    invalid_link = '<link name="{}"><collision><geometry><box size="0 1 1"/></geometry></collision></link>'
     with pytest.raises(InvalidInput) as caught:
-        load(robot(extra=bad.format("a") + bad.format("b")))
+        load(robot(extra=invalid_link.format("a") + invalid_link.format("b")))
     assert len(caught.value.problems) == 2
 
 
@@ -331,9 +338,9 @@ def test_a_urdf_outside_the_root_is_refused(tmp_path):
         build_robot_body(spec(urdf="../robot.urdf"), tmp_path / "in/cart.robot.yaml", [tmp_path / "in"])
 
 
-@pytest.mark.parametrize("named", [(), ("left",), ("left", "right"), ("steering",), ("left", "right", "steering")])
+@pytest.mark.parametrize("specified", [(), ("left",), ("left", "right"), ("steering",), ("left", "right", "steering")])
 @pytest.mark.parametrize("front", [{"left": 0.2, "right": -0.2}, {"middle": 0.0}])
-def test_car_is_steered_by_the_wheels_below_vertical_joints(load, front, named):
+def test_car_is_steered_by_the_wheels_below_vertical_joints(load, front, specified):
     steering = "".join(
         f"""
   <link name="knuckle_{side}"/>
@@ -344,7 +351,7 @@ def test_car_is_steered_by_the_wheels_below_vertical_joints(load, front, named):
     )
     drive = {"type": "ackermann", "wheel_radius": 0.05, "wheel_separation": 0.4, "wheel_base": 0.4, "max_steering": 0.5}
     names = {"left": ["left_joint"], "right": ["right_joint"], "steering": [f"steer_{side}" for side in front]}
-    body = load(robot(extra=steering), drive={**drive, **{key: names[key] for key in named}})
+    body = load(robot(extra=steering), drive={**drive, **{key: names[key] for key in specified}})
     assert [(w.is_steered, w.is_driven, round(w.x, 3)) for w in body.wheels] == [
         (False, True, 0.0), (False, True, 0.0), *[(True, False, 0.4)] * len(front)]  # fmt: skip
     simulation = SingleRobotSimulation(body)

@@ -1,3 +1,5 @@
+"""Tests of horizontal cross sections of meshes."""
+
 import math
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Tests of the search for a solid that overlaps a disc at the height of the robot."""
+
 import subprocess
 import sys
 
@@ -48,5 +50,5 @@ def test_overlap_check_imports_no_heavy_library():
         "assert first_solid_in_disc(w, (0, 0), 0.1, (0, 1)) == 'b';"
         "print({'scipy', 'trimesh', 'embreex', 'PIL', 'pybullet'} & set(sys.modules))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "set()"
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert process.stdout.strip() == "set()"

@@ -1,3 +1,5 @@
+"""Tests of upright prisms, which give distances and extents without a triangle mesh."""
+
 import math
 
 import numpy as np
@@ -28,7 +30,7 @@ shapes = st.one_of(
     st.builds(lambda x, y, z: Box((x, y, z)), sizes, sizes, sizes),
     st.builds(Cylinder, sizes, sizes),
     quadrangles,
-    quadrangles.map(lambda it: Extrusion(it.polygon[::-1], it.height)),
+    quadrangles.map(lambda quadrangle: Extrusion(quadrangle.polygon[::-1], quadrangle.height)),
 )
 
 
@@ -50,9 +52,9 @@ def mesh_rectangle(solid, frame=None):
 @given(shape=shapes, pose=poses, frame=poses)
 def test_extents_are_those_of_the_triangle_mesh(shape, pose, frame):
     solid = Solid(shape, pose)
-    for owner in (None, frame):
-        assert upright_prism(solid, owner) is not None
-        assert bounding_rectangle(solid, owner) == pytest.approx(mesh_rectangle(solid, owner), abs=1e-9)
+    for reference in (None, frame):
+        assert upright_prism(solid, reference) is not None
+        assert bounding_rectangle(solid, reference) == pytest.approx(mesh_rectangle(solid, reference), abs=1e-9)
 
 
 @pytest.mark.parametrize(

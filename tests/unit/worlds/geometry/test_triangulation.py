@@ -1,3 +1,5 @@
+"""Tests of triangle meshes of shapes, and of the merged mesh of several solids."""
+
 import math
 
 import numpy as np

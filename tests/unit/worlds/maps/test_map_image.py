@@ -1,3 +1,5 @@
+"""Tests of map images that are invalid or too large."""
+
 import os
 import struct
 import tracemalloc

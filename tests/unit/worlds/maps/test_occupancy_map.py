@@ -1,3 +1,5 @@
+"""Tests of occupancy maps of worlds, and of walls that are built from maps."""
+
 import math
 
 import numpy as np
@@ -138,6 +140,7 @@ ROTATED_ORIGIN = Pose2(3.0, -2.0, 0.7)
 
 
 def random_map(seed, shape=(30, 40), share=0.3):
+    """Return a map of free cells with a `share` of occupied cells, and three unknown cells."""
     cells = np.where(np.random.default_rng(seed).random(shape) < share, OCCUPIED, 0).astype(np.int8)
     cells[0, :3] = UNKNOWN
     return OccupancyGrid(cells, 0.05, ROTATED_ORIGIN)
@@ -160,7 +163,7 @@ def test_walls_enclose_only_the_occupied_cells_up_to_their_height():
     assert mesh.vertices[:, 2].max() == 1.5
 
 
-def test_long_wall_has_six_faces_for_any_number_of_cells():
+def test_long_wall_has_twelve_triangles_for_any_number_of_cells():
     cells = np.zeros((100, 1000), np.int8)
     cells[20:24, 10:990] = OCCUPIED
     assert len(merge_solids(walls_from_map(OccupancyGrid(cells, 0.05), 1.0)).faces) == 12

@@ -1,3 +1,5 @@
+"""Tests of the grid cells that a cross section fills or touches."""
+
 import numpy as np
 import pytest
 import shapely
@@ -14,6 +16,7 @@ STAR = tuple(
 
 
 def star_at(*offsets):
+    """Return the cross section of a star at each of the offsets."""
     return cross_section(merge_solids(Solid(Extrusion(STAR, 1.0), Pose3(x, y, 0)) for x, y in offsets), 0.5)
 
 
@@ -25,8 +28,8 @@ def test_filled_cells_are_those_whose_center_is_inside():
 
 def test_overlapping_solids_fill_their_union():
     union = filled_cells(star_at((0, 0), (3.3, 1.7)), (24, 24))
-    one, other = filled_cells(star_at((0, 0)), (24, 24)), filled_cells(star_at((3.3, 1.7)), (24, 24))
-    assert np.array_equal(union, one | other)
+    first, second = filled_cells(star_at((0, 0)), (24, 24)), filled_cells(star_at((3.3, 1.7)), (24, 24))
+    assert np.array_equal(union, first | second)
 
 
 def test_grid_that_ends_within_a_solid_contains_a_part_of_it():

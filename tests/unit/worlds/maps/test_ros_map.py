@@ -1,3 +1,5 @@
+"""Tests of ROS maps: loading in each mode and image format, and saving."""
+
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +22,7 @@ def spec(**changes):
     return RosMapSpec.model_validate({"image": "m", **values, **changes})
 
 
-def pgm(path, header, body=b""):
+def write_pgm(path, header, body=b""):
     path.write_bytes(header + body)
     return path
 
@@ -45,7 +47,7 @@ def test_missing_image_is_one_error():
 
 
 def test_thresholds_are_compared_in_single_precision_and_include_their_own_value():
-    # 1 - 100/255 is 0.6078431372…; in float32 it equals float32(0.60784316), in float64 it is below it.
+    # 1 - 100/255 is 0.6078431372…: equal to the threshold in float32, but below the threshold in float64.
     table = cell_values(spec(occupied_thresh=0.60784316, free_thresh=0.2))
     assert table[100] == 100
     assert table[101] == -1
@@ -58,17 +60,17 @@ def test_trinary_mode_has_free_occupied_and_unknown_cells():
     assert [int(v) for v in cell_values(spec(negate=1))[[0, 49, 50, 165, 166, 255]]] == [0, 0, -1, -1, 100, 100]
 
 
-def test_scale_grades_the_grays_between_the_thresholds():
+def test_scale_mode_interpolates_between_the_thresholds():
     table = cell_values(spec(mode="scale", occupied_thresh=0.9, free_thresh=0.1))
     occupancy = 1 - np.arange(256) / 255
-    between = (occupancy > 0.1) & (occupancy < 0.9)
-    assert np.abs(table[between] - (occupancy[between] - 0.1) / 0.8 * 100).max() <= 0.5001
+    is_between = (occupancy > 0.1) & (occupancy < 0.9)
+    assert np.abs(table[is_between] - (occupancy[is_between] - 0.1) / 0.8 * 100).max() <= 0.5001
     assert table[0] == 100
     assert table[255] == 0
     assert not (table == -1).any()
 
 
-def test_raw_takes_pixels_as_percentages():
+def test_raw_mode_reads_pixels_as_percentages():
     table = cell_values(spec(mode="raw"))
     assert np.array_equal(table[:101], np.arange(101))
     assert (table[101:] == -1).all()
@@ -95,16 +97,16 @@ def test_all_formats_and_depths_of_the_same_map_agree(tmp_path):
         image.save(tmp_path / name)
     image.convert("RGB").save(tmp_path / "rgb.png")
     Image.fromarray(grays.astype(np.uint16) * 257).save(tmp_path / "deep.png")
-    pgm(tmp_path / "deep.pgm", b"P5 5 7\n65535\n", (grays.astype(">u2") * 257).tobytes())
+    write_pgm(tmp_path / "deep.pgm", b"P5 5 7\n65535\n", (grays.astype(">u2") * 257).tobytes())
     text = "# a comment\n".join(" ".join(map(str, row)) + "\n" for row in grays)
-    pgm(tmp_path / "text.pgm", b"P2\n# made by hand\n5 7 # size\n255\n", text.encode())
+    write_pgm(tmp_path / "text.pgm", b"P2\n# made by hand\n5 7 # size\n255\n", text.encode())
     expected = cell_values(spec())[grays][::-1]
     for path in sorted(tmp_path.iterdir()):
         assert np.array_equal(load_map(spec(), path)[0].cells, expected), path.name
 
 
 def test_gray_205_that_counts_as_free_gives_a_warning(tmp_path):
-    path = pgm(tmp_path / "m.pgm", b"P5 2 1 255\n", bytes([205, 0]))
+    path = write_pgm(tmp_path / "m.pgm", b"P5 2 1 255\n", bytes([205, 0]))
     assert load_map(spec(free_thresh=0.196), path)[1] == ()
     (note,) = load_map(spec(free_thresh=0.25), path)[1]
     assert "1 pixels of gray 205" in note

@@ -1,3 +1,5 @@
+"""Tests of the picture of a world."""
+
 import math
 
 import numpy as np

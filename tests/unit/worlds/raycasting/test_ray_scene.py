@@ -1,3 +1,5 @@
+"""Tests of ray casting against PyBullet, Embree, and brute force."""
+
 import math
 import os
 import subprocess
@@ -28,12 +30,14 @@ CART = merge_solids([Solid(Box((0.8, 0.5, 1.0)), Pose3(z=0.5)), Solid(Cylinder(0
 
 
 def level_rays(count, origin):
+    """Return the origins and directions of horizontal rays all around a point."""
     angles = np.arange(count) * (2 * math.pi / count)
     directions = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(count)))
     return np.tile(np.array(origin, dtype=float), (count, 1)), directions
 
 
 def random_rays(count, seed, low, high):
+    """Return the origins and directions of random rays that start in a box."""
     rng = np.random.default_rng(seed)
     directions = rng.normal(size=(count, 3))
     return rng.uniform(low, high, (count, 3)), directions / np.linalg.norm(directions, axis=1)[:, None]
@@ -76,8 +80,8 @@ def assert_agree(ours, theirs):
     """Assert equal ranges within 1 mm, except for a few rays that graze an edge, where both answers are valid."""
     same_kind = np.isfinite(ours) == np.isfinite(theirs)
     both = np.isfinite(ours) & np.isfinite(theirs)
-    apart = np.abs(ours[both] - theirs[both]) > 0.001
-    assert (~same_kind).sum() + apart.sum() <= len(ours) // 2000
+    is_different = np.abs(ours[both] - theirs[both]) > 0.001
+    assert (~same_kind).sum() + is_different.sum() <= len(ours) // 2000
     assert both.sum() > len(ours) // 10
 
 
@@ -122,36 +126,37 @@ def test_bodies_are_added_moved_and_removed():
 
 def test_ranges_do_not_depend_on_earlier_queries_or_the_order_of_bodies():
     origins, directions = random_rays(500, 3, (-4, -4, 0.1), (4, 4, 1.5))
-    one, other = RayScene(merge_solids(ROOM)), RayScene(merge_solids(ROOM))
+    first, second = RayScene(merge_solids(ROOM)), RayScene(merge_solids(ROOM))
     a, b = (CART, Pose3(0, -2, 0)), (CART, Pose3(0, 3, 0))
-    one.set_bodies({"a": a}, {})
-    one.cast(*random_rays(300, 4, (-4, -4, 0.1), (4, 4, 1.5)))
-    one.set_bodies({"b": b, "a": a}, {})
-    other.set_bodies({"a": a, "b": b}, {})
-    assert np.array_equal(one.cast(origins, directions), other.cast(origins, directions))
+    first.set_bodies({"a": a}, {})
+    first.cast(*random_rays(300, 4, (-4, -4, 0.1), (4, 4, 1.5)))
+    first.set_bodies({"b": b, "a": a}, {})
+    second.set_bodies({"a": a, "b": b}, {})
+    assert np.array_equal(first.cast(origins, directions), second.cast(origins, directions))
 
 
 def test_many_bodies_give_the_ranges_of_one_merged_world():
     rng = np.random.default_rng(6)
     places = [Pose3.from_rpy(*rng.uniform((-9, -9, 0), (9, 9, 1)), *rng.uniform(-3, 3, 3)) for _ in range(40)]
-    apart, together = (
+    separate, merged = (
         RayScene(merge_solids(ROOM)),
         RayScene(merge_solids([*ROOM, *(Solid(Box((0.7, 0.3, 0.5)), pose.compose(Pose3(z=0.2))) for pose in places)])),
     )
     box = merge_solids([Solid(Box((0.7, 0.3, 0.5)), Pose3(z=0.2))])
-    apart.set_bodies({f"box {k}": (box, pose) for k, pose in enumerate(places)}, {})
+    separate.set_bodies({f"box {k}": (box, pose) for k, pose in enumerate(places)}, {})
     origins, directions = random_rays(5000, 7, (-10, -10, 0.05), (10, 10, 1.9))
-    assert_agree(apart.cast(origins, directions), together.cast(origins, directions))
+    assert_agree(separate.cast(origins, directions), merged.cast(origins, directions))
 
 
-def field(count):
+def field_of_boxes(count):
+    """Return the mesh of boxes at random poses."""
     places = np.random.default_rng(8).uniform((-60, -60, 0), (60, 60, 3), (count, 3)).tolist()
     return merge_solids([Solid(Box((0.7, 0.3, 0.9)), Pose3.planar(Pose2(*place), 0.45)) for place in places])
 
 
 @pytest.mark.parametrize("count", [1, 15, 16, 17, 361, 5000])
 def test_rays_equal_single_rays_of_the_embree_package_bit_for_bit(count):
-    mesh = field(1500)
+    mesh = field_of_boxes(1500)
     device = EmbreeDevice()
     theirs = EmbreeScene(device, True)
     center = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
@@ -168,12 +173,16 @@ def test_rays_equal_single_rays_of_the_embree_package_bit_for_bit(count):
 
 
 def test_scene_survives_a_fork_and_the_child_can_build_others():
-    mesh, (origins, directions) = field(200), level_rays(720, (1.0, 2.0, 0.3))
-    here = RayScene(mesh).cast(origins, directions)
+    mesh, (origins, directions) = field_of_boxes(200), level_rays(720, (1.0, 2.0, 0.3))
+    expected = RayScene(mesh).cast(origins, directions)
     child = os.fork()
     if not child:
-        inherited, rebuilt = (RayScene(one).cast(origins, directions) for one in (mesh, field(200)))
-        os._exit(0 if np.array_equal(inherited, here) and np.array_equal(rebuilt, here) else 1)
+        is_equal = False
+        try:
+            ranges = [RayScene(each).cast(origins, directions) for each in (mesh, field_of_boxes(200))]
+            is_equal = all(np.array_equal(actual, expected) for actual in ranges)
+        finally:  # the child must not go on with the tests
+            os._exit(0 if is_equal else 1)
     assert os.waitpid(child, 0)[1] == 0
 
 
@@ -183,9 +192,9 @@ from simscen.core.geometry.shapes import Box, Solid
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.raycasting.ray_scene import RayScene
 for _ in range(200):
-    knot = [RayScene(merge_solids([Solid(Box((1.0, 1.0, 1.0)))]))]
-    knot.append(knot)
-    del knot
+    cycle = [RayScene(merge_solids([Solid(Box((1.0, 1.0, 1.0)))]))]
+    cycle.append(cycle)
+    del cycle
     gc.collect()
 """
 
@@ -195,10 +204,12 @@ def test_garbage_collected_scene_does_not_crash():
     assert subprocess.run([sys.executable, "-c", COLLECT_CYCLES], check=False).returncode == 0
 
 
-@pytest.mark.parametrize(("first", "beams", "field"), [(-math.pi, 360, 2 * math.pi), (2.0, 91, 1.5), (0.3, 1, 0.1)])
-def test_fan_gives_the_ranges_of_its_single_rays(first, beams, field):
+@pytest.mark.parametrize(
+    ("first", "beams", "field_of_view"), [(-math.pi, 360, 2 * math.pi), (2.0, 91, 1.5), (0.3, 1, 0.1)]
+)
+def test_fan_gives_the_ranges_of_its_single_rays(first, beams, field_of_view):
     """The bodies: one behind the lidar, hit by the first and last rays, one around it, and one out of reach."""
-    scene, fan = RayScene(merge_solids(ROOM)), RayFan(first, field / beams, beams)
+    scene, fan = RayScene(merge_solids(ROOM)), RayFan(first, field_of_view / beams, beams)
     places = [(-2.5, 0.1, 0.3), (1.5, -1.5, 2.0), (0.05, 0.0, 1.0), (30.0, 0.0, 0.0)]
     scene.set_bodies({f"cart {k}": (CART, Pose3.planar(Pose2(*place))) for k, place in enumerate(places)}, {})
     for lens in (Pose3(0.0, 0.0, 0.3), Pose3.from_rpy(0.8, -0.4, 0.6, 0.1, -0.2, 2.5)):

@@ -16,16 +16,18 @@ WALLS = merge_solids([Solid(Box((20.0, 0.2, 1.0)), Pose3(0.0, y, 0.5)) for y in 
 STOOL = merge_solids([Solid(Cylinder(0.2, 0.05), Pose3(z=0.4)), Solid(Box((0.05, 0.05, 0.4)), Pose3(0.1, 0.0, 0.2))])
 CRATE = merge_solids([Solid(Box((0.6, 0.4, 0.5)), Pose3(z=0.25))])
 RNG = np.random.default_rng(21)
-REST_POSES = {f"thing {k:02}": Pose3.planar(Pose2(*RNG.uniform((-9, -9, -3), (9, 9, 3)))) for k in range(30)}
+REST_POSES = {f"body {k:02}": Pose3.planar(Pose2(*RNG.uniform((-9, -9, -3), (9, 9, 3)))) for k in range(30)}
 LEVEL, PITCHED = Pose3(0.5, 0.2, 0.18), Pose3.from_rpy(0.4, 0.1, 0.5, 0.05, -0.3, 1.0)
 FAN = RayFan(-math.pi, math.pi / 90, 180)
 
 
 def bodies_at(poses):
-    return {name: (CRATE if int(name[6:]) % 3 else STOOL, pose) for name, pose in poses.items()}
+    """Return mesh and pose of each body: a stool if its number is divisible by 3, otherwise a crate."""
+    return {name: (CRATE if int(name[5:]) % 3 else STOOL, pose) for name, pose in poses.items()}
 
 
-def scattered():
+def random_rays():
+    """Return the origins and directions of 400 random rays."""
     directions = np.random.default_rng(5).normal(size=(400, 3))
     origins = np.random.default_rng(6).uniform((-9, -9, 0.05), (9, 9, 0.8), (400, 3))
     return origins, directions / np.linalg.norm(directions, axis=1)[:, None]
@@ -34,7 +36,9 @@ def scattered():
 def ranges_of(scene, reach=9.0):
     """Return the ranges of a level fan, a pitched fan, and random rays."""
     sweeps = [scene.sweep(FAN, lens, reach) for lens in (LEVEL, PITCHED)]
-    return np.concatenate([*(np.where(ends > reach, np.inf, ends) for ends in sweeps), scene.cast(*scattered(), reach)])
+    return np.concatenate(
+        [*(np.where(ends > reach, np.inf, ends) for ends in sweeps), scene.cast(*random_rays(), reach)]
+    )
 
 
 def pose_sequence():
@@ -55,7 +59,7 @@ def pose_sequence():
     ("triangles", "groups"), [(ray_scene.MAX_GROUP_TRIANGLES, ray_scene.REGROUPING_THRESHOLD), (60, 3)]
 )
 def test_reused_scene_gives_the_ranges_of_a_new_scene(monkeypatch, triangles, groups):
-    """A reused scene gives the same ranges as a new scene, or one that had fewer bodies before."""
+    """The new scene has had no bodies, or only some of the bodies, before."""
     monkeypatch.setattr(ray_scene, "MAX_GROUP_TRIANGLES", triangles)
     monkeypatch.setattr(ray_scene, "REGROUPING_THRESHOLD", groups)
     reused = RayScene(WALLS)
@@ -99,7 +103,7 @@ def test_resting_bodies_share_one_mesh_scene(monkeypatch):
     scene.sweep(FAN, LEVEL, math.inf)
     assert len(built) == 1
     for step in range(12):
-        poses["thing 07"] = Pose3(3.0 + 0.01 * step, 3.0)
+        poses["body 07"] = Pose3(3.0 + 0.01 * step, 3.0)
         scene.set_bodies(bodies_at(poses), REST_POSES)
         scene.sweep(FAN, LEVEL, math.inf)
     assert len(built) <= 1 + 1 + math.ceil(math.log2(len(REST_POSES)))
@@ -114,7 +118,7 @@ def test_height_range_of_a_scene_does_not_change_the_ranges():
     for lens in lenses:
         full_height = RayScene(WALLS)
         full_height.set_bodies(bodies_at(REST_POSES), REST_POSES)
-        full_height.cast(*scattered(), 1e6)  # extends the height range to the maximum
+        full_height.cast(*random_rays(), 1e6)  # extends the height range to the maximum
         assert np.array_equal(scene.sweep(FAN, lens, 9.0), full_height.sweep(FAN, lens, 9.0))
         heights.add(scene._heights)
     assert len(heights) < 8

@@ -1,3 +1,5 @@
+"""Tests of the clearance field of a world."""
+
 import numpy as np
 import pytest
 import shapely

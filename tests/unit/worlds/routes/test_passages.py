@@ -1,3 +1,5 @@
+"""Tests of the passages along a shortest path."""
+
 import math
 
 import numpy as np
@@ -16,6 +18,7 @@ def wall(name, x, y, length, width, yaw=0.0):
 
 
 def leg(start, goal, *solids):
+    """Return the leg from start to goal among the solids."""
     paths = ShortestPaths(merge_solids(solids), (-6, -6, 6, 6), RADIUS)
     return paths.leg(Pose2(*start), Pose2(*goal), "goal")
 
@@ -27,8 +30,8 @@ DOOR = wall("left", 0, 10.5, 0.1, 20), wall("right", 0, -10.5, 0.1, 20)
 @pytest.mark.parametrize("start", [(-4, 0), (-4, 4), (-0.6, -3)])
 @pytest.mark.parametrize("goal", [(4, 0), (4, 4), (0.6, 4)])
 def test_door_has_its_true_width_at_any_angle_of_the_path(start, goal):
-    found = leg(start, goal, *DOOR).passages
-    narrowest = min(found, key=lambda passage: passage.width)
+    passages = leg(start, goal, *DOOR).passages
+    narrowest = min(passages, key=lambda passage: passage.width)
     assert narrowest.width == pytest.approx(1.0, abs=0.03)
     assert set(narrowest.between) == {"left", "right"}
     assert narrowest.middle == pytest.approx((0.0, 0.0), abs=0.1)
@@ -60,8 +63,8 @@ def test_oblique_door_has_its_true_width():
         wall(name, *(k * 1.9 * np.array([math.cos(yaw), math.sin(yaw)])), 3.0, 0.1, yaw)
         for name, k in (("a", 1), ("b", -1))
     ]
-    found = leg((-4, 0), (4, 0), *posts).passages
-    assert min(passage.width for passage in found) == pytest.approx(0.8, abs=0.03)
+    passages = leg((-4, 0), (4, 0), *posts).passages
+    assert min(passage.width for passage in passages) == pytest.approx(0.8, abs=0.03)
 
 
 def test_passage_of_an_unreachable_goal_is_the_gap_that_is_too_narrow():

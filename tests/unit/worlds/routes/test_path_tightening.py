@@ -1,3 +1,5 @@
+"""Tests of the tightening of a path around obstacles."""
+
 import math
 
 import numpy as np

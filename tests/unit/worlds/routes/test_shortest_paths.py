@@ -1,3 +1,5 @@
+"""Tests of shortest paths against closed forms and a visibility graph."""
+
 import itertools
 import math
 
@@ -14,11 +16,11 @@ from simscen.worlds.built_world import build_world_and_map
 from simscen.worlds.geometry.triangulation import merge_solids
 from simscen.worlds.routes.shortest_paths import ShortestPaths, legs_between
 
-R = 0.25
+RADIUS_M = 0.25
 
 
-def search_among(*solids, bounds=(-5, -5, 5, 5), radius=R, **more):
-    return ShortestPaths(merge_solids(solids), bounds, radius, **more)
+def search_among(*solids, bounds=(-5, -5, 5, 5), radius=RADIUS_M, **options):
+    return ShortestPaths(merge_solids(solids), bounds, radius, **options)
 
 
 def box(x, y, width, depth, name=""):
@@ -52,10 +54,10 @@ def test_shortest_path_around_a_wall_has_an_arc_about_the_corner():
     x, h = 2.0, -2.0
     to_corner = math.hypot(x - 0.1, h)
     # From (-2, -2) to a tangent point of the circle about (-0.1, 0), along the top, and down again.
-    rise = math.acos(R / to_corner)
+    rise = math.acos(RADIUS_M / to_corner)
     slope = math.atan2(h, -(x - 0.1)) % (2 * math.pi)  # direction corner -> start
     arc = slope - rise - math.pi / 2
-    expected = 2 * (math.sqrt(to_corner**2 - R**2) + R * arc) + 0.2
+    expected = 2 * (math.sqrt(to_corner**2 - RADIUS_M**2) + RADIUS_M * arc) + 0.2
     assert paths.length(Pose2(-x, h), Pose2(x, h)) == pytest.approx(expected, rel=0.005)
 
 
@@ -88,7 +90,7 @@ def test_shortest_path_among_random_boxes_is_that_of_a_visibility_graph_within_o
         polygons.append(shapely.Polygon(Pose2(x, y, yaw).apply(corners)))
         solids.append(Solid(Box((width, depth, 1.0)), Pose3.planar(Pose2(x, y, yaw), 0.5)))
     start, goal = (-4.5, -4.5), (4.5, 4.5)
-    expected = visibility_graph(polygons, start, goal, R)
+    expected = visibility_graph(polygons, start, goal, RADIUS_M)
     assert search_among(*solids).length(Pose2(*start), Pose2(*goal)) == pytest.approx(expected, rel=0.01)
 
 
@@ -97,7 +99,7 @@ def test_shortest_path_keeps_the_radius_of_the_robot_from_obstacles():
     posts = [(x, y) for x, y in rng.uniform(-4, 4, (30, 2)).tolist() if abs(x) + abs(y) < 7]
     paths = search_among(*(Solid(Cylinder(0.2, 1.0), Pose3(x, y, 0.5)) for x, y in posts))
     path = shapely.LineString(paths.path(Pose2(-4.8, -4.8), Pose2(4.8, 4.8)))
-    assert min(path.distance(shapely.Point(post)) for post in posts) > 0.2 + R - 0.01
+    assert min(path.distance(shapely.Point(post)) for post in posts) > 0.2 + RADIUS_M - 0.01
 
 
 def test_path_out_of_a_room_needs_a_door_that_is_wide_enough():
@@ -108,22 +110,22 @@ def test_path_out_of_a_room_needs_a_door_that_is_wide_enough():
 
     inside, outside = Pose2(0, 0), Pose2(0, 4)
     assert search_among(*room(0.0)).length(inside, outside) == math.inf
-    assert search_among(*room(2 * R - 0.03)).length(inside, Pose2(1, 4)) == math.inf
-    assert search_among(*room(2 * R + 0.10)).length(inside, Pose2(1, 4)) == pytest.approx(4.19, abs=0.06)
+    assert search_among(*room(2 * RADIUS_M - 0.03)).length(inside, Pose2(1, 4)) == math.inf
+    assert search_among(*room(2 * RADIUS_M + 0.10)).length(inside, Pose2(1, 4)) == pytest.approx(4.19, abs=0.06)
 
 
 def test_no_path_leads_to_a_goal_where_the_disc_does_not_fit():
     paths = search_among(box(0, 0, 1, 1))
     assert paths.length(Pose2(-3, 0), Pose2(0, 0)) == math.inf
     assert paths.length(Pose2(-3, 0), Pose2(0.6, 0)) == math.inf
-    assert paths.length(Pose2(-3, 0), Pose2(-0.5 - R - 0.001, 0)) == pytest.approx(2.25, abs=0.01)
+    assert paths.length(Pose2(-3, 0), Pose2(-0.5 - RADIUS_M - 0.001, 0)) == pytest.approx(2.25, abs=0.01)
 
 
 def test_only_solids_at_the_height_of_the_robot_block_the_path():
     carpet, lamp = Solid(Box((2, 9, 0.02)), Pose3(0, 0, 0.01)), Solid(Box((2, 9, 1.0)), Pose3(0, 0, 2.0))
     assert search_among(carpet, lamp).length(Pose2(-3, 0), Pose2(3, 0)) == 6.0
     ball = search_among(Solid(Sphere(0.4), Pose3(0, 0, 0.4)))
-    expected = around_circle((-3, 0), (3, 0), 0.4 + R)
+    expected = around_circle((-3, 0), (3, 0), 0.4 + RADIUS_M)
     assert ball.length(Pose2(-3, 0), Pose2(3, 0)) == pytest.approx(expected, rel=0.005)
 
 
@@ -135,7 +137,7 @@ def test_a_point_cannot_pass_through_a_sheet():
 def test_lengths_are_given_for_each_leg_even_outside_the_bounds():
     built = build_world_and_map(World("w", (Solid(Extrusion(((0, 0), (1, 0), (1, 1)), 1.0)),)), 0.2)
     stops = [Pose2(-3, 3), Pose2(-3, 8), Pose2(6, 8), Pose2(0.7, 0.3)]
-    legs = legs_between(built, [(start, Goal("g", goal)) for start, goal in itertools.pairwise(stops)], R)
+    legs = legs_between(built, [(start, Goal("g", goal)) for start, goal in itertools.pairwise(stops)], RADIUS_M)
     assert [leg.length for leg in legs] == pytest.approx([5.0, 9.0, math.inf])
 
 

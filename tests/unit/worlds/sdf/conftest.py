@@ -1,3 +1,5 @@
+"""Fixtures that load SDF texts."""
+
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,6 +18,7 @@ Refuse = Callable[..., list[Problem]]
 
 @pytest.fixture
 def data() -> Path:
+    """Return the folder of the third-party worlds."""
     folder = Path(__file__).parents[5] / "shared" / "data"
     if not folder.is_dir():
         pytest.skip("the third-party worlds are missing: see CONTRIBUTING.md")
@@ -37,7 +40,7 @@ def load(tmp_path: Path) -> Load:
 
 @pytest.fixture
 def refuse(load: Load) -> Refuse:
-    """Return a function that returns the problems with which loading fails."""
+    """Return a function that loads an invalid SDF text and returns its problems."""
 
     def _refuse(content: str, **options: object) -> list[Problem]:
         with pytest.raises(InvalidInput) as caught:

@@ -1,3 +1,5 @@
+"""Tests of scripted SDF actors."""
+
 import pytest
 
 from simscen.core.geometry import Pose2
@@ -18,8 +20,8 @@ def trajectory(points, number=0):
     return f"<trajectory id='{number}' type='walking'>{waypoints}</trajectory>"
 
 
-def actor(script="", body=SKIN, rest=""):
-    return f"<actor name='anna'>{rest}{body}<script>{script}</script></actor>"
+def actor(script="", body=SKIN, extra=""):
+    return f"<actor name='anna'>{extra}{body}<script>{script}</script></actor>"
 
 
 WALK = trajectory([(0, 1, 0, 1, 0), (4, 5, 0, 1, 0), (5, 5, 0, 1, 1.5)])
@@ -84,7 +86,7 @@ def test_actor_waits_at_its_first_waypoint_until_its_time(load):
 
 @pytest.mark.parametrize("script", ["", "<auto_start>false</auto_start>" + WALK, trajectory([(0, 1, 0, 1, 0)])])
 def test_actor_without_a_running_script_is_stationary(load, script):
-    world = load(actor(script, rest="<pose>1 0 1 0 0 0</pose>"))
+    world = load(actor(script, extra="<pose>1 0 1 0 0 0</pose>"))
     assert world.bodies[0].path is None
     assert world.bodies[0].pose.plane == Pose2(1, 0, 0)
     assert any("stands still" in note for note in world.notes)

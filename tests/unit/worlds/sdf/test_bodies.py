@@ -1,3 +1,5 @@
+"""Tests of the bodies and static solids of SDF models."""
+
 import numpy as np
 import pytest
 
@@ -6,21 +8,21 @@ from simscen.worlds.sdf.bodies import LinkGroups
 BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
 
 
-def link(name, x=0.0, mass=None, rest="", collision=BOX):
+def link(name, x=0.0, mass=None, extra="", collision=BOX):
     inertial = f"<inertial><mass>{mass}</mass></inertial>" if mass is not None else ""
-    return f"<link name='{name}'><pose>{x} 0 0 0 0 0</pose>{inertial}{collision}{rest}</link>"
+    return f"<link name='{name}'><pose>{x} 0 0 0 0 0</pose>{inertial}{collision}{extra}</link>"
 
 
 def joint(parent, child, kind="revolute", name="j"):
     return f"<joint name='{name}' type='{kind}'><parent>{parent}</parent><child>{child}</child></joint>"
 
 
-def model(content, name="cart", rest=""):
-    return f"<model name='{name}'>{rest}{content}</model>"
+def model(content, name="cart", extra=""):
+    return f"<model name='{name}'>{extra}{content}</model>"
 
 
 def test_a_free_model_is_a_body_with_its_name_frame_and_mass(load):
-    world = load(model(link("a", 1, 3), rest="<pose>0 2 1 0 0 0</pose>"))
+    world = load(model(link("a", 1, 3), extra="<pose>0 2 1 0 0 0</pose>"))
     (body,) = world.bodies
     assert (body.name, body.mass, body.path) == ("cart", 3, None)
     assert body.pose.position == (0, 2, 1)
@@ -48,7 +50,7 @@ def test_movable_joints_are_held_rigid_with_a_note(load):
 
 
 def test_links_without_a_joint_are_separate_bodies(load):
-    bodies = load(model(link("a") + link("b", 4), rest="<pose>1 0 0 0 0 0</pose>")).bodies
+    bodies = load(model(link("a") + link("b", 4), extra="<pose>1 0 0 0 0 0</pose>")).bodies
     assert [(body.name, body.pose.x) for body in bodies] == [("cart::a", 1), ("cart::b", 5)]
 
 
@@ -84,12 +86,12 @@ def test_joint_attaches_only_the_named_one_of_two_copies_of_a_file(load, tmp_pat
 
 def test_nested_models_of_a_static_model_are_static(load):
     inner = f"<model name='n'><static>false</static>{link('a')}</model>"
-    world = load(model(inner, rest="<static>TRUE</static>"))
+    world = load(model(inner, extra="<static>TRUE</static>"))
     assert (len(world.solids), len(world.bodies)) == (1, 0)
 
 
 def test_kinematic_link_is_moved_only_by_the_scenario(load):
-    assert load(model(link("a", rest="<kinematic>1</kinematic>"))).bodies[0].mass == 0
+    assert load(model(link("a", extra="<kinematic>1</kinematic>"))).bodies[0].mass == 0
 
 
 def test_a_link_without_collision_adds_its_mass_only(load):
@@ -136,7 +138,7 @@ def test_more_than_2000_bodies_are_refused(refuse):
 
 
 def test_order_is_that_of_the_document(load):
-    text = model(f"<model name='n'>{link('x')}</model>" + link("a", 3), rest="<static>1</static>") + model(
+    text = model(f"<model name='n'>{link('x')}</model>" + link("a", 3), extra="<static>1</static>") + model(
         link("z"), "b"
     )
     assert [solid.name for solid in load(text).solids] == ["cart::n::x::c", "cart::a::c"]
@@ -147,4 +149,4 @@ def test_too_heavy_body_is_refused_unless_static(load, refuse):
     (problem,) = refuse(heavy)
     assert "model[cart]/link[a]: has a mass of 1e+12 kg; at most 1e+06 kg can move" in problem.message
     assert load(heavy, lenient=True).bodies[0].mass == 0
-    assert len(load(model(link("a", 1, "1e12"), rest="<static>1</static>")).solids) == 1
+    assert len(load(model(link("a", 1, "1e12"), extra="<static>1</static>")).solids) == 1

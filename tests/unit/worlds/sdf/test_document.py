@@ -1,3 +1,5 @@
+"""Tests of SDF files: XML, size limits, unknown elements, and names."""
+
 import difflib
 import tracemalloc
 from pathlib import Path
@@ -62,7 +64,7 @@ def test_the_number_of_elements_is_limited(refuse, monkeypatch):
 def test_repeated_unknown_element_is_looked_up_once(tmp_path, monkeypatch):
     lookups = []
     real = difflib.get_close_matches
-    counting = lambda word, *rest, **options: lookups.append(word) or real(word, *rest, **options)  # noqa: E731
+    counting = lambda word, *arguments, **options: lookups.append(word) or real(word, *arguments, **options)  # noqa: E731
     monkeypatch.setattr(difflib, "get_close_matches", counting)
     (tmp_path / "x.world").write_text(
         f"<sdf version='1.6'><world name='w'>{MODEL}{'<never_heard_of/>' * 1000}</world></sdf>"

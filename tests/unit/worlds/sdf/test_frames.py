@@ -1,3 +1,5 @@
+"""Tests of poses and frames in SDF worlds."""
+
 import math
 
 import numpy as np
@@ -43,9 +45,9 @@ def test_frame_is_placed_relative_to_its_attached_frame(load):
 
 def test_joint_is_placed_relative_to_its_child_link_by_default(load):
     joint = "<joint name='j' type='fixed'><parent>world</parent><child>a</child><pose{}>0 0 1 0 0 0</pose></joint>"
-    rest = f"<link name='a'><pose>2 0 0 0 0 0</pose></link><link name='b'><pose relative_to='j'/>{BOX}</link>"
-    assert position(load(model(rest + joint.format("")))) == pytest.approx((2, 0, 1))
-    assert position(load(model(rest + joint.format(" relative_to='__model__'")))) == pytest.approx((0, 0, 1))
+    links = f"<link name='a'><pose>2 0 0 0 0 0</pose></link><link name='b'><pose relative_to='j'/>{BOX}</link>"
+    assert position(load(model(links + joint.format("")))) == pytest.approx((2, 0, 1))
+    assert position(load(model(links + joint.format(" relative_to='__model__'")))) == pytest.approx((0, 0, 1))
 
 
 def test_a_collision_may_be_placed_relative_to_any_frame_of_its_model(load):

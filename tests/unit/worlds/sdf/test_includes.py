@@ -1,3 +1,5 @@
+"""Tests of included SDF models."""
+
 import os
 
 import pytest
@@ -14,7 +16,7 @@ BOX = "<box><size>1 1 1</size></box>"
 BALL = "<sphere><radius>0.5</radius></sphere>"
 
 
-def write(folder, name="crate", files=("model.sdf",), config=None, shape=BOX, extra="<static>1</static>"):
+def write_model(folder, name="crate", files=("model.sdf",), config=None, shape=BOX, extra="<static>1</static>"):
     model_folder = folder / name
     model_folder.mkdir(parents=True, exist_ok=True)
     for file in files:
@@ -27,16 +29,16 @@ def write(folder, name="crate", files=("model.sdf",), config=None, shape=BOX, ex
 @pytest.fixture
 def models(tmp_path):
     folder = tmp_path / "elsewhere" / "models"
-    write(folder)
+    write_model(folder)
     return folder
 
 
-def include(uri, rest="", attributes=""):
-    return f"<include {attributes}><uri>{uri}</uri>{rest}</include>"
+def include(uri, content="", attributes=""):
+    return f"<include {attributes}><uri>{uri}</uri>{content}</include>"
 
 
 def test_model_uris_are_looked_up_in_the_search_folders_in_order(load, models, tmp_path):
-    write(tmp_path / "other", shape=BALL)
+    write_model(tmp_path / "other", shape=BALL)
     world = load(include("model://crate"), search=[models, tmp_path / "other"])
     assert world.solids[0].shape == Box((1, 1, 1))
     world = load(include("model://crate"), search=[tmp_path / "other", models])
@@ -70,12 +72,12 @@ def test_new_name_of_an_include_is_validated(refuse, models, name, message):
 
 
 def test_include_without_a_pose_keeps_that_of_the_model(load, tmp_path):
-    write(tmp_path / "m", extra="<static>1</static><pose>4 5 6 0 0 0</pose>")
+    write_model(tmp_path / "m", extra="<static>1</static><pose>4 5 6 0 0 0</pose>")
     assert load(include("m/crate")).solids[0].pose.position == (4, 5, 6)
 
 
 def test_pose_of_an_include_applies_to_its_placement_frame(load, tmp_path):
-    write(tmp_path / "m", extra="<static>1</static><frame name='corner'><pose>1 1 0 0 0 0</pose></frame>")
+    write_model(tmp_path / "m", extra="<static>1</static><frame name='corner'><pose>1 1 0 0 0 0</pose></frame>")
     world = load(include("m/crate", "<pose>0 0 0 0 0 0</pose><placement_frame>corner</placement_frame>"))
     assert world.solids[0].pose.position == (-1, -1, 0)
 
@@ -87,7 +89,7 @@ def test_pose_of_an_include_may_be_relative_to_a_frame_of_its_parent(load, model
 
 
 def test_model_included_in_a_static_model_is_static(load, tmp_path):
-    write(tmp_path / "m", extra="")
+    write_model(tmp_path / "m", extra="")
     inner = include("m/crate", "<pose>1 0 0 0 0 0</pose>")
     world = load(f"<model name='shelf'><static>true</static><pose>0 2 0 0 0 0</pose>{inner}</model>")
     assert world.solids[0].name == "shelf::crate::a::c"
@@ -95,7 +97,7 @@ def test_model_included_in_a_static_model_is_static(load, tmp_path):
 
 
 def test_merged_include_exposes_its_names_and_takes_static_from_its_owner(load, tmp_path):
-    write(tmp_path / "m", extra="<static>1</static>")
+    write_model(tmp_path / "m", extra="<static>1</static>")
     ball = f"<collision name='c'><geometry>{BALL}</geometry></collision>"
     on_top = f"<link name='b'><pose relative_to='a'>0 0 1 0 0 0</pose>{ball}</link>"
     merged = include("m/crate", "<pose>3 0 0 0 0 0</pose>", "merge='true'")
@@ -107,15 +109,15 @@ def test_merged_include_exposes_its_names_and_takes_static_from_its_owner(load, 
 
 def test_model_config_names_the_newest_version_that_is_read(load, tmp_path):
     config = "<sdf version='1.9'>old.sdf</sdf><sdf version='1.10'>new.sdf</sdf><sdf version='2.0'>future.sdf</sdf>"
-    write(tmp_path / "m", files=("old.sdf", "future.sdf"), config=config)
-    write(tmp_path / "m", files=("new.sdf",), shape=BALL)
+    write_model(tmp_path / "m", files=("old.sdf", "future.sdf"), config=config)
+    write_model(tmp_path / "m", files=("new.sdf",), shape=BALL)
     assert load(include("m/crate")).solids[0].shape == Sphere(0.5)
 
 
 @pytest.mark.parametrize(("file", "config"), [("model.sdf", None), ("crate.sdf", "<sdf version='1.6'>crate.sdf</sdf>")])
 def test_a_folder_with_a_model_comes_before_other_folders_with_its_name(load, tmp_path, file, config):
     (tmp_path / "crate" / "launch").mkdir(parents=True)
-    write(tmp_path / "models", files=(file,), config=config)
+    write_model(tmp_path / "models", files=(file,), config=config)
     assert len(load(include("model://crate"), search=[tmp_path]).solids) == 1
 
 
@@ -184,8 +186,8 @@ def test_online_models_are_not_fetched(refuse):
 
 
 def test_include_cycle_is_refused_with_its_chain(tmp_path, load, refuse):
-    for here, there in (("a", "b"), ("b", "a")):
-        write(tmp_path, here, extra=include(f"../{there}"))
+    for name, other in (("a", "b"), ("b", "a")):
+        write_model(tmp_path, name, extra=include(f"../{other}"))
     (problem,) = refuse(include("a"))
     assert problem.path == "b/model.sdf"
     assert "include cycle: a/model.sdf → b/model.sdf → a/model.sdf" in problem.message
@@ -195,19 +197,19 @@ def test_exponentially_nested_includes_are_refused(tmp_path, refuse, monkeypatch
     monkeypatch.setattr(model_tree, "MAX_MODELS", 1000)
     for level in range(8):
         inner = "".join(include(f"../l{level + 1}", f"<name>n{k}</name>") for k in range(10))
-        write(tmp_path, f"l{level}", extra=inner if level < 7 else "")
+        write_model(tmp_path, f"l{level}", extra=inner if level < 7 else "")
     assert any("more than 1000 models" in problem.message for problem in refuse(include("l0")))
 
 
 def test_an_error_in_an_included_file_is_reported_in_that_file(tmp_path, refuse):
-    write(tmp_path, "m", shape="<box><size>1 -1 1</size></box>")
+    write_model(tmp_path, "m", shape="<box><size>1 -1 1</size></box>")
     (problem,) = refuse(include("m"))
     assert (problem.path, problem.line) == ("m/model.sdf", 1)
     assert problem.message.startswith("model[crate]/link[a]/collision[c]/geometry/box/size: must be positive")
 
 
 def test_a_broken_included_file_is_reported_with_its_line(tmp_path, refuse):
-    write(tmp_path, "m")
+    write_model(tmp_path, "m")
     (tmp_path / "m" / "model.sdf").write_text("<sdf version='1.6'>\n<model name='x'>\n</link>")
     (problem,) = refuse(include("m"))
     assert (problem.path, problem.line) == ("m/model.sdf", 3)
@@ -232,7 +234,7 @@ class TestContainment:
     @pytest.fixture
     def outside(self, tmp_path_factory):
         folder = tmp_path_factory.mktemp("outside")
-        write(folder, shape="<box><size>7 7 7</size></box>")
+        write_model(folder, shape="<box><size>7 7 7</size></box>")
         return folder
 
     def test_relative_path_out_of_the_root_is_refused(self, refuse, outside):
@@ -263,7 +265,7 @@ class TestContainment:
 
     def test_links_in_the_folder_that_the_user_named_are_followed(self, tmp_path):
         (tmp_path / "real").mkdir()
-        write(tmp_path / "real")
+        write_model(tmp_path / "real")
         (tmp_path / "alias").symlink_to(tmp_path / "real")
         world = load_sdf(tmp_path / "alias" / "crate" / "model.sdf", root=tmp_path / "alias")
         assert len(world.solids) == 1
@@ -284,7 +286,7 @@ class TestContainment:
         assert "not well-formed XML" in refuse(include("a\0b"))[0].message
 
     def test_an_unreadable_file_is_reported(self, refuse, tmp_path):
-        write(tmp_path, "m")
+        write_model(tmp_path, "m")
         (tmp_path / "m" / "model.sdf").chmod(0)
         if os.access(tmp_path / "m" / "model.sdf", os.R_OK):
             pytest.skip("running as root")

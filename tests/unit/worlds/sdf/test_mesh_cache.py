@@ -1,3 +1,5 @@
+"""Tests of the cache of mesh files."""
+
 import numpy as np
 import pytest
 

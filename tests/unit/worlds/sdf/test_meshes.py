@@ -1,3 +1,5 @@
+"""Tests of COLLADA, STL, and OBJ meshes."""
+
 import struct
 import tracemalloc
 import warnings
@@ -46,27 +48,31 @@ def dae(geometries=None, nodes=None, unit='<unit meter="1"/>', up="Z_UP"):
     return DAE.format(geometries=geometries or geometry("g"), nodes=nodes or node("part"), unit=unit, up=up)
 
 
-def world(uri, rest=""):
+def world(uri, extra=""):
     return (
         "<model name='m'><static>1</static><link name='a'><collision name='c'><geometry>\n"
-        f"<mesh><uri>{uri}</uri>{rest}</mesh></geometry></collision></link></model>"
+        f"<mesh><uri>{uri}</uri>{extra}</mesh></geometry></collision></link></model>"
     )
 
 
 @pytest.fixture
 def mesh(load, tmp_path):
-    def _mesh(content, rest="", name="x.dae"):
+    """Return a function that loads a world with a mesh file and returns its mesh."""
+
+    def _mesh(content, extra="", name="x.dae"):
         (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-        return load(world(name, rest)).solids[0].shape
+        return load(world(name, extra)).solids[0].shape
 
     return _mesh
 
 
 @pytest.fixture
 def broken(refuse, tmp_path):
-    def _broken(content, rest="", name="x.dae"):
+    """Return a function that loads a world with an invalid mesh file and returns the problem."""
+
+    def _broken(content, extra="", name="x.dae"):
         (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-        (problem,) = refuse(world(name, rest))
+        (problem,) = refuse(world(name, extra))
         assert problem.line == 3
         return problem
 
@@ -74,6 +80,7 @@ def broken(refuse, tmp_path):
 
 
 def corners(mesh):
+    """Return the corners of the first triangle."""
     return mesh.vertices[mesh.faces[0]]
 
 
@@ -164,6 +171,7 @@ class TestCollada:
 
 
 def stl(count, triangles):
+    """Return a binary STL file of equal triangles, whose header says `count`."""
     body = b"".join(struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0) for _ in range(triangles))
     return b"binary".ljust(80, b"\0") + struct.pack("<I", count) + body
 
@@ -215,9 +223,9 @@ class TestObj:
         shape = mesh(OBJ, "<submesh><name>right</name></submesh>", name="x.obj")
         assert (len(shape.faces), shape.vertices[:, 0].min()) == (1, 5)
 
-    @pytest.mark.parametrize("written", ["v 0 0", "v 0", "v"])
-    def test_vertices_without_three_coordinates_are_refused(self, broken, written):
-        plane = "\n".join([written, written.replace("0", "1"), written.replace("0", "2"), "f 1 2 3", ""])
+    @pytest.mark.parametrize("vertex", ["v 0 0", "v 0", "v"])
+    def test_vertices_without_three_coordinates_are_refused(self, broken, vertex):
+        plane = "\n".join([vertex, vertex.replace("0", "1"), vertex.replace("0", "2"), "f 1 2 3", ""])
         assert "mesh" in broken(plane, name="x.obj").message
 
     def test_indices_out_of_range_are_refused(self, broken):
@@ -229,7 +237,7 @@ def test_other_formats_are_refused(broken):
 
 
 def test_a_scale_of_zero_is_refused(broken):
-    assert "a scale of zero" in broken(dae(), "\n<scale>1 0 1</scale>".replace("\n", "")).message
+    assert "a scale of zero" in broken(dae(), "<scale>1 0 1</scale>").message
 
 
 def test_a_mesh_beyond_10_km_is_refused(broken):

@@ -12,32 +12,32 @@ from simscen.core.geometry import Pose3
 from simscen.core.geometry.shapes import Box, Capsule, Cone, Ellipsoid, Extrusion
 from simscen.worlds.sdf import load_sdf
 
-UNIT = Box((1.0, 1.0, 1.0))
-AT_ORIGIN = Pose3()
-TURNED = Pose3.from_rpy(0, 0, 0, 0, 0, math.pi / 2)
+UNIT_BOX = Box((1.0, 1.0, 1.0))
+ORIGIN = Pose3()
+ROTATED = Pose3.from_rpy(0, 0, 0, 0, 0, math.pi / 2)
 
 STATIC = {
-    "actor": [(UNIT, AT_ORIGIN)],
-    "capsule": [(Capsule(0.2, 1.0), AT_ORIGIN)],
-    "cone": [(Cone(0.2, 1.0), AT_ORIGIN)],
-    "ellipsoid": [(Ellipsoid((0.2, 0.3, 0.4)), AT_ORIGIN)],
-    "frame": [(UNIT, Pose3(11, 2, 0))],
-    "model_pose_link_pose": [(UNIT, TURNED._replace(x=10, y=3))],
-    "nested_model": [(UNIT, Pose3(6, 0, 0))],
-    "one_link": [(UNIT, AT_ORIGIN)],
-    "polyline": [(Extrusion(((0, 0), (1, 0), (1, 1)), 1.0), AT_ORIGIN)],
-    "pose_deg": [(Box((4.0, 1.0, 1.0)), TURNED)],
-    "state_moves": [(UNIT, Pose3(7, 0, 0))],
-    "static_true": [(UNIT, AT_ORIGIN)],
-    "toplevel_model": [(UNIT, AT_ORIGIN)],
-    "two_col": [(UNIT, AT_ORIGIN), (UNIT, Pose3(3, 0, 0))],
-    "two_links": [(UNIT, AT_ORIGIN), (UNIT, Pose3(3, 0, 0))],
-    "two_worlds": [(UNIT, AT_ORIGIN)],
+    "actor": [(UNIT_BOX, ORIGIN)],
+    "capsule": [(Capsule(0.2, 1.0), ORIGIN)],
+    "cone": [(Cone(0.2, 1.0), ORIGIN)],
+    "ellipsoid": [(Ellipsoid((0.2, 0.3, 0.4)), ORIGIN)],
+    "frame": [(UNIT_BOX, Pose3(11, 2, 0))],
+    "model_pose_link_pose": [(UNIT_BOX, ROTATED._replace(x=10, y=3))],
+    "nested_model": [(UNIT_BOX, Pose3(6, 0, 0))],
+    "one_link": [(UNIT_BOX, ORIGIN)],
+    "polyline": [(Extrusion(((0, 0), (1, 0), (1, 1)), 1.0), ORIGIN)],
+    "pose_deg": [(Box((4.0, 1.0, 1.0)), ROTATED)],
+    "state_moves": [(UNIT_BOX, Pose3(7, 0, 0))],
+    "static_true": [(UNIT_BOX, ORIGIN)],
+    "toplevel_model": [(UNIT_BOX, ORIGIN)],
+    "two_col": [(UNIT_BOX, ORIGIN), (UNIT_BOX, Pose3(3, 0, 0))],
+    "two_links": [(UNIT_BOX, ORIGIN), (UNIT_BOX, Pose3(3, 0, 0))],
+    "two_worlds": [(UNIT_BOX, ORIGIN)],
 }
 MOVING = {
-    "no_static": [("m", 1.0, [AT_ORIGIN])],
-    "two_links_nostatic": [("m::a", 1.0, [AT_ORIGIN]), ("m::b", 1.0, [Pose3(3, 0, 0)])],
-    "two_models_joint": [("m", 2.0, [AT_ORIGIN, Pose3(2, 0, 0)])],
+    "no_static": [("m", 1.0, [ORIGIN])],
+    "two_links_nostatic": [("m::a", 1.0, [ORIGIN]), ("m::b", 1.0, [Pose3(3, 0, 0)])],
+    "two_models_joint": [("m", 2.0, [ORIGIN, Pose3(2, 0, 0)])],
 }
 EMPTY = ("nolink", "visual_only")
 """Files in which nothing is skipped, because an empty floor may be intended."""

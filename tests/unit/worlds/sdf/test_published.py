@@ -10,7 +10,7 @@ CRATE = f"<sdf version='1.6'><model name='crate'><static>1</static>{LINK}</model
 FUEL = "https://fuel.gazebosim.org/1.0/OpenRobotics/models"
 
 
-def crate(folder):
+def write_crate(folder):
     folder.mkdir(parents=True)
     (folder / "model.sdf").write_text(CRATE)
 
@@ -53,21 +53,22 @@ def test_sun_and_ground_plane_are_known_at_any_url(load, uri):
     ],
 )
 def test_model_is_found_in_an_allowed_folder_in_any_common_layout(load, tmp_path, layout, uri):
-    crate(tmp_path / "models" / layout)
+    write_crate(tmp_path / "models" / layout)
     assert len(load(include(uri), search=[tmp_path / "models"]).solids) == 1
 
 
 def test_the_newest_cached_version_is_used(load, tmp_path):
     cache = tmp_path / "fuel" / "fuel.gazebosim.org" / "openrobotics" / "models" / "crate"
-    crate(cache / "9")
-    crate(cache / "10")
+    write_crate(cache / "9")
+    write_crate(cache / "10")
     (cache / "9" / "model.sdf").write_text("broken")
     assert len(load(include(f"{FUEL}/crate"), search=[tmp_path / "fuel"]).solids) == 1
 
 
 @pytest.mark.parametrize("uri", [f"{FUEL}/../../secret", f"{FUEL}/..", f"{FUEL}/%2e%2e/files/../../x", "model:///../x"])
 def test_no_url_leads_out_of_the_allowed_folders(refuse, tmp_path, uri):
-    crate(tmp_path.parent / "secret") if not (tmp_path.parent / "secret").exists() else None
+    if not (tmp_path.parent / "secret").exists():
+        write_crate(tmp_path.parent / "secret")
     (tmp_path / "models").mkdir()
     (problem,) = refuse(include(uri), search=[tmp_path / "models"])
     assert "no such file" in problem.message or "outside" in problem.message or "are read" in problem.message
@@ -114,7 +115,7 @@ def test_a_missing_model_is_reported_once_with_the_number_of_its_places(refuse):
     "config", ["<model>", "<model><name>x</name></model>", "<model><sdf>gone.sdf</sdf></model>", "\x00"]
 )
 def test_broken_model_config_next_to_a_model_sdf_is_ignored(load, tmp_path, config):
-    crate(tmp_path / "models" / "crate")
+    write_crate(tmp_path / "models" / "crate")
     (tmp_path / "models" / "crate" / "model.config").write_text(config)
     world = load(include("model://crate"), search=[tmp_path / "models"])
     assert len(world.solids) == 1

@@ -82,9 +82,9 @@ def test_warehouse_map_matches_the_warehouse_world(data: Path) -> None:
     occupied, _ = _read_map(folder / "maps/005/map_rotated.png")
     rows, columns = np.nonzero(occupied)
     shift = (0.1, 0.15)  # best of a search over whole cells and quarter turns
-    points = np.column_stack([columns, rows]) * CELL + 0.025 + (-7, -10.5) + shift
+    points = np.column_stack([columns, rows]) * CELL_M + 0.025 + (-7, -10.5) + shift
     cells = map_.cell_of(points)
-    distances = distance_transform_edt(map_.cells != 100) * CELL
+    distances = distance_transform_edt(map_.cells != 100) * CELL_M
     assert np.mean(distances[cells[:, 0], cells[:, 1]] < 0.15) >= 0.95
 
 
@@ -103,21 +103,21 @@ def test_rays_in_the_sandbox_agree_with_its_map(data: Path) -> None:
     The other rays graze a column, which is up to one cell thicker in the map.
     """
     occupied, free = _read_map(data / "nav2_tb3_sandbox" / "tb3_sandbox.pgm")
-    rows, columns = np.nonzero(free & (distance_transform_edt(~occupied) * CELL > 0.2))
+    rows, columns = np.nonzero(free & (distance_transform_edt(~occupied) * CELL_M > 0.2))
     chosen = np.random.default_rng(0).choice(len(rows), 60, replace=False)
     scene = RayScene(merge_solids(_sandbox(data).solids))
     angles = np.arange(90) * 2 * math.pi / 90
     directions = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(90)])
     agreeing = 0
     for row, column in zip(rows[chosen], columns[chosen], strict=True):
-        origin = [(column + 0.5) * CELL - 10, (row + 0.5) * CELL - 10, 0.2]
-        ranges = np.minimum(scene.cast(np.tile(origin, (90, 1)), directions), RANGE)
-        mapped = np.minimum(_map_range(occupied, row, column, angles), RANGE)
+        origin = [(column + 0.5) * CELL_M - 10, (row + 0.5) * CELL_M - 10, 0.2]
+        ranges = np.minimum(scene.cast(np.tile(origin, (90, 1)), directions), RANGE_M)
+        mapped = np.minimum(_map_range(occupied, row, column, angles), RANGE_M)
         agreeing += int(np.sum(np.abs(ranges - mapped) <= 0.15))
     assert agreeing >= 0.92 * 60 * 90
 
 
-CELL, RANGE = 0.05, 20.0
+CELL_M, RANGE_M = 0.05, 20.0
 
 
 def _sandbox(data: Path) -> World:
@@ -135,14 +135,14 @@ def _map_range(
 ) -> npt.NDArray[np.float64]:
     """Return the ranges to the first occupied cell by Bresenham steps, as in map_calc_range of AMCL."""
     slope = np.maximum(np.abs(np.cos(angles)), np.abs(np.sin(angles)))
-    steps = np.arange(int(RANGE / CELL))[:, None]
+    steps = np.arange(int(RANGE_M / CELL_M))[:, None]
     columns = np.rint(column + steps * np.cos(angles) / slope).astype(int)
     rows = np.rint(row + steps * np.sin(angles) / slope).astype(int)
     inside = (columns >= 0) & (columns < occupied.shape[1]) & (rows >= 0) & (rows < occupied.shape[0])
     hit = np.zeros(rows.shape, bool)
     hit[inside] = occupied[rows[inside], columns[inside]]
     first, beam = hit.argmax(axis=0), np.arange(len(angles))
-    ranges = np.hypot(columns[first, beam] - column, rows[first, beam] - row) * CELL
+    ranges = np.hypot(columns[first, beam] - column, rows[first, beam] - row) * CELL_M
     return np.where(hit.any(axis=0), ranges, np.inf)
 
 

@@ -1,3 +1,5 @@
+"""Tests of shapes in SDF worlds: primitives, planes, polylines, and heightmaps."""
+
 import math
 from fractions import Fraction
 from itertools import pairwise
@@ -14,10 +16,11 @@ from simscen.worlds.geometry.triangulation import triangulate
 from simscen.worlds.sdf.shapes import trapezoids
 
 OFF_GRID = 8.28713
-"""No corner, crossing or border of a piece lies on a half number less this."""
+"""Offset of a grid of points with steps of 0.5, so that no point lies on a border of a piece."""
 
 
-def shaped(geometry, pose="", static="<static>1</static>"):
+def model_with(geometry, pose="", static="<static>1</static>"):
+    """Return a model with one collision geometry."""
     return (
         f"<model name='m'>{static}<link name='a'><collision name='c'>\n{pose}<geometry>{geometry}</geometry>"
         "</collision></link></model>"
@@ -36,7 +39,7 @@ def shaped(geometry, pose="", static="<static>1</static>"):
     ],
 )
 def test_primitive_shapes_keep_their_sizes(load, geometry, shape):
-    assert load(shaped(geometry)).solids[0].shape == shape
+    assert load(model_with(geometry)).solids[0].shape == shape
 
 
 @pytest.mark.parametrize(
@@ -55,13 +58,13 @@ def test_primitive_shapes_keep_their_sizes(load, geometry, shape):
     ],
 )
 def test_invalid_sizes_are_errors_at_their_line(refuse, geometry, message):
-    (problem,) = refuse(shaped(geometry))
+    (problem,) = refuse(model_with(geometry))
     assert problem.line == 3
     assert message in problem.message
 
 
 def test_lenient_loading_skips_only_the_invalid_shape(load):
-    text = shaped("<box><size>1 1 1</size></box>") + shaped("<box/>").replace("'m'", "'n'")
+    text = model_with("<box><size>1 1 1</size></box>") + model_with("<box/>").replace("'m'", "'n'")
     world = load(text, lenient=True)
     assert len(world.solids) == 1
     assert world.notes == (
@@ -73,26 +76,26 @@ def plane(normal="0 0 1", size="<size>10 20</size>"):
     return f"<plane><normal>{normal}</normal>{size}</plane>"
 
 
-BOX = shaped("<box><size>1 1 1</size></box>").replace("'m'", "'n'")
+BOX = model_with("<box><size>1 1 1</size></box>").replace("'m'", "'n'")
 
 
 class TestPlanes:
     def test_ground_plane_is_left_to_the_simulator(self, load):
-        world = load(shaped(plane()) + BOX)
+        world = load(model_with(plane()) + BOX)
         assert [solid.name for solid in world.solids] == ["n::a::c"]
         assert not world.notes
 
     def test_a_level_plane_elsewhere_becomes_a_slab_below_it_with_a_note(self, load):
-        (slab,) = load(shaped(plane(), "<pose>1 0 0.5 0 0 0</pose>")).solids
+        (slab,) = load(model_with(plane(), "<pose>1 0 0.5 0 0 0</pose>")).solids
         assert isinstance(slab.shape, Box)
         assert slab.shape.size[:2] == (10, 20)
         assert slab.pose.z + slab.shape.size[2] / 2 == pytest.approx(0.5)
-        (note,) = load(shaped(plane(), "<pose>1 0 0.5 0 0 0</pose>")).notes
+        (note,) = load(model_with(plane(), "<pose>1 0 0.5 0 0 0</pose>")).notes
         assert "level plane at z = 0.5 m" in note
 
     @pytest.mark.parametrize("normal", ["1 0 0", "0 -1 0", "0 0 -1", "1 2 3", "-1 0 -0.2"])
     def test_other_planes_face_along_their_normal(self, load, normal):
-        (slab,) = load(shaped(plane(normal), "<pose>0 0 3 0 0 0</pose>")).solids
+        (slab,) = load(model_with(plane(normal), "<pose>0 0 3 0 0 0</pose>")).solids
         expected = np.array([float(word) for word in normal.split()])
         expected /= np.linalg.norm(expected)
         np.testing.assert_allclose(slab.pose.rotation()[:, 2], expected, atol=1e-9)
@@ -100,10 +103,10 @@ class TestPlanes:
         np.testing.assert_allclose(face, [0, 0, 3], atol=1e-12)
 
     def test_rotated_plane_is_a_wall(self, load):
-        assert len(load(shaped(plane(), f"<pose>0 0 0 {math.pi / 2} 0 0</pose>")).solids) == 1
+        assert len(load(model_with(plane(), f"<pose>0 0 0 {math.pi / 2} 0 0</pose>")).solids) == 1
 
     def test_a_normal_without_length_is_refused(self, refuse):
-        assert "the normal has no length" in refuse(shaped(plane("0 0 0")))[0].message
+        assert "the normal has no length" in refuse(model_with(plane("0 0 0")))[0].message
 
 
 def outline(points, height=2.0):
@@ -114,14 +117,15 @@ SQUARE = [(0, 0), (4, 0), (4, 4), (0, 4)]
 HOLE = [(1, 1), (1, 2), (2, 2), (2, 1)]
 
 
-def area(solids):
+def union(solids):
+    """Return the union of the polygons of the solids."""
     return shapely.unary_union([shapely.Polygon(solid.shape.polygon) for solid in solids])
 
 
 class TestPolylines:
     def test_one_outline_is_one_solid_in_either_orientation(self, load):
         for points in (SQUARE, SQUARE[::-1], [*SQUARE, SQUARE[0]]):
-            (solid,) = load(shaped(outline(points))).solids
+            (solid,) = load(model_with(outline(points))).solids
             assert isinstance(solid.shape, Extrusion)
             polygon = shapely.Polygon(solid.shape.polygon)
             assert polygon.exterior.is_ccw
@@ -129,16 +133,16 @@ class TestPolylines:
             assert solid.shape.height == 2
 
     def test_an_outline_inside_another_is_a_hole(self, load):
-        solids = load(shaped(outline(SQUARE) + outline(HOLE))).solids
-        assert area(solids).symmetric_difference(shapely.Polygon(SQUARE, [HOLE])).area < 1e-9
+        solids = load(model_with(outline(SQUARE) + outline(HOLE))).solids
+        assert union(solids).symmetric_difference(shapely.Polygon(SQUARE, [HOLE])).area < 1e-9
 
     def test_outlines_side_by_side_are_all_filled(self, load):
         distant = [(x + 10, y) for x, y in HOLE]
-        assert area(load(shaped(outline(SQUARE) + outline(distant))).solids).area == pytest.approx(17)
+        assert union(load(model_with(outline(SQUARE) + outline(distant))).solids).area == pytest.approx(17)
 
     def test_both_loops_of_a_self_intersecting_outline_are_filled(self, load):
-        solids = load(shaped(outline([(0, 0), (2, 2), (2, 0), (0, 2)]))).solids
-        assert area(solids).area == pytest.approx(2)
+        solids = load(model_with(outline([(0, 0), (2, 2), (2, 0), (0, 2)]))).solids
+        assert union(solids).area == pytest.approx(2)
 
     @pytest.mark.parametrize(
         ("polylines", "message"),
@@ -152,7 +156,7 @@ class TestPolylines:
         ],
     )
     def test_degenerate_outlines_are_refused(self, refuse, polylines, message):
-        assert message in refuse(shaped(polylines))[0].message
+        assert message in refuse(model_with(polylines))[0].message
 
     coordinates = st.tuples(st.integers(-8, 8), st.integers(-8, 8))
 
@@ -182,7 +186,7 @@ def even_odd_area(outlines):
     edges = [(a, b) for outline in outlines for a, b in zip(outline, [*outline[1:], outline[0]], strict=True)]
     edges = [((Fraction(a), Fraction(b)), (Fraction(c), Fraction(d))) for (a, b), (c, d) in edges if b != d]
     heights = {y for edge in edges for _, y in edge} | {
-        y for one in edges for other in edges for y in crossing_heights(one, other)
+        y for edge in edges for other in edges for y in crossing_heights(edge, other)
     }
     return sum((top - low) * even_odd_width(edges, (top + low) / 2) for low, top in pairwise(sorted(heights)))
 
@@ -193,9 +197,9 @@ def even_odd_width(edges, y):
     return sum(right - left for left, right in zip(crossings_x[::2], crossings_x[1::2], strict=True))
 
 
-def crossing_heights(one, other):
-    """Yield the y at which two edges cross, if they do."""
-    (a, b), (c, d) = one
+def crossing_heights(edge, other):
+    """Yield the y at which two edges cross, if any."""
+    (a, b), (c, d) = edge
     (e, f), (g, h) = other
     determinant = (c - a) * (h - f) - (d - b) * (g - e)
     if determinant != 0 and 0 <= (share := ((e - a) * (h - f) - (f - b) * (g - e)) / determinant) <= 1:
@@ -212,14 +216,14 @@ class TestHeightmaps:
 
     def test_white_is_the_maximum_height_and_the_first_row_is_north(self, load, tmp_path):
         self.save(tmp_path, [[0, 50], [0, 0], [100, 0]])
-        (solid,) = load(shaped(heightmap())).solids
+        (solid,) = load(model_with(heightmap())).solids
         assert isinstance(solid.shape, Mesh)
         points = {(x, y): z for x, y, z in solid.shape.vertices.tolist()}
         assert points == {(-5, 10): 0, (5, 10): 1.5, (-5, 0): 0, (5, 0): 0, (-5, -10): 3, (5, -10): 0}
 
     def test_heightmap_faces_upward_and_covers_its_size(self, load, tmp_path):
         self.save(tmp_path, np.random.default_rng(0).integers(0, 255, (5, 5)))
-        mesh = triangulate(load(shaped(heightmap())).solids[0].shape)
+        mesh = triangulate(load(model_with(heightmap())).solids[0].shape)
         a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
         upward = np.cross(b - a, c - a)[:, 2] / 2
         assert (upward > 0).all()
@@ -227,39 +231,39 @@ class TestHeightmaps:
 
     def test_sixteen_bits_are_read(self, load, tmp_path):
         self.save(tmp_path, [[0, 65535], [32768, 0]], "I;16")
-        mesh = load(shaped(heightmap())).solids[0].shape
+        mesh = load(model_with(heightmap())).solids[0].shape
         assert sorted(mesh.vertices[:, 2]) == pytest.approx([0, 0, 1.5, 3], abs=1e-3)
 
     @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
     def test_tiff_is_read(self, load, tmp_path, dtype):
         Image.fromarray(np.array([[0, 100], [50, 0]], dtype)).save(tmp_path / "h.png", format="TIFF")
-        mesh = load(shaped(heightmap())).solids[0].shape
+        mesh = load(model_with(heightmap())).solids[0].shape
         assert sorted(mesh.vertices[:, 2]) == pytest.approx([0, 0, 1.5, 3])
 
     @pytest.mark.parametrize("height", [np.nan, -9999.0])
     def test_tiff_with_missing_heights_is_refused(self, refuse, tmp_path, height):
         Image.fromarray(np.array([[0, 1], [height, 0]], np.float32)).save(tmp_path / "h.png", format="TIFF")
-        assert "a height is negative or not a number" in refuse(shaped(heightmap()))[0].message
+        assert "a height is negative or not a number" in refuse(model_with(heightmap()))[0].message
 
     def test_heightmap_is_moved_by_its_pos(self, load, tmp_path):
         self.save(tmp_path, [[0, 0], [0, 0]])
-        (solid,) = load(shaped(heightmap("<size>1 1 1</size><pos>1 2 3</pos>"))).solids
+        (solid,) = load(model_with(heightmap("<size>1 1 1</size><pos>1 2 3</pos>"))).solids
         assert solid.pose.position == (1, 2, 3)
 
     def test_image_beyond_513_pixels_is_refused_before_it_is_decoded(self, refuse, tmp_path):
         Image.new("L", (3000, 3000)).save(tmp_path / "h.png")
-        assert "3000 x 3000 pixels; an edge must have 2 to 513" in refuse(shaped(heightmap()))[0].message
+        assert "3000 x 3000 pixels; an edge must have 2 to 513" in refuse(model_with(heightmap()))[0].message
 
     def test_decompression_bomb_is_refused(self, refuse, tmp_path):
         Image.new("1", (14_000, 14_000)).save(tmp_path / "h.png")
-        assert "image too large" in refuse(shaped(heightmap()))[0].message
+        assert "image too large" in refuse(model_with(heightmap()))[0].message
 
     def test_file_that_is_not_an_image_is_refused(self, refuse, tmp_path):
         (tmp_path / "h.png").write_bytes(b"GeoTIFF")
-        assert "not a readable image" in refuse(shaped(heightmap()))[0].message
+        assert "not a readable image" in refuse(model_with(heightmap()))[0].message
 
 
 def test_masked_collisions_are_noted(load):
     mask = "<surface><contact><collide_bitmask>0x00</collide_bitmask></contact></surface>"
-    world = load(shaped("<box><size>1 1 1</size></box>").replace("</collision>", f"{mask}</collision>"))
+    world = load(model_with("<box><size>1 1 1</size></box>").replace("</collision>", f"{mask}</collision>"))
     assert "still collides with it" in world.notes[0]

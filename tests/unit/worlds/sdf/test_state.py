@@ -1,3 +1,5 @@
+"""Tests of the saved state of SDF worlds."""
+
 import pytest
 
 from simscen.core.geometry.shapes import Box, Cylinder, Sphere
@@ -5,8 +7,8 @@ from simscen.core.geometry.shapes import Box, Cylinder, Sphere
 BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
 
 
-def model(name="m", content=f"<link name='a'>{BOX}</link>", rest="<static>1</static>"):
-    return f"<model name='{name}'>{rest}<pose>1 0 0 0 0 0</pose>{content}</model>"
+def model(name="m", content=f"<link name='a'>{BOX}</link>", extra="<static>1</static>"):
+    return f"<model name='{name}'>{extra}<pose>1 0 0 0 0 0</pose>{content}</model>"
 
 
 def state(content):
@@ -52,7 +54,7 @@ def test_insertions_and_deletions_are_applied(load):
 
 
 def test_movable_models_start_at_their_saved_pose(load):
-    world = load(model(rest="") + state("<model name='m'><pose>7 0 0 0 0 0</pose></model>"))
+    world = load(model(extra="") + state("<model name='m'><pose>7 0 0 0 0 0</pose></model>"))
     assert world.bodies[0].pose.x == 7
 
 
@@ -79,15 +81,15 @@ def test_inapplicable_state_is_an_error(refuse, saved, message):
 
 
 @pytest.mark.parametrize(
-    ("written", "expected"),
+    ("geometry", "expected"),
     [
         ("<box><size>1 2 3</size></box>", Box((2.0, 6.0, 12.0))),
         ("<cylinder><radius>1</radius><length>2</length></cylinder>", Cylinder(2.0, 8.0)),
         ("<sphere><radius>1</radius></sphere>", Sphere(2.0)),
     ],
 )
-def test_saved_scale_multiplies_sizes_but_not_positions(load, written, expected):
-    shape = f"<collision name='c'><pose>0.5 0 0 0 0 0</pose><geometry>{written}</geometry></collision>"
+def test_saved_scale_multiplies_sizes_but_not_positions(load, geometry, expected):
+    shape = f"<collision name='c'><pose>0.5 0 0 0 0 0</pose><geometry>{geometry}</geometry></collision>"
     world = load(
         model(content=f"<link name='a'>{shape}</link>") + state("<model name='m'><scale>2 3 4</scale></model>")
     )

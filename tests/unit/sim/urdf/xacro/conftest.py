@@ -30,6 +30,8 @@ def expand(tmp_path):
 
 @pytest.fixture
 def value(expand):
+    """Return a function that returns the text to which an expression is expanded."""
+
     def value(expression, before=""):
         return expand(f'{before}<a v="{expression}"/>').children[-1].attributes["v"]
 
@@ -38,6 +40,8 @@ def value(expand):
 
 @pytest.fixture
 def refusal(expand):
+    """Return a function that returns the first problem of an invalid file."""
+
     def refusal(text, **files):
         with pytest.raises(InvalidInput) as caught:
             expand(text, **files)

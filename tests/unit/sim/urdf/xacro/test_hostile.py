@@ -92,21 +92,21 @@ def test_other_substitutions_are_refused(refusal, command):
 
 
 @pytest.mark.parametrize(
-    "written",
+    "path",
     ["/etc/passwd", "../outside.xacro", "link.xacro", "$(find ..)/x", "$(dirname)/../outside.xacro", "a/../../b"],
 )
-def test_an_include_outside_the_root_is_not_read(refusal, tmp_path, written):
+def test_an_include_outside_the_root_is_not_read(refusal, tmp_path, path):
     (tmp_path.parent / "outside.xacro").write_text("<robot/>")
     (tmp_path / "link.xacro").symlink_to(tmp_path.parent / "outside.xacro")
 
-    message = refusal(f'<xacro:include filename="{written}"/>').message
+    message = refusal(f'<xacro:include filename="{path}"/>').message
     assert "outside the scenario root" in message or "not the name of a package" in message
 
 
 def test_existence_of_an_optional_file_outside_is_not_revealed(refusal):
-    for written in ("/etc/passwd", "/etc/no-such-file"):
-        problem = refusal(f'<xacro:include filename="{written}" optional="true"/>')
-        assert problem.message == f"include '{written}': outside the scenario root and the world paths"
+    for path in ("/etc/passwd", "/etc/no-such-file"):
+        problem = refusal(f'<xacro:include filename="{path}" optional="true"/>')
+        assert problem.message == f"include '{path}': outside the scenario root and the world paths"
 
 
 def test_symbolic_link_out_of_the_root_is_no_package(refusal, tmp_path):

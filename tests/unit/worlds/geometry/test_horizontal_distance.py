@@ -1,3 +1,5 @@
+"""Tests of the horizontal distance from a point to a mesh at the height of the robot."""
+
 import math
 
 import numpy as np
