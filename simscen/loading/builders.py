@@ -1,4 +1,4 @@
-"""Functions that build the world, the map, the filter masks, and the robot of a loaded scenario from their files."""
+"""Builds the world, the map, the filter masks, and the robot of a loaded scenario from their files."""
 
 from __future__ import annotations
 
@@ -60,6 +60,7 @@ def with_stops_in_bounds(world: World, loaded: LoadedScenario) -> World:
 
 
 def _stops(loaded: LoadedScenario) -> Iterator[Pose2]:
+    """Yield the stops of the robot of a view (see `with_stops_in_bounds`)."""
     spec = loaded.spec
     yield spec.only_robot.pose.pose
     for goal in (*scenario_goals(spec), *event_goals(loaded).values()):
@@ -162,8 +163,9 @@ def _with_payload_and_torque(loaded: LoadedScenario, body: RobotBody) -> RobotBo
         body = add_payload(body, entry.payload.mass, (x, y, z))
         if not is_stable(body):
             x, y, _ = center_of_mass(body)
-            what = f"the robot falls over: with its payload its center of mass is at ({x:.2f}, {y:.2f}), off its wheels"
-            raise InvalidInput([loaded.problem(("robot", "payload"), "SC406", what, "put it nearer to the middle")])
+            position = f"with its payload, its center of mass is at ({x:.2f}, {y:.2f}), outside its wheels"
+            message, hint = f"the robot falls over: {position}", "put the payload nearer to the middle"
+            raise InvalidInput([loaded.problem(("robot", "payload"), "SC406", message, hint)])
     return body
 
 
@@ -190,7 +192,7 @@ def robot_from_file(robot: LoadedRobot, roots: tuple[Path, ...]) -> tuple[RobotS
 
 
 MAX_RECTANGLES = 100_000
-"""Largest number of rectangles of equal cells in the mask of a criterion. Every log contains all these rectangles."""
+"""Maximum number of rectangles of equal cells in the mask of a criterion. Every log contains all rectangles."""
 
 
 def load_masks(loaded: LoadedScenario) -> FilterMasks:
@@ -215,8 +217,8 @@ def load_criterion_masks(
         found[name] = mask_blocks(_mask_grid(mask.map, mask.keys, tree, texts))
         count = len(found[name].blocks)
         if count > MAX_RECTANGLES:
-            message = f"mask image {mask.map.image.name} falls into {count} rectangles of equal cells"
-            hint = f"criteria judge by masks of {MAX_RECTANGLES} at most; is it a photograph, or a map with noise?"
+            message = f"mask image {mask.map.image.name} consists of {count} rectangles of equal cells"
+            hint = f"a criterion supports up to {MAX_RECTANGLES}; use a mask image without noise"
             problem = Problem(*value_position(tree, mask.keys), "SC320", message, hint)
             raise InvalidInput([with_source_line(problem, texts)])
     return found

@@ -1,4 +1,4 @@
-"""Goals of a scenario, listed under `goals` or sent by events, and their expected failures."""
+"""Goals of a scenario, listed under `goals` or sent by events, and the expected failures of goals."""
 
 import math
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from simscen.actions.robot import NewGoal
 
 START_FAILURES = ErrorCode.START_OCCUPIED, ErrorCode.START_OUTSIDE_MAP
-"""Error codes of Nav2 for a failure because of the start pose."""
+"""Error codes of planners for a start pose from which no plan is possible."""
 
 
 def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
@@ -37,11 +37,8 @@ def scenario_goals(spec: ScenarioSpec) -> tuple[Goal, ...]:
 
 def event_goals(loaded: LoadedScenario) -> dict[Keys, Goal]:
     """Return the goals that events send, by the keys of their `new_goal` actions in the scenario."""
-    return {
-        action.keys: _goal(action.spec.name, action.spec, loaded.spec)
-        for action in loaded.actions
-        if action.kind == "new_goal"
-    }
+    new_goals = (action for action in loaded.actions if action.kind == "new_goal")
+    return {action.keys: _goal(action.spec.name, action.spec, loaded.spec) for action in new_goals}
 
 
 def _goal(name: str, entry: "GoalEntry | NewGoal", spec: ScenarioSpec) -> Goal:
@@ -57,11 +54,14 @@ def _goal(name: str, entry: "GoalEntry | NewGoal", spec: ScenarioSpec) -> Goal:
 
 
 def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, str]:
-    """Return the expected failures, such as "NO_VALID_PATH", by name of the goals, which are from `scenario_goals`."""
-    through = spec.navigation.mode == "navigate_through_poses"
+    """Return the expected failure, such as "NO_VALID_PATH", of each goal that should fail, by name of the goal.
+
+    `goals` are from `scenario_goals`.
+    """
+    has_via_poses = spec.navigation.mode == "navigate_through_poses"
     found = {}
     for number, goal in enumerate(goals):
-        entry = spec.goals[-1] if through else spec.goals[number % len(spec.goals)]
+        entry = spec.goals[-1] if has_via_poses else spec.goals[number % len(spec.goals)]
         if failure := expected_failure_name(entry.expect):
             found[goal.name] = failure
     return found
@@ -69,12 +69,13 @@ def expected_failures(spec: ScenarioSpec, goals: tuple[Goal, ...]) -> dict[str, 
 
 def expects_failure(spec: ScenarioSpec, goal: str) -> bool:
     """Return whether `expect` at the goal, or a criterion, states that the goal with this name fails."""
-    through = spec.navigation.mode == "navigate_through_poses"
-    entries = zip(spec.goal_names, [spec.goals[-1]] * len(spec.goals) if through else spec.goals, strict=True)
+    has_via_poses = spec.navigation.mode == "navigate_through_poses"
+    goal_entries = [spec.goals[-1]] * len(spec.goals) if has_via_poses else spec.goals
+    entries = zip(spec.goal_names, goal_entries, strict=True)
     if any(matches_goal_name(goal, name) and expected_failure_name(entry.expect) for name, entry in entries):
         return True
-    required = [entry for entry in spec.pass_ if entry.severity == "fail"]
-    if any(entry.kind == "result" and entry.chosen.status == "FAILED" for entry in required):
+    criteria = [entry for entry in spec.pass_ if entry.severity == "fail"]
+    if any(entry.kind == "result" and entry.chosen.status == "FAILED" for entry in criteria):
         return True
     return any(code != ErrorCode.NONE and matches_goal_name(goal, name) for code, name in _required_codes(spec))
 

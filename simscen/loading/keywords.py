@@ -9,7 +9,7 @@ from simscen.loading.schema.messages import quoted, suggestion
 
 _TOKEN_PATTERN = re.compile(r"[()]|[^\s()]+")
 MAX_DEPTH = 50
-"""Largest nesting depth of `not` and parentheses."""
+"""Maximum nesting depth of `not` and parentheses."""
 
 Matcher = Callable[[str], bool]
 """Function that returns whether the title of a scenario matches an expression."""
@@ -74,14 +74,15 @@ class _Parser:
         return lambda text: word in text.casefold()
 
     def _take(self, token: str) -> bool:
+        """Return whether the next token is `token`, and remove the token if so."""
         if self.tokens and self.tokens[0] == token:
             self.tokens.pop(0)
             return True
         return False
 
-    def error(self, why: str) -> UsageError:
-        """Return the error for the expression, with a reason."""
-        return UsageError(f"cannot read -k {quoted(self._expression)}: {why}")
+    def error(self, reason: str) -> UsageError:
+        """Return the error that the expression is invalid for this reason."""
+        return UsageError(f"cannot read -k {quoted(self._expression)}: {reason}")
 
 
 def _no_match_message(candidates: Sequence[LoadedScenario], keyword: str, tags: Sequence[str]) -> str:

@@ -55,8 +55,9 @@ class LoadedWorld:
     spec: WorldSpec | None = None
     """Specification; None for a ROS map or SDF file alone."""
     map: LoadedMap | None = None
+    """ROS map; None without a map."""
     sdf: Path | None = None
-    """SDF file, which is not parsed yet."""
+    """SDF file, which is not parsed yet; None without one."""
     tree: MappingNode | None = field(default=None, repr=False, compare=False)
     """YAML tree of `spec`."""
 
@@ -97,6 +98,7 @@ class LoadedScenario:
     world_path: tuple[Path, ...]
     """Folders of `--world-path`, in which files are searched that the root does not contain."""
     text: str
+    """Text of the file."""
     spec: ScenarioSpec
     """Specification, with poses instead of place names."""
     world: LoadedWorld
@@ -112,15 +114,18 @@ class LoadedScenario:
     read_files: tuple[Path, ...] = ()
     """Other files that were read to build the world and the robot, such as meshes."""
     notes: tuple[Problem, ...] = ()
+    """Warnings about the files."""
     lenient: bool = False
     """Whether unusable parts of an SDF world are skipped with a warning, instead of being errors."""
     keepout_mask: LoadedMap | None = None
+    """Filter mask of the stack's keepout zones; None without one."""
     speed_mask: LoadedMap | None = None
+    """Filter mask of the stack's speed limits; None without one."""
     criterion_masks: Mapping[str, CriterionMask] = field(default_factory=dict)
     """Filter masks of criteria, by path as written in the scenario."""
     choice: StackChoice | None = None
     """Stack selected on the command line; None for the stack of the scenario."""
-    several_stacks: bool = False
+    has_several_stacks: bool = False
     """Whether the session runs the scenario with several stacks."""
     external_command: ExternalCommand | None = None
     """Command that starts the external stack; None for another stack, or if no command is defined."""
@@ -152,7 +157,7 @@ class LoadedScenario:
         return replace(self, choice=choice, spec=self.spec.model_copy(update={"skip": reason}))
 
     def includes_robot(self, robot: str | None) -> bool:
-        """Return whether a part of the scenario that names `robot` applies to this view; True if it names no robot."""
+        """Return whether this view includes the parts of the scenario that name `robot`, or that name no robot."""
         return robot is None or not self.robot_name or robot == self.robot_name
 
     def may_do(self, *kinds: str) -> bool:
@@ -181,7 +186,7 @@ class LoadedScenario:
     @property
     def stack_name(self) -> str:
         """Name of the stack in run keys; "" unless the session runs the scenario with several stacks."""
-        return self.choice.name if self.choice is not None and self.several_stacks else ""
+        return self.choice.name if self.choice is not None and self.has_several_stacks else ""
 
     @property
     def stack(self) -> str:
@@ -189,14 +194,14 @@ class LoadedScenario:
         return "" if self.choice is None else self.choice.relative_to_folder(self.root)
 
     @property
-    def expectation(self) -> ExpectedFailure | None:
-        """The failure that the scenario expects, or None. Its line is 0 if `expected` is in a file that is extended."""
+    def expected_failure(self) -> ExpectedFailure | None:
+        """The failure that the scenario expects; None for none. `line` is 0 if `expected` is in an extended file."""
         failure, position = expected_failure(self.spec), self.key_position_of("expected")
         return failure and replace(failure, line=position.line if position.path == self.path else 0)
 
     @property
     def disturbances(self) -> tuple[Disturbance, ...]:
-        """The events, each followed by the steps of its sequence, and then the faults, as logs contain them."""
+        """The events, each followed by the steps of its sequence, and then the faults. Logs contain them."""
         events = [
             self._disturbance("event", step.name, step.keys, step.required, step.after) for step in self.spec.steps
         ]
@@ -209,7 +214,7 @@ class LoadedScenario:
     def _disturbance(
         self, kind: Literal["event", "fault"], name: str, keys: Keys, required: bool, after: int | None = None
     ) -> Disturbance:
-        """Return the event or fault at `keys`. Its line is 0 if it is in a file that is extended."""
+        """Return the event or fault at `keys`. `line` is 0 if the event or fault is in an extended file."""
         node = node_at(self.tree, keys)
         when, position = child(node, "when"), node.position
         text = ""

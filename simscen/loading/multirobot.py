@@ -1,4 +1,4 @@
-"""Scenarios of several robots (`robots`): splitting of the YAML tree into one scenario per robot, and key checks."""
+"""Scenarios of several robots (`robots`): splits the YAML tree into one scenario per robot, and checks the keys."""
 
 from simscen.core.errors import Problem
 from simscen.loading.stacks.choice import EXTERNAL, StackChoice, replace_stack
@@ -26,13 +26,16 @@ def has_valid_robots(tree: MappingNode) -> bool:
 
 
 def _single_robot_tree(tree: MappingNode, entry: Entry) -> MappingNode:
-    """Return the tree of one robot. Its keys override keys at top level, but its criteria are added to those there."""
-    own_tree, position = entry.value, entry.value.position
-    assert isinstance(own_tree, MappingNode)
-    robot = {key: value for key, value in own_tree.entries.items() if key in RobotEntry.model_fields}
-    own = {key: value for key, value in own_tree.entries.items() if key not in robot and key != PASS}
-    merged = merge_mappings(MappingNode(tree.position, own), tree.without_keys(ROBOTS, EXPECTED))
-    criteria = SequenceNode(tree.position, (*items_of(child(tree, PASS)), *items_of(child(own_tree, PASS))))
+    """Return the scenario tree of the robot in `entry`. `tree` is the scenario of all robots.
+
+    Keys of the robot override keys at top level. Criteria of the robot are added to the criteria at top level.
+    """
+    robot_tree, position = entry.value, entry.value.position
+    assert isinstance(robot_tree, MappingNode)
+    robot = {key: value for key, value in robot_tree.entries.items() if key in RobotEntry.model_fields}
+    other_keys = {key: value for key, value in robot_tree.entries.items() if key not in robot and key != PASS}
+    merged = merge_mappings(MappingNode(tree.position, other_keys), tree.without_keys(ROBOTS, EXPECTED))
+    criteria = SequenceNode(tree.position, (*items_of(child(tree, PASS)), *items_of(child(robot_tree, PASS))))
     return MappingNode(
         tree.position,
         {**merged.entries, ROBOT: Entry(entry.key, MappingNode(position, robot)), PASS: Entry(entry.key, criteria)},
@@ -42,7 +45,7 @@ def _single_robot_tree(tree: MappingNode, entry: Entry) -> MappingNode:
 def apply_stack_choice(tree: MappingNode, choice: StackChoice) -> MappingNode:
     """Return a scenario tree in which the selected stack replaces the stacks of all robots.
 
-    The tree is unchanged if one of several robots already uses the external stack that `choice` starts.
+    If one of several robots already uses the external stack that `choice` starts, the tree is unchanged.
     """
     if ROBOTS not in tree.entries:
         return replace_stack(tree, choice)
@@ -69,7 +72,7 @@ def external_stack_name(tree: MappingNode) -> str | None:
 
 
 def scenario_robot_problems(tree: MappingNode) -> list[Problem]:
-    """Return problems of a scenario: no `robot`, no criteria, and keys that cannot be used together with `robots`."""
+    """Return problems of a scenario: missing `robot`, missing criteria, and keys that `robots` excludes."""
     problems = criteria_robot_problems(tree)
     if ROBOTS not in tree.entries and ROBOT not in tree.entries:
         problems.append(Problem(*tree.position, "SC010", f"missing key `{ROBOT}`"))
@@ -77,7 +80,7 @@ def scenario_robot_problems(tree: MappingNode) -> list[Problem]:
 
 
 def criteria_robot_problems(tree: MappingNode) -> list[Problem]:
-    """Return problems of a criteria file: missing criteria, and keys that cannot be used together with `robots`."""
+    """Return problems of a criteria file: missing criteria, and keys that `robots` excludes."""
     problems: list[Problem] = []
     criteria, robots = child(tree, PASS), child(tree, ROBOTS)
     if isinstance(criteria, SequenceNode) and not criteria.items:
@@ -92,12 +95,12 @@ def criteria_robot_problems(tree: MappingNode) -> list[Problem]:
         problems.append(Problem(*tree.entries[ROBOT].key, "SC016", message, hint))
     for key in ROBOT_KEYS:
         if key in tree.entries:
-            message = f"`{key}` belong to one robot, but the scenario has several"
+            message = f"`{key}` belongs to one robot, but the scenario has several"
             hint = f"move them to each robot in `{ROBOTS}`"
             problems.append(Problem(*tree.entries[key].key, "SC016", message, hint))
     for name, entry in entries_of(robots).items():
-        own_criteria = child(entry.value, PASS)
-        if isinstance(entry.value, MappingNode) and not items_of(criteria) and not items_of(own_criteria):
+        robot_criteria = child(entry.value, PASS)
+        if isinstance(entry.value, MappingNode) and not items_of(criteria) and not items_of(robot_criteria):
             message = f"missing key `{PASS}` in `{ROBOTS}.{name}`"
             hint = "add criteria for this robot, or for all robots at top level"
             problems.append(Problem(*entry.key, "SC010", message, hint))

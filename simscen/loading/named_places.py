@@ -1,4 +1,4 @@
-"""Replacement of place names in a specification by the poses of these places."""
+"""Replaces place names in a specification by the poses of these places."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar

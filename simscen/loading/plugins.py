@@ -23,12 +23,12 @@ def plugins_of(loaded: LoadedScenario) -> tuple[RegisteredType, ...]:
 
 def plugins_of_all(scenarios: Iterable[LoadedScenario]) -> tuple[RegisteredType, ...]:
     """Return the types of plug-ins that at least one of the scenarios uses, sorted by group and name."""
-    different = {id(scenario): scenario for scenario in scenarios}.values()
-    return _sorted({entry for scenario in different for entry in plugins_of(scenario)})
+    distinct = {id(scenario): scenario for scenario in scenarios}.values()
+    return _sorted({entry for scenario in distinct for entry in plugins_of(scenario)})
 
 
 def log_header_key(entry: RegisteredType) -> str:
-    """Return the header key of a type in a log, e.g. `plugin.criterion.dwell`. Its value is from `requirement_of`."""
+    """Return the key of a type in a log header, e.g. `plugin.criterion.dwell`. The value is from `requirement_of`."""
     return f"{_HEADER_PREFIX}{entry.group}.{entry.name}"
 
 
@@ -38,9 +38,10 @@ def requirement_of(entry: RegisteredType) -> str:
 
 
 def missing_plugins(facts: Mapping[str, str], groups: Container[str]) -> list[Problem]:
-    """Return a problem (with the path "") for each type of `groups` that is not installed in the version of a log.
+    """Return a problem for each plug-in type of a log that is not installed in the recorded version.
 
-    `facts` are the header entries of the log.
+    `facts` are the header entries of the log. Only types of the registry groups `groups` count. The path of the
+    problems is "".
     """
     missing: list[Problem] = []
     for key, recorded in sorted(facts.items()):
@@ -62,7 +63,10 @@ def _sorted(entries: Iterable[RegisteredType]) -> tuple[RegisteredType, ...]:
 
 
 def _plugin_types(keys: Keys, part: Any) -> Iterator[RegisteredType]:
-    """Yield the plug-in types of a part; those with its `type` or key, if a package registers its class repeatedly."""
+    """Yield the plug-in types whose specification is `part`. `keys` are the keys of `part`.
+
+    If a package registers the class of `part` under several names, the `type` or the last key of `part` decides.
+    """
     if isinstance(part, Choice):
         entry = find_type(part.group, part.kind) if part.original_class is not None else None
         if entry is not None and not entry.is_shipped:

@@ -1,4 +1,4 @@
-"""Reduction of scenarios for `simscen shrink`: removal of parts, rounding of numbers, and list of the changes.
+"""Reduction of scenarios for `simscen shrink`: removes parts, rounds numbers, and lists the changes.
 
 A part is a value in the YAML tree of a scenario, given by its keys, e.g. ("goals", 0, "pose").
 """
@@ -27,11 +27,11 @@ REQUIRED_KEYS = frozenset({"simscen", "world", "robot", "robots", "seed", "pass"
 FIXED_KEYS = frozenset({"simscen", "seed", "pass", "time_limit"})
 """Top-level keys with values that are never changed. They define the failure and the length of the run."""
 FIXED_WORLD_PARTS = frozenset({("world", "walls"), ("world", "map"), ("world", "sdf")})
-"""Parts of an inline world that are never changed. Without them, a criterion would fail for another reason."""
+"""Parts of an inline world that are never changed. Without these parts, a criterion could fail for another reason."""
 UNNEEDED_KEYS = frozenset({"acceptance", "description", "expected", "metrics", "skip", "tags", "variations"})
 """Top-level keys that do not affect a run."""
 MAX_DIGITS = 3
-"""Largest number of significant digits to which numbers are rounded."""
+"""Maximum number of significant digits to which numbers are rounded."""
 
 
 class Rounding(NamedTuple):
@@ -87,28 +87,28 @@ def find_roundings(tree: MappingNode, digits: int) -> list[Rounding]:
 
 def with_roundings(tree: MappingNode, roundings: Sequence[Rounding]) -> MappingNode:
     """Return the scenario with these rounded numbers."""
-    return with_values(tree, {one.keys: ScalarNode(node_at(tree, one.keys).position, one.value) for one in roundings})
+    return with_values(tree, {keys: ScalarNode(node_at(tree, keys).position, value) for keys, value in roundings})
 
 
 def with_seed(tree: MappingNode, seed: int) -> MappingNode:
     """Return the scenario with this seed, without `acceptance`, `expected`, and `variations`."""
     position = key_position(tree, ("seed",))
-    rest = tree.without_keys("acceptance", "expected", "variations")
-    return rest.with_value(("seed",), ScalarNode(position, seed), position)
+    changed = tree.without_keys("acceptance", "expected", "variations")
+    return changed.with_value(("seed",), ScalarNode(position, seed), position)
 
 
-def with_only_criterion(tree: MappingNode, criterion: str, verdict_id: str, seed: int) -> MappingNode:
-    """Return the scenario with this seed, only keys that affect a run, and only one criterion.
+def with_only_criterion(tree: MappingNode, kind: str, verdict_id: str, seed: int) -> MappingNode:
+    """Return the scenario with this seed, the keys that affect a run, and only the criterion with an id and kind.
 
-    This is the criterion `criterion` (e.g. "collisions") with the id `verdict_id`, or else all of this kind, or
-    else all.
+    `kind` is e.g. "collisions". If no criterion of this kind has the id, all criteria of the kind are kept. If there is
+    no criterion of the kind, all criteria are kept.
     """
     entries = {key: entry for key, entry in tree.entries.items() if key not in UNNEEDED_KEYS}
     criteria = tree.entries.get("pass")
-    if criterion and criteria is not None and isinstance(criteria.value, SequenceNode):
-        items = [item for item in criteria.value.items if child(item, criterion) is not None]
-        named = [item for item in items if (name := child(item, "id")) and name.plain == verdict_id]
-        if selected := named or items:
+    if kind and criteria is not None and isinstance(criteria.value, SequenceNode):
+        items_of_kind = [item for item in criteria.value.items if child(item, kind) is not None]
+        items_with_id = [item for item in items_of_kind if (name := child(item, "id")) and name.plain == verdict_id]
+        if selected := items_with_id or items_of_kind:
             entries["pass"] = Entry(criteria.key, replace(criteria.value, items=tuple(selected)))
     return with_seed(MappingNode(tree.position, entries), seed)
 
@@ -126,8 +126,8 @@ def removed_parts(before: MappingNode, after: MappingNode) -> list[str]:
     remaining = {node.position for _, node in nodes_with_keys(after)}
     found: list[Keys] = []
     for keys, node in nodes_with_keys(before):
-        is_part_of_found = bool(found) and keys[: len(found[-1])] == found[-1]
-        if not is_part_of_found and not any(below.position in remaining for _, below in nodes_with_keys(node)):
+        is_inside_found = bool(found) and keys[: len(found[-1])] == found[-1]
+        if not is_inside_found and not any(below.position in remaining for _, below in nodes_with_keys(node)):
             found.append(keys)
     return [_part_text(before, keys) for keys in found]
 

@@ -9,13 +9,13 @@ from simscen.loading import multirobot
 from simscen.loading.checks.registry import ROBOT_NAMES
 from simscen.loading.checks.runner import check_scenario
 from simscen.loading.codes import UNSUPPORTED_BY_STACK
-from simscen.loading.file_kinds import kind_of_content, not_a_scenario
+from simscen.loading.file_kinds import kind_of_content, not_a_scenario_problem
 from simscen.loading.files.assets import Assets, find_criterion_masks
 from simscen.loading.files.paths import PathSandbox, is_unusable_name, scenario_id
 from simscen.loading.loaded import KEEPOUT_MASK_KEYS, SPEED_MASK_KEYS, LoadedMap, LoadedScenario
 from simscen.loading.named_places import places_of, resolve_places, unknown_places
 from simscen.loading.schema.messages import quoted, suggestion
-from simscen.loading.schema.validate import check, not_a_mapping
+from simscen.loading.schema.validate import check, not_a_mapping_problem
 from simscen.loading.stacks.choice import StackChoice
 from simscen.loading.stacks.nav2_expansion import with_nav2_parameters
 from simscen.loading.variations.expand import VARIATIONS, Variation, VariationSpace, expand_variations, variation_space
@@ -56,10 +56,11 @@ def try_variations(
     variation_numbers: Sequence[int] | None = None,
     unsaved: Mapping[Path, str] | None = None,
 ) -> tuple[LoadedScenario, ...] | list[Problem]:
-    """Return all variations of the scenario in a file; or all problems if one of them has errors.
+    """Return all variations of the scenario in a file; or all problems if one of the variations has errors.
 
-    A file without variations has one. `variation_numbers` selects variations from 1; unknown numbers are ignored.
-    `unsaved` are texts that replace the content of files. The other parameters are those of `load_scenario`.
+    A scenario without `variations` counts as one variation. `variation_numbers` selects variations by number, from 1;
+    unknown numbers are ignored. `unsaved` are texts that replace the content of files, by absolute path. The other
+    parameters are those of `load_scenario`.
     """
     library = Library(PathSandbox.around(root, world_path), unsaved=unsaved or {})
     read = _read(path, library, choice)
@@ -70,11 +71,15 @@ def try_variations(
     variations = [variation for variation in expanded if isinstance(variation, Variation)]
     if problems := [problem for problem in expanded if isinstance(problem, Problem)]:
         return library.with_source(sorted(problems))
-    tried = [(variation, _load_variation(variation, library, file, choice)) for variation in variations]
-    if any(isinstance(found, list) for _, found in tried):
-        problems_of = ((one, found if isinstance(found, list) else ()) for one, found in tried)
-        return merge_problems([VariationProblems(one.name, one.varied_paths, found) for one, found in problems_of])
-    return tuple(found for _, found in tried if isinstance(found, LoadedScenario))
+    results = [(variation, _load_variation(variation, library, file, choice)) for variation in variations]
+    if any(isinstance(result, list) for _, result in results):
+        return merge_problems(
+            [
+                VariationProblems(variation.name, variation.varied_paths, result if isinstance(result, list) else ())
+                for variation, result in results
+            ]
+        )
+    return tuple(result for _, result in results if isinstance(result, LoadedScenario))
 
 
 def read_variation_space(path: Path, root: Path, world_path: Sequence[Path] = ()) -> VariationSpace | None:
@@ -88,10 +93,11 @@ def read_variation_space(path: Path, root: Path, world_path: Sequence[Path] = ()
 
 
 class ChangedScenario:
-    """Scenario file from which changed scenarios are loaded without writing them to a file.
+    """Scenario file of which changed versions can be loaded without writing them to files.
 
-    `merged_tree` is the YAML tree of the file, merged with `extends` and `defaults.yaml`; `base_tree` has no
-    `variations`. `changes` are the values of the selected variation, and `tree` is `base_tree` with these values.
+    `file` is the absolute path. `merged_tree` is the YAML tree of the file, merged with `extends` and `defaults.yaml`.
+    `base_tree` is `merged_tree` without `variations`. `changes` are the values of the selected variation, and `tree` is
+    `base_tree` with these values.
     """
 
     def __init__(
@@ -114,17 +120,17 @@ class ChangedScenario:
         self.changes: tuple[Change, ...] = ()
         if variation:
             number = number_of(variation)
-            found = expand_variations(self.merged_tree, None if number is None else [number])
-            varied = next(one for one in found if isinstance(one, Variation) and one.name == variation)
-            self.tree, self.changes = varied.tree, varied.changes
+            variations = expand_variations(self.merged_tree, None if number is None else [number])
+            selected = next(v for v in variations if isinstance(v, Variation) and v.name == variation)
+            self.tree, self.changes = selected.tree, selected.changes
 
     def load(self, tree: MappingNode) -> LoadedScenario | list[Problem]:
         """Return the scenario with the content `tree`, ignoring its `variations`; or all its problems."""
         merged, problems = self._library.with_defaults(self.file, tree, [])
         if problems or not isinstance(merged, MappingNode):
             return problems
-        varied = Variation("", merged.without_keys(VARIATIONS))
-        return _load_variation(varied, self._library, self.file, self._choice)
+        variation = Variation("", merged.without_keys(VARIATIONS))
+        return _load_variation(variation, self._library, self.file, self._choice)
 
     def text_in(self, folder: Path, tree: MappingNode, comment: str) -> str:
         """Return the content `tree` as text for a file in `folder`, with `comment` at the top.
@@ -152,11 +158,11 @@ def _read(path: Path, library: Library, choice: StackChoice | None) -> tuple[Pat
     display_name = sandbox.display_name(file)
     kind = kind_of_content(tree, library.texts.get(display_name, ""), display_name)
     if kind != "scenario":
-        return [not_a_scenario(kind, display_name)]
+        return [not_a_scenario_problem(kind, display_name)]
     if choice is not None:
         library.add(choice.texts, choice.files)
     if not problems and tree is not None and not isinstance(tree, MappingNode):
-        problems = [not_a_mapping(tree)]
+        problems = [not_a_mapping_problem(tree)]
     if problems or not isinstance(tree, MappingNode):
         return library.with_source(sorted(problems))
     return file, tree
@@ -176,7 +182,7 @@ def _load_variation(
     if isinstance(spec, list):
         assets, world = Assets(library), child(tree, "world")
         if isinstance(world, ScalarNode) and isinstance(world.value, str) and world.value:
-            assets.world(world)  # reports also the problems of the world file
+            assets.world(world)  # also reports the problems of the world file
         return library.with_source(sorted([*spec, *assets.problems]))
     if problems := ROBOT_NAMES.problems(tree, spec):
         return library.with_source(problems)
@@ -192,10 +198,10 @@ def _load_variation(
 
 def _ineffective_variation_problems(variation: Variation, tree: MappingNode, choice: StackChoice) -> Iterator[Problem]:
     """Yield a problem for each value of a variation that has no effect, because `choice` replaces the stack."""
-    each = [tree, *multirobot.split_by_robot(tree).values()] if multirobot.has_valid_robots(tree) else [tree]
+    robot_trees = multirobot.split_by_robot(tree).values() if multirobot.has_valid_robots(tree) else ()
     for change in variation.changes:
-        if all(node_at(part, change.target.keys) is not change.value for part in each):
-            message = f"{quoted(change.target.path)} changes nothing with --stack {choice.written}"
+        if all(node_at(part, change.target.keys) is not change.value for part in (tree, *robot_trees)):
+            message = f"{quoted(change.target.path)} changes nothing with --stack {choice.option_text}"
             hint = "select variations that do not set it with -k or --variation, or choose another stack"
             yield Problem(*change.target.position, UNSUPPORTED_BY_STACK, message, hint)
 
@@ -205,14 +211,17 @@ def _load_multi_robot(
 ) -> LoadedScenario | list[Problem]:
     views: dict[str, LoadedScenario] = {}
     problems: list[Problem] = []
-    for name, own in multirobot.split_by_robot(tree).items():
-        one = check(ScenarioSpec, own)
+    for name, robot_tree in multirobot.split_by_robot(tree).items():
+        robot_spec = check(ScenarioSpec, robot_tree)
+        if isinstance(robot_spec, list):
+            problems += robot_spec
+            continue
         others = tuple(other for other in sorted(spec.robots or ()) if other != name)
-        found = one if isinstance(one, list) else _load_single_robot(one, own, library, file, name, others)
-        if isinstance(found, list):
-            problems += found
+        view = _load_single_robot(robot_spec, robot_tree, library, file, name, others)
+        if isinstance(view, list):
+            problems += view
         else:
-            views[name] = found
+            views[name] = view
     if problems:
         return library.with_source(sorted(set(problems)))
     first, notes = next(iter(views.values())), [note for view in views.values() for note in view.notes]
@@ -230,7 +239,7 @@ def _load_multi_robot(
 def _load_single_robot(
     spec: ScenarioSpec, tree: MappingNode, library: Library, file: Path, name: str = "", others: tuple[str, ...] = ()
 ) -> LoadedScenario | list[Problem]:
-    """Load a scenario of one robot, or the view of the robot `name` beside `others`. Return it, or all its problems."""
+    """Return a scenario of one robot, or the view of the robot `name` beside the robots `others`; or all problems."""
     assets = Assets(library)
     world = assets.world_of(spec.world, tree, file)
     robot_map = None if spec.map == "none" else _map_at(("map",), tree, assets)

@@ -22,15 +22,18 @@ _JUDGING_KEYS = frozenset({"simscen", "pass", "metrics", "expected"})
 
 def resolved_text(loaded: LoadedScenario) -> str:
     """Return the scenario, or its variation, as one text without `extends`, with poses for place names in criteria."""
-    own, _ = parse_yaml(loaded.text, loaded.path)
+    file_tree, _ = parse_yaml(loaded.text, loaded.path)
     plain = resolve_criteria_places(loaded.tree.plain, _validated(ScenarioSpec, loaded.tree), places_of(loaded.world))
-    if isinstance(own, MappingNode) and own.plain == plain:
+    if isinstance(file_tree, MappingNode) and file_tree.plain == plain:
         return loaded.text
     return to_yaml(plain)
 
 
 def criteria_and_tree(text: str, robot: str) -> tuple[CriteriaSpec, MappingNode]:
-    """Return the criteria in a scenario text for a robot ("": the only one), and the YAML tree. Raises InvalidInput."""
+    """Return the criteria in a scenario text, and the YAML tree. Raises InvalidInput.
+
+    `robot` is the name of one of several robots; "" for the only robot.
+    """
     tree = _read(text, "scenario.yaml")
     if isinstance(tree, MappingNode) and robot:
         tree = split_by_robot(tree).get(robot, tree)
@@ -42,8 +45,9 @@ def criteria_and_tree(text: str, robot: str) -> tuple[CriteriaSpec, MappingNode]
 def criteria_of_text(text: str, name: str, facts: Mapping[str, str], robot: str = "") -> CriteriaSpec:
     """Return the criteria in the scenario text of a log, ignoring the rest of the scenario.
 
-    `name` is the path of the text in messages, `facts` are the header entries of the log, and `robot` is one of
-    several robots. Raises InvalidInput, also for a plug-in that is not installed in the version of the log.
+    `name` is the path of the text in messages, and `facts` are the header entries of the log. `robot` is the name of
+    one of several robots; "" for the only robot. Raises InvalidInput, also for a plug-in that is not installed in the
+    version of the log.
     """
     if missing := missing_plugins(facts, JUDGING_PLUGINS):
         raise InvalidInput([replace(problem, path=name) for problem in missing])

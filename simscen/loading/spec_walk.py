@@ -1,4 +1,4 @@
-"""Search of a specification for nested specifications, references by name, and angles, with their YAML keys."""
+"""Searches a specification for nested specifications, references by name, and angles, with their YAML keys."""
 
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -16,7 +16,10 @@ RobotFilter = Callable[[str], bool]
 
 
 class Reference(NamedTuple):
-    """Name in a specification that refers to a thing, the keys that lead to it, and the annotation of its field."""
+    """Name in a specification that refers to an entry, such as the name of a door.
+
+    `keys` lead to the name in the scenario. `annotation` is the annotation of the field with the name.
+    """
 
     keys: Keys
     annotation: ReferenceTo
@@ -24,14 +27,14 @@ class Reference(NamedTuple):
 
     @property
     def target(self) -> str:
-        """The kind of thing that the name refers to, e.g. "door"."""
+        """Kind of entry that the name refers to, e.g. "door" (see `ReferenceTo`)."""
         return self.annotation.target
 
 
 def walk(spec: Any, includes_robot: RobotFilter | None = None, keys: Keys = ()) -> Iterator[tuple[Keys, BaseModel]]:
-    """Yield a specification and all specifications in it with their keys. `keys` are the keys of `spec`.
+    """Yield a specification and all specifications in it, with their keys. `keys` are the keys of `spec`.
 
-    `spec` can also be a list or dict. Parts that name a robot are left out if `includes_robot` is false for it.
+    `spec` can also be a list or dict. Parts that name a robot are left out if `includes_robot` is false for this robot.
     """
     parts: list[tuple[Keys, Any]]
     if isinstance(spec, BaseModel):
@@ -74,9 +77,9 @@ def references(spec: BaseModel, includes_robot: RobotFilter | None = None) -> It
 def _reference_fields(model: type[BaseModel]) -> list[tuple[str, Keys, ReferenceTo]]:
     """Return the name, the keys in YAML, and the first ReferenceTo annotation of each field that has one."""
     return [
-        (name, keys, mark)
+        (name, keys, annotation)
         for name, keys, kind in _fields(model)
-        for mark in [mark for mark in _annotations(kind) if isinstance(mark, ReferenceTo)][:1]
+        for annotation in [item for item in _annotations(kind) if isinstance(item, ReferenceTo)][:1]
     ]
 
 

@@ -30,7 +30,7 @@ class WorldCache:
     """
 
     max_worlds: int = 100_000
-    """Largest number of worlds in the cache. The oldest worlds are discarded."""
+    """Maximum number of worlds in the cache. The oldest worlds are discarded."""
     _worlds: list[tuple[LoadedWorld, World, set[Path]]] = field(default_factory=list)
     """Worlds, and the files from which they were built."""
     _simple_paths: list[tuple[Solids, object, SimplePaths | None]] = field(default_factory=list)
@@ -71,7 +71,10 @@ class WorldCache:
 def _cached(
     cache: list[tuple[Solids, object, Paths]], size: int, solids: Solids, key: object, search: Callable[[], Paths]
 ) -> Paths:
-    """Return the path search for `solids` (compared by identity) and `key`. The cache keeps the last `size`."""
+    """Return the path search for `solids` (compared by identity) and `key`, from `cache` or else from `search`.
+
+    `size` is the maximum number of path searches in the cache. The oldest are discarded.
+    """
     for known_solids, known_key, paths in cache:
         if known_solids is solids and known_key == key:
             return paths

@@ -133,7 +133,7 @@ class ScenarioFile(pytest.File):
             scenarios, problems = checker.check_scenario(self.path, choice)
             _raise_errors(problems, root)
             for scenario in scenarios:
-                loaded = scenario.with_changes(several_stacks=len(checker.choices) > 1)
+                loaded = scenario.with_changes(has_several_stacks=len(checker.choices) > 1)
                 for seed in scenario_seeds(loaded, options):
                     yield ScenarioRun.create(self, loaded, seed, with_seed=options.repeat > 1)
 

@@ -122,7 +122,7 @@ def _judge_traces(prepared: PreparedScenario, seed: int, traces: Mapping[str, Tr
     first = next(iter(runs.values()))
     if not prepared.robots:
         return first
-    result = combine_robots({name: run.result for name, run in runs.items()}, traces, prepared.loaded.expectation)
+    result = combine_robots({name: run.result for name, run in runs.items()}, traces, prepared.loaded.expected_failure)
     return replace(first, result=result, robots=runs)
 
 
@@ -139,7 +139,7 @@ def _judge_robot(prepared: PreparedScenario, seed: int, trace: Trace, log: Path 
         prepared.case,
         lines,
         metrics=prepared.spec.metrics,
-        expected=loaded.expectation,
+        expected=loaded.expected_failure,
     )
     return Run(replace(result, stack=loaded.stack), trace, prepared.case, log)
 

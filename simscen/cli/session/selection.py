@@ -161,7 +161,7 @@ def load_selection(
             variations, found = checker.check_scenario(file, None, selection.variation_numbers)
             variations = [variation.as_skipped(choice, reason) for variation in variations]
         for scenario in variations:
-            loaded.setdefault(scenario.title, []).append(scenario.with_changes(several_stacks=len(choices) > 1))
+            loaded.setdefault(scenario.title, []).append(scenario.with_changes(has_several_stacks=len(choices) > 1))
             warnings.setdefault(scenario.id, []).extend(found)
         problems.update(dict.fromkeys(found))
     if any(problem.severity == "error" for problem in problems):

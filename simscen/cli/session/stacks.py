@@ -16,7 +16,12 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
 from simscen.loading.schema.messages import quoted, suggestion
 from simscen.loading.stacks.choice import REFERENCE, StackChoice
-from simscen.loading.stacks.userconfig import UserConfig, conflicting_stacks, load_config, undefined_stack
+from simscen.loading.stacks.userconfig import (
+    UserConfig,
+    conflicting_stacks_problems,
+    load_config,
+    undefined_stack_problem,
+)
 from simscen.model.stack_files import ExternalStackSpec
 from simscen.spec.registry import all_types, find_type
 
@@ -50,7 +55,7 @@ class Stacks:
             names = [choice.name for choice in self.choices if choice.external_command]
             problems = [
                 *(problem for _, found in checked.values() for problem in found),
-                *conflicting_stacks(loaded, names, config_file()),
+                *conflicting_stacks_problems(loaded, names, config_file()),
             ]
             complete = replace(loaded, robots={name: view for name, (view, _) in checked.items()})
             return complete, list(dict.fromkeys(problems))
@@ -60,7 +65,7 @@ class Stacks:
         if (command := self.command(stack.external)) is not None:
             return replace(loaded, external_command=command), []
         names = [*(choice.name for choice in self.choices if choice.external_command), *self.config.spec.stacks]
-        problem = undefined_stack(loaded, names, self.config.file)
+        problem = undefined_stack_problem(loaded, names, self.config.file)
         return loaded, [problem] if problem is not None else []
 
     def command(self, name: str) -> ExternalCommand | None:

@@ -1,4 +1,4 @@
-"""Loading of the files that a scenario names: worlds, maps, robots, and filter masks."""
+"""Loads the files that a scenario names: worlds, maps, robots, and filter masks."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -26,23 +26,27 @@ Loaded = TypeVar("Loaded", LoadedMap, LoadedRobot, LoadedWorld)
 SDF_SUFFIXES = (".sdf", ".world", ".sdf.xacro", ".world.xacro")
 """Suffixes of the files of Gazebo worlds."""
 URDF_SUFFIXES = (".urdf", ".xacro")
+"""Suffixes of URDF files."""
 SHIPPED_ROBOT_SUFFIX = ".robot.yaml"
 """Suffix of the files of robots that ship with simscen."""
 
 
 @dataclass
 class Assets:
-    """Loader of the files that a scenario names. Its methods add problems to `problems`.
+    """Loader of the files that a scenario names.
 
-    Methods return None if a file is unusable, or if there is nothing to load. `written` is a name or path in a YAML
-    file, and `position` is its position there. Paths are relative to the folder of this YAML file.
+    If a file is unusable, a method returns None, and adds problems to `problems`. Paths in a YAML file are relative to
+    the folder of this file. `position` is the position of a path or name in a YAML file.
     """
 
     library: Library
     problems: list[Problem] = field(default_factory=list)
 
     def world_of(self, world: WorldSpec | str | None, tree: MappingNode, file: Path) -> LoadedWorld | None:
-        """Load the world of the scenario `file`: inline, or in the file that `world` names (see `world_file`)."""
+        """Load the world of the scenario `file`: inline, or in the file that `world` names (see `world_file`).
+
+        `tree` is the YAML tree of the scenario. Returns None if the scenario has no world.
+        """
         node = node_at(tree, ("world",))
         if isinstance(world, WorldSpec):
             return self.complete_world(world, node, file)
@@ -93,16 +97,16 @@ class Assets:
             return None
         return self._ros_map(self._read_tree(path), path)
 
-    def robot(self, written: str, position: Position) -> LoadedRobot | None:
-        """Load the robot in the file with the path `written`, or the shipped robot with this name."""
-        if "/" in written or written.endswith((*URDF_SUFFIXES, ".yaml", ".yml")):
-            path = self._find(written, position)
+    def robot(self, name_or_path: str, position: Position) -> LoadedRobot | None:
+        """Load the robot in the file with this path, or the shipped robot with this name."""
+        if "/" in name_or_path or name_or_path.endswith((*URDF_SUFFIXES, ".yaml", ".yml")):
+            path = self._find(name_or_path, position)
             return None if path is None else self._load_cached(self.robot_file, path)
         shipped_files = shipped_robots()
-        if written in shipped_files:
-            return self._load_cached(self.robot_file, shipped_files[written])
-        hint = f"{suggestion(written, shipped_files)} (or the path of a *.robot.yaml or .urdf file)"
-        message = f"no robot called {quoted(written)} ships with simscen"
+        if name_or_path in shipped_files:
+            return self._load_cached(self.robot_file, shipped_files[name_or_path])
+        hint = f"{suggestion(name_or_path, shipped_files)} (or the path of a *.robot.yaml or .urdf file)"
+        message = f"no robot called {quoted(name_or_path)} ships with simscen"
         self.problems.append(Problem(*position, "SC023", message, hint))
         return None
 
@@ -123,8 +127,8 @@ class Assets:
             return None
         urdf = self._find(spec.urdf, value_position(tree, ("urdf",))) if spec.urdf else None
         packages = {}
-        for package, written in spec.packages.items():
-            folder = self._find(written, value_position(tree, ("packages", package)), "folder")
+        for package, path_text in spec.packages.items():
+            folder = self._find(path_text, value_position(tree, ("packages", package)), "folder")
             if folder is not None:
                 packages[package] = folder
         if (spec.urdf and urdf is None) or len(packages) < len(spec.packages):
@@ -133,7 +137,10 @@ class Assets:
         return LoadedRobot(name, path, spec, urdf, mapping, packages)
 
     def _is_xml_file(self, path: Path, kind: str, hint: str) -> bool:
-        """Return whether a file is XML instead of YAML, and report it as a problem if so."""
+        """Return whether a file is XML instead of YAML, and report an XML file as a problem.
+
+        `kind` is the expected kind of file for the message.
+        """
         name = self.library.sandbox.display_name(path)
         text = self.library.text(path)
         if isinstance(text, Problem) or not is_xml(text):
@@ -142,7 +149,7 @@ class Assets:
         return True
 
     def _load_cached(self, load: Callable[[Path], Loaded | None], path: Path) -> Loaded | None:
-        """Return `load(path)`; from the cache if the file has been loaded without problems before."""
+        """Return `load(path)`, or the result of an earlier call without problems."""
         key = load.__name__, path
         if key in self.library.loaded:
             known: Loaded = self.library.loaded[key]
@@ -180,11 +187,11 @@ class Assets:
             return None
         return spec
 
-    def _find(self, written: str, position: Position, kind: str = "regular file") -> Path | None:
-        """Return the existing file or folder with the path `written`. `kind` is "regular file" or "folder"."""
-        found = self.library.find(written, position)
+    def _find(self, path_text: str, position: Position, kind: str = "regular file") -> Path | None:
+        """Return the existing file or folder with the path `path_text`. `kind` is "regular file" or "folder"."""
+        found = self.library.find(path_text, position)
         if isinstance(found, Path) and not (found.is_dir() if kind == "folder" else found.is_file()):
-            found = Problem(*position, "SC001", f"not a {kind}: {quoted(written)}")
+            found = Problem(*position, "SC001", f"not a {kind}: {quoted(path_text)}")
         if isinstance(found, Problem):
             self.problems.append(found)
             return None
@@ -209,7 +216,10 @@ def shipped_robots() -> dict[str, Path]:
 
 
 def find_criterion_masks(spec: BaseModel, tree: MappingNode, assets: Assets) -> Mapping[str, CriterionMask]:
-    """Return the filter masks of the criteria under `pass`, by path as written. Problems are added to `assets`."""
+    """Return the filter masks of the criteria under `pass`, by path as written in the file.
+
+    `tree` is the YAML tree of `spec`. Problems are added to `assets`.
+    """
     found: dict[str, CriterionMask] = {}
     for reference in references(spec):
         node = node_at(tree, reference.keys)

@@ -1,4 +1,4 @@
-"""Copying of a scenario, and of the files that it names, to another folder."""
+"""Copies a scenario, and the files that it names, to another folder."""
 
 import shutil
 from collections.abc import Iterable, Mapping
@@ -15,7 +15,7 @@ from simscen.loading.yaml.tree import Keys, MappingNode, Node, ScalarNode, node_
 from simscen.loading.yaml.writing import to_yaml
 
 _MODELINE = "# yaml-language-server:"
-"""Beginning of the comment that tells editors the path of the JSON schema."""
+"""Beginning of the comment that contains the path of the JSON schema for editors."""
 _SEARCHED_SUFFIXES = (".yaml", ".yml")
 """Suffixes of files that are searched for names of further files."""
 _UNSEARCHED_SUFFIXES = (".sdf", ".world", ".urdf", ".xacro")
@@ -25,26 +25,26 @@ _UNSEARCHED_SUFFIXES = (".sdf", ".world", ".urdf", ".xacro")
 def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path]:
     """Copy a scenario to the file `target`, and return the paths of all copies. Paths in the copy are adapted.
 
-    `root` is the root of `target`. If the scenario has another root, the files that it names are copied as well, to a
-    folder next to `target` with the name of `target` without suffixes. Raises UsageError if a file cannot be copied, or
-    if a copy already exists.
+    `root` is the root of `target`. If the scenario has another root, the files that the scenario names are copied as
+    well. Their folder is next to `target`, and has the name of `target` without suffixes. Raises UsageError if a file
+    cannot be copied, or if a copy already exists.
     """
     library = Library(PathSandbox.around(loaded.root, loaded.world_path))
     merged, _ = library.read(loaded.file, defaults=True)
-    own, _ = parse_yaml(loaded.text, loaded.path)
+    file_tree, _ = parse_yaml(loaded.text, loaded.path)
     assert merged is not None
-    assert own is not None
-    whole = loaded.text if own.plain == merged.plain else to_yaml(merged.plain)
-    text = "\n".join(line for line in whole.split("\n") if not line.startswith(_MODELINE))
+    assert file_tree is not None
+    merged_text = loaded.text if file_tree.plain == merged.plain else to_yaml(merged.plain)
+    text = "\n".join(line for line in merged_text.split("\n") if not line.startswith(_MODELINE))
     tree, _ = parse_yaml(text, loaded.path)
     assert tree is not None
     named = [(node_at(tree, keys), file) for keys, (_, file) in _named_files(merged, library.files).items()]
     files = {leaf: file for leaf, file in named if isinstance(leaf, ScalarNode)}
     needed = _with_dependencies(files.values())
-    same_root = root == loaded.root
+    has_same_root = root == loaded.root
     common_folder = Path(commonpath([file.parent for file in needed])) if needed else loaded.root
     folder = target.parent / target.name.partition(".")[0]
-    copies = {} if same_root else {file: folder / file.relative_to(common_folder) for file in needed}
+    copies = {} if has_same_root else {file: folder / file.relative_to(common_folder) for file in needed}
     if existing := next((copy for copy in copies.values() if copy.exists()), None):
         raise UsageError(f"{existing} already exists; choose another name")
     for file, copy in copies.items():
@@ -59,9 +59,10 @@ def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path
 
 
 def with_paths_relative_to(folder: Path, tree: MappingNode, yaml_files: Mapping[str, Path]) -> MappingNode:
-    """Return a scenario with paths relative to `folder`, instead of to the folders of the YAML files with these paths.
+    """Return a scenario in which all paths of files are relative to `folder`.
 
-    `yaml_files` are the absolute paths of these files, by path in messages.
+    In `tree`, each path is relative to the folder of the YAML file that contains the path. `yaml_files` are the
+    absolute paths of these YAML files, by path in messages.
     """
     start = Path(realpath(folder))
     for keys, (leaf, file) in _named_files(tree, yaml_files).items():
@@ -71,7 +72,10 @@ def with_paths_relative_to(folder: Path, tree: MappingNode, yaml_files: Mapping[
 
 
 def _named_files(tree: Node, yaml_files: Mapping[str, Path]) -> dict[Keys, tuple[ScalarNode, Path]]:
-    """Return the scalars that name existing files, and these files, by keys. See `with_paths_relative_to`."""
+    """Return the scalars that name existing files, and these files, by keys of the scalar.
+
+    `yaml_files` is explained in `with_paths_relative_to`.
+    """
     found = {}
     for keys, leaf in nodes_with_keys(tree):
         yaml_file = yaml_files.get(leaf.position.path)
@@ -105,6 +109,7 @@ def _with_dependencies(files: Iterable[Path]) -> list[Path]:
 
 
 def _with_path(text: str, leaf: ScalarNode, path: str) -> str:
+    """Return the YAML text with `path` instead of the value of the scalar `leaf`."""
     lines = text.split("\n")
     line, start = lines[leaf.position.line - 1], leaf.position.col - 1
     quote = line[start] if line[start] in "'\"" else ""

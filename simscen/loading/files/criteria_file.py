@@ -1,4 +1,4 @@
-"""Loading of files with criteria (`--scenario`) by which existing logs are judged."""
+"""Loads files with criteria (`--scenario`) by which existing logs are judged."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,27 +24,28 @@ class LoadedCriteria:
     file: Path
     spec: CriteriaSpec
     lines: tuple[int, ...]
-    """Line of each criterion in `file`; 0 for a criterion from a file that it extends."""
+    """Line of each criterion in `file`; 0 for a criterion from a file that `file` extends."""
     tree: MappingNode = field(repr=False)
     """YAML tree of `file`, merged with the files that it extends."""
     library: Library = field(repr=False)
+    """Reader that has read `file`."""
     masks: Mapping[str, CriterionMask] = field(default_factory=dict)
     """Filter masks of the criteria, by path as written in the file."""
 
     def for_robot(self, robot: str) -> "LoadedCriteria":
-        """Return the criteria for a robot of a log; "" is the only robot of a log. Raises InvalidInput."""
+        """Return the criteria for the robot `robot` of a log; "" stands for the only robot. Raises InvalidInput."""
         trees = multirobot.split_by_robot(self.tree)
         if robot in trees:
             return _load_tree(self.file, trees[robot], self.library)
         if not trees:
             return self
-        unknown = f"the log has a robot {quoted(robot)}, which is not listed here"
-        message = unknown if robot else "the log has one robot, but several are listed here"
+        unknown_robot = f"the log has a robot {quoted(robot)}, which is not listed here"
+        message = unknown_robot if robot else "the log has one robot, but several are listed here"
         problem = Problem(*key_position(self.tree, (multirobot.ROBOTS,)), code="SC030", message=message)
         raise InvalidInput(self.library.with_source([problem]))
 
     def load_world_and_robot(self) -> tuple[LoadedWorld | None, LoadedRobot | None]:
-        """Load the world and the robot that the file names; None for a missing world or robot. Raises InvalidInput."""
+        """Return the world and the robot that the file names; None if the file names none. Raises InvalidInput."""
         assets, robot = Assets(self.library), None
         world = assets.world_of(self.spec.world, self.tree, self.file)
         if self.spec.robot is not None:

@@ -1,4 +1,4 @@
-"""Search for the files that the path arguments of a command select, and for the default root folder."""
+"""Finds the files that the path arguments of a command select, and the default root folder."""
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
@@ -10,18 +10,18 @@ from simscen.loading.files.paths import absolute_path, exists, is_folder, path_i
 from simscen.loading.schema.messages import quoted
 from simscen.loading.yaml.textfile import os_error_reason
 
+# Suffixes of the YAML files of simscen by kind. Scenarios extend base files.
 SCENARIO_SUFFIXES = (".scenario.yaml", ".scenario.yml")
 WORLD_SUFFIXES = (".world.yaml", ".world.yml")
 ROBOT_SUFFIXES = (".robot.yaml", ".robot.yml")
 STUDY_SUFFIXES = (".study.yaml", ".study.yml")
 STACK_SUFFIXES = (".stack.yaml", ".stack.yml")
 BASE_SUFFIXES = (".base.yaml", ".base.yml")
-"""Suffixes of the YAML files of simscen by kind. Scenarios extend base files."""
 SUFFIXES = SCENARIO_SUFFIXES + STUDY_SUFFIXES + WORLD_SUFFIXES + ROBOT_SUFFIXES + STACK_SUFFIXES + BASE_SUFFIXES
 """Suffixes of all kinds of YAML files of simscen."""
 
 REPOSITORY_FOLDERS = (".git", ".hg", ".jj", ".svn")
-"""Names of the folder of a version control system at the top of a repository."""
+"""Names of folders of version control systems, which are at the top of a repository."""
 PROJECT_FILES = ("pyproject.toml", "package.xml", "setup.py")
 """Names of files at the top of a Python project or ROS package."""
 SCENARIOS_FOLDER = "scenarios"
@@ -62,18 +62,21 @@ def sibling(file: Path, label: str) -> Path:
 
 
 def default_root(paths: Iterable[Path]) -> Path:
-    """Return the folder of the project that contains all `paths`.
+    """Return the folder of the project that contains all `paths`: the first of these folders that exists.
 
-    It is the first that exists of: the nearest parent that is a repository, the nearest parent with a project file, the
-    parent of the nearest folder `scenarios`, the working folder if it contains the paths, their common folder.
+    1. the nearest common parent of the paths that is a repository
+    2. the nearest common parent with a project file
+    3. the parent of the nearest common parent with the name `scenarios`
+    4. the working folder, if it contains the paths
+    5. the common folder of the paths
     """
     folders = [Path(os.path.realpath(path if is_folder(path) else path.parent)) for path in paths]
     common = Path(os.path.commonpath(folders)) if folders else Path.cwd()
-    above = (common, *common.parents)
+    parents = (common, *common.parents)
     candidates = (
-        *(folder for folder in above if _contains_any(folder, REPOSITORY_FOLDERS)),
-        *(folder for folder in above if _contains_any(folder, PROJECT_FILES)),
-        *(folder.parent for folder in above if folder.name == SCENARIOS_FOLDER and not _is_too_wide(folder.parent)),
+        *(folder for folder in parents if _contains_any(folder, REPOSITORY_FOLDERS)),
+        *(folder for folder in parents if _contains_any(folder, PROJECT_FILES)),
+        *(folder.parent for folder in parents if folder.name == SCENARIOS_FOLDER and not _is_too_wide(folder.parent)),
         *(folder for folder in (Path.cwd(),) if common.is_relative_to(folder) and not _is_too_wide(folder)),
     )
     return next(iter(candidates), common)
@@ -95,11 +98,11 @@ def _selected_files(path: Path, suffixes: tuple[str, ...], problems: list[Proble
         yield path
         return
 
-    def unsearchable(error: OSError) -> None:
+    def report(error: OSError) -> None:
         problems.append(Problem(str(error.filename), 0, 0, "SC001", os_error_reason(error)))
 
     is_empty = True
-    for folder, below, names in os.walk(path, onerror=unsearchable):
+    for folder, below, names in os.walk(path, onerror=report):
         below[:] = sorted(name for name in below if not name.startswith("."))
         files = [Path(folder) / name for name in sorted(names) if name.endswith(suffixes)]
         is_empty = is_empty and not files
@@ -109,13 +112,16 @@ def _selected_files(path: Path, suffixes: tuple[str, ...], problems: list[Proble
 
 
 def _output_folder_conflicts(files: list[Path], root: Path) -> Iterator[Problem]:
-    """Yield a problem for each scenario such as `a/seed-1/b` whose output folder is that of a run of scenario `a`."""
+    """Yield a problem for each scenario whose output folder is inside the folder of a run of another scenario.
+
+    For example, `a/seed-1` is the output folder of a run of the scenario `a`, and contains that of `a/seed-1/b`.
+    """
     ids = {scenario_id(file, root).casefold() for file in files}
     for file in files:
         name = scenario_id(file, root).casefold()
-        above = name.split("/")[:-1]
-        for depth, part in enumerate(above[1:], start=1):
-            if part.startswith("seed-") and (other := "/".join(above[:depth])) in ids:
+        folders = name.split("/")[:-1]
+        for depth, folder in enumerate(folders[1:], start=1):
+            if folder.startswith("seed-") and (other := "/".join(folders[:depth])) in ids:
                 message = f"its output folder would be the folder of a run of {quoted(other)}"
                 yield Problem(path_in_messages(file, root), 0, 0, "SC041", message, "rename one of them")
 

@@ -1,4 +1,4 @@
-"""Paths in YAML files, which must be relative, and ids of scenarios, which are paths."""
+"""Resolves relative paths in YAML files and paths on the command line, and derives ids of scenarios from paths."""
 
 import errno
 import os
@@ -31,36 +31,36 @@ class PathSandbox:
         """Return the sandbox of these folders, as absolute paths with symbolic links resolved."""
         return cls(_resolved(root), tuple(_resolved(folder) for folder in world_path))
 
-    def find(self, written: str, folder: Path, position: Position) -> Path | Problem:
-        """Return the existing file or folder with the path `written`, or a problem at `position`.
+    def find(self, path_text: str, folder: Path, position: Position) -> Path | Problem:
+        """Return the existing file or folder with the path `path_text`, or a problem at `position`.
 
-        The path is relative to `folder`, the folder of the YAML file that contains it. If it does not exist there or
-        leads out of the sandbox, it is searched in the folders of `--world-path`. `model://name/…` is only searched in
-        these folders.
+        The path is relative to `folder`, the folder of the YAML file with the path. If there is no such file, or the
+        path leads out of the sandbox, the path is searched in the folders of `--world-path`. A path `model://name/…` is
+        only searched in these folders.
         """
-        if problem := _form_problem(written, position):
+        if problem := _form_problem(path_text, position):
             return problem
-        if written.startswith(MODEL_SCHEME):
-            message = f"{quoted(written)} was not found in any folder of --world-path"
+        if path_text.startswith(MODEL_SCHEME):
+            message = f"{quoted(path_text)} was not found in any folder of --world-path"
             hint = "" if self.world_path else "allow its folder with --world-path"
             missing = Problem(*position, "SC023", message, hint)
-            return self._in_world_path(written.removeprefix(MODEL_SCHEME)) or missing
-        path = _resolved(folder / written)
+            return self._in_world_path(path_text.removeprefix(MODEL_SCHEME)) or missing
+        path = _resolved(folder / path_text)
         if not self.contains(path):
             hint = "choose the root with --root, or allow a folder with --world-path"
-            outside = Problem(*position, "SC020", f"{quoted(written)} is outside the scenario root", hint)
-            return self._in_world_path(written) or outside
+            outside = Problem(*position, "SC020", f"{quoted(path_text)} is outside the scenario root", hint)
+            return self._in_world_path(path_text) or outside
         try:
             path.stat()
         except OSError as error:
             code = "SC022" if error.errno == errno.ELOOP else "SC023"
-            message = f"{os_error_reason(error)}: {quoted(written)}"
+            message = f"{os_error_reason(error)}: {quoted(path_text)}"
             missing = Problem(*position, code, message, _similar_name_hint(path))
-            return self._in_world_path(written) or missing
+            return self._in_world_path(path_text) or missing
         return path
 
     def resolve_argument(self, path: Path) -> Path | Problem:
-        """Return the `absolute_path` of a file on the command line, which need not exist; or a problem."""
+        """Return the `absolute_path` of a file on the command line, existing or not; or a problem."""
         file = absolute_path(path)
         if self.contains(file):
             return _name_problem(path, self.display_name(file)) or file
@@ -75,11 +75,11 @@ class PathSandbox:
         """Return the path of a file for messages: relative to the root if it is inside, else absolute."""
         return path_in_messages(path, self.root)
 
-    def _in_world_path(self, written: str) -> Path | None:
+    def _in_world_path(self, path_text: str) -> Path | None:
         """Return the first existing file or folder with this path relative to a folder of `--world-path`, or None."""
-        if ".." in PurePosixPath(written).parts:
+        if ".." in PurePosixPath(path_text).parts:
             return None
-        candidates = ((folder, _resolved(folder / written)) for folder in self.world_path)
+        candidates = ((folder, _resolved(folder / path_text)) for folder in self.world_path)
         return next((found for folder, found in candidates if found.is_relative_to(folder) and exists(found)), None)
 
 
@@ -108,25 +108,26 @@ def is_folder(path: Path) -> bool:
     return os.path.isdir(path)  # noqa: PTH112
 
 
-def _form_problem(written: str, position: Position) -> Problem | None:
-    """Return a problem if a path is not relative or has invalid characters; else None."""
-    if INVALID_IN_PATHS.search(written):
-        return Problem(*position, "SC017", f"control character in the path {quoted(written)}")
-    if written.startswith(("/", "~")) or (len(written) > 1 and written[1] == ":"):
-        return Problem(*position, "SC021", f"{quoted(written)} is an absolute path", "write it relative to this file")
-    if "://" in written and not written.startswith(MODEL_SCHEME):
-        return Problem(*position, "SC021", f"{quoted(written)} is a URL", "use a relative path or model://name")
+def _form_problem(path_text: str, position: Position) -> Problem | None:
+    """Return a problem if a path is not relative, or has invalid characters; else None."""
+    if INVALID_IN_PATHS.search(path_text):
+        return Problem(*position, "SC017", f"control character in the path {quoted(path_text)}")
+    if path_text.startswith(("/", "~")) or (len(path_text) > 1 and path_text[1] == ":"):
+        return Problem(*position, "SC021", f"{quoted(path_text)} is an absolute path", "write it relative to this file")
+    if "://" in path_text and not path_text.startswith(MODEL_SCHEME):
+        return Problem(*position, "SC021", f"{quoted(path_text)} is a URL", "use a relative path or model://name")
     return None
 
 
 def _name_problem(path: Path, name: str) -> Problem | None:
-    """Return a problem if `name`, the path of the file for messages, has invalid characters; else None."""
+    """Return a problem if `name`, the path of the file in messages, has invalid characters; else None."""
     character = INVALID_IN_PATHS.search(name)
     if character is None:
         return None
     code = ord(character[0])
-    bad_bytes = 0xD800 <= code < 0xE000
-    message = "the file name is not valid UTF-8" if bad_bytes else f"control character U+{code:04X} in the file name"
+    is_invalid_utf8 = 0xD800 <= code < 0xE000  # Python decodes invalid bytes as surrogates
+    control_character = f"control character U+{code:04X} in the file name"
+    message = "the file name is not valid UTF-8" if is_invalid_utf8 else control_character
     return Problem(str(path), 0, 0, "SC017", message, "rename the file")
 
 

@@ -1,4 +1,4 @@
-"""Loading of robot and world files without a scenario."""
+"""Loads robot and world files without a scenario."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,20 +25,21 @@ class RobotFile:
         return (self.library.sandbox.root, *self.library.sandbox.world_path)
 
 
-def load_robot_file(written: str, root: Path, world_path: Sequence[Path] = ()) -> RobotFile:
-    """Load the robot in the file `written` (`*.robot.yaml`, `.urdf`, or `.xacro`), or the shipped robot of this name.
+def load_robot_file(name_or_path: str, root: Path, world_path: Sequence[Path] = ()) -> RobotFile:
+    """Load the shipped robot with this name, or the robot in a `*.robot.yaml`, `.urdf`, or `.xacro` file.
 
     All files must lie in `root` or in a folder of `world_path`. Raises InvalidInput with all problems.
     """
     shipped = shipped_robots()
     library = Library(PathSandbox.around(root, world_path))
-    use_shipped = written in shipped and not exists(Path(written))
-    path = shipped[written] if use_shipped else library.sandbox.resolve_argument(Path(written))
+    is_shipped = name_or_path in shipped and not exists(Path(name_or_path))
+    path = shipped[name_or_path] if is_shipped else library.sandbox.resolve_argument(Path(name_or_path))
     if isinstance(path, Problem):
         raise InvalidInput([path])
     if not is_file(path):
-        message = "not a regular file" if exists(path) else f"no such file or shipped robot: {quoted(written)}"
-        raise InvalidInput([Problem(written, 0, 0, "SC001", message, suggestion(written, shipped))])
+        missing = f"no such file or shipped robot: {quoted(name_or_path)}"
+        message = "not a regular file" if exists(path) else missing
+        raise InvalidInput([Problem(name_or_path, 0, 0, "SC001", message, suggestion(name_or_path, shipped))])
     assets = Assets(library)
     robot = assets.robot_file(path)
     if robot is None or assets.problems:
@@ -51,8 +52,8 @@ def load_world_file(
 ) -> LoadedWorld:
     """Load the world in a `*.world.yaml`, a ROS map, or an SDF file. Raises InvalidInput with all problems.
 
-    All files must lie in `root` or in a folder of `world_path`. `unsaved` are texts that replace the content of
-    files.
+    All files must lie in `root` or in a folder of `world_path`. `unsaved` are texts that replace the content of files,
+    by absolute path.
     """
     library = Library(PathSandbox.around(root, world_path), unsaved=unsaved or {})
     file = library.sandbox.resolve_argument(path)

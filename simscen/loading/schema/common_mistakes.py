@@ -38,16 +38,17 @@ def hint_for_wrong_type(error_type: str, model: type[BaseModel], loc: Sequence[K
     """
     models = models_at(model, loc)
     keys = [part for part in loc if isinstance(part, int) or " " not in part]  # tags of unions contain a space
-    in_list = bool(keys) and isinstance(keys[-1], int)
+    is_in_list = bool(keys) and isinstance(keys[-1], int)
     if error_type == "list_type":
-        return _list_hint(node, in_list)
+        return _list_hint(node, is_in_list)
     if isinstance(node, SequenceNode):
         return _sequence_for_mapping_hint(models, node)
     if isinstance(node, ScalarNode):
-        colon_hint = _missing_colon_hint(models, node.value, in_list) if isinstance(node.value, str) else ""
+        colon_hint = _missing_colon_hint(models, node.value, is_in_list) if isinstance(node.value, str) else ""
         if hint := colon_hint or _scalar_for_mapping_hint(models, node):
             return hint
-        if loc and any(issubclass(one, Choice) and loc[-1] in one.choices() for one in models_at(model, loc[:-1])):
+        parents = models_at(model, loc[:-1]) if loc else ()
+        if any(issubclass(parent, Choice) and loc[-1] in parent.choices() for parent in parents):
             return f"`simscen explain {loc[-1]}` shows its keys"
     return ""
 
@@ -55,19 +56,23 @@ def hint_for_wrong_type(error_type: str, model: type[BaseModel], loc: Sequence[K
 def hint_for_bounds(model: type[BaseModel], loc: Sequence[Key], node: Node) -> str:
     """Return the reason for the bounds of `node`, or a hint that an angle could be in degrees; "" if unknown."""
     value = node.value if isinstance(node, ScalarNode) else None
-    is_angle = any(keys == (loc[-1],) for one in models_at(model, loc[:-1]) for _, keys, _ in fields_with_angles(one))
+    parents = models_at(model, loc[:-1])
+    is_angle = any(keys == (loc[-1],) for parent in parents for _, keys, _ in fields_with_angles(parent))
     if is_angle and isinstance(value, int | float) and abs(value) > 2 * math.pi:
         return f"angles without a unit are in radians; did you mean `{value:g} deg`?"
     return HINTS_FOR_BOUNDS.get(tuple(loc), "")
 
 
 def hint_for_misplaced_key(model: type[BaseModel], tree: Node, loc: Sequence[Key], key: str) -> str:
-    """Return a hint on where to move an unknown key of the mapping at `loc`, within its list item; "" if unknown."""
+    """Return a hint on where to move an unknown key of the mapping at `loc`; "" if unknown.
+
+    Inside an item of a list, the hint leads to a place in the same item.
+    """
     item = next((index + 1 for index, part in enumerate(loc) if isinstance(part, int)), 0)
     for length in range(len(loc) - 1, item - 1, -1):
         if key in keys_of(models_at(model, loc[:length])):
             parent = dotted_path(existing_keys(tree, loc[:length]))
-            return f"move it one level up, to `{parent}`" if parent else "move it to the top level of the file"
+            return f"move it to `{parent}`" if parent else "move it to the top level of the file"
     starts = ((loc, models_at(model, loc)), ((), [model]))
     for start, models in starts[:1] if item else starts:
         for below, valid_keys in _mappings_below(tuple(models)):
@@ -93,9 +98,9 @@ def hint_for_known_mistake(loc: Sequence[Key], key: str) -> str:
     return ""
 
 
-def _list_hint(node: Node, in_list: bool) -> str:
-    """Return a hint on how to write `node` as a list; "" if unknown. With `in_list`, `node` is an item of a list."""
-    if in_list and isinstance(node, ScalarNode) and isinstance(node.value, int | float):
+def _list_hint(node: Node, is_in_list: bool) -> str:
+    """Return a hint on how to write `node` as a list; "" if unknown. `is_in_list`: `node` is an item of a list."""
+    if is_in_list and isinstance(node, ScalarNode) and isinstance(node.value, int | float):
         return "write each point as a list: `[[1, 2], [3, 4]]`"
     if isinstance(node, MappingNode):
         point = [entry.value.value for entry in node.entries.values() if isinstance(entry.value, ScalarNode)]
@@ -139,7 +144,7 @@ def _is_valid(model: type[BaseModel], value: dict[str, object]) -> bool:
     return True
 
 
-def _missing_colon_hint(models: Iterable[type[BaseModel]], word: str, in_list: bool) -> str:
+def _missing_colon_hint(models: Iterable[type[BaseModel]], word: str, is_in_list: bool) -> str:
     """Return a hint on how to write the text `word` as a key of a Choice, with a colon and a value; "" if unknown."""
     for choice in (model for model in models if issubclass(model, Choice)):
         keys = [*choice.choices()]
@@ -147,14 +152,14 @@ def _missing_colon_hint(models: Iterable[type[BaseModel]], word: str, in_list: b
             return did_you_mean(word, keys).replace("`?", ": …`?")
         chosen = models_at(choice, [word])
         body = "{}" if chosen and all(has_no_required_keys(model) for model in chosen) else "…"
-        written = f"`{word}: {body}`" if in_list else f"`{{{word}: {body}}}`"
+        written = f"`{word}: {body}`" if is_in_list else f"`{{{word}: {body}}}`"
         return f"write {written}" + ("" if body == "{}" else f"; `simscen explain {word}` shows its keys")
     return ""
 
 
 @lru_cache(maxsize=64)  # a file of another kind has many unknown keys
 def _mappings_below(models: tuple[type[BaseModel], ...], depth: int = 1) -> tuple[MappingKeys, ...]:
-    """Return the mappings up to MAX_SEARCH_DEPTH levels below `models`, the nearest first in each branch."""
+    """Return the mappings from `depth` to MAX_SEARCH_DEPTH levels below `models`, the nearest first in each branch."""
     holders = [(name, tuple(models_at(model, [name]))) for model in models if not issubclass(model, Choice)
                for name in keys_of([model])]  # fmt: skip
     found: list[MappingKeys] = [

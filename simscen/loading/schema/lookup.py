@@ -1,7 +1,7 @@
-"""Lookup of the pydantic models, and of their keys, that are possible at a location in a YAML file.
+"""Looks up the pydantic models, and the keys of these models, that are possible at a location in a YAML file.
 
 A `loc` is the location of a validation error in pydantic: keys and list indices, with tags of union members between
-them. `kind` is a type annotation. Models of installed packages are included.
+them. A `kind` is a type annotation. Models of installed packages are included.
 """
 
 from collections.abc import Iterable, Sequence
@@ -36,11 +36,11 @@ def type_values_at(model: type[BaseModel], loc: Sequence[Key]) -> list[str]:
 
 def type_values_with_key(model: type[BaseModel], loc: Sequence[Key], key: str) -> list[str]:
     """Return the other values of `type` with which `key` would be valid in the mapping at `loc`."""
-    own = type_values_at(model, loc)
-    if not loc or loc[-1] not in own:
+    current = type_values_at(model, loc)
+    if not loc or loc[-1] not in current:
         return []
-    having = [kind for kind in models_at(model, loc[:-1]) if key in keys_of([kind])]
-    return [name for kind in having for name in map(str, _type_values(kind)) if name not in own]
+    models_with_key = [kind for kind in models_at(model, loc[:-1]) if key in keys_of([kind])]
+    return [name for kind in models_with_key for name in map(str, _type_values(kind)) if name not in current]
 
 
 def keys_of(models: Iterable[type[BaseModel]]) -> list[str]:
@@ -55,7 +55,7 @@ def has_no_required_keys(model: type[BaseModel]) -> bool:
 
 
 def _field_type(model: type[BaseModel], key: str) -> Any:
-    """Return the type of the field with this key in YAML; None if it is unknown or cannot be imported."""
+    """Return the type of the field with this key in YAML; None if the key is unknown or the type cannot be imported."""
     field = next((field for name, field in model.model_fields.items() if key in (field.alias, name)), None)
     if field is None:
         return None
@@ -77,8 +77,8 @@ def _union_members(kind: Any) -> list[Any]:
         return [option for member in get_args(unwrapped) if member is not NoneType for option in _union_members(member)]
     if _is_model(unwrapped) and issubclass(unwrapped, RootModel):
         inner = _unwrapped(unwrapped.model_fields["root"].annotation)
-        holds_models = _is_model(inner) or get_origin(inner) in (Union, UnionType)
-        return _union_members(unwrapped.model_fields["root"].annotation) if holds_models else [kind]
+        contains_models = _is_model(inner) or get_origin(inner) in (Union, UnionType)
+        return _union_members(unwrapped.model_fields["root"].annotation) if contains_models else [kind]
     return [kind]
 
 

@@ -1,4 +1,4 @@
-"""Messages about validation errors of pydantic, and formatting of values and suggestions in messages."""
+"""Messages for validation errors of pydantic, and formatting of values and suggestions in messages."""
 
 import difflib
 import re
@@ -29,9 +29,9 @@ _BOUNDS = {
     "less_than": ("less than", "lt"),
     "less_than_equal": ("at most", "le"),
 }
-"""Words for a bound, and the key of the bound in the context of the error, by error type of pydantic."""
+"""(words for a bound, key of the bound in the context of the error), by error type of pydantic."""
 MAX_LISTED_CHOICES = 40
-"""Largest number of choices in a message."""
+"""Maximum number of choices in a message."""
 _NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?")
 _LEADING_ZERO = re.compile(r"[-+]?0[0-9]")
 _TEMPLATES = {
@@ -42,11 +42,11 @@ _TEMPLATES = {
     "path_name": ("SC017", "a name must not be a path"),
     "string_too_long": ("SC017", "longer than {max_length} characters"),
 }
-"""Error code, and message with placeholders for values from the context of the error, by error type of pydantic."""
+"""(error code, message with placeholders for values from the context of the error), by error type of pydantic."""
 
 
 class Message(NamedTuple):
-    """Error code of simscen (SC…), text, and hint of a problem, without its position."""
+    """Error code (SC…), text, and hint of a problem without a position."""
 
     code: str
     text: str
@@ -70,7 +70,7 @@ def describe_node(node: Node) -> str:
 
 
 def quoted(text: str, max_chars: int = 60) -> str:
-    """Return text of a user for a message: in backquotes, printable, and shortened to `max_chars` characters."""
+    """Return a text of the user for messages: in backquotes, printable, and shortened to `max_chars` characters."""
     printable = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
     return f"`{printable if len(printable) <= max_chars else printable[: max_chars - 1] + '…'}`"
 
@@ -93,7 +93,10 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
 
 def translate_error(error_type: str, context: Mapping[str, Any], node: Node, text: str) -> Message:
-    """Return the message for an error of pydantic in the value `node`, with the fields `type`, `ctx`, and `msg`."""
+    """Return the message for an error of pydantic in the value `node`.
+
+    `error_type`, `context`, and `text` are the fields `type`, `ctx`, and `msg` of the error.
+    """
     if error_type in _EXPECTED_TYPES:
         text = f"expected {_EXPECTED_TYPES[error_type]}, got {describe_node(node)}"
         return Message("SC011", text, _type_hint(error_type, node))
@@ -124,8 +127,9 @@ def translate_error(error_type: str, context: Mapping[str, Any], node: Node, tex
     if "names" in context:
         hint = suggestion(str(context["value"]), str(context["names"]).split(", "))
         return Message("SC014", f"{short_value(node)} is not one of the choices", hint)
-    is_name = error_type == "string_pattern_mismatch"
-    return _invalid_name(node, str(context["pattern"])) if is_name else Message("SC011", text[:1].lower() + text[1:])
+    if error_type == "string_pattern_mismatch":
+        return _invalid_name_message(node, str(context["pattern"]))
+    return Message("SC011", text[:1].lower() + text[1:])
 
 
 def _type_hint(error_type: str, node: Node) -> str:
@@ -159,7 +163,7 @@ def short_value(node: Node) -> str:
     return describe_node(node)
 
 
-def _invalid_name(node: Node, pattern: str) -> Message:
+def _invalid_name_message(node: Node, pattern: str) -> Message:
     value = node.value if isinstance(node, ScalarNode) and isinstance(node.value, str) else ""
     control = next((c for c in value if not c.isprintable()), None)
     if control is not None:

@@ -31,11 +31,11 @@ LANGUAGE_VERSION = 1
 """Version of the scenario language, which files state under the key `simscen`."""
 
 FindMissingKeys = Callable[[MappingNode], list[Problem]]
-"""Function that returns the problems of keys that are required only if other keys are missing."""
+"""Function that returns problems of keys that depend on other keys, such as a missing `robot` without `robots`."""
 
 
 def check(model: type[Model], tree: Node, find_missing_keys: FindMissingKeys | None = None) -> Model | list[Problem]:
-    """Return the specification in `tree`; or all its problems, including the problems from `find_missing_keys`."""
+    """Return the specification of the class `model` in `tree`; or all problems, also from `find_missing_keys`."""
     mapping = _supported_mapping(tree)
     if isinstance(mapping, Problem):
         return [mapping]
@@ -46,7 +46,7 @@ def check(model: type[Model], tree: Node, find_missing_keys: FindMissingKeys | N
 
 
 def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
-    """Return the problems of an incomplete file. Missing keys are only reported in items of lists."""
+    """Return the problems of an incomplete file. Missing keys are problems only in items of lists."""
     mapping = _supported_mapping(tree)
     if isinstance(mapping, Problem):
         return [mapping]
@@ -55,11 +55,11 @@ def check_partial(model: type[BaseModel], tree: Node) -> list[Problem]:
 
 
 def _supported_mapping(tree: Node) -> MappingNode | Problem:
-    """Return the tree; or a problem if it is not a mapping, or is written for another version of the language."""
-    return _version_problem(tree) or tree if isinstance(tree, MappingNode) else not_a_mapping(tree)
+    """Return the tree; or a problem if the tree is not a mapping, or has another version of the language."""
+    return _version_problem(tree) or tree if isinstance(tree, MappingNode) else not_a_mapping_problem(tree)
 
 
-def not_a_mapping(tree: Node) -> Problem:
+def not_a_mapping_problem(tree: Node) -> Problem:
     """Return the problem that the tree of a file is not a mapping."""
     return Problem(*tree.position, "SC004", f"expected a mapping at top level, got {messages.describe_node(tree)}")
 
@@ -69,8 +69,8 @@ def _validate(model: type[Model], tree: MappingNode) -> tuple[Model | None, list
     try:
         return model.model_validate(tree.plain, by_alias=True, by_name=False), []
     except ValidationError as error:
-        errors = [dict(one) for one in error.errors(include_input=False, include_url=False)]
-        return None, [one for one in errors if not _is_caused_by_empty_value(tree, one)]
+        errors = [dict(details) for details in error.errors(include_input=False, include_url=False)]
+        return None, [details for details in errors if not _is_caused_by_empty_value(tree, details)]
 
 
 def _problems(
@@ -87,12 +87,12 @@ def _problems(
 
 def _is_missing_key(error: dict[str, Any]) -> bool:
     """Return whether an error of pydantic reports a missing key that is not in an item of a list."""
-    in_a_list = any(isinstance(part, int) for part in error["loc"])
-    return error["type"] in ("missing", "union_tag_not_found") and not in_a_list
+    is_in_list = any(isinstance(part, int) for part in error["loc"])
+    return error["type"] in ("missing", "union_tag_not_found") and not is_in_list
 
 
 def _version_problem(tree: MappingNode) -> Problem | None:
-    """Return a problem if the file is written for another version of the language; None if not, or if unknown."""
+    """Return a problem if the file states another version of the language; else None."""
     version = child(tree, "simscen")
     if version is None or type(version.plain) is not int or version.plain == LANGUAGE_VERSION:
         return None
@@ -145,7 +145,7 @@ def _unknown_key_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Probl
         )
     if not hint:
         hint = messages.suggestion(key, keys_of(models))
-        if any(issubclass(one, Choice) and one.group for one in models):
+        if any(issubclass(choice, Choice) and choice.group for choice in models):
             hint = f"{hint}; `simscen plugins` lists what installed packages add".removeprefix("; ")
     return Problem(*key_position(tree, loc), "SC012", f"unknown key {messages.quoted(key)}{where}", hint)
 
@@ -181,13 +181,13 @@ def _empty_value_problem(model: type[BaseModel], tree: Node, loc: Keys) -> Probl
         message = f"item {key + 1} of `{dotted_path(holder)}` is empty"
         return Problem(*key_position(tree, loc), "SC018", message, "remove it")
     models = models_at(model, loc)
-    complete = models and all(has_no_required_keys(option) for option in models)
-    hint = f"write `{key}: {{}}`" if complete else "give it a value or remove the key"
+    can_be_empty = models and all(has_no_required_keys(option) for option in models)
+    hint = f"write `{key}: {{}}`" if can_be_empty else "give it a value or remove the key"
     return Problem(*key_position(tree, loc), "SC018", f"{messages.quoted(key)} has no value", hint)
 
 
 def _is_caused_by_empty_value(tree: Node, error: dict[str, Any]) -> bool:
-    """Return whether an empty value causes an error of pydantic. Empty values are reported separately."""
+    """Return whether an error of pydantic is caused by an empty value, which is reported as a separate problem."""
     node = node_at(tree, error["loc"])
     if isinstance(node, ScalarNode):
         return node.value is None
@@ -198,7 +198,7 @@ def _is_caused_by_empty_value(tree: Node, error: dict[str, Any]) -> bool:
 def _without_duplicates(problems: list[Problem]) -> list[Problem]:
     """Return one problem for each mistake.
 
-    Pydantic reports a mistake for each member of a union, and a misspelled key also as a missing key.
+    Pydantic reports a mistake once for each member of a union. It reports a misspelled key also as a missing key.
     """
     first_at: dict[tuple[str, int, int, str], Problem] = {}
     for problem in problems:

@@ -1,4 +1,4 @@
-"""Parsing of commands that start external stacks: check of the program, and digest of its files."""
+"""Parses commands that start external stacks, checks the program, and computes a digest of the files of the stack."""
 
 import hashlib
 import itertools
@@ -21,9 +21,9 @@ CHUNK_BYTES = 1 << 20
 EXCLUDED_FOLDERS = frozenset({"__pycache__", "venv", "node_modules", "site-packages"})
 """Names of folders that do not belong to a stack."""
 MAX_FOLDERS = 500
-"""Largest number of folders that are searched below a source folder of a stack."""
+"""Maximum number of folders that are searched below a source folder of a stack."""
 MAX_PYTHON_FILES = 1000
-"""Largest number of Python files of a source folder in the digest."""
+"""Maximum number of Python files of a source folder in the digest."""
 SIMSCEN_PROGRAM = "simscen"
 """Name of the simscen program. If it is not in the PATH, the program of the running installation is started."""
 
@@ -37,23 +37,24 @@ def parse_command(
 ) -> ExternalCommand:
     """Return the command in `text`, which has shell quoting. The command will be started in `folder`.
 
-    `own_variables` are added to the variables `environment`. `timeouts_s` are for the start and for each answer.
-    Raises ValueError if the text cannot be parsed or the program cannot be run.
+    `own_variables` are environment variables of the stack in addition to those in `environment`. `timeouts_s` are the
+    maximum times for the start and for each answer. Raises ValueError if the text cannot be parsed or the program
+    cannot be run.
     """
     program, *arguments = split_command(text)
     program = str(expand_home(program)) if program.startswith("~") else program
     env = {**environment, **(own_variables or {})}
-    if program == SIMSCEN_PROGRAM and _why_not_executable(program, env, folder):
+    if program == SIMSCEN_PROGRAM and _program_problem(program, env, folder):
         program = str(Path(sys.executable).parent / SIMSCEN_PROGRAM)
-    if reason := _why_not_executable(program, env, folder):
-        raise ValueError(reason)
+    if problem := _program_problem(program, env, folder):
+        raise ValueError(problem)
     argv = (program, *arguments)
     digest = _digest(argv, own_variables or {}, env, folder)
     return ExternalCommand(argv, env, str(folder), *timeouts_s, digest=digest)
 
 
-def _why_not_executable(program: str, env: Mapping[str, str], folder: Path) -> str:
-    """Return the reason why a program cannot be run in `folder` with the variables `env`; "" if it can."""
+def _program_problem(program: str, env: Mapping[str, str], folder: Path) -> str:
+    """Return the reason why a program cannot be run in `folder` with the variables `env`; "" if it can be run."""
     if "/" not in program:
         found = shutil.which(program, path=_absolute_search_path(env, folder))
         return "" if found else f"no program {quoted(program)} in the PATH"
@@ -66,11 +67,14 @@ def _why_not_executable(program: str, env: Mapping[str, str], folder: Path) -> s
         return f"{quoted(program)} is {'a folder' if stat.S_ISDIR(mode) else 'not a regular file'}, not a program"
     if not os.access(file, os.X_OK):
         return f"permission denied: {quoted(program)} is not executable"
-    return _why_no_interpreter(program, file)
+    return _interpreter_problem(program, file)
 
 
-def _why_no_interpreter(program: str, file: Path) -> str:
-    """Return the reason why the interpreter of the script `file` cannot be run; "" if it can, or for other files."""
+def _interpreter_problem(program: str, file: Path) -> str:
+    """Return the reason why the interpreter of the script `file` cannot be run; "" if there is none.
+
+    `program` is the path of the script as written, for the message.
+    """
     try:
         with file.open("rb") as stream:
             first = stream.read(256).partition(b"\n")[0]
@@ -95,7 +99,7 @@ def _absolute_search_path(env: Mapping[str, str], folder: Path) -> str:
 def _digest(argv: Sequence[str], own_variables: Mapping[str, str], env: Mapping[str, str], folder: Path) -> str:
     """Return the SHA-256 digest of the arguments, variables, program, and files of a stack.
 
-    The files are those in the arguments, and the Python files in the folders of scripts and modules in the
+    The files are the files in the arguments, and the Python files in the folders of scripts and modules in the
     arguments.
     """
     sha = hashlib.sha256(json.dumps([list(argv), sorted(own_variables.items())]).encode())

@@ -27,15 +27,15 @@ def translate_costmap(parameters: Parameters, section: str) -> Iterator[Translat
     layers: Mapping[str, str] = DEFAULT_LAYERS
     if isinstance(listed := parameters.get("plugins"), list):
         layers = {layer: class_of(parameters.get(f"{layer}.plugin", "")) for layer in strings(listed)}
-        yield from _note_other_layers(layers.values(), listed, section)
+        yield from _layer_notes(layers.values(), listed, section)
     handled = {*layers, *strings(parameters.get("filters"))}
     for name, value in parameters.items():
-        layer, _, rest = name.partition(".")
+        layer, _, parameter = name.partition(".")
         if name == "rolling_window":
-            rolls = section == "local_costmap"
-            why = "" if bool(value) == rolls else "the local costmap always rolls, the global one with `map: none`"
-            yield Translation(name, (), value, why)
-        if not rest:
+            is_rolling = section == "local_costmap"
+            note = "the local costmap always rolls, the global costmap with `map: none`"
+            yield Translation(name, (), value, "" if bool(value) == is_rolling else note)
+        if not parameter:
             yield from translate_same_name(name, value, (section,), section)
         elif layers.get(layer) == "InflationLayer":
             yield from translate_same_name(name, value, (section,), section, name.rpartition(".")[2])
@@ -49,12 +49,15 @@ def translate_costmap(parameters: Parameters, section: str) -> Iterator[Translat
         if kind == "DenoiseLayer" and f"{layer}.enabled" not in parameters:  # Nav2 enables layers by default
             yield Translation(f"{layer}.plugin", (section, "denoise_layer", "enabled"), True)
     yield from _translate_observation_sources(parameters, layers, section)
-    for zones in strings(parameters.get("filters")):
-        yield Translation("filters", (), None, covers=f"{zones}.")  # the scenario defines zones
+    for costmap_filter in strings(parameters.get("filters")):
+        yield Translation("filters", (), None, covers=f"{costmap_filter}.")  # the scenario defines zones
 
 
-def _note_other_layers(kinds: Collection[str], listed: Any, section: str) -> Iterator[Translation]:
-    """Yield notes about layers that simscen's costmap has, but `plugins` does not list, and the other way around."""
+def _layer_notes(kinds: Collection[str], listed: Any, section: str) -> Iterator[Translation]:
+    """Yield notes about layers that only simscen's costmap has, or that only the Nav2 file lists.
+
+    `kinds` are the classes of the layers in the Nav2 file, and `listed` is the value of `plugins`.
+    """
     hint = "simscen always has this layer"
     if "InflationLayer" not in kinds:
         yield Translation("plugins", (), listed, "it lists no inflation layer", hint=hint)
@@ -73,20 +76,23 @@ HEIGHT_PARAMETERS = ("min_obstacle_height", "max_obstacle_height")
 def _translate_observation_sources(
     parameters: Parameters, layers: Mapping[str, str], section: str
 ) -> Iterator[Translation]:
-    """Translate the ranges of the first laser scan, and the heights of the first point cloud or else laser scan."""
+    """Translate the ranges of the first laser scan, and the heights of the first point cloud.
+
+    Without a point cloud, the heights of the first laser scan are used.
+    """
     sources = _observation_sources(parameters, layers)
     types = {source: parameters.get(f"{source}.data_type", LASER_SCAN) for source in sources}
     first: dict[str, str] = {}
     for source in sorted(types, key=lambda source: types[source] == LASER_SCAN):  # point clouds first
         is_scan = types[source] == LASER_SCAN
-        ignored = "" if is_scan else f"{types[source]} data does not set the ranges of the lidar"
+        range_note = "" if is_scan else f"{types[source]} data does not set the ranges of the lidar"
         for key, value in parameters_below(parameters, source):
             name = f"{source}.{key}"
             if key not in simscen_parameters(section):
                 continue
             if not is_scan and key not in HEIGHT_PARAMETERS:
-                yield Translation(name, (), value, ignored, covers=f"{source}.")
-                ignored = ""  # one note for all ranges of a source
+                yield Translation(name, (), value, range_note, covers=f"{source}.")
+                range_note = ""  # one note for all ranges of a source
             elif first.setdefault(key, source) == source:
                 yield Translation(name, (section, key), value)
             else:

@@ -1,4 +1,4 @@
-"""Expansion of `stack: {nav2_params: FILE}`: the translated parameters of the Nav2 file are added to the section."""
+"""Expands `stack: {nav2_params: FILE}`: adds the translated parameters of the Nav2 file to the section `stack`."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -28,12 +28,12 @@ from simscen.loading.yaml.tree import (
 )
 
 NAV2_PARAMS, STACK, ROBOTS = "nav2_params", "stack", "robots"
-"""Keys of a scenario, and of its section `stack`."""
+"""Keys of a scenario and of the section `stack`."""
 
 
 @dataclass
 class ExpandedTree:
-    """YAML tree with the parameters of its Nav2 files, errors in these files, and warnings (`notes`)."""
+    """YAML tree with the parameters of its Nav2 files, errors in these files (`problems`), and warnings (`notes`)."""
 
     tree: MappingNode
     problems: list[Problem] = field(default_factory=list)
@@ -41,7 +41,7 @@ class ExpandedTree:
 
 
 def with_nav2_parameters(tree: MappingNode, library: Library) -> ExpandedTree:
-    """Return a scenario or stack tree with the parameters of its Nav2 files, and add their texts to `library`."""
+    """Return a scenario or stack tree with the parameters of its Nav2 files. The texts are added to `library`."""
     result = ExpandedTree(tree)
     for keys in (*((ROBOTS, name, STACK) for name in entries_of(child(tree, ROBOTS))), (STACK,)):
         stack = node_at(tree, keys)
@@ -51,11 +51,14 @@ def with_nav2_parameters(tree: MappingNode, library: Library) -> ExpandedTree:
 
 
 def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree) -> MappingNode:
-    """Return a section `stack`, completed by its Nav2 file and Nav2's defaults. Add problems and notes to `result`."""
-    written, position = stack.entries[NAV2_PARAMS].value, value_position(stack, (NAV2_PARAMS,))
-    if not isinstance(written, ScalarNode) or not isinstance(written.value, str):
+    """Return a section `stack` with the parameters of its Nav2 file and of the profile `nav2`.
+
+    Problems and notes are added to `result`.
+    """
+    path_node, position = stack.entries[NAV2_PARAMS].value, value_position(stack, (NAV2_PARAMS,))
+    if not isinstance(path_node, ScalarNode) or not isinstance(path_node.value, str):
         return stack  # validation reports the wrong type
-    file = library.find(written.value, position)
+    file = library.find(path_node.value, position)
     if isinstance(file, Problem):
         result.problems.append(file)
         return stack
@@ -68,15 +71,15 @@ def _merge_parameters(stack: MappingNode, library: Library, result: ExpandedTree
     merged = MappingNode(position, {"profile": Entry(position, ScalarNode(position, "nav2"))})
     clock = _clock(result.tree)
     translations = {
-        node: [_with_valid_frequency(one, clock) for one in translate(node, values)]
+        node: [_with_valid_frequency(translation, clock) for translation in translate(node, values)]
         for node, values in parameters.nodes.items()
     }
-    for node, translated in translations.items():
-        for one in translated:
-            if one.keys:
-                at = parameters.positions[node, one.parameter]
-                own = MappingNode(at, {}).with_value(one.keys, _parameter_node(one.value, at), at)
-                merged = merge_mappings(merged, own)
+    for node, node_translations in translations.items():
+        for translation in node_translations:
+            if translation.keys:
+                source = parameters.positions[node, translation.parameter]
+                value = _parameter_node(translation.value, source)
+                merged = merge_mappings(merged, MappingNode(source, {}).with_value(translation.keys, value, source))
     result.notes += sorted({*parameters.notes, *_notes(translations, parameters)})
     return merge_mappings(stack, merged)
 
@@ -93,14 +96,14 @@ def _clock(scenario: MappingNode) -> Clock:
 
 
 def _with_valid_frequency(translation: Translation, clock: Clock) -> Translation:
-    """Return the translation. A controller frequency is replaced by the nearest one with a period of whole ticks."""
+    """Return the translation. A controller frequency is replaced by the nearest one with a whole number of ticks."""
     is_number = isinstance(translation.value, int | float) and 0 < translation.value < math.inf
     if translation.keys != ("controller_frequency",) or not is_number:
         return translation  # validation reports other values
     try:
         clock.period(translation.value)
     except ValueError as error:
-        hint = "the nearest is used; write `stack: {controller_frequency: …}` in the scenario for another one"
+        hint = "the nearest rate is used; to use another rate, set `stack: {controller_frequency: …}` in the scenario"
         return replace(translation, value=clock.nearest_rate(translation.value), note=str(error), hint=hint)
     return translation
 
@@ -114,15 +117,20 @@ def _parameter_node(value: Any, position: Position) -> Node:
 
 def _notes(translations: Mapping[str, list[Translation]], parameters: Nav2Parameters) -> Iterator[Problem]:
     """Yield warnings about changed and ignored parameters, and about nodes without a counterpart."""
-    used = {parameters.positions[node, one.parameter] for node, own in translations.items() for one in own if one.keys}
-    for node, own in translations.items():
+    used_positions = {
+        parameters.positions[node, translation.parameter]
+        for node, node_translations in translations.items()
+        for translation in node_translations
+        if translation.keys
+    }
+    for node, node_translations in translations.items():
         ignored = []
-        for one in own:
-            position = parameters.positions[node, one.parameter]
-            if one.note:
-                yield ignored_note(position, f"{node}: `{one.parameter}`: {one.note}", one.hint)
-            elif position not in used:  # another node may use a parameter of `/**`
-                ignored.append((position, one.parameter))
+        for translation in node_translations:
+            position = parameters.positions[node, translation.parameter]
+            if translation.note:
+                yield ignored_note(position, f"{node}: `{translation.parameter}`: {translation.note}", translation.hint)
+            elif position not in used_positions:  # another node may use a parameter of `/**`
+                ignored.append((position, translation.parameter))
         if ignored:
             names = ", ".join(f"{name} ({position.line})" for position, name in sorted(ignored))
             yield ignored_note(min(ignored)[0], f"{node}: simscen has no {names}")

@@ -1,4 +1,4 @@
-"""Tables and types for the translation of Nav2's parameters to parameters of simscen's reference stack."""
+"""Tables and types for translating Nav2's parameters to parameters of simscen's reference stack."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ RENAMED_PARAMETERS: Mapping[tuple[str, str], str] = {
     ("dwb", "Oscillation.oscillation_reset_angle"): "oscillation_reset_angle",
     ("dwb", "Oscillation.x_only_threshold"): "x_only_threshold",
 }
-"""Names in simscen of parameters that have another name in Nav2, by type in simscen and name in Nav2."""
+"""Names in simscen of parameters that have another name in Nav2, by (type in simscen, name in Nav2)."""
 IGNORED_PARAMETERS = frozenset(
     {
         "tf_broadcast", "save_pose_rate", "random_seed", "map_subscribe_transient_local",
@@ -58,7 +58,7 @@ IGNORED_PARAMETERS = frozenset(
         "always_reset_initial_pose", "polygons", "controller_plugin_types",
     }
 )  # fmt: skip
-"""Parameters that have no effect in simulation, or are translated together with others."""
+"""Parameters that have no effect in simulation, or are translated together with other parameters."""
 IGNORED_NAME_PARTS = (
     "frame", "topic", "plugin", "use_sim_time", "transform_t", "introspection_mode", "publish", "visualize", "bond",
     "qos", "realtime_priority", "stamp", "transport",
@@ -70,7 +70,7 @@ EQUIVALENT_VALUES: Mapping[str, tuple[object, ...]] = {
     "combination_method": (1,), "footprint_clearing_enabled": (True,), "stateful": (True,), "lookahead_time": (-1.0,),
     **dict.fromkeys(("short_circuit_trajectory_evaluation", "debug_trajectory_details"), (True, False)),
 }  # fmt: skip
-"""Parameters that simscen does not have, with the values for which Nav2 behaves like simscen."""
+"""Values with which Nav2 behaves like simscen, by parameter that simscen does not have."""
 SCENARIO_PARAMETERS: Mapping[str, str] = {
     **dict.fromkeys(("footprint", "robot_radius"), "the robot file defines the size of the robot"),
     **dict.fromkeys(("initial_pose", "set_initial_pose"), "the scenario defines the initial pose"),
@@ -111,10 +111,9 @@ class Translation:
     value: Any
     """Value in simscen, or the ignored value."""
     note: str = ""
-    """Message of a separate warning. Ignored parameters without a note are listed in one warning of their node."""
+    """Message of a separate warning. Ignored parameters without a note are listed in one warning for the node."""
     covers: str | None = None
-    """Prefix of the names of other parameters that this translation includes, so that they need no translation of their
-    own; None if there are none."""
+    """Prefix of the names of other parameters that this translation includes; None if there are none."""
     hint: str = "it is ignored"
     """Hint of the separate warning: what simscen does instead."""
 
@@ -133,7 +132,10 @@ def translate_same_name(
 
 @cache
 def simscen_parameters(kind: str) -> frozenset[str]:
-    """Return simscen's parameters of a section of `stack`, or of a type such as "dwb"; `a.b` is `b` in `a`."""
+    """Return the parameters that simscen has in a section of `stack`, or of a type such as "dwb".
+
+    The name of a nested parameter is dotted: `a.b` is `b` in `a`.
+    """
     from simscen.model import controllers, costmaps, localizers, mppi, planners, recovery
 
     models: dict[str, type[BaseModel]] = {
@@ -160,7 +162,7 @@ def simscen_parameters(kind: str) -> frozenset[str]:
 
 def strings(value: Any) -> list[str]:
     """Return the items of a list as texts; [] for other values."""
-    return [str(one) for one in value] if isinstance(value, list) else []
+    return [str(item) for item in value] if isinstance(value, list) else []
 
 
 def parameters_below(parameters: Parameters, name: str) -> Iterator[tuple[str, Any]]:

@@ -1,4 +1,4 @@
-"""Translation of the parameters of Nav2's nodes to parameters of simscen's reference stack.
+"""Translates the parameters of Nav2's nodes to parameters of simscen's reference stack.
 
 There is one function for each kind of node. `parameters` are the parameters of the node in the Nav2 file.
 """
@@ -28,10 +28,10 @@ from simscen.spec.quantities import MAX_DURATION_S
 
 def _translate_velocity_smoother(parameters: Parameters) -> Iterator[Translation]:
     """Translate the limits of forward motion and turning. Other limits get a note if they differ."""
-    turning_names = {"max_velocity": "max_angular_velocity", "max_accel": "max_angular_accel", "max_decel": ""}
-    for name, turning in turning_names.items():
+    angular_names = {"max_velocity": "max_angular_velocity", "max_accel": "max_angular_accel", "max_decel": ""}
+    for name, angular_name in angular_names.items():
         limits = _xy_and_rotation(parameters.get(name))
-        for simscen_name, limit in zip((name, turning), limits[::2], strict=True) if limits else ():
+        for simscen_name, limit in zip((name, angular_name), limits[::2], strict=True) if limits else ():
             if simscen_name and limit:
                 yield Translation(name, ("velocity_smoother", simscen_name), abs(limit))
         if limits and limits[1] and abs(limits[1]) != abs(limits[0]):
@@ -39,12 +39,13 @@ def _translate_velocity_smoother(parameters: Parameters) -> Iterator[Translation
     lowest, highest = _xy_and_rotation(parameters.get("min_velocity")), _xy_and_rotation(parameters.get("max_velocity"))
     if lowest:
         is_same = bool(highest) and all(low in (-high, 0) for low, high in zip(lowest, highest, strict=True))
-        why = "" if is_same else "backward motion has the same limit as forward motion"
-        yield Translation("min_velocity", (), lowest, why)
-    faster, slower = _xy_and_rotation(parameters.get("max_accel")), _xy_and_rotation(parameters.get("max_decel"))
-    if faster and slower and abs(slower[2]) != abs(faster[2]):
-        why = "angular deceleration has the same limit as angular acceleration"
-        yield Translation("max_decel", (), slower, why)
+        note = "" if is_same else "backward motion has the same limit as forward motion"
+        yield Translation("min_velocity", (), lowest, note)
+    accelerations = _xy_and_rotation(parameters.get("max_accel"))
+    decelerations = _xy_and_rotation(parameters.get("max_decel"))
+    if accelerations and decelerations and abs(decelerations[2]) != abs(accelerations[2]):
+        note = "angular deceleration has the same limit as angular acceleration"
+        yield Translation("max_decel", (), decelerations, note)
 
 
 def _translate_collision_monitor(parameters: Parameters) -> Iterator[Translation]:
@@ -54,7 +55,7 @@ def _translate_collision_monitor(parameters: Parameters) -> Iterator[Translation
         is_off = timeout == 0 and not isinstance(timeout, bool)
         timeout = MAX_DURATION_S if is_off else timeout
         yield Translation("source_timeout", ("collision_monitor", "source_timeout"), timeout)
-    on = parameters.get("enabled", True)
+    is_enabled = parameters.get("enabled", True)
     actions = {polygon: parameters.get(f"{polygon}.action_type") for polygon in strings(parameters.get("polygons"))}
     enabled = {polygon: parameters.get(f"{polygon}.enabled", True) for polygon in actions}
     approaching = {polygon: enabled[polygon] for polygon in actions if actions[polygon] == "approach"}
@@ -64,16 +65,16 @@ def _translate_collision_monitor(parameters: Parameters) -> Iterator[Translation
             yield from (Translation(f"{polygon}.{setting}", (), None) for setting in ("action_type", "enabled"))
             yield from _translate_approach(parameters, polygon)
         elif enabled[polygon]:
-            why = f"action_type {action} of {polygon} is not supported"
+            note = f"action_type {action} of {polygon} is not supported"
             if polygon in approaching:
-                why = f"only the first polygon that approaches is used: {used}, not {polygon}"
-            yield Translation("polygons", (), action, why, covers=f"{polygon}.")
+                note = f"only the first polygon with the action_type approach is used: {used}, not {polygon}"
+            yield Translation("polygons", (), action, note, covers=f"{polygon}.")
         else:
             yield Translation("polygons", (), action, covers=f"{polygon}.")  # disabled
-    on = on and (any(approaching.values()) or not approaching)
+    is_enabled = is_enabled and (any(approaching.values()) or not approaching)
     for name in ("enabled", "polygons"):
         if name in parameters:
-            yield Translation(name, ("collision_monitor", "enabled"), on)
+            yield Translation(name, ("collision_monitor", "enabled"), is_enabled)
             break
 
 
@@ -93,8 +94,8 @@ def _translate_approach(parameters: Parameters, polygon: str) -> Iterator[Transl
 
 def _xy_and_rotation(value: Any) -> list[float]:
     """Return a list of values for x, y, and rotation; [] if `value` is not a list of three numbers."""
-    fits = isinstance(value, list) and len(value) == 3 and all(isinstance(one, int | float) for one in value)
-    return value if fits else []
+    is_valid = isinstance(value, list) and len(value) == 3 and all(isinstance(item, int | float) for item in value)
+    return value if is_valid else []
 
 
 def _translate_amcl(parameters: Parameters) -> Iterator[Translation]:
@@ -110,8 +111,8 @@ def _translate_amcl(parameters: Parameters) -> Iterator[Translation]:
 def _translate_behavior_server(parameters: Parameters) -> Iterator[Translation]:
     for name, value in parameters.items():
         # A negative minimum has no effect in Nav2.
-        no_minimum = name == "min_rotational_vel" and isinstance(value, float | int) and value < 0
-        yield from translate_same_name(name, 0.0 if no_minimum else value, ("recovery",), "recovery")
+        has_no_minimum = name == "min_rotational_vel" and isinstance(value, float | int) and value < 0
+        yield from translate_same_name(name, 0.0 if has_no_minimum else value, ("recovery",), "recovery")
 
 
 TRANSLATORS: dict[str, Callable[[Parameters], Iterator[Translation]]] = {
@@ -128,7 +129,10 @@ TRANSLATORS: dict[str, Callable[[Parameters], Iterator[Translation]]] = {
 
 
 def translate(node: str, parameters: Parameters) -> list[Translation]:
-    """Return the translations of the relevant parameters of a node, without keys if simscen has no counterpart."""
+    """Return the translations of the relevant parameters of a node.
+
+    The translation of a parameter without a counterpart in simscen has no keys.
+    """
     translator = TRANSLATORS.get(OLD_NODE_NAMES.get(node, node))
     if translator is None:
         return []

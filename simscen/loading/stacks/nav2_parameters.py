@@ -1,4 +1,4 @@
-"""Reading of Nav2 parameter files, and comparison of their topics and frames with those of simscen."""
+"""Reads Nav2 parameter files, and compares their topics and frames with those of simscen."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -26,8 +26,9 @@ class Nav2Parameters:
     nodes: Mapping[str, Mapping[str, Any]]
     """Parameters by name of the node, then by dotted name. The parameters of `/**` are included in each node."""
     positions: Mapping[tuple[str, str], Position]
-    """Positions of the values, by name of the node and dotted name of the parameter."""
+    """Positions of the values, by (name of the node, dotted name of the parameter)."""
     text: str
+    """Text of the file."""
     notes: tuple[Problem, ...] = ()
     """Warnings about duplicate keys and nodes."""
 
@@ -46,7 +47,10 @@ class Nav2Parameters:
 
 
 def read_nav2_parameters(path: Path, display_name: str = "") -> Nav2Parameters | list[Problem]:
-    """Return the parameters in a file, or its problems. `display_name` is its path in messages; "" for `path`."""
+    """Return the parameters in the file `path`, or the problems of the file.
+
+    `display_name` is the path in messages; "" for `path`.
+    """
     display_name = display_name or str(path)
     text = read_text(path, display_name)
     if isinstance(text, Problem):
@@ -85,7 +89,7 @@ def is_nav2_parameter_file(text: str, display_name: str) -> bool:
 
 
 def _ros_nodes(tree: Node, name: str) -> Iterator[tuple[str, MappingNode]]:
-    """Yield the name (without namespace) and the parameters of each ROS node in a tree with the key `name`."""
+    """Yield the name (without namespace) and the parameters of each ROS node in a tree. `name` is the key of `tree`."""
     for key, entry in entries_of(tree).items():
         if key == PARAMETERS_KEY and isinstance(entry.value, MappingNode):
             yield name, entry.value

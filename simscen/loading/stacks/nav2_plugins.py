@@ -1,4 +1,4 @@
-"""Translation of the plug-ins of Nav2's controller and planner servers to parameters of simscen's reference stack.
+"""Translates the plug-ins of Nav2's controller and planner servers to parameters of simscen's reference stack.
 
 `parameters` are the parameters of the server in the Nav2 file. `section` is a key under `stack`, such as "controller".
 """
@@ -41,7 +41,7 @@ def translate_controller_server(parameters: Parameters) -> Iterator[Translation]
             yield Translation(name, (name,), parameters[name])
     for kind in ("progress_checker", "goal_checker"):
         chosen = _first_plugin(parameters, kind, kind)
-        yield from _note_unused_plugins(parameters, kind, chosen)
+        yield from _unused_plugin_notes(parameters, kind, chosen)
         yield from _translate_checker_class(parameters, kind, chosen)
         for key, value in parameters_below(parameters, chosen):
             yield from translate_same_name(f"{chosen}.{key}", value, (kind,), kind, key)
@@ -54,9 +54,10 @@ def translate_planner_server(parameters: Parameters) -> Iterator[Translation]:
 
 
 def _translate_checker_class(parameters: Parameters, kind: str, chosen: str) -> Iterator[Translation]:
-    """Translate the class of the progress checker or goal checker `chosen`: its effect, or a note about another class.
+    """Translate the class of the progress checker or goal checker with the name `chosen`.
 
-    Yield nothing for the simple classes, whose parameters have the same names in simscen.
+    A class that simscen does not have results in a note. The simple classes need no translation, because their
+    parameters have the same names in simscen.
     """
     name = f"{chosen}.plugin"
     if name not in parameters:
@@ -80,8 +81,8 @@ def _first_plugin(parameters: Parameters, kind: str, default: str) -> str:
     return next(iter(strings(named)), "") if isinstance(named, list) else str(named)
 
 
-def _note_unused_plugins(parameters: Parameters, kind: str, chosen: str) -> Iterator[Translation]:
-    """Yield a note for each plugin of a kind that is not used. Only the first one, `chosen`, is used."""
+def _unused_plugin_notes(parameters: Parameters, kind: str, chosen: str) -> Iterator[Translation]:
+    """Yield a note for each plugin of a kind that is not used. Only the first plugin, `chosen`, is used."""
     listed = f"{kind}_plugins"
     for other in strings(parameters.get(listed))[1:]:
         yield Translation(listed, (), None, f"only the first {kind} is used: {chosen}, not {other}", f"{other}.")
@@ -96,45 +97,48 @@ def _translate_plugin(
     if the file lists none. `types` are the types in simscen, by class in Nav2.
     """
     name = _first_plugin(parameters, section, default)
-    yield from _note_unused_plugins(parameters, section, name)
+    yield from _unused_plugin_notes(parameters, section, name)
     inner = f"{name}.primary_controller"
-    shimmed = f"{inner}.plugin" in parameters
-    plugin_key = f"{inner}.plugin" if shimmed else inner if inner in parameters else f"{name}.plugin"
+    has_shim_prefix = f"{inner}.plugin" in parameters
+    plugin_key = f"{inner}.plugin" if has_shim_prefix else inner if inner in parameters else f"{name}.plugin"
     plugin = str(parameters.get(plugin_key, ""))
     kind = types.get(class_of(plugin))
     if kind is None:
         if plugin:
-            why = f"{plugin} is not supported; the default {section} is used"
-            yield Translation(plugin_key, (), plugin, why, covers=f"{name}.")
+            note = f"{plugin} is not supported; the default {section} is used"
+            yield Translation(plugin_key, (), plugin, note, covers=f"{name}.")
         return
-    why = ""
+    note = ""
     if plugin_key != f"{name}.plugin":
-        why = f"{parameters.get(f'{name}.plugin')} is not supported; {plugin} is used without it"
-    yield Translation(plugin_key, (section, "type"), kind, why)
-    prefix = inner if shimmed else name
+        note = f"{parameters.get(f'{name}.plugin')} is not supported; {plugin} is used without it"
+    yield Translation(plugin_key, (section, "type"), kind, note)
+    prefix = inner if has_shim_prefix else name
     model = _motion_model(parameters, prefix) if kind == "mppi" else ""
-    for key, written in parameters_below(parameters, prefix):
-        own, value = RENAMED_PARAMETERS.get((kind, key), key), written
+    for key, nav2_value in parameters_below(parameters, prefix):
+        simscen_name, value = RENAMED_PARAMETERS.get((kind, key), key), nav2_value
         if key == "motion_model":
             value = model
         elif (kind, key) == ("dwb", "GoalAlign.forward_point_distance"):
-            is_same = written == parameters.get(f"{prefix}.PathAlign.forward_point_distance", DWB_FORWARD_POINT_M)
-            why = "" if is_same else "simscen uses the value of PathAlign"
-            yield Translation(f"{prefix}.{key}", (), written, why)
+            is_same = nav2_value == parameters.get(f"{prefix}.PathAlign.forward_point_distance", DWB_FORWARD_POINT_M)
+            note = "" if is_same else "simscen uses the value of PathAlign"
+            yield Translation(f"{prefix}.{key}", (), nav2_value, note)
             continue
         elif key.rpartition(".")[2] == "min_turning_r":
-            own = key if model != "Ackermann" else "min_turning_r"
+            simscen_name = key if model != "Ackermann" else "min_turning_r"
         elif key == "critics" and kind in ("mppi", "dwb"):
-            yield from _translate_critics(f"{prefix}.{key}", written, kind)
+            yield from _translate_critics(f"{prefix}.{key}", nav2_value, kind)
             continue
-        elif _has_no_effect(kind, model, key, written):
-            yield Translation(f"{prefix}.{key}", (), written)
+        elif _has_no_effect(kind, model, key, nav2_value):
+            yield Translation(f"{prefix}.{key}", (), nav2_value)
             continue
-        yield from translate_same_name(f"{prefix}.{key}", value, (section,), kind, own)
+        yield from translate_same_name(f"{prefix}.{key}", value, (section,), kind, simscen_name)
 
 
 def _has_no_effect(kind: str, model: str, name: str, value: Any) -> bool:
-    """Return whether Nav2 ignores a value, which simscen would reject as out of range. `model` is that of MPPI."""
+    """Return whether Nav2 ignores a value that simscen would reject as out of range.
+
+    `kind` is the type of the controller, and `model` the motion model of MPPI.
+    """
     if not isinstance(value, float | int):
         return False
     if kind == "dwb":
@@ -148,9 +152,9 @@ def _motion_model(parameters: Parameters, prefix: str) -> str:
     return class_of(parameters.get(f"{prefix}.{written}.plugin", written)).removesuffix("MotionModel")
 
 
-def _translate_critics(name: str, written: Any, kind: str) -> Iterator[Translation]:
-    """Translate the list `written` of critics: MPPI gets the supported ones, DWB the weight 0 for all others."""
-    listed = strings(written)
+def _translate_critics(name: str, value: Any, kind: str) -> Iterator[Translation]:
+    """Translate the list of critics. MPPI gets the supported critics. DWB gets the weight 0 for critics not listed."""
+    listed = strings(value)
     supported = MPPI_CRITICS if kind == "mppi" else (*DWB_CRITICS, *DWB_CRITICS_WITHOUT_WEIGHT)
     suffix = "Critic" if kind == "mppi" else ""
     names = {critic: class_of(critic).removesuffix("Critic") + suffix for critic in listed}
@@ -162,4 +166,4 @@ def _translate_critics(name: str, written: Any, kind: str) -> Iterator[Translati
         if critic not in used:
             yield Translation(name, ("controller", weight), 0.0)
     if unknown:
-        yield Translation(name, (), written, f"not supported: {', '.join(unknown)}")
+        yield Translation(name, (), value, f"not supported: {', '.join(unknown)}")

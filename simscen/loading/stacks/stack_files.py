@@ -1,4 +1,4 @@
-"""Reading of files with the parameters of a stack: `*.stack.yaml` files and Nav2 parameter files."""
+"""Reads files with the parameters of a stack: `*.stack.yaml` files and Nav2 parameter files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,9 +27,9 @@ def load_stack_file(name: str, value: str, path: Path, root: Path, world_path: S
 
 
 def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Problem]] | list[Problem]:
-    """Return the section `stack` of a stack file or Nav2 file, with the parameters of its Nav2 files, and warnings.
+    """Return the section `stack` of a stack file or Nav2 parameter file, and warnings; or all problems of the file.
 
-    Return all problems of the file instead if it is invalid.
+    The section includes the parameters of the Nav2 file that a stack file names.
     """
     file = library.sandbox.resolve_argument(path)
     if isinstance(file, Problem):
@@ -58,7 +58,10 @@ def read_stack_file(path: Path, library: Library) -> tuple[MappingNode, list[Pro
 
 
 def _read_tree(file: Path, library: Library) -> tuple[Node | None, list[Problem]]:
-    """Return the YAML tree and problems of a stack file. For a Nav2 file, the tree is `stack: {nav2_params: FILE}`."""
+    """Return the YAML tree and all problems of a stack file.
+
+    A Nav2 parameter file is treated as a stack file with `stack: {nav2_params: FILE}`.
+    """
     display_name = library.sandbox.display_name(file)
     text = read_text(file, display_name)
     if isinstance(text, Problem) or not is_nav2_parameter_file(text, display_name):

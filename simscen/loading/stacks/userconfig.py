@@ -22,7 +22,10 @@ from simscen.model.stack_files import ExternalStackSpec, UserConfigSpec
 
 @dataclass(frozen=True)
 class UserConfig:
-    """User configuration in `file`. `tree` (YAML tree) and `library` (reader) are None if the file does not exist."""
+    """User configuration in `file`.
+
+    `tree` is the YAML tree of the file, and `library` has read the file. They are None if the file does not exist.
+    """
 
     file: Path
     spec: UserConfigSpec
@@ -30,9 +33,10 @@ class UserConfig:
     library: Library | None = field(repr=False, default=None)
 
     def command(self, name: str, environment: Mapping[str, str], folder: Path) -> ExternalCommand | None:
-        """Return the command of the external stack `name`; None if the configuration does not define it.
+        """Return the command of the external stack `name`; None if the configuration does not define the stack.
 
-        `environment` and `folder` are those of this process. Raises InvalidInput if the command cannot be run.
+        `environment` and `folder` are the environment variables and the working folder of this process. Raises
+        InvalidInput if the command cannot be run.
         """
         if name not in self.spec.stacks:
             return None
@@ -58,7 +62,7 @@ def load_config(file: Path) -> UserConfig:
     """Return the configuration in `file`; an empty configuration if it does not exist. Raises InvalidInput."""
     if not exists(file):
         return UserConfig(file, UserConfigSpec())
-    # No file is inside of this root, so problems show the absolute path of the file.
+    # No file is inside this root, so that problems show the absolute path of the file.
     library = Library(PathSandbox.around(Path(os.devnull), [file.parent]))
     tree, problems = library.read(file)
     spec = check(UserConfigSpec, tree) if tree is not None else []
@@ -67,25 +71,35 @@ def load_config(file: Path) -> UserConfig:
     return UserConfig(file, spec, tree, library)
 
 
-def undefined_stack(
+def undefined_stack_problem(
     loaded: LoadedScenario, defined_names: Iterable[str] = (), config_file: Path | None = None
 ) -> Problem | None:
-    """Return a problem for an external stack without a command; else None. The other parameters are for the hint."""
+    """Return a problem if the scenario has an external stack without a command; else None.
+
+    The hint contains a similar name of `defined_names`, and the path `config_file`.
+    """
     stack = loaded.spec.stack
     if not isinstance(stack, ExternalStackSpec) or loaded.external_command is not None:
         return None
     name = stack.external
-    there = f", or under `stacks:` in {config_file}" if config_file is not None else ""
-    hint = did_you_mean(name, defined_names) or f"give it with --stack {name}='COMMAND'{there}"
+    alternative = f", or under `stacks:` in {config_file}" if config_file is not None else ""
+    hint = did_you_mean(name, defined_names) or f"give it with --stack {name}='COMMAND'{alternative}"
     message = f"the external stack {quoted(name)} has no command"
     return loaded.problem(("stack", EXTERNAL), "SC060", message, hint)
 
 
-def conflicting_stacks(loaded: LoadedScenario, given: Iterable[str], config_file: Path) -> list[Problem]:
-    """Return a problem if a scenario has several of the external stacks `given` by `--stack` options."""
-    own = {name: view for view in loaded.robots.values() if (name := external_stack_name(view.tree)) is not None}
-    conflicting = [name for name in given if name in own]
-    stacks = " and ".join(map(quoted, conflicting))
+def conflicting_stacks_problems(
+    loaded: LoadedScenario, option_names: Iterable[str], config_file: Path
+) -> list[Problem]:
+    """Return a problem if the robots of a scenario use several external stacks that `--stack` options define.
+
+    `option_names` are the names of the stacks in `--stack` options.
+    """
+    views = {name: view for view in loaded.robots.values() if (name := external_stack_name(view.tree)) is not None}
+    names = [name for name in option_names if name in views]
+    if len(names) < 2:
+        return []
+    stacks = " and ".join(map(quoted, names))
     message = f"robots of this scenario have the stacks {stacks}, but a run can have only one --stack"
     hint = f"define the commands of all but one under `stacks:` in {config_file}"
-    return [own[conflicting[1]].problem(("stack", EXTERNAL), "SC042", message, hint)] if len(conflicting) > 1 else []
+    return [views[names[1]].problem(("stack", EXTERNAL), "SC042", message, hint)]

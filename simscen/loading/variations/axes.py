@@ -1,4 +1,4 @@
-"""Building of the axes of a block of variations from its YAML tree.
+"""Builds the axes of a block of variations from its YAML tree.
 
 A block is one item of `variations`. An axis is a list of options. An option is a new value for one path, or new values
 for several paths. Each variation of a block combines one option of each axis.
@@ -37,6 +37,7 @@ class AxisBuilder:
     tree: MappingNode
     """YAML tree of the scenario without its key `variations`."""
     problems: list[Problem] = field(default_factory=list)
+    """Problems found so far."""
     targets: dict[str, Target] = field(default_factory=dict)
     """Targets of all varied paths found so far, by path."""
     _names: dict[str, Position] = field(default_factory=dict)
@@ -85,13 +86,16 @@ class AxisBuilder:
         self._report_overlaps(found)
         return found
 
-    def _changes_by_path(self, node: Node | None, distinct: bool) -> list[list[Change]]:
-        """Return the changes of each path in a mapping from paths to values, which must differ if `distinct`."""
+    def _changes_by_path(self, node: Node | None, must_differ: bool) -> list[list[Change]]:
+        """Return the changes of each path. `node` is a mapping from paths to values.
+
+        With `must_differ`, a value that is listed twice is a problem.
+        """
         found = []
         for path, entry in entries_of(node).items():
             values = items_of(entry.value)
             for number, value in enumerate(values):
-                if distinct and any(value.plain == other.plain for other in values[:number]):
+                if must_differ and any(value.plain == other.plain for other in values[:number]):
                     self.add_problem(value.position, "SC054", "this value is listed twice", "remove one of them")
             if (target := self._resolve_target(path, entry)) is not None:
                 found.append([Change(target, value, number) for number, value in enumerate(values, start=1)])
@@ -100,9 +104,10 @@ class AxisBuilder:
     def _pairwise_options(
         self, columns: Sequence[Sequence[Change]], other_axes: Sequence[Axis], conditions: Sequence[Condition]
     ) -> list[Option]:
-        """Return options in which each pair of changes of two columns occurs, unless the conditions exclude it.
+        """Return options that contain each pair of changes of two columns, except pairs that conditions exclude.
 
-        A column contains the changes of one path. Conditions on values of `other_axes` of the block exclude nothing.
+        A column contains the changes of one path. Conditions on values of `other_axes` are ignored here, because these
+        values are not known yet.
         """
         if self.problems or not columns:
             return []
@@ -166,7 +171,7 @@ class AxisBuilder:
         return name
 
     def _sampled_options(self, sampled: "Sampled", node: Node | None) -> SampledOptions:
-        """Return options with drawn values. Report invalid distributions. `node` is their YAML tree."""
+        """Return options with drawn values. Report invalid distributions. `node` is the YAML tree of distributions."""
         from simscen.loading.variations.sampling import quantile
 
         assert isinstance(node, MappingNode)
@@ -193,24 +198,25 @@ class AxisBuilder:
         return target
 
     def _report_overlaps(self, axes: Sequence[Axis]) -> None:
-        """Report changes in one variation that lead to the same value, or to a value and to a part of it."""
+        """Report changes of one variation with overlapping targets: the same value, or a value and a part of it."""
         together = [
             tuple(change.target for change in option.changes) for axis in axes for option in typical_options(axis)
         ]
         for targets in dict.fromkeys(together):
-            for one, other in combinations(targets, 2):
-                self._report_overlap(one, other)
-        for first, second in combinations(map(_targets_by_path, axes), 2):
-            for one, other in product(first.values(), second.values()):
-                self._report_overlap(one, other)
+            for first, second in combinations(targets, 2):
+                self._report_overlap(first, second)
+        for axis_targets, other_targets in combinations(map(_targets_by_path, axes), 2):
+            for first, second in product(axis_targets.values(), other_targets.values()):
+                self._report_overlap(first, second)
 
-    def _report_overlap(self, one: Target, other: Target) -> None:
-        if _overlap(one.keys, other.keys):
-            what = "change the same value" if len(one.keys) == len(other.keys) else "overlap: one is part of the other"
-            self.add_problem(other.position, "SC054", f"{quoted(one.path)} and {quoted(other.path)} {what}")
+    def _report_overlap(self, first: Target, second: Target) -> None:
+        if _overlap(first.keys, second.keys):
+            is_same = len(first.keys) == len(second.keys)
+            verb = "change the same value" if is_same else "overlap: one is part of the other"
+            self.add_problem(second.position, "SC054", f"{quoted(first.path)} and {quoted(second.path)} {verb}")
 
     def add_problem(self, position: Position, code: str, message: str, hint: str = "") -> None:
-        """Add a problem to `problems` unless it is there already."""
+        """Add a problem to `problems` unless `problems` already contains it."""
         problem = Problem(*position, code=code, message=message, hint=hint)
         if problem not in self.problems:
             self.problems.append(problem)
@@ -220,7 +226,7 @@ def _targets_by_path(axis: Axis) -> dict[str, Target]:
     return {change.target.path: change.target for option in typical_options(axis) for change in option.changes}
 
 
-def _overlap(one: Keys, other: Keys) -> bool:
-    """Return whether one of two values is the other one or a part of it. () are the keys of no value."""
-    shorter = min(len(one), len(other))
-    return shorter > 0 and one[:shorter] == other[:shorter]
+def _overlap(first: Keys, second: Keys) -> bool:
+    """Return whether two values are the same, or one value is a part of the other. () are the keys of no value."""
+    shorter = min(len(first), len(second))
+    return shorter > 0 and first[:shorter] == second[:shorter]

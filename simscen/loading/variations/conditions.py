@@ -17,7 +17,7 @@ from simscen.loading.variations.paths import PathError, resolve_path
 from simscen.loading.yaml.tree import Keys, MappingNode, existing_keys, node_at
 from simscen.spec.quantities import si_number
 
-# What conditions can contain, besides `and`, `or`, and `not`.
+# Operators and functions that conditions can contain, in addition to `and`, `or`, and `not`.
 _COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
     ast.Eq: operator.eq, ast.NotEq: operator.ne,
@@ -42,14 +42,14 @@ class ConditionError(ValueError):
 
 @dataclass(frozen=True)
 class Condition:
-    """Condition: its text in the file, its parsed expression, and the paths in it."""
+    """Condition on values: its text in the file, the parsed expression, and the paths in the expression."""
 
     text: str
     expression: ast.expr
     paths: tuple[str, ...]
 
     def holds(self, values: Mapping[str, Any]) -> bool:
-        """Return whether the condition holds for values by path, in any units. Raises ConditionError."""
+        """Return whether the condition holds. `values` are the YAML data by path, with units. Raises ConditionError."""
         try:
             result = _evaluate(self.expression, values)
         except (TypeError, ValueError, ArithmeticError, RecursionError) as error:

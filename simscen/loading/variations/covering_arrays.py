@@ -11,14 +11,14 @@ Pair = tuple[int, int, int, int]
 CANDIDATES_PER_ROW = 30
 """Number of candidates for each row of a covering array. The candidate with the most new pairs is used."""
 MAX_CHECKED_ROWS = 200_000
-"""Largest number of rows among which an allowed row with a given pair is searched."""
+"""Maximum number of rows among which an allowed row with a given pair is searched."""
 
 
 def covering_array(counts: Sequence[int], is_allowed: Callable[[Row], bool]) -> list[Row]:
     """Return a pairwise covering array: few allowed rows that contain each pair of values of two parameters.
 
-    Pairs that no allowed row contains are left out. `counts` are the numbers of values of the parameters. The search is
-    greedy and deterministic. (Cohen et al.: The AETG System, 1997.)
+    Pairs that no allowed row contains are left out. `counts` are the numbers of values of the parameters. `is_allowed`
+    returns whether a row is allowed. The search is greedy and deterministic. (Cohen et al.: The AETG System, 1997.)
     """
     if len(counts) == 1:
         return [(value,) for value in range(counts[0]) if is_allowed((value,))]
@@ -58,17 +58,17 @@ def pairs_of(row: Row) -> set[Pair]:
 def _candidate_row(
     pair: Pair, counts: Sequence[int], uncovered: set[Pair], attempt: int, is_allowed: Callable[[Row], bool]
 ) -> Row | None:
-    """Return a row with `pair` and, chosen greedily, many of `uncovered`; None if it is not allowed.
+    """Return a row with `pair` and, chosen greedily, many pairs of `uncovered`; None if the row is not allowed.
 
     `attempt` changes the order of the parameters and values.
     """
     a, x, b, y = pair
     chosen = {a: x, b: y}
-    rest = [parameter for parameter in range(len(counts)) if parameter not in chosen]
-    if rest:
-        shift = attempt % len(rest)
-        rest = rest[shift:] + rest[:shift]
-    for parameter in rest:
+    others = [parameter for parameter in range(len(counts)) if parameter not in chosen]
+    if others:
+        shift = attempt % len(others)
+        others = others[shift:] + others[:shift]
+    for parameter in others:
         values = [(value + attempt) % counts[parameter] for value in range(counts[parameter])]
         chosen[parameter] = max(
             values,

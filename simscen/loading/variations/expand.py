@@ -1,4 +1,4 @@
-"""Expansion of a scenario with `variations` to one scenario for each variation.
+"""Expands a scenario with `variations` to one scenario for each variation.
 
 `variations` has one or more blocks. A block has axes, and an axis has options (new values for some paths). Each
 variation of a block combines one option of each axis.
@@ -22,16 +22,16 @@ from simscen.loading.yaml.tree import MappingNode, Node, Position, SequenceNode,
 VARIATIONS, ACCEPTANCE = "variations", "acceptance"
 """Top-level keys of a scenario."""
 MAX_TOTAL_VALUES = 5_000_000
-"""Largest number of keys and values in all variations of a scenario together."""
+"""Maximum number of keys and values in all variations of a scenario together."""
 MAX_REJECTED_DRAWS = 10_000
-"""Number of consecutive random draws that may violate the conditions before an error is raised."""
+"""Number of consecutive random draws that violate the conditions after which an error is raised."""
 _DESCRIPTIVE_KEYS = frozenset({"description", "tags", "expected", "skip"})
 """Top-level keys that do not affect the simulation. Names contain their values only if nothing else is varied."""
 
 
 @dataclass(frozen=True)
 class Variation:
-    """Variation of a scenario: its `tree` contains the new values in `changes`. Without `variations`, `name` is ""."""
+    """Variation of a scenario. `tree` contains the new values in `changes`. `name` is "" without `variations`."""
 
     name: str
     tree: MappingNode = field(repr=False)
@@ -82,8 +82,8 @@ class Block:
             return [self.axes[0][index]]
         chosen = []
         for axis in reversed(self.axes):
-            index, own = divmod(index, len(axis))
-            chosen.append(axis[own])
+            index, option_index = divmod(index, len(axis))
+            chosen.append(axis[option_index])
         return chosen[::-1]
 
 
@@ -97,13 +97,13 @@ class VariationSpace:
     targets: Mapping[str, Target]
     """Targets of all varied paths, by path."""
     is_random: bool
-    """Whether the variations are independent random draws. Their numbers then have no upper limit."""
+    """Whether the variations are independent random draws. If so, their numbers have no upper limit."""
 
     @property
     def count(self) -> int:
         """Number of variations, including variations that do not meet the conditions.
 
-        With `is_random`, it is the `count` in the file.
+        With `is_random`, this is the `count` in the file.
         """
         return sum(block.count for block in self.blocks)
 
@@ -129,7 +129,10 @@ class VariationSpace:
                 raise ConditionError(f"none of {MAX_REJECTED_DRAWS} draws in a row meets the conditions in `require`")
 
     def named_variations(self) -> list[Variation]:
-        """Return the first `count` variations of `numbers()`, named by values that differ. Raises ConditionError."""
+        """Return the first `count` variations of `numbers()`. Their names contain the values that differ.
+
+        Raises ConditionError.
+        """
         numbers = list(itertools.islice(self.numbers(), self.count))
         chosen = [options for number in numbers if (options := self._options(number)) is not None]
         values = [{change.target.path: change.value.plain for change in _changes(options)} for options in chosen]
@@ -170,7 +173,7 @@ def expand_variations(tree: MappingNode, numbers: Sequence[int] | None = None) -
     try:
         if numbers is not None:
             known = [number for number in numbers if space.is_random or 0 < number <= space.count]
-            return [one for number in known if (one := space.variation(number)) is not None]
+            return [variation for number in known if (variation := space.variation(number)) is not None]
         if problem := _too_many_problem(space, position):
             return [problem]
         found = space.named_variations()
@@ -188,21 +191,21 @@ def variation_space(tree: MappingNode) -> VariationSpace | list[Problem] | None:
         return None
     from simscen.model.variations import VariationsSection  # most scenarios have no variations
 
-    own = tree.without_keys(VARIATIONS)
+    base_tree = tree.without_keys(VARIATIONS)
     section = check(VariationsSection, MappingNode(tree.position, {VARIATIONS: entry}))
     if isinstance(section, list):
         return section
-    builder, found = AxisBuilder(own), []
+    builder, blocks = AxisBuilder(base_tree), []
     specs = section.variations.blocks
     nodes = entry.value.items if isinstance(entry.value, SequenceNode) else [entry.value]
     is_random = len(specs) == 1 and specs[0].is_random
     for block, node in zip(specs, nodes, strict=True):
-        found.append(Block(*builder.build_block(block, node), is_random, block.pairwise is not None))
+        blocks.append(Block(*builder.build_block(block, node), is_random, block.pairwise is not None))
     if specs and not is_random and ACCEPTANCE in tree.entries:
         message = "these variations are not independent random draws, so no confidence can be stated for a pass rate"
         hint = "vary with `sampled` and `method: random` alone, or remove `acceptance`"
         builder.add_problem(tree.entries[ACCEPTANCE].key, "SC016", message, hint)
-    return builder.problems or VariationSpace(own, found, builder.targets, is_random)
+    return builder.problems or VariationSpace(base_tree, blocks, builder.targets, is_random)
 
 
 def _too_many_problem(space: VariationSpace, position: Position) -> Problem | None:
@@ -225,7 +228,7 @@ def _too_many_problem(space: VariationSpace, position: Position) -> Problem | No
 
 
 def _position_of_require(tree: MappingNode) -> Position:
-    """Return the position of the first `require` in `variations`; of `variations` if there is none."""
+    """Return the position of the first `require` in `variations`; the position of `variations` if there is none."""
     value = tree.entries[VARIATIONS].value
     for block in items_of(value) or [value]:
         if (require := child(block, "require")) is not None:
@@ -234,11 +237,11 @@ def _position_of_require(tree: MappingNode) -> Position:
 
 
 def _variation_name(options: Sequence[Option], keys: dict[str, str], number: int) -> str:
-    """Return the name of a variation with these options. `keys` are the short names of the paths in the name."""
+    """Return the name of a variation with these options. `keys` are short names by path, for paths in the name."""
     parts = []
     for option in options:
-        shown = [change for change in option.changes if change.target.path in keys]
-        parts.append(option.name or (derive_name(keys, shown, number) if shown else ""))
+        named_changes = [change for change in option.changes if change.target.path in keys]
+        parts.append(option.name or (derive_name(keys, named_changes, number) if named_changes else ""))
     name = ",".join(part for part in parts if part)
     return name if name and name_error(name) is None else numbered_name(number)
 

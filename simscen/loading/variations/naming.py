@@ -10,9 +10,11 @@ from simscen.loading.variations.paths import Target, split_path
 from simscen.loading.yaml.tree import MappingNode, Node, ScalarNode, SequenceNode
 
 MAX_NAME_CHARS = 100
+"""Maximum number of characters of a name."""
 MAX_NAME_BYTES = 180
-"""Largest length of a name in UTF-8. Names of folders, which also contain seed and stack, have at most 255 bytes."""
+"""Maximum length of a name in UTF-8. Names of folders, which also contain seed and stack, have at most 255 bytes."""
 _MAX_VALUE_CHARS = 40
+"""Maximum number of characters of a value in a name."""
 _VALID_NAME_PATTERN = re.compile(r"[^\W][\w.,=+%-]*")
 _NUMBERED_NAME_PATTERN = re.compile(r"variation-([1-9][0-9]{0,8})")
 _INVALID_CHARS_PATTERN = re.compile(r"[^\w.+%-]+")
@@ -43,10 +45,10 @@ def short_names(targets: Sequence[Target]) -> dict[str, str]:
 
 
 def derive_name(keys: dict[str, str], changes: Sequence[Change], number: int) -> str:
-    """Return a name such as `speed=0.5,mass=10`; `variation-<number>` if it would be too long.
+    """Return a name such as `speed=0.5,mass=10`; `variation-<number>` if the name would be too long.
 
-    `keys` are the short names of the paths. The number of a value in the list of its path replaces a value that is
-    too long.
+    `keys` are the short names by path. A value that is too long is replaced by its number in the list of its path, such
+    as `no3`.
     """
     values = {keys[change.target.path]: _value_text(change.value) or f"no{change.number}" for change in changes}
     name = ",".join(f"{key}={value}" for key, value in values.items())
@@ -66,7 +68,10 @@ def number_of(name: str) -> int | None:
 
 
 def make_unique(names: Sequence[str], is_fixed: Sequence[bool]) -> list[str]:
-    """Add `+2`, `+3`, … to repeated names, ignoring case, except to those for which `is_fixed` is true."""
+    """Return the names with `+2`, `+3`, … added to repeated names, ignoring case.
+
+    Names for which `is_fixed` is true are not changed.
+    """
     taken = {name.casefold() for name, fixed in zip(names, is_fixed, strict=True) if fixed}
     found = []
     for name, fixed in zip(names, is_fixed, strict=True):
@@ -97,5 +102,5 @@ def _value_text(node: Node) -> str:
 
 
 def _sanitize(text: str) -> str:
-    """Return the text without spaces, and with `_` instead of characters that are invalid in names."""
+    """Return the text without spaces, and with `_` instead of other characters that are invalid in names."""
     return _INVALID_CHARS_PATTERN.sub("_", text.replace(" ", "")).strip("_")

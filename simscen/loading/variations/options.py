@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # most scenarios have no variations
 
 @dataclass(frozen=True)
 class Change:
-    """New value of a target. `number` is the position of the value in the list of values of its path, from 1."""
+    """New value of a target. `number` is the number of the value among the values of its path, from 1."""
 
     target: Target
     value: Node
@@ -22,7 +22,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Option:
-    """Changes that are made together. `name` is the name in the file; "" for none."""
+    """Changes that are made together. `name` is the name of the variation in the file; "" for none."""
 
     changes: tuple[Change, ...]
     name: str = ""
@@ -47,7 +47,10 @@ class SampledOptions:
         return self.option([probability(self.sampled, target.path, index) for target in self.targets], index + 1)
 
     def option(self, probabilities: Sequence[float], number: int = 1) -> Option:
-        """Return the option `number` with the quantiles at these cumulative probabilities, one for each target."""
+        """Return the option with the quantiles at these cumulative probabilities, one for each target.
+
+        `number` is the number of the option, from 1.
+        """
         from simscen.loading.variations.sampling import quantile
 
         changes = []
@@ -64,5 +67,8 @@ Axis = Sequence[Option] | SampledOptions
 
 
 def typical_options(axis: Axis) -> Sequence[Option]:
-    """Return options of an axis that together change all its targets: the first one if they are drawn, else all."""
+    """Return options of an axis that together change all targets of the axis.
+
+    These are the first option if the options are drawn, and otherwise all options.
+    """
     return [axis[0]] if isinstance(axis, SampledOptions) else axis

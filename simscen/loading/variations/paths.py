@@ -1,4 +1,4 @@
-"""Resolution of the paths of varied values, such as `goals[0].pose` or `faults.lidar.noise.std`.
+"""Resolves the paths of varied values, such as `goals[0].pose` or `faults.lidar.noise.std`, to keys of the YAML tree.
 
 A path selects an item of a list by its index from 0 (`[0]` or `.0`), or by its name: the value of `name` or `id`, the
 place of a goal, the sensor of a fault, or the kind of a criterion or metric.
@@ -31,11 +31,11 @@ FIXED_KEYS = {
     "variations": "variations cannot be nested",
     "name": "each variation has its own name",
 }
-"""Top-level keys that a variation cannot change, with the reasons."""
+"""Reasons for messages, by top-level key that a variation cannot change."""
 _PART_PATTERN = re.compile(r"""\.?(?:([^.\[\]]+)|\["([^"]*)"\]|\['([^']*)'\]|\[([^\]]*)\])""")
 """Pattern of one part of a path: a key, or a key or index in brackets. A dot can precede it."""
 _NAME_KEYS = ("name", "id", "sensor", "pose")
-"""Keys of an item of a list that contain a name of the item."""
+"""Keys of an item of a list whose values are names of the item."""
 
 
 class PathError(ValueError):
@@ -58,8 +58,8 @@ class Target:
 def resolve_path(path: str, position: Position, tree: MappingNode) -> Target:
     """Return the target of a path in the scenario `tree`. `position` is the position of the path in the file.
 
-    Keys of mappings may be missing in the scenario. Raises PathError for a missing item of a list, an invalid path, and
-    a key that a variation cannot change.
+    A path can lead to keys that the scenario does not have yet. Raises PathError for a missing item of a list, an
+    invalid path, and a key that a variation cannot change.
     """
     parts = split_path(path)
     if parts[0] in FIXED_KEYS:
@@ -97,8 +97,8 @@ def _resolve_keys(path: str, parts: list[str], tree: MappingNode) -> Keys:
                 for key in found:
                     node = child(node, key)
             case ScalarNode(value=value):
-                what = "empty" if value is None else short_value(node)
-                message = f"{quoted(path)} leads to nothing: `{dotted_path(keys)}` is {what}, without a `{part}`"
+                written = "empty" if value is None else short_value(node)
+                message = f"{quoted(path)} leads to nothing: `{dotted_path(keys)}` is {written}, without a `{part}`"
                 raise PathError(message, _scalar_hint(keys))
             case None:
                 if keys[-1] in LIST_KEYS and len(keys) == 1:
@@ -107,11 +107,12 @@ def _resolve_keys(path: str, parts: list[str], tree: MappingNode) -> Keys:
     return tuple(keys)
 
 
-def _item_keys(path: str, keys: list[Key], items: SequenceNode, part: str, rest: list[str]) -> list[Key]:
+def _item_keys(path: str, keys: list[Key], items: SequenceNode, part: str, next_parts: list[str]) -> list[Key]:
     """Return the index of the item that `part` of a path selects in the list `items` at `keys`.
 
     If `part` is the kind of a criterion or metric, the index is followed by the kind, unless the path continues with a
-    key of the item itself. `rest` are the parts after `part`. Raises PathError if no item or several items match.
+    key of the item itself. `next_parts` are the parts of the path after `part`. Raises PathError if no item or several
+    items match.
     """
     holder = dotted_path(keys)
     if part.isascii() and part.isdecimal():
@@ -120,8 +121,8 @@ def _item_keys(path: str, keys: list[Key], items: SequenceNode, part: str, rest:
             raise PathError(f"{quoted(path)} leads to nothing: `{holder}` has {count}", "the first item is [0]")
         return [int(part)]
     matches = [index for index, item in enumerate(items.items) if part in _item_names(item)]
-    if len(matches) > 1 and rest:
-        matches = [index for index in matches if child(items.items[index], rest[0]) is not None] or matches
+    if len(matches) > 1 and next_parts:
+        matches = [index for index in matches if child(items.items[index], next_parts[0]) is not None] or matches
     kinds = [
         index
         for index, item in enumerate(items.items)
@@ -138,7 +139,7 @@ def _item_keys(path: str, keys: list[Key], items: SequenceNode, part: str, rest:
             known += [key for item in items.items for key in entries_of(item) if key != "id"]
         hint = suggestion(part, known) if known else "use the index; the first item is [0]"
         raise PathError(f"{quoted(path)} leads to nothing: no item of `{holder}` is called {quoted(part)}", hint)
-    if kinds and not (rest and rest[0] in ("id", "severity", "then", part)):
+    if kinds and not (next_parts and next_parts[0] in ("id", "severity", "then", part)):
         return [kinds[0], part]
     return [found[0]]
 
@@ -154,8 +155,8 @@ def _item_names(item: Node) -> list[str]:
 def _scalar_hint(keys: list[Key]) -> str:
     """Return the hint for a path that leads into the name of a file or place at `keys`; "" for other scalars."""
     if keys in (["world"], ["map"], ["robot", "model"]):
-        what = "name other files by the path of this key" + (", or write the world inline" if keys == ["world"] else "")
-        return f"values in another file cannot be varied; {what}"
+        alternative = ", or write the world inline" if keys == ["world"] else ""
+        return f"values in another file cannot be varied; vary the file name itself{alternative}"
     if keys[-1] == "pose":
         return f"vary {quoted(dotted_path(keys))} as a whole, or write it as `{{x: …, y: …, yaw: …}}`"
     return ""

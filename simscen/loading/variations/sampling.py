@@ -1,4 +1,4 @@
-"""Sampling of values for variations. Random numbers are hashes of the seed, the path, and the draw's number."""
+"""Samples values for variations. Random numbers are hashes of the seed, the path, and the number of the variation."""
 
 import hashlib
 import math
@@ -18,15 +18,15 @@ def probability(sampled: Sampled, path: str, index: int) -> float:
     """
     if sampled.method == "sobol":
         return _sobol_probability(sampled, path, index)
-    own = _hashed_uniform(sampled.seed, path, "value", index)
+    u = _hashed_uniform(sampled.seed, path, "value", index)
     if sampled.method == "random":
-        return own
-    return (_strata(sampled.seed, path, sampled.count)[index] + own) / sampled.count
+        return u
+    return (_strata(sampled.seed, path, sampled.count)[index] + u) / sampled.count
 
 
 @cache
 def _strata(seed: int, path: str, count: int) -> list[int]:
-    """Return the interval of each variation in a Latin hypercube: each of `count` intervals once, in random order."""
+    """Return the number of the interval of each variation in a Latin hypercube: 0 to `count` - 1 in random order."""
     return sorted(range(count), key=lambda number: _hashed_uniform(seed, path, "stratum", number))
 
 
@@ -52,7 +52,7 @@ def _sobol_points(dimensions: int, count: int) -> Any:
 
 
 def _hashed_uniform(seed: int, path: str, purpose: str, number: int) -> float:
-    """Return a number from the uniform distribution on (0, 1), computed by a hash of the arguments."""
+    """Return a number that is uniformly distributed on (0, 1): a hash of the arguments."""
     digest = hashlib.sha256(f"{seed}\0{path}\0{purpose}\0{number}".encode()).digest()
     return ((int.from_bytes(digest[:8], "big") >> 12) + 0.5) / 2**52
 

@@ -24,12 +24,13 @@ class SearchSpace:
     def choice_counts(self) -> list[int]:
         """Number of values of each dimension that is a `choice`; 0 for other distributions."""
         chosen = [self.options.sampled.values[target.path].chosen for target in self.options.targets]
-        return [len(one.root) if isinstance(one, OneOf) else 0 for one in chosen]
+        return [len(spec.root) if isinstance(spec, OneOf) else 0 for spec in chosen]
 
     def variation(self, name: str, point: Sequence[float]) -> Variation | None:
-        """Return the variation at a point of cumulative probabilities in (0, 1); None if it violates conditions.
+        """Return the variation at a point of the space; None if the variation violates conditions.
 
-        Raises ConditionError if a condition cannot be evaluated.
+        `point` has the cumulative probability in (0, 1) of the value of each path. Raises ConditionError if a condition
+        cannot be evaluated.
         """
         changes = self.options.option(point).changes
         return (

@@ -1,4 +1,4 @@
-"""Merging of the problems of all variations of a scenario. A problem of several variations is reported once."""
+"""Merges the problems of all variations of a scenario. A problem of several variations is reported once."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -18,7 +18,7 @@ class VariationProblems(NamedTuple):
 
 
 def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
-    """Return each problem once. Its message states the varied path, and which variations have the problem."""
+    """Return each problem once. Messages state the varied path, and which variations have the problem."""
     if len(variations) == 1 and not variations[0].name:
         return list(dict.fromkeys(variations[0].problems))
     variations_by_problem: dict[Problem, list[VariationProblems]] = {}
@@ -33,9 +33,9 @@ def merge_problems(variations: Sequence[VariationProblems]) -> list[Problem]:
 def _with_variation_names(problem: Problem, affected: Sequence[VariationProblems], variation_count: int) -> Problem:
     """Return a problem with the varied path and the variations with the problem (`affected`) in its message."""
     path = affected[0].varied_paths.get(Position(problem.path, problem.line, problem.col))
-    names = [one.name for one in affected if one.name]
+    names = [variation.name for variation in affected if variation.name]
     if not names or (path is None and len(names) == variation_count):
         return problem
-    several = f" and {len(names) - 1} more" if len(names) > 1 else ""
-    where = "in all variations" if len(names) == variation_count else f"in the variation {quoted(names[0])}{several}"
-    return replace(problem, message=f"{problem.message} ({f'{quoted(path)}, ' if path else ''}{where})")
+    more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+    place = "in all variations" if len(names) == variation_count else f"in the variation {quoted(names[0])}{more}"
+    return replace(problem, message=f"{problem.message} ({f'{quoted(path)}, ' if path else ''}{place})")

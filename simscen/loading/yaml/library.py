@@ -1,4 +1,4 @@
-"""Reading of a YAML file and of its base files: files that it `extends`, and the `defaults.yaml` in its folder."""
+"""Reads a YAML file, the files that it `extends`, and the `defaults.yaml` in its folder."""
 
 import os
 from collections.abc import Mapping
@@ -15,31 +15,31 @@ from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, Scalar
 DEFAULTS_FILE = "defaults.yaml"
 """Name of the file whose values apply to all scenarios in its folder."""
 EXTENDS = "extends"
-"""Key of a file with the path of another file that it extends."""
+"""Key of a file. The value is the path of the file that this file extends."""
 MAX_FILES = 32
-"""Largest number of YAML files of one scenario."""
+"""Maximum number of YAML files of one scenario."""
 APPEND_SUFFIX = "+"
-"""Suffix of a top-level key such as `pass+`, whose items are added to the list `pass` of the extended file."""
+"""Suffix of a top-level key such as `pass+`. The items of `pass+` are added to the list `pass` of the extended file."""
 
 
 @dataclass
 class Library:
-    """Reader of the YAML files of one scenario. It keeps their texts for the source lines of problems."""
+    """Reader of the YAML files of one scenario, which keeps the texts for the source lines of problems."""
 
     sandbox: PathSandbox
     texts: dict[str, str] = field(default_factory=dict)
-    """Texts of the files read so far, by display path (path in messages, PathSandbox.display_name)."""
+    """Texts of the files read so far, by path in messages (see `PathSandbox.display_name`)."""
     files: dict[str, Path] = field(default_factory=dict)
-    """Absolute paths of the same files, by display path."""
+    """Absolute paths of the same files, by path in messages."""
     loaded: dict[tuple[str, Path], Any] = field(default_factory=dict)
-    """Worlds, maps, and robots loaded so far, by the name of the method of Assets that loaded them, and by path."""
+    """Worlds, maps, and robots loaded so far, by (name of the method of Assets that loaded them, path)."""
     unsaved: Mapping[Path, str] = field(default_factory=dict)
     """Texts that replace the content of files, by absolute path, such as unsaved texts of an editor."""
 
     def read(self, path: Path, defaults: bool = False) -> tuple[Node | None, list[Problem]]:
         """Return the tree of a file (None if it cannot be parsed), merged with the files it extends, and all problems.
 
-        With `defaults`, the tree is also merged with the `defaults.yaml` in its folder.
+        With `defaults`, the tree is also merged with the `defaults.yaml` in the folder of the file.
         """
         tree, problems = self._read_with_base(path, ())
         return self.with_defaults(path, tree, problems) if defaults else (tree, problems)
@@ -51,7 +51,10 @@ class Library:
     def with_defaults(
         self, path: Path, tree: Node | None, problems: list[Problem]
     ) -> tuple[Node | None, list[Problem]]:
-        """Return `tree`, the content of `path`, merged with the `defaults.yaml` in its folder, and all problems."""
+        """Return `tree`, the content of `path`, merged with the `defaults.yaml` in the folder of `path`.
+
+        Also return `problems` and the problems of `defaults.yaml`.
+        """
         defaults_file = path.parent / DEFAULTS_FILE
         # A defaults.yaml that cannot be read is a problem; ignoring it would change the scenario silently.
         if isinstance(tree, MappingNode) and os.path.lexists(defaults_file) and path.name != DEFAULTS_FILE:
@@ -66,20 +69,23 @@ class Library:
         return tree, problems
 
     def add(self, texts: Mapping[str, str], files: Mapping[str, Path]) -> None:
-        """Add texts and absolute paths of files that were read without this library, by display path."""
+        """Add texts and absolute paths of files that were read without this library, by path in messages."""
         self.texts |= texts
         self.files |= files
 
-    def find(self, written: str, position: Position) -> Path | Problem:
-        """Return the existing file or folder with the path `written` at a position of a YAML file, or a problem."""
-        return self.sandbox.find(written, self.files[position.path].parent, position)
+    def find(self, path_text: str, position: Position) -> Path | Problem:
+        """Return the existing file or folder with the path `path_text`, or a problem.
+
+        `position` is the position of the path in a YAML file.
+        """
+        return self.sandbox.find(path_text, self.files[position.path].parent, position)
 
     def with_source(self, problems: list[Problem]) -> list[Problem]:
-        """Return the problems with their source lines. Problems that have one are unchanged."""
+        """Return the problems with source lines. Problems that already have a source line are unchanged."""
         return [problem if problem.source else with_source_line(problem, self.texts) for problem in problems]
 
     def _read_with_base(self, path: Path, chain: tuple[Path, ...]) -> tuple[Node | None, list[Problem]]:
-        """Return the merged tree of a file and all problems. `chain` are the files that led to it by `extends`."""
+        """Return the merged tree of a file and all problems. `chain` are the files that led to `path` by `extends`."""
         tree, problems = self._read_file(path)
         if not isinstance(tree, MappingNode) or EXTENDS not in tree.entries:
             return tree, problems
@@ -93,7 +99,7 @@ class Library:
         return own, problems + more
 
     def _read_file(self, path: Path) -> tuple[Node | None, list[Problem]]:
-        """Return the tree of a file alone, and all problems. Keep its text and path."""
+        """Return the tree of a file without its base files, and all problems. Keep the text and the path."""
         name = self.sandbox.display_name(path)
         self.files[name] = path
         text = self.text(path)
@@ -103,7 +109,7 @@ class Library:
         return parse_yaml(text, name)
 
     def _base_file(self, extends: Node, chain: tuple[Path, ...]) -> Path | Problem:
-        """Return the file that the last file of `chain` extends; or a problem. `extends` is the value of its key."""
+        """Return the file that the last file of `chain` extends; or a problem. `extends` is the value of the key."""
         position = extends.position
         if not isinstance(extends, ScalarNode) or not isinstance(extends.value, str):
             return Problem(*position, "SC011", f"`{EXTENDS}` must be the path of one file")
@@ -121,8 +127,8 @@ class Library:
 def extend_mapping(own: MappingNode, base: MappingNode) -> MappingNode:
     """Return `own`, the content of a file, merged with `base`, the content of the file that it extends.
 
-    The items of a key such as `pass+` in `own` are appended to the list `pass` or `pass+` in `base`. If `base` has
-    neither of them, the key `pass+` is kept.
+    The items of a key such as `pass+` in `own` are appended to the list `pass` or `pass+` in `base`. Without such a
+    list in `base`, the key `pass+` is kept.
     """
     entries = dict(own.entries)
     for key, more in own.entries.items():
@@ -140,7 +146,7 @@ def extend_mapping(own: MappingNode, base: MappingNode) -> MappingNode:
 
 
 def merge_mappings(own: MappingNode, base: MappingNode) -> MappingNode:
-    """Return a mapping with the keys of both. Values in `own` replace values in `base`; mappings are merged."""
+    """Return `base` updated by `own`. Nested mappings are merged if they have the same type."""
     entries = dict(own.entries)
     for key, base_entry in base.entries.items():
         entry, base_value = entries.get(key), base_entry.value
@@ -156,10 +162,9 @@ def merge_mappings(own: MappingNode, base: MappingNode) -> MappingNode:
 
 
 def _are_mergeable(key: str, own: MappingNode, base: MappingNode) -> bool:
-    """Return whether two mappings under the same key describe a thing of the same type, by their keys `type`.
+    """Return whether two mappings under the same key `key` can be merged: their values of `type` do not differ.
 
-    A `type` that is missing in one of them matches all types. An external stack replaces a stack of another kind,
-    and a stack with a `type` replaces an external one.
+    A missing `type` matches all types. An external stack and a stack with a `type` cannot be merged.
     """
     own_type, base_type = child(own, "type"), child(base, "type")
     if key == "stack" and "external" in own.entries and "external" not in base.entries:

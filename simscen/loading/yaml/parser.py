@@ -1,4 +1,4 @@
-"""YAML parser. It returns a tree with positions, and limits the depth and the number of values of files."""
+"""YAML parser that returns a tree with positions, and limits the depth and the number of values of files."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -12,15 +12,15 @@ from simscen.loading.yaml.syntax_problems import syntax_problem
 from simscen.loading.yaml.tree import Entry, MappingNode, Node, Position, ScalarNode, SequenceNode, nodes_with_keys
 
 MAX_DEPTH = 40
-"""Largest level of a value in nested mappings and lists. The level of the top-level value is 1."""
+"""Maximum level of a value in nested mappings and lists. The level of the top-level value is 1."""
 MAX_VALUES = 100_000
-"""Largest number of keys and values of a file, after the expansion of aliases."""
+"""Maximum number of keys and values of a file, after the expansion of aliases."""
 
 # The tree is built from PyYAML's events. PyYAML's constructors accept duplicate keys silently, expand alias bombs, and
 # overflow the C stack at 30 000 brackets. libyaml yields the same events ten times faster, if PyYAML was built with it.
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _LIBYAML_TOO_DEEP = "exceeded maximum nesting depth"
-"""Message of libyaml for a file that is deeper than its own limit."""
+"""Message of libyaml for a file that is deeper than libyaml's limit."""
 
 
 class _ParseError(Exception):
@@ -33,8 +33,7 @@ class _ParseError(Exception):
 def parse_yaml(text: str, path: str, *, allow_duplicates: bool = False) -> tuple[Node | None, list[Problem]]:
     """Return the only document of `text` as a tree (None if it cannot be parsed), and all problems.
 
-    With `allow_duplicates`, a repeated key is only a warning, and its last value is used, as in ROS 2 parameter
-    files.
+    With `allow_duplicates`, a repeated key is only a warning, and the last value is used, as in ROS 2 parameter files.
     """
     composer = _Composer(path, text, allow_duplicates)
     try:
@@ -46,7 +45,10 @@ def parse_yaml(text: str, path: str, *, allow_duplicates: bool = False) -> tuple
 
 @dataclass
 class _Composer:
-    """Builds the tree of a text from PyYAML's events, and collects problems. `depth` is the level of a node, from 1."""
+    """Builds the tree of a text from PyYAML's events, and collects problems.
+
+    `path` is the path of the text in messages. In the methods, `depth` is the level of a node, from 1.
+    """
 
     path: str
     text: str
@@ -142,7 +144,7 @@ class _Composer:
         return MappingNode(self._position_of(start), self._apply_merge_keys(start, entries, merged))
 
     def _apply_merge_keys(self, start: ev.Event, entries: dict[str, Entry], merged: list[Node]) -> dict[str, Entry]:
-        """Return `entries` with the keys of `merged`, the values of the key `<<`. The first of equal keys is used."""
+        """Return `entries` with the keys of `merged`, the values of the key `<<`. The first of equal keys counts."""
         for other in merged:
             if not isinstance(other, MappingNode):
                 self.problems.append(self._problem(start, "SC003", "`<<` expects a mapping or a list of mappings"))
@@ -158,7 +160,7 @@ class _Composer:
         return str(event.value)
 
     def _compose_alias(self, event: ev.AliasEvent, depth: int) -> Node:
-        """Return the node of an alias; its values and levels count again. Raises _ParseError if it is missing."""
+        """Return the node of an alias. The values of the node are counted again. Raises _ParseError without anchor."""
         if event.anchor not in self._anchors:
             raise _ParseError(self._problem(event, "SC006", f"alias `*{event.anchor}` has no anchor before it"))
         node = self._anchors[event.anchor]
@@ -167,8 +169,8 @@ class _Composer:
         keys_below = [keys for keys, _ in nodes_with_keys(node)]
         if depth + max(map(len, keys_below)) > MAX_DEPTH:
             raise _ParseError(self._problem(event, "SC006", f"nested deeper than {MAX_DEPTH}"))
-        named = sum(isinstance(keys[-1], str) for keys in keys_below[1:])  # their keys count as well
-        self._count_values(event, len(keys_below) + named)
+        key_count = sum(isinstance(keys[-1], str) for keys in keys_below[1:])
+        self._count_values(event, len(keys_below) + key_count)
         return node
 
     def _count_values(self, event: ev.Event, count: int) -> None:

@@ -1,7 +1,7 @@
-"""Values of scalars by the core schema of YAML 1.2 (YAML 1.2.2, section 10.3.2).
+"""Values of scalars according to the core schema of YAML 1.2 (YAML 1.2.2, section 10.3.2).
 
-PyYAML implements YAML 1.1. Numbers with a leading zero are text here, because YAML 1.1 reads them as octal, but YAML
-1.2 as decimal.
+PyYAML implements YAML 1.1. Numbers with a leading zero are text here, because they are octal in YAML 1.1, but decimal
+in YAML 1.2.
 """
 
 import math
@@ -10,7 +10,7 @@ import re
 from simscen.loading.yaml.tree import Scalar
 
 MAX_INTEGER_CHARS = 19
-"""Largest number of characters of an integer: the length of the largest 64-bit integer."""
+"""Maximum number of characters of an integer: the length of the largest 64-bit integer."""
 
 _CONSTANTS: dict[str, Scalar] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),

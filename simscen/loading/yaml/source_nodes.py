@@ -1,4 +1,4 @@
-"""Nodes with the start and end of each value in a YAML text, with which an editor can replace single values."""
+"""Nodes with the start and end of each value in a YAML text, so that the editor can replace single values."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -59,6 +59,8 @@ def source_at(node: SourceNode, keys: Sequence[Key]) -> SourceNode | None:
 
 
 class _Composer:
+    """Builds the nodes of a text from PyYAML's events."""
+
     def __init__(self, text: str, events: Iterator[ev.Event]) -> None:
         self._text, self._events = text, events
 
@@ -98,7 +100,7 @@ class _Composer:
         return SourceNode("mapping", start, end, is_flow, entries=entries)
 
     def _after_properties(self, event: ev.NodeEvent, start: int) -> int:
-        """Return the index after the anchor and the tag of a node that begins at the index `start`."""
+        """Return the index of a value after its anchor and its tag, which begin at the index `start`."""
         for _ in range(2):
             if self._text[start : start + 1] in ("&", "!") and (event.anchor or getattr(event, "tag", None)):
                 while start < len(self._text) and not self._text[start].isspace():

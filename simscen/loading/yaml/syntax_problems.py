@@ -1,4 +1,4 @@
-"""Problems of texts that are not YAML, with clearer messages than libyaml's, and hints about lookalike characters."""
+"""Problems of texts that are not YAML, with clearer messages than libyaml, and hints for lookalike characters."""
 
 from typing import NamedTuple
 
@@ -8,19 +8,20 @@ from simscen.core.errors import Problem
 from simscen.spec.quantities import with_article
 
 _MISSING_COLON = "could not find expected ':'"
-"""Message of libyaml for a line that must be a key but has no colon. Its context is the key."""
+"""Message of libyaml for a line that must be a key but has no colon. The context of the error is the key."""
 _UNCLOSED = {
     "while parsing a flow sequence": "list in brackets",
     "while parsing a flow mapping": "mapping in braces",
     "while scanning a quoted scalar": "text in quotes",
 }
-"""Contexts of libyaml that need a closing bracket or quote."""
+"""Words for a list, mapping, or text that must be closed, by context of the error in libyaml."""
 _CONTAINERS = {
     "while parsing a block mapping": "mapping",
     "while parsing a flow mapping": "mapping",
     "while parsing a block collection": "list",
     "while parsing a flow sequence": "list",
 }
+"""Words for a list or mapping, by context of the error in libyaml."""
 _ALIGN_KEYS = "indent all keys of a mapping alike"
 _MESSAGES = {
     _MISSING_COLON: ("`:` is missing after this key", "write `key: value`, or `- value` for an item of a list"),
@@ -66,7 +67,7 @@ _LOOKALIKES = {
     "\u2014": ("dash", "`-`"),
     "\u2212": ("minus sign", "`-`"),
 }
-"""Names and replacements of characters that look like ASCII characters of YAML."""
+"""(name, replacement) by character that looks like an ASCII character of YAML."""
 
 
 def syntax_problem(error: yaml.MarkedYAMLError, text: str, path: str) -> Problem:
@@ -80,7 +81,7 @@ def syntax_problem(error: yaml.MarkedYAMLError, text: str, path: str) -> Problem
         return Problem(path, mark.line + 1, line.find("\t") + 1, "SC003", "tab character", "indent with spaces")
     for number in range(start.line if start else mark.line, min(mark.line + 1, len(lines))):
         if (found := _first_lookalike(lines[number].partition(" #")[0])) is not None:
-            return Problem(path, number + 1, found.at + 1, "SC003", found.name, f"write {found.replacement}")
+            return Problem(path, number + 1, found.column + 1, "SC003", found.name, f"write {found.replacement}")
     is_at_end = mark.index >= len(text.rstrip())
     unclosed = _UNCLOSED.get(error.context or "", "")
     if start is not None and is_at_end and start.index < mark.index and unclosed:
@@ -94,7 +95,7 @@ def syntax_problem(error: yaml.MarkedYAMLError, text: str, path: str) -> Problem
 
 
 def _message(error: yaml.MarkedYAMLError) -> tuple[str, str]:
-    """Return the message and the hint for a syntax error. The message names the list or mapping that contains it."""
+    """Return the message and the hint for a syntax error. The message names the list or mapping with the error."""
     problem = error.problem or "cannot be read as YAML"
     message, hint = _MESSAGES.get(problem, (problem, ""))
     start, mark = error.context_mark, error.problem_mark
@@ -109,9 +110,9 @@ def _message(error: yaml.MarkedYAMLError) -> tuple[str, str]:
 
 
 class _Lookalike(NamedTuple):
-    """Lookalike character: its index in a text, its name such as "no-break space (U+00A0)", and what to write."""
+    """Lookalike character at a column (from 0), with a name such as "no-break space (U+00A0)", and a replacement."""
 
-    at: int
+    column: int
     name: str
     replacement: str
 

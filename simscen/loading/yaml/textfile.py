@@ -1,4 +1,4 @@
-"""Safe reading of text files, and the source lines of problems."""
+"""Reads text files safely, and adds source lines to problems."""
 
 import errno
 import os
@@ -11,7 +11,7 @@ from pathlib import Path
 from simscen.core.errors import Problem
 
 MAX_FILE_BYTES = 1 << 20
-"""Largest size of a text file: 1 MiB."""
+"""Maximum size of a text file: 1 MiB."""
 _IMAGE_START = re.compile(rb"P[25]\s+[#\d]|\x89PNG|BM.{4}\0{4}|\xff\xd8\xff", re.DOTALL)
 """First bytes of images in the formats PGM, PNG, BMP, and JPEG."""
 
@@ -53,7 +53,7 @@ def decode(raw: bytes, display_name: str) -> str | Problem:
 
 
 def with_source_line(problem: Problem, texts: Mapping[str, str]) -> Problem:
-    """Return a copy of a problem with the text of its line. `texts` are the texts of files, by path as in messages."""
+    """Return a copy of a problem with the text of the line. `texts` are the texts of files, by path as in messages."""
     lines = texts.get(problem.path, "").split("\n")
     return replace(problem, source=lines[problem.line - 1]) if 0 < problem.line <= len(lines) else problem
 

@@ -1,4 +1,4 @@
-"""Tree of a YAML file with the positions of its keys and values, and functions to search it and make changed copies.
+"""Tree of a YAML file with the positions of keys and values, and functions that search or change such a tree.
 
 Trees are immutable. A `loc` is the location of a validation error in pydantic: keys and list indices, with tags of
 union members between them. Functions with a `loc` skip parts that do not exist in the tree, such as tags.
@@ -12,9 +12,9 @@ Scalar = str | int | float | bool | None
 
 
 class Position(NamedTuple):
-    """Position in a file. `path` is usually relative to the root, as in messages.
+    """Position in a file. `path` is the path in messages, usually relative to the root.
 
-    `line` and `col` count from 1; both are 0 for the whole file.
+    `line` and `col` (column) count from 1; they are 0 for the whole file.
     """
 
     path: str
@@ -50,7 +50,7 @@ class SequenceNode:
 
 @dataclass(frozen=True)
 class Entry:
-    """Position of a key in a mapping, and its value."""
+    """Entry of a mapping: the position of the key (`key`), and the value."""
 
     key: Position
     value: "Node"
@@ -73,7 +73,7 @@ class MappingNode:
         return MappingNode(self.position, {key: entry for key, entry in self.entries.items() if key not in keys})
 
     def with_value(self, keys: "Keys", value: "Node", position: Position) -> "MappingNode":
-        """Return a copy with `value` at `keys`, which are not empty. Added keys and mappings get `position`."""
+        """Return a copy with `value` at `keys`, at least one key. Added keys and mappings get `position`."""
         changed = _with_value(self, keys, value, position)
         assert isinstance(changed, MappingNode)
         return changed
@@ -116,17 +116,17 @@ def nodes_with_keys(node: Node, keys: Keys = ()) -> Iterator[tuple[Keys, Node]]:
 
 
 def _with_value(node: Node | None, keys: Keys, value: Node, position: Position) -> Node:
-    """Return a copy of a tree with `value` at `keys`. Nodes on the way without keys become mappings."""
+    """Return a copy of a tree with `value` at `keys`. Mappings replace scalars and missing nodes on the way."""
     if not keys:
         return value
-    key, rest = keys[0], keys[1:]
+    key, next_keys = keys[0], keys[1:]
     if isinstance(node, SequenceNode) and isinstance(key, int):
         items = list(node.items)
-        items[key] = _with_value(items[key], rest, value, position)
+        items[key] = _with_value(items[key], next_keys, value, position)
         return SequenceNode(node.position, tuple(items))
     mapping = node if isinstance(node, MappingNode) else MappingNode(position, {})
     old = mapping.entries.get(str(key))
-    entry = Entry(old.key if old else position, _with_value(old.value if old else None, rest, value, position))
+    entry = Entry(old.key if old else position, _with_value(old.value if old else None, next_keys, value, position))
     return MappingNode(mapping.position, {**mapping.entries, str(key): entry})
 
 

@@ -1,4 +1,4 @@
-"""Writing of data as YAML 1.2 text: completely new, or with the unchanged parts of an existing text."""
+"""Writes data as YAML 1.2 text: completely new text, or text that keeps the unchanged lines of an existing text."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ class CompactDumper(Dumper):
 
 
 def _represent_list(dumper: yaml.SafeDumper, value: list[Any]) -> yaml.Node:
-    flat = not any(isinstance(item, dict) for item in value)
-    return dumper.represent_sequence("tag:yaml.org,2002:seq", value, flow_style=flat)
+    is_flow = not any(isinstance(item, dict) for item in value)
+    return dumper.represent_sequence("tag:yaml.org,2002:seq", value, flow_style=is_flow)
 
 
 def _represent_mapping(dumper: yaml.SafeDumper, value: dict[str, Any]) -> yaml.Node:
     """Return the YAML node of a mapping, in braces if it contains a scalar and is not the whole file."""
-    flat = any(not isinstance(item, dict | list) for item in value.values()) and "simscen" not in value
-    return dumper.represent_mapping("tag:yaml.org,2002:map", value, flow_style=flat)
+    is_flow = any(not isinstance(item, dict | list) for item in value.values()) and "simscen" not in value
+    return dumper.represent_mapping("tag:yaml.org,2002:map", value, flow_style=is_flow)
 
 
 CompactDumper.add_representer(list, _represent_list)
@@ -83,14 +83,14 @@ def _in_order(value: Any) -> Any:
 
 
 LINE_WIDTH_CHARS = 100
-"""Length of a line above which new lists and mappings continue in the next line."""
+"""Maximum length of a line. Longer new lists and mappings continue in the next line."""
 
 
 def changed_text(text: str, path: str, content: Mapping[str, Any], comment: str = "") -> str:
-    """Return `content` as YAML text with `comment` at the top.
+    """Return `content` as YAML text with `comment` at the top. `path` is the path of `text` in messages.
 
-    Top-level keys and list items with the same value in `text` keep their lines, with the comments directly above.
-    If the result would not be equal to `content`, for example because of YAML anchors, no lines are kept.
+    Top-level keys and list items with the same value in `text` keep their lines, and the comments directly above these
+    lines. If the new text would not have the value `content`, for example because of YAML anchors, no lines are kept.
     """
     original, _ = parse_yaml(text, path)
     assert isinstance(original, MappingNode), "the text of a valid scenario is a mapping"
@@ -104,25 +104,25 @@ def changed_text(text: str, path: str, content: Mapping[str, Any], comment: str 
         elif key in segments and isinstance(value, list):
             parts.append(_list_text(key, value, original, lines, segments[key]))
         else:
-            parts.append(_entry(key, value))
-    whole = "".join(parts)
-    written, problems = parse_yaml(whole, path)
-    if problems or written is None or written.plain != content:
+            parts.append(_entry_text(key, value))
+    new_text = "".join(parts)
+    tree, problems = parse_yaml(new_text, path)
+    if problems or tree is None or tree.plain != content:
         return head + to_yaml(content)
-    return whole
+    return new_text
 
 
 def _segments(original: MappingNode, lines: Sequence[str]) -> dict[str, list[str]]:
-    """Return the lines of each top-level key, with the comments directly above it; {} for a mapping in braces."""
+    """Return the lines of each top-level key and of the comments directly above; {} for a mapping in braces."""
     keys = sorted(original.entries, key=lambda key: original.entries[key].key.line)
     if any(original.entries[key].key.col != 1 for key in keys):
         return {}
-    starts = [_with_comments(original.entries[key].key.line - 1, lines) for key in keys]
+    starts = [_comment_start(original.entries[key].key.line - 1, lines) for key in keys]
     ends = [*starts[1:], len(lines)]
     return {key: list(lines[start:end]) for key, start, end in zip(keys, starts, ends, strict=True)}
 
 
-def _with_comments(start: int, lines: Sequence[str]) -> int:
+def _comment_start(start: int, lines: Sequence[str]) -> int:
     """Return the index of the first comment line directly above the line `start`; `start` if there is no comment."""
     while start > 0 and lines[start - 1].lstrip().startswith("#"):
         start -= 1
@@ -137,25 +137,25 @@ def _list_text(key: str, value: list[Any], original: MappingNode, lines: Sequenc
     node = original.entries[key].value
     start = original.entries[key].key.line - 1
     if not isinstance(node, SequenceNode) or not value or not node.items:
-        return _entry(key, value)
+        return _entry_text(key, value)
     first_lines = [item.position.line - 1 for item in node.items]
     begin_lines = all(lines[line].lstrip().startswith("- ") for line in first_lines)
     if not begin_lines or len(set(first_lines)) < len(first_lines) or first_lines[0] == start:
-        return _entry(key, value)
-    starts = [_with_comments(line, lines) for line in first_lines]
-    end = _with_comments(start, lines) + len(segment)
+        return _entry_text(key, value)
+    starts = [_comment_start(line, lines) for line in first_lines]
+    end = _comment_start(start, lines) + len(segment)
     ends = [*starts[1:], end]
     indent = len(lines[first_lines[0]]) - len(lines[first_lines[0]].lstrip())
     texts = [_joined_lines(lines[first:last]) for first, last in zip(starts, ends, strict=True)]
-    head = _joined_lines(lines[_with_comments(start, lines) : starts[0]])
-    parts, rest = [], list(zip((item.plain for item in node.items), texts, strict=True))
+    head = _joined_lines(lines[_comment_start(start, lines) : starts[0]])
+    parts, remaining = [], list(zip((item.plain for item in node.items), texts, strict=True))
     for item in value:
-        same = next((index for index, (plain, _) in enumerate(rest) if plain == item), None)
+        same = next((index for index, (plain, _) in enumerate(remaining) if plain == item), None)
         if same is None:
             parts.append(textwrap.indent(_dump_innermost_flow([item]), " " * indent))
         else:
-            parts.append(rest[same][1])
-            rest = rest[same + 1 :]
+            parts.append(remaining[same][1])
+            remaining = remaining[same + 1 :]
     return head + "".join(parts)
 
 
@@ -167,8 +167,8 @@ def _joined_lines(lines: Sequence[str]) -> str:
     return "".join(f"{line}\n" for line in trimmed)
 
 
-def _entry(key: str, value: Any) -> str:
-    """Return the YAML text of a top-level key and its value, without braces around them."""
+def _entry_text(key: str, value: Any) -> str:
+    """Return the YAML text of a top-level key and its value, without braces."""
     text = _dump_innermost_flow({key: value})
     is_braced = text.startswith("{")
     return f"{text.strip()[1:-1]}\n" if is_braced else text

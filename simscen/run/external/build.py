@@ -7,7 +7,7 @@ from pathlib import Path
 from simscen.core.clock import Clock
 from simscen.core.errors import InvalidInput
 from simscen.core.external_command import ExternalCommand
-from simscen.loading.stacks.userconfig import undefined_stack
+from simscen.loading.stacks.userconfig import undefined_stack_problem
 from simscen.model.stack import StackSpec
 from simscen.model.stack_base import GoalTolerances, StackBase
 from simscen.model.stack_files import ExternalStackSpec
@@ -34,7 +34,7 @@ def build_external_stack(
     """
     command = prepared.loaded.external_command
     if command is None:
-        raise InvalidInput([problem] if (problem := undefined_stack(prepared.loaded)) else [])
+        raise InvalidInput([problem] if (problem := undefined_stack_problem(prepared.loaded)) else [])
     parameters = RunParameters(
         seed=seed,
         control_period=Clock(surroundings.tick_rate).period(spec.controller_frequency),

@@ -156,7 +156,10 @@ def repeat_command(scenario: LoadedScenario, seed: int) -> str:
         words += ["--world-path", display_path(folder)]
     if scenario.choice is not None:
         choice = scenario.choice
-        words += ["--stack", choice.written if choice.file is None else f"{choice.name}={display_path(choice.file)}"]
+        words += [
+            "--stack",
+            choice.option_text if choice.file is None else f"{choice.name}={display_path(choice.file)}",
+        ]
     return shlex.join([*words, *(["--lenient"] if scenario.lenient else [])])
 
 

@@ -55,7 +55,7 @@ WRONG = {
     ),
     "goals of all": (
         f"robots: {{{A}, {B}}}\ngoals: [there]\n" + PASS,
-        (8, "SC016", "`goals` belong to one robot, but the scenario has several"),
+        (8, "SC016", "`goals` belongs to one robot, but the scenario has several"),
     ),
     "nothing must hold": (
         f"robots:\n  a: {{pose: here, {PASS.strip()}}}\n  {B}\n",

@@ -235,7 +235,7 @@ def test_every_parameter_that_changes_nothing_here_is_named_with_its_line(tmp_pa
          " not precise"),
         (18, "controller_server: `FollowPath.critics`: not supported: PreferForward"),
         (23, "global_costmap: `robot_radius`: the robot file defines the size of the robot"),
-        (24, "global_costmap: `rolling_window`: the local costmap always rolls, the global one with `map: none`"),
+        (24, "global_costmap: `rolling_window`: the local costmap always rolls, the global costmap with `map: none`"),
         (25, "global_costmap: `plugins`: it lists no inflation layer"),
         (29, "global_costmap: simscen has no obstacle_layer.scan.clearing (29),"
          " obstacle_layer.old.obstacle_max_range (30)"),
@@ -289,7 +289,7 @@ collision_monitor:
     found = loaded(tmp_path, "stack: {nav2_params: nav2.yaml}", polygons)
     assert (found.spec.stack.collision_monitor.enabled, found.spec.stack.collision_monitor.min_points) == (True, 4)
     assert [note.message for note in found.notes] == [
-        "collision_monitor: `polygons`: only the first polygon that approaches is used: Near, not Far"
+        "collision_monitor: `polygons`: only the first polygon with the action_type approach is used: Near, not Far"
     ]
 
 
