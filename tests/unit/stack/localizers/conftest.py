@@ -1,4 +1,4 @@
-"""Make the modules of this folder importable in its tests, whatever import mode pytest uses."""
+"""Make the modules of this folder importable in its tests, which pytest's importlib mode does not."""
 
 import sys
 from pathlib import Path

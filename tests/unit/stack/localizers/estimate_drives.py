@@ -1,4 +1,4 @@
-"""Drives through shipped and generated worlds to evaluate a localizer without a simulation, also with wrong maps."""
+"""Drives through shipped and generated worlds for the evaluation of localizers without a simulation."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ WORLDS = Path(__file__).parents[4] / "worlds"
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A drive at 10 Hz: true poses (k, 3), `steps` (k, 3) that the wheels report, and `ranges` (k, 60) in m."""
+    """Drive at 10 Hz: true poses (k, 3), motions (k, 3) reported by the wheels, and lidar ranges (k, 60) in m."""
 
     truth: Array
     steps: Array
@@ -58,11 +58,11 @@ def building(name: str) -> BuiltWorld:
 
 def _hall(width: float, depth: float, boxes: list[tuple[float, float, float, float]]) -> dict[str, object]:
     """Return the keys of a world file: walls around a hall, and boxes given by center x, y and length, width in m."""
-    around = [[0, 0], [width, 0], [width, depth], [0, depth], [0, 0]]
+    outline = [[0, 0], [width, 0], [width, depth], [0, depth], [0, 0]]
     obstacles = [
         {"name": f"box {k}", "box": [a, b, 1.0], "pose": {"x": x, "y": y}} for k, (x, y, a, b) in enumerate(boxes)
     ]
-    return {"walls": [{"name": "around", "points": around, "thickness": 0.2}], "obstacles": obstacles}
+    return {"walls": [{"name": "outline", "points": outline, "thickness": 0.2}], "obstacles": obstacles}
 
 
 def _symmetric() -> dict[str, object]:
@@ -73,13 +73,13 @@ def _symmetric() -> dict[str, object]:
 
 
 def _corridor() -> dict[str, object]:
-    """Return a corridor of 30 m with a few boxes; a lidar with a range of 3.5 m sees only two walls mostly."""
+    """Return a corridor of 30 m with a few boxes; a lidar with a range of 3.5 m mostly sees only two walls."""
     niches = [(4.0, 0.3), (11.0, 2.7), (13.5, 0.3), (21.0, 2.7), (27.0, 0.3)]
     return _hall(30, 3, [(x, y, 0.8, 0.4) for x, y in niches])
 
 
 def _pillars() -> dict[str, object]:
-    """Return a hall of 18 x 14 m with equal pillars in rows, one of which is shifted."""
+    """Return a hall of 18 x 14 m with rows of equal pillars; one row is shifted."""
     boxes = [(x, y + (0.7 if x == 9 else 0), 0.4, 0.4) for x in range(3, 17, 3) for y in range(2, 13, 3)]
     return _hall(18, 14, boxes)
 
@@ -105,8 +105,8 @@ def shortest_paths(name: str) -> ShortestPaths:
 def drive(name: str, seed: int, seconds: float = 60.0) -> Array:
     """Return true poses (k, 3) at 10 Hz of a drive between random points, with at most 0.5 m/s and 1 rad/s."""
     corners = _corners(name, np.random.default_rng((seed, 1)))
-    before, goal = next(corners), next(corners)
-    pose, truth = Pose2(*before, float(np.arctan2(*(goal - before)[::-1]))), []
+    start, goal = next(corners), next(corners)
+    pose, truth = Pose2(*start, float(np.arctan2(*(goal - start)[::-1]))), []
     while len(truth) < seconds * 10:
         truth.append(pose)
         if np.hypot(*(goal - pose[:2])) < 0.1:
@@ -132,7 +132,7 @@ def _corners(name: str, rng: np.random.Generator) -> Iterator[Array]:
 
 
 def record(truth: Array, scene: RayScene) -> Recording:
-    """Return what wheels and lidar without errors measure at these true poses."""
+    """Return the recording of wheels and a lidar without errors at these true poses."""
     poses = [Pose2(*row) for row in truth]
     steps = np.array([Pose2(0, 0, 0), *(a.between(b) for a, b in pairwise(poses))])
     heading = (truth[:, 2:] + ANGLES).ravel()
@@ -142,7 +142,7 @@ def record(truth: Array, scene: RayScene) -> Recording:
 
 
 def moved_furniture(name: str, truth: Array, seed: int) -> RayScene:
-    """Return the scene of a world with random boxes that are not on the map, none of them on the robot's path."""
+    """Return the scene of a world with random unmapped boxes beside the robot's path."""
     built, rng = building(name), np.random.default_rng((seed, 2))
     low, high = built.world.bounds[:2], built.world.bounds[2:]
     boxes: list[tuple[float, float, float, float]] = []
@@ -156,8 +156,8 @@ def moved_furniture(name: str, truth: Array, seed: int) -> RayScene:
     return RayScene(merge_solids((*built.world.solids, *world_from_spec(spec, "more").solids)))
 
 
-def crowded(recording: Recording, seed: int, people: int = 6) -> Recording:
-    """Return the same drive with people that come and go, and with wheels that slip by up to 30 % for some seconds."""
+def with_people_and_slip(recording: Recording, seed: int, people: int = 6) -> Recording:
+    """Return the same drive with people that come and go, and with wheels that slip by up to 30 % at times."""
     rng, ranges = np.random.default_rng((seed, 3)), recording.ranges.copy()
     bearing, distance = rng.uniform(-np.pi, np.pi, people), rng.uniform(0.6, 2.5, people)
     phase, period = rng.uniform(0, 2 * np.pi, people), rng.uniform(8, 30, people)
@@ -179,12 +179,12 @@ def crowded(recording: Recording, seed: int, people: int = 6) -> Recording:
 
 CIRCUMSTANCES = {
     "known": "correct initial estimate with the default uncertainty",
-    "crowded": "the same with people, furniture that is not on the map, and wheels that slip by up to 30 %",
+    "crowded": "as known, with people, unmapped furniture, and wheels that slip by up to 30 %",
     "short": "as known, with a lidar range of 3.5 m instead of 12 m",
-    "short, crowded": "both",
+    "short, crowded": "as crowded, with a lidar range of 3.5 m",
     "wide": "initial estimate with standard deviations of 1 m and 46°, which the localizer knows",
     "unknown": "no initial estimate, 5000 particles",
-    "kidnapped": "moved elsewhere after 20 s, 5000 particles, recovery (0.001, 0.1)",
+    "kidnapped": "moved to another place after 20 s, 5000 particles, recovery (0.001, 0.1)",
 }
 """Names of the conditions of a drive, with their descriptions."""
 
@@ -243,6 +243,6 @@ def case(name: str, circumstance: str, model: str, seed: int) -> Case:
     if circumstance == "kidnapped":
         recording.steps[KIDNAPPED_ROW] = 0
     if "crowded" in circumstance:
-        recording = crowded(recording, seed)
+        recording = with_people_and_slip(recording, seed)
     range_max = 3.5 if "short" in circumstance else 12.0
     return Case(recording, estimate, Amcl.model_validate(changes), built.map.refined(0.05), range_max, seed)

@@ -24,14 +24,15 @@ def kidnapped(before: RoomDrive, after: RoomDrive) -> RoomDrive:
 
 
 REMOVED_BOXES = (6, 7, 9)
-"""Indices of the furniture in BOXES that is on the map, but no longer in the room."""
+"""Indices in BOXES of the furniture that is on the map, but not in the room."""
 ADDED_BOXES = np.array([
     (1.6, -0.3, 2.4, 0.4), (3.2, -3.2, 4.2, -2.6), (0.2, 1.2, 0.8, 1.6), (3.9, 2.2, 4.4, 3.0), (1.0, -3.9, 1.5, -3.4),
     (4.6, -1.5, 4.9, -0.5),
 ])  # fmt: skip
+"""min x, min y, max x, max y in m of the furniture that is in the room, but not on the map."""
 
 
-def crowded(path: RoomDrive, seed: int, people: int = 8) -> RoomDrive:
+def with_people_and_slip(path: RoomDrive, seed: int, people: int = 8) -> RoomDrive:
     """Return the same drive with moved furniture, people that come and go, and slipping wheels.
 
     People are 0.6 m wide and walk 0.5 to 3 m from the robot. Slipping wheels turn up to 30 % too far for some seconds.

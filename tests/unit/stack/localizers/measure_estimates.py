@@ -24,24 +24,24 @@ TEST_WORLDS = ("office", "warehouse", "clutter", "house coarse")
 Estimator = Callable[[Particles], Pose2]
 
 
-def near_the_best(particles: Particles) -> Pose2:
-    """Return the mean of the particles near (0.25 m, 10°) the best one of the heaviest cluster (Rekleitis 2004)."""
+def mean_near_best(particles: Particles) -> Pose2:
+    """Return the mean of the particles within 0.25 m and 10° of the best one of a cluster (Rekleitis 2004)."""
     labels = cluster_labels(bin_keys(particles.poses))
     heaviest = labels == np.bincount(labels, weights=particles.weights).argmax()
     center = particles.poses[np.where(heaviest, particles.weights, -1.0).argmax()]
-    near = pose_errors(center, particles.poses)
-    kept = heaviest & (np.hypot(near[:, 0], near[:, 1]) <= 0.25) & (np.abs(near[:, 2]) <= np.deg2rad(10))
-    return Pose2(*(center + particles.weights[kept] @ near[kept] / particles.weights[kept].sum()))
+    errors = pose_errors(center, particles.poses)
+    is_near = heaviest & (np.hypot(errors[:, 0], errors[:, 1]) <= 0.25) & (np.abs(errors[:, 2]) <= np.deg2rad(10))
+    return Pose2(*(center + particles.weights[is_near] @ errors[is_near] / particles.weights[is_near].sum()))
 
 
 def heaviest_mean(power: float) -> Estimator:
-    """Return an estimator: the mean of the heaviest cluster, with weights to this power; 1 as in nav2_amcl."""
+    """Return the estimator that weights the heaviest cluster by the weights to this power; nav2_amcl uses 1."""
 
     def estimate(particles: Particles) -> Pose2:
         labels = cluster_labels(bin_keys(particles.poses))
-        kept = labels == np.bincount(labels, weights=particles.weights).argmax()
-        x, y, yaw = particles.poses[kept].T
-        weights = (particles.weights[kept] / particles.weights[kept].max()) ** power
+        is_heaviest = labels == np.bincount(labels, weights=particles.weights).argmax()
+        x, y, yaw = particles.poses[is_heaviest].T
+        weights = (particles.weights[is_heaviest] / particles.weights[is_heaviest].max()) ** power
         weights /= weights.sum()
         return Pose2(weights @ x, weights @ y, np.arctan2(weights @ np.sin(yaw), weights @ np.cos(yaw)))
 
@@ -54,7 +54,7 @@ def shipped(peak_power: float) -> Estimator:
 
 
 ESTIMATORS: Mapping[str, Estimator] = {
-    "near the best": near_the_best,
+    "near the best": mean_near_best,
     "mean": heaviest_mean(1),
     "power 16": heaviest_mean(16),
     "shipped, power 4": shipped(4),
@@ -65,32 +65,32 @@ ESTIMATORS: Mapping[str, Estimator] = {
 
 
 def beliefs(drive: Case, estimators: Mapping[str, Estimator]) -> dict[str, Array]:
-    """Return the poses (k, 3) of each estimator during a drive: its last estimate, composed with later odometry."""
-    subject, latest, corrected = drive.localizer(), {}, False
+    """Return the poses (k, 3) of each estimator during a drive: the last estimate, moved by the odometry since then."""
+    localizer, latest, is_corrected = drive.localizer(), {}, False
 
     def apply_estimators(particles: Particles, peak_power: float) -> tuple[Pose2, Array]:
-        nonlocal corrected, latest
-        corrected, latest = True, {name: estimate(particles) for name, estimate in estimators.items()}
+        nonlocal is_corrected, latest
+        is_corrected, latest = True, {name: estimate(particles) for name, estimate in estimators.items()}
         return summarize(particles, peak_power)
 
-    found: dict[str, list[Pose2]] = {name: [] for name in estimators}
+    poses_by_name: dict[str, list[Pose2]] = {name: [] for name in estimators}
     anchors: dict[str, Pose2] = {}
     with mock.patch.object(particle_filter, "summarize", apply_estimators):
         for odometry, scan in drive.readings():
-            subject.on_odometry(odometry)
-            subject.on_scan(scan)
-            if corrected:
+            localizer.on_odometry(odometry)
+            localizer.on_scan(scan)
+            if is_corrected:
                 anchors = {name: pose.compose(odometry.pose.inverse()) for name, pose in latest.items()}
-                corrected = False
+                is_corrected = False
             for name, anchor in anchors.items():
-                found[name].append(anchor.compose(odometry.pose))
-    return {name: np.array(poses) for name, poses in found.items()}
+                poses_by_name[name].append(anchor.compose(odometry.pose))
+    return {name: np.array(poses) for name, poses in poses_by_name.items()}
 
 
-def figures(believed: Array, truth: Array) -> tuple[float, float, float]:
-    """Return RMSE and largest error in m, and the number of jumps of the belief by more than 1 m."""
-    distance = np.hypot(*(believed - truth)[:, :2].T)
-    jumps = np.hypot(*np.diff(believed[:, :2], axis=0).T) > 1
+def figures(estimates: Array, truth: Array) -> tuple[float, float, float]:
+    """Return the RMSE in m, the largest error in m, and the number of jumps of the estimate by more than 1 m."""
+    distance = np.hypot(*(estimates - truth)[:, :2].T)
+    jumps = np.hypot(*np.diff(estimates[:, :2], axis=0).T) > 1
     return float(np.sqrt(np.mean(distance**2))), float(distance.max()), float(jumps.sum())
 
 
@@ -100,8 +100,8 @@ def measure(worlds: Iterable[str], circumstance: str, model: str, seeds: Iterabl
     for world in worlds:
         for seed in seeds:
             drive = case(world, circumstance, model, seed)
-            for name, believed in beliefs(drive, ESTIMATORS).items():
-                rows[name].append(figures(believed, drive.recording.truth))
+            for name, estimates in beliefs(drive, ESTIMATORS).items():
+                rows[name].append(figures(estimates, drive.recording.truth))
     return {name: np.array(row) for name, row in rows.items()}
 
 
@@ -112,8 +112,8 @@ def main() -> None:
             for circumstance in CIRCUMSTANCES:
                 print(f"\n{', '.join(worlds)}: {model}, {circumstance}")
                 for name, rows in measure(worlds, circumstance, model, range(1, 2 if model == "beam" else 5)).items():
-                    (rmse, most, _), worst = rows.mean(axis=0), rows[:, 1].max()
-                    print(f"  {name:14} RMSE {rmse:.3f} m, largest error {most:.2f} m (worst drive {worst:.2f}), "
+                    (rmse, largest, _), worst = rows.mean(axis=0), rows[:, 1].max()
+                    print(f"  {name:14} RMSE {rmse:.3f} m, largest error {largest:.2f} m (worst drive {worst:.2f}), "
                           f"{np.sum(rows[:, 1] > 1)} of {len(rows)} ever more than 1 m off, {rows[:, 2].sum():.0f} "
                           "jumps of more than 1 m", flush=True)  # fmt: skip
 

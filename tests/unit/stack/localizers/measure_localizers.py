@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from hard_drives import crowded, kidnapped
+from hard_drives import kidnapped, with_people_and_slip
 
 from simscen.core.geometry import Array, Pose2
 from simscen.core.geometry.kinematics import Twist
@@ -44,10 +44,10 @@ RECOVERING = Amcl(
 )
 RECOVERING_PROB = RECOVERING.model_copy(update={"laser_model_type": "likelihood_field_prob"})
 EXACT_EKF = Ekf(type="ekf", translation_noise=0.01, rotation_noise=0.01, gyro_noise=0.002)
-# Noise parameters of a well-tuned filter: motion noise near that of the wheels, and hits as exact as the map's cells.
+# Noise parameters of a well-tuned filter: the motion noise of the wheels, and the accuracy of the cells of the map.
 TUNED = PROB.model_copy(update={"alpha1": 1e-3, "alpha2": 1e-3, "alpha3": 1e-3, "alpha4": 1e-3, "sigma_hit": 0.05})
 FOUND_M, FOUND_RAD = 0.25, 0.25
-"""Errors of position and heading below which a robot is found."""
+"""Errors of position and heading below which a robot counts as found."""
 START_STD = np.array([0.1, 0.1, 0.05])
 """Standard deviations of the initial estimate (m, m, rad)."""
 
@@ -74,8 +74,8 @@ def tracking(
     squares, consistency, path = [], [], drive(seconds)
     for seed in seeds:
         start = Pose2(*(path.truth[0] + np.random.default_rng((seed, 3)).normal(0, START_STD)))
-        subject = build_localizer(spec, Estimate(start, tuple(START_STD)), seed)
-        beliefs = run_localizer(subject, path, seed, noise, imu=imu)
+        localizer = build_localizer(spec, Estimate(start, tuple(START_STD)), seed)
+        beliefs = run_localizer(localizer, path, seed, noise, imu=imu)
         error = pose_errors(beliefs, path.truth)
         times = np.linspace(0.25, 1, 25) * (len(error) - 1)
         squares.append((np.mean(error[:, 0] ** 2 + error[:, 1] ** 2), np.mean(error[:, 2] ** 2)))
@@ -86,7 +86,11 @@ def tracking(
 
 @dataclass(frozen=True, eq=False)
 class Relocalization:
-    """For n runs: whether the robot was found and stayed so for the last second, and the time in s until then."""
+    """Results of n runs.
+
+    found: whether the localizer had found the robot by the last second, and did not lose the robot again (n,)
+    seconds: time until the errors stayed small, in s (n,)
+    """
 
     found: "np.ndarray[tuple[int, ...], np.dtype[np.bool_]]"
     seconds: Array
@@ -95,7 +99,7 @@ class Relocalization:
 def relocalization(
     spec: Spec, seeds: Iterable[int], drives: "dict[int, tuple[RoomDrive, Estimate]]", begin: float = 0.0
 ) -> Relocalization:
-    """Run a localizer with each seed on the drive, and from the initial estimate, of this seed.
+    """Run a localizer with each seed on the drive and from the initial estimate of this seed.
 
     Times are measured from `begin` (s).
     """
@@ -110,11 +114,11 @@ def relocalization(
     return Relocalization(found.astype(np.bool_), seconds)
 
 
-def among_people(spec: Spec, seeds: Iterable[int], seconds: float = 60.0) -> Array:
+def errors_among_people(spec: Spec, seeds: Iterable[int], seconds: float = 60.0) -> Array:
     """Return RMSE and largest error (n, 2) in m for drives with people, moved furniture, slip, and a known start."""
     rows = []
     for seed in seeds:
-        path = crowded(drive(seconds, seed % 12), seed)
+        path = with_people_and_slip(drive(seconds, seed % 12), seed)
         start = Estimate(Pose2(*path.truth[0]), tuple(START_STD))
         beliefs = run_localizer(build_localizer(spec, start, seed), path, seed)
         distance = np.hypot(*pose_errors(beliefs, path.truth)[:, :2].T)
@@ -140,7 +144,7 @@ def global_start(spec: Spec, seeds: Iterable[int]) -> Relocalization:
 
 
 def kidnapping(spec: Spec, seeds: Iterable[int]) -> Relocalization:
-    """Return the results for a robot that is moved elsewhere in the room after 10 s, and drives for another 60 s."""
+    """Return the results for a robot that is moved to another place after 10 s, and drives for another 60 s."""
     drives = {}
     for seed in seeds:
         path = kidnapped(drive(10.0, seed % 12), drive(60.0, (seed + 5) % 12))
@@ -151,12 +155,12 @@ def kidnapping(spec: Spec, seeds: Iterable[int]) -> Relocalization:
 def update_cost(spec: Amcl, particles: int) -> float:
     """Return the wall time in ms of one update by a scan with this number of particles, as median of 100."""
     path = drive(20.0)
-    fixed = spec.model_copy(update={"min_particles": particles, "max_particles": particles})
-    subject, costs = build_localizer(fixed, Estimate(Pose2(*path.truth[0])), 1), []
+    fixed_spec = spec.model_copy(update={"min_particles": particles, "max_particles": particles})
+    localizer, costs = build_localizer(fixed_spec, Estimate(Pose2(*path.truth[0])), 1), []
     for tick in range(100):
-        subject.on_odometry(Odometry("odom", tick, Pose2(0.0, 0.0, 0.25 * (tick % 2)), Twist()))
+        localizer.on_odometry(Odometry("odom", tick, Pose2(0.0, 0.0, 0.25 * (tick % 2)), Twist()))
         start = time.perf_counter()
-        subject.on_scan(scan(path.ranges[0], tick))
+        localizer.on_scan(scan(path.ranges[0], tick))
         costs.append(time.perf_counter() - start)
     return float(np.median(costs)) * 1e3
 
@@ -170,16 +174,17 @@ def main() -> None:
 
 
 def print_among_people(seeds: Iterable[int]) -> None:
-    """Print the errors of robots that are not lost, with and without recovery, if map and odometry are wrong."""
+    """Print the errors with and without recovery, if the start is known and map and odometry are wrong."""
     many = PROB.model_copy(update={"max_particles": 5000})
     for name, spec in (("amcl", MANY), ("recovery", RECOVERING), ("prob", many), ("prob, recovery", RECOVERING_PROB)):
-        rmse, most = among_people(spec, seeds).T
-        print(f"among people, {name}: RMSE {rmse.mean():.2f} m (worst {rmse.max():.2f}), at most {most.max():.2f} m, "
-              f"{np.sum(most > 1)} of {len(most)} ever more than 1 m off", flush=True)  # fmt: skip
+        rmse, largest = errors_among_people(spec, seeds).T
+        print(f"among people, {name}: RMSE {rmse.mean():.2f} m (worst {rmse.max():.2f}), "
+              f"at most {largest.max():.2f} m, {np.sum(largest > 1)} of {len(largest)} ever more than 1 m off",
+              flush=True)  # fmt: skip
 
 
 def print_costs() -> None:
-    """Print how long one update takes."""
+    """Print the wall time of one update."""
     for spec in (SUM, PROB, BEAM):
         cost = " and ".join(f"{update_cost(spec, n):.2f} ms with {n}" for n in (500, 2000))
         print(f"an update, {spec.laser_model_type}, 60 beams: {cost} particles", flush=True)

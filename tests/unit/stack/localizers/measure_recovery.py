@@ -1,6 +1,6 @@
 """Measure the effect of the recovery threshold of AMCL: `python tests/unit/stack/localizers/measure_recovery.py`.
 
-The threshold is the fraction of random poses that must explain recent scans better before particles are added.
+Random particles are added only if at least this fraction of random poses explains recent scans better.
 """
 
 import sys
@@ -25,11 +25,11 @@ FOUND_M, FINAL_ROWS = 0.5, 50
 
 def position_errors(drive: Case) -> Array:
     """Return the distances (k,) in m of the belief from the true position."""
-    subject, beliefs = drive.localizer(), []
+    localizer, beliefs = drive.localizer(), []
     for odometry, scan in drive.readings():
-        subject.on_odometry(odometry)
-        subject.on_scan(scan)
-        beliefs.append(subject.belief.pose)
+        localizer.on_odometry(odometry)
+        localizer.on_scan(scan)
+        beliefs.append(localizer.belief.pose)
     error: Array = np.hypot(*(np.array(beliefs) - drive.recording.truth)[:, :2].T)
     return error
 
@@ -41,16 +41,16 @@ def drives(circumstance: str, model: str, seeds: Iterable[int], buildings: Seque
 
 
 def main() -> None:
-    """Print for each threshold how many robots are found that are lost, and the errors of robots that are not."""
+    """Print for each threshold how many lost robots are found, and the errors of robots with a known start."""
     for model in ("likelihood_field", "likelihood_field_prob"):
         sets = {name: drives(name, model, range(11, 15)) for name in ("kidnapped", "unknown", "crowded")}
         for threshold in THRESHOLDS:
             with mock.patch.object(augmented_mcl, "MIN_BETTER_FRACTION", threshold):
                 found = {
-                    name: sum(bool((position_errors(one)[-FINAL_ROWS:] < FOUND_M).all()) for one in sets[name])
+                    name: sum(bool((position_errors(drive)[-FINAL_ROWS:] < FOUND_M).all()) for drive in sets[name])
                     for name in ("kidnapped", "unknown")
                 }
-                errors = [position_errors(one) for one in sets["crowded"]]
+                errors = [position_errors(drive) for drive in sets["crowded"]]
             rmse = np.array([np.sqrt(np.mean(error**2)) for error in errors])
             print(f"{model}, {threshold:.0%}: kidnapped {found['kidnapped']}, unknown {found['unknown']} of "
                   f"{len(errors)} found; among people RMSE {rmse.mean():.3f} m (worst {rmse.max():.2f}), "

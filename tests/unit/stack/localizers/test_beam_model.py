@@ -1,4 +1,4 @@
-"""Tests of the beam model: ray casting, and weights of table 6.1."""
+"""Tests of the beam model: ray casting, and the likelihood of Table 6.1 of Probabilistic Robotics."""
 
 import math
 
@@ -14,28 +14,28 @@ from simscen.testing.synthetic_room import BEAMS, cast, drive, grid, scan
 MOUNT = Pose2(0.15, -0.1, 0.5)
 
 
-def stepped(room: OccupancyGrid, pose: Pose2, angle: float, limit: float) -> float:
-    """A ray followed in steps of a millimeter until its cell is not free."""
-    reach = np.arange(0, limit, 0.001)
-    points = np.column_stack((pose.x + reach * math.cos(angle), pose.y + reach * math.sin(angle)))
+def range_by_steps(room: OccupancyGrid, pose: Pose2, angle: float, limit: float) -> float:
+    """Return the distance to the first cell that is not free, found by steps of 1 mm along a ray."""
+    distances = np.arange(0, limit, 0.001)
+    points = np.column_stack((pose.x + distances * math.cos(angle), pose.y + distances * math.sin(angle)))
     hit = np.flatnonzero(room.values_at(points) != FREE)
-    return float(reach[hit[0]]) if len(hit) else limit
+    return float(distances[hit[0]]) if len(hit) else limit
 
 
 @pytest.mark.parametrize("limit", [12.0, 2.0])
-def test_rays_equal_steps_of_a_millimeter(limit: float) -> None:
+def test_cast_rays_equal_steps_of_a_millimeter(limit: float) -> None:
     field = opaque_field(grid(), 100.0)
     beams = select_beams(scan(np.full(BEAMS, 1.0), mount=MOUNT), 40, -1, limit)
     poses = drive(60.0).truth[::400]
     ranges = cast_rays(field, poses, beams)
     for pose, row in zip(poses, ranges, strict=True):
         lidar = Pose2(*pose).compose(MOUNT)
-        exact = [stepped(grid(), lidar, pose[2] + bearing, limit) for bearing in beams.bearings]
-        # A ray may graze a corner within half a cell and pass; nothing else may differ by more.
+        exact = [range_by_steps(grid(), lidar, pose[2] + bearing, limit) for bearing in beams.bearings]
+        # A few rays that graze a corner may differ by more than half a cell.
         assert np.quantile(np.abs(row - exact), 0.97) <= 0.5 * 0.05 + 1e-3
 
 
-def test_unknown_cells_and_the_end_of_the_map_stop_a_ray() -> None:
+def test_rays_end_at_unknown_cells_and_at_the_border_of_the_map() -> None:
     cells = np.full((10, 20), FREE, dtype=np.int8)
     cells[:, 15:] = UNKNOWN
     field = opaque_field(OccupancyGrid(cells, 0.1), 100.0)
@@ -49,7 +49,7 @@ def test_particle_outside_the_map_has_zero_ranges() -> None:
     assert (cast_rays(opaque_field(grid(), 100.0), np.array([[50.0, 1e6, 0.0]]), beams) == 0).all()
 
 
-def test_weights_are_those_of_the_four_cases_worked_out_by_hand() -> None:
+def test_likelihood_equals_the_mixture_of_the_four_cases_computed_by_hand() -> None:
     model = BeamModel(opaque_field(grid(), 100.0), 0.5, 0.05, 0.05, 0.5, 0.2, 0.1)
     pose = np.array([[-2.5, -1.8, 0.6]])
     ranges = cast(pose, -np.pi + np.pi / 180 * np.arange(BEAMS))[0]

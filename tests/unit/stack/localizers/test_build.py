@@ -17,12 +17,14 @@ from simscen.stack.protocols import Localizer, Surroundings
 from simscen.stack.setting import Setting
 from simscen.testing.synthetic_room import ROBOT, surroundings
 
-HERE = Estimate(Pose2(0, 0, 0))
+ESTIMATE = Estimate(Pose2(0, 0, 0))
 
 
-def built(spec: model.LocalizerSpec, around: Surroundings) -> Localizer:
-    made: Localizer = spec.implementation()(spec, Setting(around, "localizer", Streams(1), estimate=HERE))
-    return made
+def build_localizer(spec: model.LocalizerSpec, robot_surroundings: Surroundings) -> Localizer:
+    localizer: Localizer = spec.implementation()(
+        spec, Setting(robot_surroundings, "localizer", Streams(1), estimate=ESTIMATE)
+    )
+    return localizer
 
 
 @pytest.mark.parametrize(
@@ -34,24 +36,24 @@ def built(spec: model.LocalizerSpec, around: Surroundings) -> Localizer:
         (model.OdometryOnly(type="odometry"), DeadReckoning),
     ],
 )
-def test_each_type_becomes_its_localizer(spec: model.LocalizerSpec, kind: type) -> None:
-    assert isinstance(built(spec, surroundings()), kind)
+def test_each_type_of_specification_builds_its_localizer(spec: model.LocalizerSpec, kind: type) -> None:
+    assert isinstance(build_localizer(spec, surroundings()), kind)
 
 
-def test_without_a_map_amcl_is_dead_reckoning() -> None:
-    assert isinstance(built(model.Amcl(), replace(surroundings(), map=None)), DeadReckoning)
+def test_amcl_without_a_map_is_dead_reckoning() -> None:
+    assert isinstance(build_localizer(model.Amcl(), replace(surroundings(), map=None)), DeadReckoning)
 
 
 @pytest.mark.parametrize(
-    ("robot_model", "holonomic", "strafes"),
+    ("robot_model", "holonomic", "is_omni"),
     [(None, False, False), (None, True, True), ("omni", False, True), ("differential", True, False)],
 )
-def test_the_motion_model_is_that_of_the_drive_unless_it_is_named(
-    robot_model: str | None, holonomic: bool, strafes: bool
+def test_motion_model_is_robot_model_or_else_that_of_the_drive(
+    robot_model: str | None, holonomic: bool, is_omni: bool
 ) -> None:
-    """alpha5 is the noise of strafing: it shows in the covariance of the omni model only."""
+    """Only the omni model uses alpha5, the noise of lateral motion."""
     spec = model.Amcl(alpha1=0, alpha2=0, alpha3=0, alpha4=0, alpha5=1.0, robot_model=robot_model)  # type: ignore[arg-type]
-    subject = built(spec, replace(surroundings(), robot=replace(ROBOT, holonomic=holonomic)))
-    assert isinstance(subject, AmclLocalizer)
-    grow_covariance = subject._motion.propagate(np.zeros((3, 3)), 0.0, Pose2(0.3, 0, 0))
-    assert (grow_covariance[1, 1] > 0) == strafes
+    localizer = build_localizer(spec, replace(surroundings(), robot=replace(ROBOT, holonomic=holonomic)))
+    assert isinstance(localizer, AmclLocalizer)
+    covariance = localizer._motion.propagate(np.zeros((3, 3)), 0.0, Pose2(0.3, 0, 0))
+    assert (covariance[1, 1] > 0) == is_omni

@@ -28,43 +28,43 @@ def odometry(tick: int, pose: Pose2) -> Odometry:
 
 
 @pytest.mark.parametrize("imu", [False, True])
-def test_without_noise_the_pose_is_exact(imu: bool) -> None:
-    way = drive(30.0)
-    subject = ekf(SPEC, Estimate(Pose2(*way.truth[0]), (0.0, 0.0, 0.0)))
-    assert np.abs(pose_errors(run_localizer(subject, way, 1, NOISELESS, imu=imu), way.truth)).max() < 1e-4
+def test_pose_without_noise_is_exact(imu: bool) -> None:
+    log = drive(30.0)
+    localizer = ekf(SPEC, Estimate(Pose2(*log.truth[0]), (0.0, 0.0, 0.0)))
+    assert np.abs(pose_errors(run_localizer(localizer, log, 1, NOISELESS, imu=imu), log.truth)).max() < 1e-4
 
 
 def test_a_precise_gyroscope_corrects_the_heading_of_the_wheels() -> None:
-    subject = ekf(Ekf(type="ekf", rotation_noise=0.5, gyro_noise=1e-4, gyro_bias=0.0), Estimate(Pose2(0, 0, 0)))
-    subject.on_odometry(odometry(0, Pose2(0, 0, 0)))
-    subject.on_imu(Imu("imu", 6, (0.0, 0.0, 0.0), (0.0, 0.0, 9.81)))
-    subject.on_odometry(odometry(6, Pose2(0.1, 0.0, 0.3)))
-    assert abs(subject.belief.pose.yaw) < 0.01
+    localizer = ekf(Ekf(type="ekf", rotation_noise=0.5, gyro_noise=1e-4, gyro_bias=0.0), Estimate(Pose2(0, 0, 0)))
+    localizer.on_odometry(odometry(0, Pose2(0, 0, 0)))
+    localizer.on_imu(Imu("imu", 6, (0.0, 0.0, 0.0), (0.0, 0.0, 9.81)))
+    localizer.on_odometry(odometry(6, Pose2(0.1, 0.0, 0.3)))
+    assert abs(localizer.belief.pose.yaw) < 0.01
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("imu", [False, True])
 def test_the_covariance_agrees_with_the_error(imu: bool) -> None:
     """The average NEES lies within the 99.9 % bounds of a consistent filter with three degrees of freedom."""
-    way, values = drive(10.0), []
+    log, values = drive(10.0), []
     for seed in range(700, 750):
-        start = Pose2(*(way.truth[0] + np.random.default_rng((seed, 3)).normal(0, STD)))
-        beliefs = run_localizer(ekf(SPEC, Estimate(start, (STD[0], STD[1], STD[2]))), way, seed, AS_SPECIFIED, imu=imu)
-        values.append(nees(beliefs[-1], pose_errors(beliefs, way.truth)[-1]))
+        start = Pose2(*(log.truth[0] + np.random.default_rng((seed, 3)).normal(0, STD)))
+        beliefs = run_localizer(ekf(SPEC, Estimate(start, (STD[0], STD[1], STD[2]))), log, seed, AS_SPECIFIED, imu=imu)
+        values.append(nees(beliefs[-1], pose_errors(beliefs, log.truth)[-1]))
     low, high = stats.chi2.ppf([0.0005, 0.9995], 3 * len(values))
     assert low < np.sum(values) < high
 
 
-def test_standing_still_reveals_the_bias_of_the_gyroscope() -> None:
-    subject = ekf(SPEC, Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
+def test_gyroscope_bias_is_estimated_at_standstill() -> None:
+    localizer = ekf(SPEC, Estimate(Pose2(0, 0, 0), (0.0, 0.0, 0.0)))
     for k in range(400):
-        subject.on_imu(Imu("imu", 6 * k, (0.0, 0.0, 0.004), (0.0, 0.0, 9.81)))
-        subject.on_odometry(odometry(6 * k, Pose2(0, 0, 0)))
-    assert abs(subject.belief.pose.yaw) < 1e-3
+        localizer.on_imu(Imu("imu", 6 * k, (0.0, 0.0, 0.004), (0.0, 0.0, 9.81)))
+        localizer.on_odometry(odometry(6 * k, Pose2(0, 0, 0)))
+    assert abs(localizer.belief.pose.yaw) < 1e-3
 
 
-def test_standing_still_does_not_make_the_covariance_singular() -> None:
-    subject = ekf(SPEC, Estimate(Pose2(0, 0, 0), (0.1, 0.1, 0.1)))
+def test_covariance_at_standstill_is_not_singular() -> None:
+    localizer = ekf(SPEC, Estimate(Pose2(0, 0, 0), (0.1, 0.1, 0.1)))
     for k in range(100):
-        subject.on_odometry(odometry(6 * k, Pose2(0, 0, 0)))
-    assert np.linalg.eigvalsh(subject.belief.covariance).min() > 0
+        localizer.on_odometry(odometry(6 * k, Pose2(0, 0, 0)))
+    assert np.linalg.eigvalsh(localizer.belief.covariance).min() > 0

@@ -1,4 +1,4 @@
-"""The filters of filterpy are imported without scipy.stats, and work completely."""
+"""Test that the filters of filterpy are imported without scipy.stats, which is imported at its first use."""
 
 import math
 import subprocess
@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-BEFORE = """
+IMPORT_CODE = """
 import sys
 from simscen.stack.localizers.kalman_filters import KalmanFilter
 print("scipy.stats" in sys.modules, "filterpy.stats" in sys.modules)
@@ -24,7 +24,7 @@ print("scipy.stats" in sys.modules, "filterpy.stats" in sys.modules)
     ids=["likelihood", "attribute", "import"],
 )
 def test_scipy_stats_is_not_imported_before_the_first_use_of_statistics(code: str) -> None:
-    done = subprocess.run([sys.executable, "-c", BEFORE + code], check=True, capture_output=True, text=True)
-    imported, value = done.stdout.splitlines()
-    assert imported == "False False"
-    assert float(value) == pytest.approx(-0.5 * (math.log(2 * math.pi) + 1))  # of N(1; 0, 1)
+    process = subprocess.run([sys.executable, "-c", IMPORT_CODE + code], check=True, capture_output=True, text=True)
+    imported_modules, value = process.stdout.splitlines()
+    assert imported_modules == "False False"
+    assert float(value) == pytest.approx(-0.5 * (math.log(2 * math.pi) + 1))  # log of N(1; 0, 1)

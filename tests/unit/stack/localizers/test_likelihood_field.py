@@ -27,7 +27,7 @@ def beams_at(pose: Pose2, mount: Pose2 = Pose2(0.1, 0.05, 0.3)) -> Beams:
 
 
 def probabilities(room: OccupancyGrid, pose: Pose2, beams: Beams) -> list[float]:
-    """Table 6.3, one beam after the other, with distances searched by hand."""
+    """Return the probability of each beam by Table 6.3 of Probabilistic Robotics, with distances by brute force."""
     centers = room.center_of(np.argwhere(surfaces(room.cells == OCCUPIED)))
     result = []
     for end in pose.apply(beams.ends.view(np.float64).reshape(-1, 2)):
@@ -39,9 +39,9 @@ def probabilities(room: OccupancyGrid, pose: Pose2, beams: Beams) -> list[float]
     return result
 
 
-@pytest.mark.parametrize("turned", [0.0, 0.7])
-def test_both_models_agree_with_the_formulas_worked_out_by_hand(turned: float) -> None:
-    room = OccupancyGrid(grid().cells, 0.05, Pose2(*grid().origin[:2], turned))
+@pytest.mark.parametrize("map_yaw", [0.0, 0.7])
+def test_both_models_equal_the_formulas_for_each_beam(map_yaw: float) -> None:
+    room = OccupancyGrid(grid().cells, 0.05, Pose2(*grid().origin[:2], map_yaw))
     field, beams = obstacle_field(room, 2.0), beams_at(POSE)
     poses = np.random.default_rng(4).normal(POSE, (1.5, 1.5, 1.0), (6, 3))
     expected = [probabilities(room, Pose2(*pose), beams) for pose in poses]
@@ -58,49 +58,48 @@ def test_the_true_pose_is_likelier_than_poses_around_it() -> None:
         assert model.log_likelihood(np.array(POSE) + steps, beams, False).argmax() == steps.index((0, 0, 0))
 
 
-def test_beam_end_inside_a_solid_is_unlikely() -> None:
+def test_surfaces_exclude_the_inner_cells_of_solids() -> None:
     solid = np.zeros((8, 9), dtype=np.bool_)
     solid[2:7, 3:8] = True
     solid[0, :] = True
-    found = surfaces(solid)
-    assert not found[3:6, 4:7].any()
-    assert found.sum() == 16 + 9
+    surface_cells = surfaces(solid)
+    assert not surface_cells[3:6, 4:7].any()
+    assert surface_cells.sum() == 16 + 9
 
 
 def test_beams_without_a_hit_have_no_effect() -> None:
     poses = np.random.default_rng(1).normal(POSE, 1.0, (20, 3))
-    blind = select_beams(scan(np.full(BEAMS, np.inf)), 60, -1, 100)
+    beams = select_beams(scan(np.full(BEAMS, np.inf)), 60, -1, 100)
     field = obstacle_field(grid(), 2.0)
     for model in (LikelihoodField(field, Z_HIT, Z_RAND, SIGMA), LikelihoodFieldProb(field, Z_HIT, Z_RAND, SIGMA)):
-        assert (model.log_likelihood(poses, blind, False) == 0).all()
+        assert (model.log_likelihood(poses, beams, False) == 0).all()
 
 
-def crowded() -> tuple[Beams, np.ndarray]:
-    """A scan in which a person hides a third of the walls, and particles close around the truth."""
+def scan_with_person() -> tuple[Beams, np.ndarray]:
+    """Return a scan in which a person hides a third of the walls, and particles near the true pose."""
     ranges = cast(np.array([POSE]), -np.pi + np.pi / 180 * np.arange(BEAMS))[0]
     ranges[60:180] = np.minimum(ranges[60:180], 0.4)
     return select_beams(scan(ranges), 60, -1, 100), np.random.default_rng(2).normal(POSE, (0.05, 0.05, 0.03), (300, 3))
 
 
 def test_beam_skipping_ignores_beams_that_few_particles_explain() -> None:
-    beams, poses = crowded()
+    beams, poses = scan_with_person()
     field, skipping = obstacle_field(grid(), 2.0), BeamSkipping(0.5, 0.3, 0.9)
-    skipped = LikelihoodFieldProb(field, Z_HIT, Z_RAND, SIGMA, skipping).log_likelihood(poses, beams, True)
-    near = Z_HIT * math.exp(-(0.5**2) / (2 * SIGMA**2)) + Z_RAND / beams.range_max
-    explained = (
-        np.mean([np.array(probabilities(grid(), Pose2(*pose), beams)) > near for pose in poses[:9]], axis=0) > 0.3
-    )
-    kept = Beams(beams.ranges[explained], beams.unit_vectors[explained], beams.origin, beams.range_max)
-    plain = LikelihoodFieldProb(field, Z_HIT, Z_RAND, SIGMA).log_likelihood(poses, kept, True)
-    assert 0 < len(kept.ranges) < 60
-    assert np.allclose(skipped, plain)
+    with_skipping = LikelihoodFieldProb(field, Z_HIT, Z_RAND, SIGMA, skipping).log_likelihood(poses, beams, True)
+    min_probability = Z_HIT * math.exp(-(0.5**2) / (2 * SIGMA**2)) + Z_RAND / beams.range_max
+    rows = [np.array(probabilities(grid(), Pose2(*pose), beams)) for pose in poses[:9]]
+    is_explained = np.mean(np.array(rows) > min_probability, axis=0) > 0.3
+    explained_beams = Beams(beams.ranges[is_explained], beams.unit_vectors[is_explained], beams.origin, beams.range_max)
+    without_skipping = LikelihoodFieldProb(field, Z_HIT, Z_RAND, SIGMA).log_likelihood(poses, explained_beams, True)
+    assert 0 < len(explained_beams.ranges) < 60
+    assert np.allclose(with_skipping, without_skipping)
 
 
 def test_beam_skipping_needs_convergence_and_is_off_with_too_many_outliers() -> None:
-    beams, poses = crowded()
+    beams, poses = scan_with_person()
     field = obstacle_field(grid(), 2.0)
-    plain = LikelihoodFieldProb(field, Z_HIT, Z_RAND, SIGMA).log_likelihood(poses, beams, True)
-    careful = LikelihoodFieldProb(field, Z_HIT, Z_RAND, SIGMA, BeamSkipping(0.5, 0.3, 0.9))
+    without_skipping = LikelihoodFieldProb(field, Z_HIT, Z_RAND, SIGMA).log_likelihood(poses, beams, True)
+    tolerant = LikelihoodFieldProb(field, Z_HIT, Z_RAND, SIGMA, BeamSkipping(0.5, 0.3, 0.9))
     strict = LikelihoodFieldProb(field, Z_HIT, Z_RAND, SIGMA, BeamSkipping(0.5, 0.3, 0.1))
-    assert np.array_equal(careful.log_likelihood(poses, beams, False), plain)
-    assert np.array_equal(strict.log_likelihood(poses, beams, True), plain)
+    assert np.array_equal(tolerant.log_likelihood(poses, beams, False), without_skipping)
+    assert np.array_equal(strict.log_likelihood(poses, beams, True), without_skipping)

@@ -1,4 +1,4 @@
-"""Tests of plans of cars and long hulls."""
+"""Tests of plans over poses, for cars and long robots."""
 
 from dataclasses import replace
 
@@ -26,59 +26,60 @@ def hall(*boxes: tuple[float, float, float, float], robot: RobotModel = CAR) -> 
     return LayeredCostmap(CostmapSpec(), Surroundings(robot, world.grid((-0.5, -0.5, 9.5, 6.5)), TICK_RATE_HZ)).view
 
 
-def planned(view: CostmapView, start: Pose2, goal: Pose2, robot: RobotModel = CAR, **options: object) -> np.ndarray:
+def plan_points(view: CostmapView, start: Pose2, goal: Pose2, robot: RobotModel = CAR, **options: object) -> np.ndarray:
     return ompl_planner(Spec(max_iterations=5000, **options), setting(robot)).plan(view, start, goal, 1).points
 
 
-def hits(view: CostmapView, points: np.ndarray, robot: RobotModel = CAR) -> np.ndarray:
+def in_collision(view: CostmapView, points: np.ndarray, robot: RobotModel = CAR) -> np.ndarray:
+    """Return which of the poses (n, 3) collide."""
     return ~Footprint(robot, view.resolution).free(view, points)
 
 
-def test_a_goal_where_only_the_inscribed_circle_fits_is_moved_to_where_the_hull_does() -> None:
+def test_goal_at_which_only_the_inscribed_circle_fits_is_moved_until_the_hull_fits() -> None:
     view, goal = hall(), Pose2(8.7, 3.0, 0.0)  # 0.3 m from a wall; the nose is 0.45 m ahead
-    assert hits(view, np.array([goal]))[0]
-    points = planned(view, Pose2(2.0, 2.0, 0.0), goal)
-    assert not hits(view, points).any()
+    assert in_collision(view, np.array([goal]))[0]
+    points = plan_points(view, Pose2(2.0, 2.0, 0.0), goal)
+    assert not in_collision(view, points).any()
     assert np.hypot(*(points[-1, :2] - goal[:2])) <= 0.5 and points[-1, 2] == pytest.approx(0.0, abs=1e-6)
-    with pytest.raises(NavigationFailure) as failed:
-        planned(view, Pose2(2.0, 2.0, 0.0), goal, tolerance=0.1)
-    assert failed.value.code is ErrorCode.GOAL_OCCUPIED
+    with pytest.raises(NavigationFailure) as failure:
+        plan_points(view, Pose2(2.0, 2.0, 0.0), goal, tolerance=0.1)
+    assert failure.value.code is ErrorCode.GOAL_OCCUPIED
 
 
 @pytest.mark.parametrize("start", [Pose2(8.62, 3.0, 0.0), Pose2(3.0, 0.26, 0.15)])
 def test_plan_of_a_car_in_contact_leads_away_from_the_obstacle(start: Pose2) -> None:
-    """The nose in a wall, and a flank along one: it was START_OCCUPIED at once."""
+    """The front or the side of the car touches a wall. Regression: planning failed with START_OCCUPIED."""
     view = hall()
     footprint = Footprint(CAR, view.resolution)
-    points = planned(view, start, Pose2(2.0, 4.0, 0.0))
-    touching = hits(view, points)
-    away = int(np.argmin(touching))
-    assert touching[0] and not touching[away:].any() and points[0] == pytest.approx(start)
-    assert np.hypot(*np.diff(points[: away + 1, :2], axis=0).T).sum() <= 0.55
-    rooms = footprint.clearance(view, points[: away + 1])
-    assert rooms.min() > rooms[0] - 0.02  # no deeper on the way
+    points = plan_points(view, start, Pose2(2.0, 4.0, 0.0))
+    is_touching = in_collision(view, points)
+    first_free = int(np.argmin(is_touching))
+    assert is_touching[0] and not is_touching[first_free:].any() and points[0] == pytest.approx(start)
+    assert np.hypot(*np.diff(points[: first_free + 1, :2], axis=0).T).sum() <= 0.55
+    clearances = footprint.clearance(view, points[: first_free + 1])
+    assert clearances.min() > clearances[0] - 0.02  # the overlap does not increase
 
 
-def test_a_holonomic_long_hull_is_led_away_sideways() -> None:
+def test_omnidirectional_robot_in_contact_leaves_the_wall() -> None:
     view = hall(robot=OMNI)
-    points = planned(view, Pose2(3.0, 0.18, 0.0), Pose2(3.0, 4.0, 0.0), OMNI)
-    touching = hits(view, points, OMNI)
-    assert touching[0] and not touching[int(np.argmin(touching)) :].any()
+    points = plan_points(view, Pose2(3.0, 0.18, 0.0), Pose2(3.0, 4.0, 0.0), OMNI)
+    is_touching = in_collision(view, points, OMNI)
+    assert is_touching[0] and not is_touching[int(np.argmin(is_touching)) :].any()
 
 
 def test_enclosed_hull_cannot_start() -> None:
     stakes = ((2.65, 2.4, 2.7, 2.75), (2.65, 3.25, 2.7, 3.6), (3.3, 2.4, 3.35, 2.75), (3.3, 3.25, 3.35, 3.6))
     pocket = (*stakes, (2.45, 2.6, 2.6, 3.4), (3.4, 2.6, 3.55, 3.4))
-    with pytest.raises(NavigationFailure) as failed:
-        planned(hall(*pocket), Pose2(3.0, 3.0, 0.0), Pose2(7.0, 3.0, 0.0))
-    assert failed.value.code is ErrorCode.START_OCCUPIED
+    with pytest.raises(NavigationFailure) as failure:
+        plan_points(hall(*pocket), Pose2(3.0, 3.0, 0.0), Pose2(7.0, 3.0, 0.0))
+    assert failure.value.code is ErrorCode.START_OCCUPIED
 
 
 def test_no_pose_is_in_unknown_space_without_allow_unknown() -> None:
-    """Not on a single cell either: the blocks in which ways are looked for hold known ones beside it."""
+    """This includes single unknown cells, although the search uses blocks of several cells."""
     view = hall()
     view.costs[np.random.default_rng(1).random(view.costs.shape) < 0.02] = 255
-    points = planned(view, Pose2(2.0, 3.0, 0.0), Pose2(7.0, 3.0, 0.0), allow_unknown=False)
+    points = plan_points(view, Pose2(2.0, 3.0, 0.0), Pose2(7.0, 3.0, 0.0), allow_unknown=False)
     columns, rows = ((points[:, i] - view.origin[i]) / view.resolution for i in (0, 1))
     assert (view.costs[rows.astype(int), columns.astype(int)] != 255).all()
 
@@ -87,8 +88,8 @@ BOX = (4.0, 0.0, 4.4, 3.0)
 ENDS = Pose2(1.5, 1.5, 0.0), Pose2(7.0, 1.5, 0.0)
 
 
-def tightest_turn(points: np.ndarray) -> float:
-    """Largest curvature of a path in 1/m, away from its cusps."""
+def max_curvature(points: np.ndarray) -> float:
+    """Return the largest curvature of a path in 1/m, except at cusps."""
     steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
     turns = np.abs(np.angle(np.exp(1j * np.diff(points[:, 2]))))
     return float((turns[steps > 0.03] / steps[steps > 0.03]).max())
@@ -96,29 +97,29 @@ def tightest_turn(points: np.ndarray) -> float:
 
 def test_minimum_turning_radius_limits_the_curvature() -> None:
     view = hall(BOX)
-    usual, wide = planned(view, *ENDS), planned(view, *ENDS, minimum_turning_radius=1.4)
-    assert tightest_turn(usual) == pytest.approx(1.0 / (1.15 * CAR.turning_radius), rel=0.02)
-    assert tightest_turn(wide) <= 1.02 / 1.4
+    default, wide = plan_points(view, *ENDS), plan_points(view, *ENDS, minimum_turning_radius=1.4)
+    assert max_curvature(default) == pytest.approx(1.0 / (1.15 * CAR.turning_radius), rel=0.02)
+    assert max_curvature(wide) <= 1.02 / 1.4
 
 
-def test_pose_searches_and_cusp_penalty_decide_between_paths(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A path of 4.2 m without a cusp, then one of 4 m that drives past the goal and back."""
+def test_shortest_path_of_several_searches_with_cusp_penalty_is_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The searches return a path of 4.2 m without a cusp, and then a path of 4 m that passes the goal and reverses."""
     bend = np.concatenate((np.linspace((2.0, 3.0), (3.5, 4.5), 44), np.linspace((3.5, 4.5), (5.0, 3.0), 44)[1:]))
-    past = np.concatenate((np.linspace((2.0, 3.0), (5.5, 3.0), 71), np.linspace((5.5, 3.0), (5.0, 3.0), 11)[1:]))
+    with_cusp = np.concatenate((np.linspace((2.0, 3.0), (5.5, 3.0), 71), np.linspace((5.5, 3.0), (5.0, 3.0), 11)[1:]))
     yaw = np.arctan2(*np.diff(bend, axis=0)[:, ::-1].T)
     bend = np.column_stack((bend, [0.0, *yaw[1:], 0.0]))
-    past = np.column_stack((past, np.zeros(len(past))))
-    found: list[np.ndarray] = []
+    with_cusp = np.column_stack((with_cusp, np.zeros(len(with_cusp))))
+    results: list[np.ndarray] = []
 
     def search(*_: object) -> list[Pose2]:
-        found.append((bend, past)[len(found) % 2])
-        return [Pose2(*pose) for pose in found[-1].tolist()]
+        results.append((bend, with_cusp)[len(results) % 2])
+        return [Pose2(*pose) for pose in results[-1].tolist()]
 
     monkeypatch.setattr(ompl_planner_module, "search_poses", search)
-    for searches, penalty, expected in ((1, 0.0, bend), (2, 0.0, past), (2, 0.1, past), (2, 1.0, bend)):
-        found.clear()
-        points = planned(hall(), Pose2(2, 3), Pose2(5, 3), pose_searches=searches, cusp_penalty=penalty)
-        assert len(found) == searches
+    for searches, penalty, expected in ((1, 0.0, bend), (2, 0.0, with_cusp), (2, 0.1, with_cusp), (2, 1.0, bend)):
+        results.clear()
+        points = plan_points(hall(), Pose2(2, 3), Pose2(5, 3), pose_searches=searches, cusp_penalty=penalty)
+        assert len(results) == searches
         assert np.allclose(points, expected)
 
 
@@ -127,16 +128,18 @@ def test_hull_clearance_is_kept_where_possible() -> None:
     footprint = Footprint(CAR, view.resolution)
 
     def clearance(required: float) -> float:
-        points = planned(view, Pose2(1.5, 3.0), Pose2(7.5, 3.0), hull_clearance=required, cost_travel_multiplier=0.0)
+        points = plan_points(
+            view, Pose2(1.5, 3.0), Pose2(7.5, 3.0), hull_clearance=required, cost_travel_multiplier=0.0
+        )
         return float(footprint.clearance(view, points[np.abs(points[:, 0] - 4.2) < 1.0]).min())
 
     assert clearance(0.0) < 0.3
     assert clearance(0.5) > 0.5
-    assert clearance(1.0) > 0.5  # half of it fits
+    assert clearance(1.0) > 0.5  # half of the required clearance is available
 
 
-def test_range_and_goal_bias_apply_to_poses() -> None:
+def test_range_and_goal_bias_change_searches_over_poses() -> None:
     view = hall(BOX)
-    usual = planned(view, *ENDS, type="kpiece", pose_searches=1)
-    assert not np.array_equal(usual, planned(view, *ENDS, type="kpiece", pose_searches=1, range=0.8))
-    assert not np.array_equal(usual, planned(view, *ENDS, type="kpiece", pose_searches=1, goal_bias=0.5))
+    default = plan_points(view, *ENDS, type="kpiece", pose_searches=1)
+    assert not np.array_equal(default, plan_points(view, *ENDS, type="kpiece", pose_searches=1, range=0.8))
+    assert not np.array_equal(default, plan_points(view, *ENDS, type="kpiece", pose_searches=1, goal_bias=0.5))

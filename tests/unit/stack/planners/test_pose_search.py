@@ -11,47 +11,48 @@ from simscen.stack.planners.pose_search import search_poses
 BOUNDS = (-5.0, -5.0, 5.0, 5.0)
 
 
-def everywhere(x, y, yaw):
+def always_free(x, y, yaw):
     return True
 
 
 @pytest.mark.parametrize("yaw", [math.pi, -math.pi, 0.0])
 def test_any_heading_can_be_a_goal(yaw):
-    """OMPL's headings lie in [-π, π), ours in (-π, π]; a goal out of bounds would be waited for, not refused."""
-    poses = search_poses("rrt_connect", "reeds_shepp", 0.8, BOUNDS, Pose2(0, 0), Pose2(1, 1, yaw), everywhere, 1, 2000)
+    """Headings of OMPL are in [-π, π), and headings of simscen in (-π, π]. For a goal at π, OMPL would wait forever."""
+    poses = search_poses("rrt_connect", "reeds_shepp", 0.8, BOUNDS, Pose2(0, 0), Pose2(1, 1, yaw), always_free, 1, 2000)
     assert poses is not None
     assert poses[-1][:2] == pytest.approx((1, 1), abs=1e-6)
     assert wrap(poses[-1].yaw - yaw) == pytest.approx(0, abs=1e-6)
 
 
 def test_no_search_if_start_or_goal_is_invalid():
-    asked = []
+    checked = []
 
     def is_free(x, y, yaw):
-        asked.append((x, y, yaw))
+        checked.append((x, y, yaw))
         return x < 1
 
     for start, goal in ((Pose2(0, 0), Pose2(2, 2)), (Pose2(2, 2), Pose2(0, 0)), (Pose2(0, 0), Pose2(9, 0))):
-        free = search_poses("rrt_connect", "reeds_shepp", 0.8, BOUNDS, start, goal, is_free, 1, 20_000)
-        assert free is None
-    assert len(asked) <= 6
+        poses = search_poses("rrt_connect", "reeds_shepp", 0.8, BOUNDS, start, goal, is_free, 1, 20_000)
+        assert poses is None
+    assert len(checked) <= 6
 
 
 @pytest.mark.parametrize("space", ["dubins", "reeds_shepp"])
-def test_no_arc_is_tighter_than_the_turning_radius_and_dubins_never_goes_back(space):
-    poses = search_poses("rrt_connect", space, 0.8, BOUNDS, Pose2(0, 0), Pose2(0, 1, math.pi), everywhere, 3, 2000)
+def test_arcs_keep_the_turning_radius_and_only_reeds_shepp_paths_reverse(space):
+    poses = search_poses("rrt_connect", space, 0.8, BOUNDS, Pose2(0, 0), Pose2(0, 1, math.pi), always_free, 3, 2000)
     assert poses is not None
     points = np.array(poses)
     step = np.diff(points[:, :2], axis=0)
-    turned = np.abs((np.diff(points[:, 2]) + np.pi) % (2 * np.pi) - np.pi)
-    chord = 2 * 0.8 * np.sin(np.minimum(turned, 3.0) / 2)
-    assert (np.hypot(step[:, 0], step[:, 1]) >= chord - 1e-3).mean() > 0.95  # but where a piece ends within a step
-    ahead = step[:, 0] * np.cos(points[:-1, 2]) + step[:, 1] * np.sin(points[:-1, 2])
-    assert (ahead < -0.01).any() == (space == "reeds_shepp")
+    turn = np.abs((np.diff(points[:, 2]) + np.pi) % (2 * np.pi) - np.pi)
+    chord = 2 * 0.8 * np.sin(np.minimum(turn, 3.0) / 2)
+    # Steps in which a segment ends may be shorter.
+    assert (np.hypot(step[:, 0], step[:, 1]) >= chord - 1e-3).mean() > 0.95
+    forward = step[:, 0] * np.cos(points[:-1, 2]) + step[:, 1] * np.sin(points[:-1, 2])
+    assert (forward < -0.01).any() == (space == "reeds_shepp")
 
 
 @pytest.mark.parametrize("planner", ["rrt_star", "informed_rrt_star"])
-def test_planner_that_improves_its_path_stops_before_the_maximum_of_iterations(planner: str) -> None:
+def test_improving_planner_stops_before_its_maximum_number_of_iterations(planner: str) -> None:
     checked = list[float]()
 
     def is_free(x: float, y: float, yaw: float) -> bool:

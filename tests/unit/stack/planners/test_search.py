@@ -1,3 +1,5 @@
+"""Tests of OMPL searches for points: invalid start or goal, costs, samples, and seeds."""
+
 import math
 from itertools import pairwise
 
@@ -18,14 +20,15 @@ def search(
     return OmplSearch(spec, problem, seed).solve(simplify=simplify)
 
 
-def left_half(ax: float, ay: float, bx: float, by: float) -> float:
+def left_half_cost(ax: float, ay: float, bx: float, by: float) -> float:
+    """Return the cost of a motion: its length for x < 2, and infinity otherwise."""
     return math.hypot(bx - ax, by - ay) if max(ax, bx) < 2.0 else math.inf
 
 
-def dear_below(ax: float, ay: float, bx: float, by: float) -> float:
-    """Ten times as dear below y = 2."""
-    price = 1.0 + 9.0 * float(np.mean(np.linspace(ay, by, 20) < 2.0))
-    return price * math.hypot(bx - ax, by - ay)
+def cost_with_expensive_half(ax: float, ay: float, bx: float, by: float) -> float:
+    """Return the cost of a motion: its length, with ten times the cost for y < 2."""
+    rate = 1.0 + 9.0 * float(np.mean(np.linspace(ay, by, 20) < 2.0))
+    return rate * math.hypot(bx - ax, by - ay)
 
 
 @pytest.mark.parametrize("kind", sorted(PLANNERS))
@@ -35,20 +38,20 @@ def dear_below(ax: float, ay: float, bx: float, by: float) -> float:
     ids=["goal not free", "start not free", "goal out of bounds", "start out of bounds"],
 )
 def test_impossible_start_or_goal_is_reported_before_any_iteration(kind: str, start, goal) -> None:
-    """OMPL would sleep 5 ms an iteration in wait for better ones: for ever, with so many."""
-    assert search(kind, Problem(start, goal, BOUNDS, left_half), 1, 10**6, 1) is None
+    """OMPL would wait 5 ms per iteration for a valid start or goal, which is endless with that many iterations."""
+    assert search(kind, Problem(start, goal, BOUNDS, left_half_cost), 1, 10**6, 1) is None
 
 
-PROBLEM = Problem((0.5, 1.9), (3.5, 1.9), BOUNDS, dear_below)
+PROBLEM = Problem((0.5, 1.9), (3.5, 1.9), BOUNDS, cost_with_expensive_half)
 
 
 def cost(points: list[tuple[float, float]]) -> float:
-    return sum(dear_below(*a, *b) for a, b in pairwise(points))
+    return sum(cost_with_expensive_half(*a, *b) for a, b in pairwise(points))
 
 
 @pytest.mark.parametrize("kind", ["rrt_star", "informed_rrt_star", "bit_star"])
 def test_optimizing_planners_avoid_expensive_cells(kind: str) -> None:
-    """Straight on costs 30, up to cheap ground and along it 4.9."""
+    """The straight path costs 30, and the path over cheap ground 4.9."""
     points = search(kind, PROBLEM, 1, 9000, 400 if kind != "bit_star" else 3000)
     assert points is not None
     assert cost(points) < 8.0
@@ -69,5 +72,5 @@ def test_bit_star_uses_only_the_given_samples() -> None:
 
 @pytest.mark.parametrize("kind", sorted(PLANNERS))
 def test_same_seed_gives_the_same_path(kind: str) -> None:
-    one, other = (search(kind, PROBLEM, 7, 2000, 50) for _ in range(2))
-    assert one == other
+    first, second = (search(kind, PROBLEM, 7, 2000, 50) for _ in range(2))
+    assert first == second

@@ -1,3 +1,5 @@
+"""Tests of the cost of motions through a costmap."""
+
 import math
 
 import numpy as np
@@ -18,7 +20,7 @@ def sampled_cost(costs: TraversalCosts, start: np.ndarray, end: np.ndarray) -> f
 
 @pytest.mark.parametrize("seed", range(4))
 def test_cost_of_a_motion_is_its_length_times_the_mean_cost_of_its_samples(seed: int) -> None:
-    """Most motions cross only free cells, some cross expensive or blocked cells, some only pass them."""
+    """Most motions cross only free cells; some cross or touch expensive or blocked cells."""
     rng = np.random.default_rng(seed)
     cells = np.zeros((60, 90), dtype=np.uint8)
     for row, column in rng.integers(0, (56, 86), (8, 2)).tolist():
@@ -27,9 +29,9 @@ def test_cost_of_a_motion_is_its_length_times_the_mean_cost_of_its_samples(seed:
     distance[20:24, 30:34] = 0.0
     distance[35:55, 10:60] = round_robot().inscribed_radius + 0.03  # a narrow gap
     view = CostmapView(cells, distance, 0.05, (-1.0, 2.0))
-    every = TraversalCosts(view, round_robot(), 2.0, True)
-    every.between(0.0, 2.2, 0.1, 2.2)
-    for costs in (every, every.without_narrow_gaps(0.05, ())):
+    with_gaps = TraversalCosts(view, round_robot(), 2.0, True)
+    with_gaps.between(0.0, 2.2, 0.1, 2.2)
+    for costs in (with_gaps, with_gaps.without_narrow_gaps(0.05, ())):
         results = []
         for start, end in rng.uniform((-1.0, 2.0), (3.5, 5.0), (400, 2, 2)):
             results.append(costs.between(*start.tolist(), *end.tolist()))
