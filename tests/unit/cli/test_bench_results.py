@@ -1,4 +1,4 @@
-"""Result files of `simscen bench`: reading, comparison, and errors."""
+"""Tests of result files of `simscen bench`: reading, comparison, and errors."""
 
 import json
 from dataclasses import replace
@@ -53,12 +53,12 @@ def test_other_machine_and_version_are_reported() -> None:
 
 
 def test_judgment_respects_direction_and_needs_two_rounds() -> None:
-    few, many = (
+    slower, faster = (
         Measurement(10.5, "", (10.0, 11.0), more_is_better=True),
         Measurement(20.5, "", (20.0, 21.0), more_is_better=True),
     )
-    assert (judgment(few, many), judgment(many, few)) == ("better", "worse")
-    assert judgment(few, Measurement.from_rounds((20.0,), "")) == ""
+    assert (judgment(slower, faster), judgment(faster, slower)) == ("better", "worse")
+    assert judgment(slower, Measurement.from_rounds((20.0,), "")) == ""
 
 
 def test_zero_before_has_no_ratio() -> None:
@@ -118,8 +118,8 @@ def test_results_of_different_commands_cannot_be_compared() -> None:
         comparison_text(BEFORE, replace(AFTER, figures={"2 robots": Measurement(80.0, "ms per simulated second")}))
 
 
-def test_suite_whose_runs_were_all_aborted_has_no_figures(simscen, monkeypatch: pytest.MonkeyPatch) -> None:
-    nothing = SuiteResult(1, ("good",), 1, simulated=0.0, wall=1.0, cpu=0.0, memory=(), baseline=0.1)
-    monkeypatch.setattr("simscen.bench.speed.session_speed.measure_suite", lambda *_: nothing)
-    ended = simscen("bench", "suite", "good.scenario.yaml", "-j", "1")
-    assert (ended.code, ended.out, ended.err) == (3, "", "1 runs were aborted: good\n")
+def test_suite_in_which_all_runs_were_aborted_has_no_figures(simscen, monkeypatch: pytest.MonkeyPatch) -> None:
+    empty_suite = SuiteResult(1, ("good",), 1, simulated=0.0, wall=1.0, cpu=0.0, memory=(), baseline=0.1)
+    monkeypatch.setattr("simscen.bench.speed.session_speed.measure_suite", lambda *_: empty_suite)
+    result = simscen("bench", "suite", "good.scenario.yaml", "-j", "1")
+    assert (result.code, result.out, result.err) == (3, "", "1 runs were aborted: good\n")

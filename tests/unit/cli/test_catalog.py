@@ -1,4 +1,4 @@
-"""Every topic of the language is documented and has a valid example."""
+"""Tests that each topic of the language has a description and a valid example."""
 
 from typing import Any
 
@@ -42,19 +42,19 @@ def load_yaml(text: str) -> Any:
     return tree.plain
 
 
-def _id(topic: Topic) -> str:
+def _topic_id(topic: Topic) -> str:
     return f"{topic.group}.{topic.name}"
 
 
-@pytest.mark.parametrize("topic", TOPICS, ids=_id)
+@pytest.mark.parametrize("topic", TOPICS, ids=_topic_id)
 def test_every_topic_has_a_description(topic: Topic) -> None:
     first = topic.text.split("\n\n")[0]
     assert first[:1].isupper() or first.startswith("nav2_")
     assert first.rstrip().endswith((".", ":"))
 
 
-@pytest.mark.parametrize("topic", SINGLE, ids=_id)
-def test_every_topic_has_a_valid_example(topic: Topic) -> None:
+@pytest.mark.parametrize("topic", SINGLE, ids=_topic_id)
+def test_example_of_every_trigger_action_fault_and_criterion_is_valid(topic: Topic) -> None:
     example = load_yaml(topic.example)
     models: dict[str, tuple[type[BaseModel], str | None]] = {
         "trigger": (trigger_registry.Trigger, "when"),
@@ -68,7 +68,7 @@ def test_every_topic_has_a_valid_example(topic: Topic) -> None:
     assert topic.name in source
 
 
-@pytest.mark.parametrize("topic", SECTIONS, ids=_id)
+@pytest.mark.parametrize("topic", SECTIONS, ids=_topic_id)
 def test_example_of_every_section_is_valid(topic: Topic) -> None:
     (value,) = load_yaml(topic.example).values()
     assert topic.model is not None
@@ -76,7 +76,7 @@ def test_example_of_every_section_is_valid(topic: Topic) -> None:
     topic.model.model_validate(entry, by_alias=True, by_name=False)
 
 
-@pytest.mark.parametrize("topic", [t for t in SINGLE if t.group == "criterion"], ids=_id)
+@pytest.mark.parametrize("topic", [t for t in SINGLE if t.group == "criterion"], ids=_topic_id)
 def test_every_criterion_documents_measure_failure_reason_and_source(topic: Topic) -> None:
     for heading in ("What is measured:", "When it fails:", "Why this:", "Source:"):
         assert f"\n{heading} " in topic.text

@@ -25,8 +25,8 @@ PASS, FAIL, ERROR = Outcome.PASSED, Outcome.FAILED, Outcome.ERROR
 def result(
     outcome: Outcome, seed: int, scenario: str = "a", time: float = 10.0, stack: str = "", clearance: float = 0.5
 ) -> RunResult:
-    found = Finding(Status.FAIL, "clearance", "0.03 m", "≥ 0.05 m", -0.02, "m", tick=240, place=(1.0, 2.0))
-    verdicts = (Verdict("clearance", "clearance", "fail", (found,)),) if outcome is FAIL else ()
+    finding = Finding(Status.FAIL, "clearance", "0.03 m", "≥ 0.05 m", -0.02, "m", tick=240, place=(1.0, 2.0))
+    verdicts = (Verdict("clearance", "clearance", "fail", (finding,)),) if outcome is FAIL else ()
     error = RunFailure("crashed", "SIGSEGV") if outcome is ERROR else None
     metrics = {"time_to_goal": time, "path_length": 5.0, "min_clearance": clearance, "collisions": 0.0}
     key = RunKey(scenario, seed, stack_name=stack)
@@ -41,9 +41,9 @@ def folder(tmp_path: Path) -> Callable[..., Path]:
         path = tmp_path / name
         path.mkdir()
         journal = Journal(path)
-        journal.plan([PlannedRun(one.key, one.path, definition=definition) for one in results], "0.1.0", 1)
-        for one in results:
-            journal(RunFinished(one, again=f"simscen run {one.path} --seed {one.key.seed}"))
+        journal.plan([PlannedRun(result.key, result.path, definition=definition) for result in results], "0.1.0", 1)
+        for result in results:
+            journal(RunFinished(result, again=f"simscen run {result.path} --seed {result.key.seed}"))
         journal.close()
         return path
 
@@ -51,48 +51,49 @@ def folder(tmp_path: Path) -> Callable[..., Path]:
 
 
 def compare(*arguments: object) -> Result:
+    """Return the result of `simscen compare ARGUMENTS`, with its exception."""
     return CliRunner().invoke(app, ["compare", *map(str, arguments)])
 
 
 def test_equal_sessions_are_not_worse(folder: Callable[..., Path]) -> None:
     runs = [result(PASS, seed) for seed in range(4)]
-    done = compare(folder("a", runs), folder("b", runs))
-    assert done.exit_code == 0
-    assert "4 pairs of the same scenario and seed, all with equal outcomes" in done.output
-    assert done.output.rstrip().endswith("candidate is not significantly worse in 4 pairs")
+    comparison = compare(folder("a", runs), folder("b", runs))
+    assert comparison.exit_code == 0
+    assert "4 pairs of the same scenario and seed, all with equal outcomes" in comparison.output
+    assert comparison.output.rstrip().endswith("candidate is not significantly worse in 4 pairs")
 
 
 @pytest.mark.parametrize("outcome", [PASS, FAIL])
-def test_a_baseline_without_completed_runs_shows_nothing(folder: Callable[..., Path], outcome: Outcome) -> None:
-    done = compare(folder("a", [result(ERROR, 1)]), folder("b", [result(outcome, 1)]))
-    assert "nothing to compare" in done.output
-    assert done.exit_code == 3
+def test_baseline_without_completed_runs_cannot_be_compared(folder: Callable[..., Path], outcome: Outcome) -> None:
+    comparison = compare(folder("a", [result(ERROR, 1)]), folder("b", [result(outcome, 1)]))
+    assert "nothing to compare" in comparison.output
+    assert comparison.exit_code == 3
 
 
-def test_six_of_six_runs_that_fail_now_are_worse_and_five_are_not(folder: Callable[..., Path]) -> None:
+def test_six_new_failures_in_six_pairs_are_significant_and_five_in_five_are_not(folder: Callable[..., Path]) -> None:
     """McNemar's exact test: p = 2 / 2^6 = 0.031 and 2 / 2^5 = 0.0625."""
-    before = [result(PASS, seed) for seed in range(6)]
-    after = [result(FAIL, seed) for seed in range(6)]
-    worse = compare(folder("a", before), folder("b", after))
-    assert worse.exit_code == 1
-    assert "worse  a: pass rate 100% → 0% (p = 0.031, 6 pairs)" in worse.output
-    assert "simscen run a.scenario.yaml --seed 3" in worse.output
-    chance = compare(folder("c", before[:5]), folder("d", after[:5]))
-    assert chance.exit_code == 0
-    assert "5 runs fail that passed before, which may be chance" in chance.output
+    baseline = [result(PASS, seed) for seed in range(6)]
+    candidate = [result(FAIL, seed) for seed in range(6)]
+    six_pairs = compare(folder("a", baseline), folder("b", candidate))
+    assert six_pairs.exit_code == 1
+    assert "worse  a: pass rate 100% → 0% (p = 0.031, 6 pairs)" in six_pairs.output
+    assert "simscen run a.scenario.yaml --seed 3" in six_pairs.output
+    five_pairs = compare(folder("c", baseline[:5]), folder("d", candidate[:5]))
+    assert five_pairs.exit_code == 0
+    assert "5 runs fail that passed before, which may be chance" in five_pairs.output
 
 
 def test_a_better_candidate_is_not_worse(folder: Callable[..., Path]) -> None:
-    before = [result(FAIL, seed, time=20.0) for seed in range(8)]
-    after = [result(PASS, seed, time=10.0 + seed / 100) for seed in range(8)]
-    done = compare(folder("a", before), folder("b", after))
-    assert done.exit_code == 0
-    assert "better a: pass rate 0% → 100%" in done.output
-    assert "better a: time_to_goal 20.00 → 10.04 s" in done.output
+    baseline = [result(FAIL, seed, time=20.0) for seed in range(8)]
+    candidate = [result(PASS, seed, time=10.0 + seed / 100) for seed in range(8)]
+    comparison = compare(folder("a", baseline), folder("b", candidate))
+    assert comparison.exit_code == 0
+    assert "better a: pass rate 0% → 100%" in comparison.output
+    assert "better a: time_to_goal 20.00 → 10.04 s" in comparison.output
 
 
 @pytest.mark.parametrize(
-    ("metric", "before", "after", "is_worse"),
+    ("metric", "baseline", "candidate", "is_worse"),
     [
         ("time", 10.0, 12.0, True),
         ("time", 12.0, 10.0, False),
@@ -102,11 +103,11 @@ def test_a_better_candidate_is_not_worse(folder: Callable[..., Path]) -> None:
     ],
 )
 def test_metrics_have_a_direction_and_a_smallest_effect(
-    folder: Callable[..., Path], metric: str, before: float, after: float, is_worse: bool
+    folder: Callable[..., Path], metric: str, baseline: float, candidate: float, is_worse: bool
 ) -> None:
-    first = [result(PASS, seed, **{metric: before + seed / 1000}) for seed in range(8)]
-    second = [result(PASS, seed, **{metric: after + seed / 900}) for seed in range(8)]
-    assert compare(folder("a", first), folder("b", second)).exit_code == is_worse
+    baseline_runs = [result(PASS, seed, **{metric: baseline + seed / 1000}) for seed in range(8)]
+    candidate_runs = [result(PASS, seed, **{metric: candidate + seed / 900}) for seed in range(8)]
+    assert compare(folder("a", baseline_runs), folder("b", candidate_runs)).exit_code == is_worse
 
 
 def test_significance_is_corrected_for_the_number_of_tests(folder: Callable[..., Path]) -> None:
@@ -114,54 +115,59 @@ def test_significance_is_corrected_for_the_number_of_tests(folder: Callable[...,
     equal, noise = (
         [result(PASS, seed, "b", time=10.0 + offset * (-1) ** seed) for seed in range(6)] for offset in (0, 1)
     )
-    before = [result(PASS, seed, time=10.0 + seed) for seed in range(6)]
-    after = [result(PASS, seed, time=13.0 + 2 * seed) for seed in range(6)]
-    assert compare(folder("a", before + equal), folder("b", after + equal)).exit_code == 1
-    assert compare(folder("c", before + equal), folder("d", after + noise)).exit_code == 0
+    baseline = [result(PASS, seed, time=10.0 + seed) for seed in range(6)]
+    candidate = [result(PASS, seed, time=13.0 + 2 * seed) for seed in range(6)]
+    assert compare(folder("a", baseline + equal), folder("b", candidate + equal)).exit_code == 1
+    assert compare(folder("c", baseline + equal), folder("d", candidate + noise)).exit_code == 0
 
 
 def test_any_flip_can_set_the_exit_code(folder: Callable[..., Path]) -> None:
-    before, after = folder("a", [result(PASS, 1), result(FAIL, 2)]), folder("b", [result(FAIL, 1), result(PASS, 2)])
-    assert compare(before, after).exit_code == 0
-    assert compare(before, after, "--fail-on", "flip").exit_code == 1
-    assert compare(before, after, "--fail-on", "never").exit_code == 0
+    baseline, candidate = (
+        folder("a", [result(PASS, 1), result(FAIL, 2)]),
+        folder("b", [result(FAIL, 1), result(PASS, 2)]),
+    )
+    assert compare(baseline, candidate).exit_code == 0
+    assert compare(baseline, candidate, "--fail-on", "flip").exit_code == 1
+    assert compare(baseline, candidate, "--fail-on", "never").exit_code == 0
 
 
 def test_runs_of_several_stacks_are_paired_by_stack(folder: Callable[..., Path]) -> None:
-    before = [result(PASS, 1, stack="rpp"), result(FAIL, 1, stack="dwb")]
-    after = [result(PASS, 1, stack="rpp"), result(PASS, 1, stack="dwb")]
-    done = compare(folder("a", before), folder("b", after))
-    assert "better a (dwb), seed 1: passed with candidate, failed with baseline" in done.output
-    assert "simscen run a.scenario.yaml --seed 1" in done.output
+    baseline = [result(PASS, 1, stack="rpp"), result(FAIL, 1, stack="dwb")]
+    candidate = [result(PASS, 1, stack="rpp"), result(PASS, 1, stack="dwb")]
+    comparison = compare(folder("a", baseline), folder("b", candidate))
+    assert "better a (dwb), seed 1: passed with candidate, failed with baseline" in comparison.output
+    assert "simscen run a.scenario.yaml --seed 1" in comparison.output
 
 
 def test_runs_that_could_not_be_completed_are_not_compared(folder: Callable[..., Path]) -> None:
-    done = compare(folder("a", [result(PASS, 1), result(PASS, 2)]), folder("b", [result(PASS, 1), result(ERROR, 2)]))
-    assert done.exit_code == 3
-    assert "1 pair with an error" in done.output
+    comparison = compare(
+        folder("a", [result(PASS, 1), result(PASS, 2)]), folder("b", [result(PASS, 1), result(ERROR, 2)])
+    )
+    assert comparison.exit_code == 3
+    assert "1 pair with an error" in comparison.output
 
 
 def test_changed_scenarios_are_refused_unless_allowed(folder: Callable[..., Path]) -> None:
-    before, after = folder("a", [result(PASS, 1)]), folder("b", [result(PASS, 1)], definition="other")
-    refused = compare(before, after)
-    assert isinstance(refused.exception, InvalidInput)
-    assert [problem.code for problem in refused.exception.problems] == ["SC811"]
-    assert "a differs from the scenario in the baseline" in str(refused.exception)
-    assert compare(before, after, "--changed-scenarios").exit_code == 0
+    baseline, candidate = folder("a", [result(PASS, 1)]), folder("b", [result(PASS, 1)], definition="other")
+    comparison = compare(baseline, candidate)
+    assert isinstance(comparison.exception, InvalidInput)
+    assert [problem.code for problem in comparison.exception.problems] == ["SC811"]
+    assert "a differs from the scenario in the baseline" in str(comparison.exception)
+    assert compare(baseline, candidate, "--changed-scenarios").exit_code == 0
 
 
 def test_sessions_without_a_common_run_are_refused(folder: Callable[..., Path]) -> None:
-    refused = compare(folder("a", [result(PASS, 1)]), folder("b", [result(PASS, 2)]))
-    assert isinstance(refused.exception, InvalidInput)
-    assert "no run has a counterpart" in str(refused.exception)
+    comparison = compare(folder("a", [result(PASS, 1)]), folder("b", [result(PASS, 2)]))
+    assert isinstance(comparison.exception, InvalidInput)
+    assert "no run has a counterpart" in str(comparison.exception)
 
 
 def test_comparison_is_printed_as_json_and_markdown(folder: Callable[..., Path]) -> None:
-    before, after = folder("a", [result(PASS, 1)]), folder("b", [result(FAIL, 1)])
-    data = json.loads(compare(before, after, "--format", "json").output)
+    baseline, candidate = folder("a", [result(PASS, 1)]), folder("b", [result(FAIL, 1)])
+    data = json.loads(compare(baseline, candidate, "--format", "json").output)
     assert data["worse"] is False
     assert data["against"][0]["flips"][0]["scenario"] == "a"
-    lines = compare(before, after, "--format", "markdown").output.splitlines()
+    lines = compare(baseline, candidate, "--format", "markdown").output.splitlines()
     assert lines[0].startswith("### simscen: candidate is not significantly worse in 1 pair")
     assert "| a | 1/1 | 0/1 |" in lines
 
@@ -184,11 +190,11 @@ def test_equal_versions_are_called_worse_with_at_most_the_stated_probability() -
     assert 0 < alarms <= trials * (alpha + 3 * (alpha * (1 - alpha) / trials) ** 0.5)
 
 
-def test_a_lower_pass_rate_over_all_scenarios_is_found(folder: Callable[..., Path]) -> None:
+def test_lower_pass_rate_over_all_scenarios_is_significant(folder: Callable[..., Path]) -> None:
     """One of two runs of each of ten scenarios fails, which is not significant for a single scenario."""
     names = "abcdefghij"
-    before = [result(PASS, seed, name) for name in names for seed in (1, 2)]
-    after = [result(FAIL if seed == 1 else PASS, seed, name) for name in names for seed in (1, 2)]
-    done = compare(folder("a", before), folder("b", after))
-    assert done.exit_code == 1
-    assert "worse  all scenarios: pass rate 100% → 50% (p = 0.021, 20 pairs)" in done.output
+    baseline = [result(PASS, seed, name) for name in names for seed in (1, 2)]
+    candidate = [result(FAIL if seed == 1 else PASS, seed, name) for name in names for seed in (1, 2)]
+    comparison = compare(folder("a", baseline), folder("b", candidate))
+    assert comparison.exit_code == 1
+    assert "worse  all scenarios: pass rate 100% → 50% (p = 0.021, 20 pairs)" in comparison.output

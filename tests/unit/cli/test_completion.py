@@ -1,4 +1,4 @@
-"""Shell completion."""
+"""Tests of shell completion."""
 
 import os
 import subprocess
@@ -17,16 +17,16 @@ def completions(*words: str) -> list[str]:
     """Return the completions of bash for these words, the last of which may be incomplete."""
     env = {**os.environ, "_SIMSCEN_COMPLETE": "complete_bash", "COMP_WORDS": " ".join(("simscen", *words)),
            "COMP_CWORD": str(len(words))}  # fmt: skip
-    # The name of the program is the name of the variable, too.
+    # The name of the variable, _SIMSCEN_COMPLETE, contains the name of the program.
     program = COMMAND[2].replace("start()", "import sys; sys.argv[0] = 'simscen'; start()", 1)
-    done = subprocess.run([*COMMAND[:2], program], capture_output=True, text=True, env=env, check=False)
-    assert done.stderr == ""
-    return done.stdout.split()
+    result = subprocess.run([*COMMAND[:2], program], capture_output=True, text=True, env=env, check=False)
+    assert result.stderr == ""
+    return result.stdout.split()
 
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize(
-    ("words", "among"),
+    ("words", "offered"),
     [
         (("exp",), ["explain"]),
         (("validate", "go"), ["good.scenario.yaml"]),
@@ -39,9 +39,11 @@ def completions(*words: str) -> list[str]:
     ],
     ids=" ".join,
 )
-def test_completion_offers_commands_files_names_and_options(simscen, words: tuple[str, ...], among: list[str]) -> None:
+def test_completion_offers_commands_files_names_and_options(
+    simscen, words: tuple[str, ...], offered: list[str]
+) -> None:
     Path("deep").mkdir()
-    assert set(among) <= set(completions(*words))
+    assert set(offered) <= set(completions(*words))
 
 
 def test_files_in_a_folder_are_completed_with_their_folder(simscen) -> None:
@@ -53,9 +55,9 @@ def test_files_in_a_folder_are_completed_with_their_folder(simscen) -> None:
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
 def test_script_of_each_shell_is_printed(simscen, shell: str) -> None:
-    ended = simscen("completion", shell)
-    assert ended.code == 0
-    assert "_SIMSCEN_COMPLETE" in ended.out
+    result = simscen("completion", shell)
+    assert result.code == 0
+    assert "_SIMSCEN_COMPLETE" in result.out
 
 
 def test_bash_accepts_its_script(simscen) -> None:
@@ -65,8 +67,8 @@ def test_bash_accepts_its_script(simscen) -> None:
 
 @pytest.mark.parametrize("arguments", [("-h",), ("run", "-h"), ("world", "-h"), ("world", "convert", "-h")])
 def test_help_has_a_short_option(simscen, arguments: tuple[str, ...]) -> None:
-    ended = simscen(*arguments)
-    assert (ended.code, "Usage:" in ended.out) == (0, True)
+    result = simscen(*arguments)
+    assert (result.code, "Usage:" in result.out) == (0, True)
 
 
 def test_an_unknown_home_folder_is_no_error(simscen, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -1,3 +1,5 @@
+"""Tests of printed problems: carets, escaped text, and encodings."""
+
 import io
 import json
 import sys
@@ -8,11 +10,12 @@ from simscen.cli.diagnostics import as_github, as_text, escaped, print_json, pri
 from simscen.core.errors import Problem
 
 
-def _problem(source: str, col: int, **more: str) -> Problem:
-    return Problem("a.yaml", 7, col, "SC012", "wrong", source=source, **more)
+def _problem(source: str, col: int, **fields: str) -> Problem:
+    return Problem("a.yaml", 7, col, "SC012", "wrong", source=source, **fields)
 
 
 def _carets(source: str, col: int) -> str:
+    """Return the line with carets below the line `source` of a file with a problem at column `col`."""
     return as_text([_problem(source, col)]).splitlines()[2].split("| ")[1]
 
 
@@ -63,11 +66,11 @@ def test_problem_without_a_line_is_one_line() -> None:
     "text", ["::error::x", "  ::set-output name=a::b", "##[error]x", "a\n::error::b", "\x1b[31m", "\u202e"]
 )
 def test_control_sequences_in_untrusted_text_are_escaped(text: str) -> None:
-    shown = escaped(text)
-    assert not shown.lstrip().startswith("::")
-    assert "##[" not in shown
-    assert "\n" not in shown
-    assert shown.isprintable()
+    output = escaped(text)
+    assert not output.lstrip().startswith("::")
+    assert "##[" not in output
+    assert "\n" not in output
+    assert output.isprintable()
 
 
 def test_annotations_escape_github_syntax() -> None:

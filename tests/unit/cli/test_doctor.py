@@ -1,4 +1,4 @@
-"""Checks of `simscen doctor`."""
+"""Tests of the checks of `simscen doctor`."""
 
 import errno
 import os
@@ -18,8 +18,8 @@ from simscen.run.disk_cache import DiskCache, cache_folder
 
 
 @pytest.fixture
-def quick(monkeypatch):
-    """Skip the checks that take long."""
+def without_slow_checks(monkeypatch):
+    """Replace the checks that simulate a run."""
     monkeypatch.setattr(doctor, "check_run", lambda: "not now")
     monkeypatch.setattr(doctor, "check_speed", lambda: "not now, either")
 
@@ -27,44 +27,46 @@ def quick(monkeypatch):
 def test_working_installation_passes_within_80_columns(simscen, monkeypatch) -> None:
     monkeypatch.setattr(doctor, "check_speed", lambda: "not now")
     monkeypatch.setenv("COLUMNS", "80")
-    ended = simscen("doctor")
-    assert ended.code == 0
-    lines = ended.out.splitlines()
+    result = simscen("doctor")
+    assert result.code == 0
+    lines = result.out.splitlines()
     assert all(line.startswith(("  ✓ ", " " * 15)) for line in lines)
-    assert all(len(line) <= 80 or line.endswith(str(Path.cwd())) for line in lines), "only a path is never broken"
-    assert "1 s simulated twice, equal logs: sha256 " in ended.out.splitlines()[-2]
+    assert all(len(line) <= 80 or line.endswith(str(Path.cwd())) for line in lines), (
+        "a line is longer only if it ends with a path"
+    )
+    assert "1 s simulated twice, equal logs: sha256 " in result.out.splitlines()[-2]
 
 
-def test_failed_check_is_reported_and_the_others_still_run(simscen, quick, monkeypatch) -> None:
+def test_failed_check_is_reported_and_the_others_still_run(simscen, without_slow_checks, monkeypatch) -> None:
     monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(1, 1, 30 << 20))
-    ended = simscen("doctor")
-    assert ended.code == 3
-    assert next(line for line in ended.out.splitlines() if "✗" in line).startswith(
+    result = simscen("doctor")
+    assert result.code == 3
+    assert next(line for line in result.out.splitlines() if "✗" in line).startswith(
         "  ✗ disk       only 30 MiB are free"
     )
-    assert ended.out.splitlines()[-1] == "  ✓ speed      not now, either"
+    assert result.out.splitlines()[-1] == "  ✓ speed      not now, either"
 
 
-def test_missing_temporary_folder_is_a_failed_check(simscen, quick, monkeypatch) -> None:
+def test_missing_temporary_folder_is_a_failed_check(simscen, without_slow_checks, monkeypatch) -> None:
     def missing() -> str:
         raise FileNotFoundError(errno.ENOENT, "No usable temporary directory found")
 
     monkeypatch.setattr(tempfile, "gettempdir", missing)
-    ended = simscen("doctor")
-    assert ended.code == 3
-    assert "  ✗ tmp        No usable temporary directory found; set TMPDIR" in ended.out
-    assert "  ✓ disk " in ended.out
+    result = simscen("doctor")
+    assert result.code == 3
+    assert "  ✗ tmp        No usable temporary directory found; set TMPDIR" in result.out
+    assert "  ✓ disk " in result.out
 
 
-def test_engine_that_cannot_be_imported_is_a_failed_check(simscen, quick, monkeypatch) -> None:
+def test_engine_that_cannot_be_imported_is_a_failed_check(simscen, without_slow_checks, monkeypatch) -> None:
     def missing_library() -> str:
         raise ImportError("libGL.so.1: cannot open shared object file")
 
     monkeypatch.setattr(doctor, "check_run", missing_library)
-    ended = simscen("doctor")
-    assert ended.code == 3
-    assert "  ✗ run        ImportError: libGL.so.1: cannot open shared object file\n" in ended.out
-    assert ended.out.splitlines()[-1] == "  ✓ speed      not now, either"
+    result = simscen("doctor")
+    assert result.code == 3
+    assert "  ✗ run        ImportError: libGL.so.1: cannot open shared object file\n" in result.out
+    assert result.out.splitlines()[-1] == "  ✓ speed      not now, either"
 
 
 def test_cache_is_shown_and_a_foreign_cache_fails(tmp_path: Path, monkeypatch) -> None:

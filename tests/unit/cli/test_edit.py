@@ -1,4 +1,4 @@
-"""`simscen edit` on the command line."""
+"""Tests of `simscen edit` as a process with its HTTP server."""
 
 import json
 import os
@@ -30,20 +30,22 @@ SDF = """\
 
 @contextmanager
 def editor(folder: Path, *arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Start `simscen edit ARGUMENTS` in a folder; yield its process and the URL of its page."""
     command = [sys.executable, "-m", "simscen", "edit", *arguments, "--no-browser"]
     process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None and process.stderr is not None
         line = process.stdout.readline()
-        found = re.search(r"http://127\.0\.0\.1:\d+/[\w-]+/", line)
-        assert found, line + process.stderr.read()
-        yield process, found[0]
+        url = re.search(r"http://127\.0\.0\.1:\d+/[\w-]+/", line)
+        assert url, line + process.stderr.read()
+        yield process, url[0]
     finally:
         process.kill()
         process.communicate()
 
 
 def ask(url: str, name: str, **data: Any) -> Any:
+    """Return the answer of the server to the request `name`."""
     request = urllib.request.Request(
         f"{url}api/{name}", json.dumps(data).encode(), {"Content-Type": "application/json"}
     )
@@ -106,7 +108,7 @@ def test_signal_ends_the_editor_and_deletes_the_files_of_its_runs(
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", ["ros map", "world", "sdf"])
-def test_a_new_scenario_on_a_map_is_valid_and_has_a_goal_that_can_be_reached(tmp_path: Path, kind: str) -> None:
+def test_new_scenario_on_a_map_is_valid_and_has_a_reachable_goal(tmp_path: Path, kind: str) -> None:
     if kind == "ros map":
         for file in ("house_last_year.yaml", "house_last_year.pgm"):
             shutil.copy(ROOT / "worlds" / file, tmp_path)
@@ -121,8 +123,12 @@ def test_a_new_scenario_on_a_map_is_valid_and_has_a_goal_that_can_be_reached(tmp
     with editor(tmp_path, "--new", "--map", map_) as (_, url):
         opened = ask(url, "open")
         assert opened["is_new"] and opened["name"] == name and world in opened["text"]
-        assert not (tmp_path / name).exists(), "nothing is written before it is saved"
-        errors = [one for one in ask(url, "problems", text=opened["text"])["problems"] if one["severity"] == "error"]
+        assert not (tmp_path / name).exists(), "the file is written only when the scenario is saved"
+        errors = [
+            problem
+            for problem in ask(url, "problems", text=opened["text"])["problems"]
+            if problem["severity"] == "error"
+        ]
         assert errors == []
         (leg,) = ask(url, "preview", text=opened["text"], edits=[])["robots"]["robot"]["legs"]
         assert leg["length"] > 2
@@ -157,12 +163,12 @@ def test_files_that_cannot_be_edited_are_errors_with_exit_code_2(
     (tmp_path / "w.sdf").write_text(SDF)
     (tmp_path / "w.world.yaml").write_text("simscen: 1\n")
     (tmp_path / "folder").mkdir()
-    ended = simscen("edit", *arguments, "--no-browser")
-    assert ended.code == 2
-    assert message in ended.err and "Traceback" not in ended.err
+    result = simscen("edit", *arguments, "--no-browser")
+    assert result.code == 2
+    assert message in result.err and "Traceback" not in result.err
 
 
 def test_binary_file_is_refused(simscen: Any, tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_bytes(b"\xff\xfe")
-    ended = simscen("edit", "a.scenario.yaml", "--no-browser")
-    assert ended.code == 2 and "not valid UTF-8" in ended.err
+    result = simscen("edit", "a.scenario.yaml", "--no-browser")
+    assert result.code == 2 and "not valid UTF-8" in result.err

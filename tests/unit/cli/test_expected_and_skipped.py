@@ -1,4 +1,4 @@
-"""`expected` and `skip` in all reports."""
+"""Tests of `expected` and `skip` in all reports."""
 
 import json
 from dataclasses import replace
@@ -38,16 +38,18 @@ def project(simscen, tmp_path: Path) -> Path:
 
 
 def test_reports_distinguish_expected_failures_and_skipped_runs(simscen, project: Path) -> None:
-    ended = simscen("run", ".", "--repeat", "2", "--seed", "1", "-k", "not other", "--out", "out", "--format", "github")
-    assert ended.code == 1, ended.out
+    result = simscen(
+        "run", ".", "--repeat", "2", "--seed", "1", "-k", "not other", "--out", "out", "--format", "github"
+    )
+    assert result.code == 1, result.out
     output = "failed as expected: too fast, NAV-1 (speed: 0.50 m/s > 0.10 m/s"
-    lines = [" ".join(line.split()) for line in ended.out.splitlines()]
+    lines = [" ".join(line.split()) for line in result.out.splitlines()]
     assert any(line.startswith("~ a[known] (seed 1) 1.0 s simulated") and output in line for line in lines)
     assert "- a[skipped] (seed 1) skipped: no lift here, NAV-2" in lines
-    assert "expected: everything passed; expected a failure: too fast, NAV-1" in ended.out
-    assert "0 passed, 2 failed, 2 failed as expected, 1 skipped" in ended.out
-    assert f"::notice file=a.scenario.yaml,line=6,title=a[known] (seed 1)::{output}" in ended.out
-    assert "::error file=a.scenario.yaml,line=7,title=a[mended] (seed 1)::expected: everything passed" in ended.out
+    assert "expected: everything passed; expected a failure: too fast, NAV-1" in result.out
+    assert "0 passed, 2 failed, 2 failed as expected, 1 skipped" in result.out
+    assert f"::notice file=a.scenario.yaml,line=6,title=a[known] (seed 1)::{output}" in result.out
+    assert "::error file=a.scenario.yaml,line=7,title=a[mended] (seed 1)::expected: everything passed" in result.out
     document = json.loads((project / "out/results.json").read_text())
     assert {name: document[name] for name in ("passed", "failed", "error", "failed-as-expected", "skipped")} == {
         "passed": 0,
@@ -60,7 +62,7 @@ def test_reports_distinguish_expected_failures_and_skipped_runs(simscen, project
     suite = ElementTree.parse(project / "out/junit.xml").find("testsuite")
     assert suite is not None
     assert [suite.get(name) for name in ("tests", "failures", "errors", "skipped")] == ["5", "2", "0", "3"]
-    kinds = [(one.get("type"), str(one.get("message"))[:31]) for one in suite.iter("skipped")]
+    kinds = [(element.get("type"), str(element.get("message"))[:31]) for element in suite.iter("skipped")]
     assert kinds == [("simscen.expected-failure", output[:31])] * 2 + [("simscen.skip", "no lift here, NAV-2")]
     page = (project / "out/report.html").read_text()
     assert "2 failed as expected" in page
@@ -82,24 +84,24 @@ def test_session_with_only_expected_outcomes_passes(simscen, project: Path) -> N
 
 @pytest.mark.slow
 def test_unexpected_failure_fails(simscen, project: Path) -> None:
-    ended = simscen("run", ".", "-k", "other")
-    assert ended.code == 1
-    assert "expected: collisions passed; expected a failure" in ended.out
-    assert "speed: 0.50 m/s > 0.10 m/s" in ended.out
+    result = simscen("run", ".", "-k", "other")
+    assert result.code == 1
+    assert "expected: collisions passed; expected a failure" in result.out
+    assert "speed: 0.50 m/s > 0.10 m/s" in result.out
 
 
 def test_session_with_only_skipped_scenarios_selects_nothing(simscen, project: Path) -> None:
-    ended = simscen("run", ".", "-k", "skipped", "--repeat", "9", "--check-determinism", "--out", "out")
-    assert ended.code == 5
-    assert "nothing was run" in ended.err
+    result = simscen("run", ".", "-k", "skipped", "--repeat", "9", "--check-determinism", "--out", "out")
+    assert result.code == 5
+    assert "nothing was run" in result.err
     assert [run["outcome"] for run in json.loads((project / "out/results.json").read_text())["runs"]] == ["skipped"]
 
 
 @pytest.mark.slow
 def test_aborted_run_is_an_error_despite_an_expected_failure(simscen, project: Path) -> None:
-    ended = simscen("run", ".", "-k", "known", "--stack", "mine=/bin/false")
-    assert ended.code == 3
-    assert "1 error" in ended.out
+    result = simscen("run", ".", "-k", "known", "--stack", "mine=/bin/false")
+    assert result.code == 3
+    assert "1 error" in result.out
 
 
 def test_skipped_scenario_must_be_valid(simscen, project: Path) -> None:

@@ -1,3 +1,5 @@
+"""Tests of `simscen explain`."""
+
 from pathlib import Path
 
 import pytest
@@ -47,11 +49,11 @@ def test_codes_of_other_stacks_are_marked(simscen) -> None:
     assert "The reference stack never returns this code" in simscen("explain", "107").out.replace("\n  ", " ")
     stack = Path(package.__file__).parent / "stack"
     sources = [path.read_text(encoding="utf-8") for path in stack.rglob("*.py")]
-    named = {code for code in ErrorCode if any(f"ErrorCode.{code.name}" in text for text in sources)}
-    assert set(ErrorCode) - named - {ErrorCode.NONE} <= EXTERNAL_ONLY_CODES
+    returned_codes = {code for code in ErrorCode if any(f"ErrorCode.{code.name}" in text for text in sources)}
+    assert set(ErrorCode) - returned_codes - {ErrorCode.NONE} <= EXTERNAL_ONLY_CODES
 
 
-def test_every_drive_can_reverse() -> None:
+def test_backup_never_has_invalid_input_because_every_robot_can_reverse() -> None:
     assert ErrorCode.BACKUP_INVALID_INPUT in EXTERNAL_ONLY_CODES
     base = {"linear": 1.0, "angular": 1.0, "linear_acceleration": 1.0, "angular_acceleration": 1.0}
     assert Limits.model_validate({**base, "reverse": 0.1}).reverse == 0.1
@@ -61,9 +63,9 @@ def test_every_drive_can_reverse() -> None:
 
 @pytest.mark.parametrize(("name", "hint"), [("collision_s", "did you mean"), ("zzzzzz", "for a list")])
 def test_unknown_name_is_a_usage_error(simscen, name: str, hint: str) -> None:
-    ended = simscen("explain", name)
-    assert ended.code == 2
-    assert hint in ended.err
+    result = simscen("explain", name)
+    assert result.code == 2
+    assert hint in result.err
 
 
 def test_output_fits_a_narrow_terminal(simscen, monkeypatch) -> None:
@@ -102,9 +104,9 @@ def test_signals_are_listed_with_units_and_explained(simscen) -> None:
     ],
 )
 def test_keys_and_codes_are_explained(simscen, name: str, expected_text: str) -> None:
-    ended = simscen("explain", name)
-    assert ended.code == 0, ended.err
-    assert expected_text in ended.out
+    result = simscen("explain", name)
+    assert result.code == 0, result.err
+    assert expected_text in result.out
 
 
 @pytest.mark.parametrize(
@@ -117,9 +119,9 @@ def test_misspelled_keys_and_codes_get_a_suggestion(simscen, name: str, suggesti
 
 def test_every_topic_every_key_and_every_code_is_explained(monkeypatch, is_quick: bool) -> None:
     """`make test` asks for every fifth key only."""
-    everything = topic_lookup.all_topics()
+    topics = topic_lookup.all_topics()
     for module in (explain, topic_lookup):
-        monkeypatch.setattr(module, "all_topics", lambda: everything)  # its collection takes most of the time
+        monkeypatch.setattr(module, "all_topics", lambda: topics)  # collecting the topics takes most of the time
     for name in [*known_names(), *list(known_names(keys=True))[:: 5 if is_quick else 1]]:
         assert explanation(name), name
 

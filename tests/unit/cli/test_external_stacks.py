@@ -1,4 +1,4 @@
-"""Commands of external stacks from the command line and the user configuration."""
+"""Tests of commands of external stacks from the command line and the user configuration."""
 
 import sys
 from pathlib import Path
@@ -26,7 +26,7 @@ MINE = (
 
 @pytest.fixture
 def project(simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a folder with scenarios with and without a named stack, a program, and its own home directory."""
+    """Return a folder with scenarios with and without a named stack, a program, and an empty configuration folder."""
     (tmp_path / "good.scenario.yaml").unlink()
     (tmp_path / "mine.scenario.yaml").write_text(MINE)
     (tmp_path / "plain.scenario.yaml").write_text(SHORT)
@@ -37,6 +37,7 @@ def project(simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def configure(project: Path, text: str) -> Path:
+    """Write the user configuration, and return its file."""
     file = project / "home/simscen/config.yaml"
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(text)
@@ -44,21 +45,22 @@ def configure(project: Path, text: str) -> Path:
 
 
 def loaded(name: str, *stacks: str):
+    """Return the scenarios that are run for a scenario file and values of `--stack`."""
     return load_selection([Path(f"{name}.scenario.yaml")], None, [], False, Selection(), stacks)[0]
 
 
 def test_undefined_stack_name_is_an_error_with_its_location(simscen, project: Path) -> None:
-    ended = simscen("run", ".")
-    assert ended.code == 2
-    assert "mine.scenario.yaml:7:19: error[SC060] the external stack `mine` has no command" in ended.err
-    assert "--stack mine='COMMAND'" in ended.err
+    result = simscen("run", ".")
+    assert result.code == 2
+    assert "mine.scenario.yaml:7:19: error[SC060] the external stack `mine` has no command" in result.err
+    assert "--stack mine='COMMAND'" in result.err
     assert not (project / "simscen-out").exists()
 
 
 def test_undefined_stack_name_is_a_warning_in_validate(simscen, project: Path) -> None:
-    ended = simscen("validate", "mine.scenario.yaml")
-    assert ended.code == 0
-    assert "mine.scenario.yaml:7:19: warning[SC060]" in ended.out
+    result = simscen("validate", "mine.scenario.yaml")
+    assert result.code == 0
+    assert "mine.scenario.yaml:7:19: warning[SC060]" in result.out
     checked = simscen("validate", "mine.scenario.yaml", "--stack", "mine=./nav --fast")
     assert (checked.code, checked.out) == (0, "1 scenario is valid\n")
 
@@ -82,17 +84,19 @@ def test_undefined_stack_name_is_a_warning_in_validate(simscen, project: Path) -
 def test_unusable_program_is_reported_before_any_run(simscen, project, command, stack_option, expected_text) -> None:
     (project / "home").mkdir()
     (project / "notes.txt").write_text("none\n")
-    ended = simscen(command, ".", "--stack", stack_option)
-    assert ended.code == 2
-    assert expected_text in ended.err
+    result = simscen(command, ".", "--stack", stack_option)
+    assert result.code == 2
+    assert expected_text in result.err
 
 
 def test_command_line_overrides_the_configuration(project: Path) -> None:
     configure(project, "stacks: {mine: {command: sh -c true}, other: {command: ./nav --other}}\n")
     assert loaded("mine")[0].external_command.argv == ("sh", "-c", "true")
     assert loaded("mine", "mine=./nav 'a b'")[0].external_command.argv == ("./nav", "a b")
-    both = loaded("mine", "mine", "x=other", "ref=reference")
-    assert [(one.stack_name, one.external_command and one.external_command.argv) for one in both] == [
+    scenarios = loaded("mine", "mine", "x=other", "ref=reference")
+    assert [
+        (scenario.stack_name, scenario.external_command and scenario.external_command.argv) for scenario in scenarios
+    ] == [
         ("mine", ("sh", "-c", "true")),
         ("x", ("./nav", "--other")),
         ("ref", None),
@@ -109,8 +113,8 @@ def test_command_keeps_the_scenario_parameters_of_the_stack(project: Path) -> No
 def test_stack_file_can_name_an_external_stack(project: Path) -> None:
     (project / "slow.stack.yaml").write_text("simscen: 1\nstack: {external: mine, controller_frequency: 5 Hz}\n")
     configure(project, "stacks: {mine: {command: ./nav --slow}}\n")
-    (one,) = loaded("plain", "slow=slow.stack.yaml")
-    assert (one.spec.stack.controller_frequency, one.external_command.argv) == (5.0, ("./nav", "--slow"))
+    (scenario,) = loaded("plain", "slow=slow.stack.yaml")
+    assert (scenario.spec.stack.controller_frequency, scenario.external_command.argv) == (5.0, ("./nav", "--slow"))
 
 
 def test_goal_tolerances_of_the_scenario_apply_to_every_stack(project: Path) -> None:
@@ -133,10 +137,11 @@ def test_configuration_sets_limits_folder_and_variables(project: Path, monkeypat
     configure(project, f"stacks: {{mine: {text}}}\n")
     (project / "deep").mkdir()
     monkeypatch.chdir(project / "deep")
-    runs = load_selection([project / "mine.scenario.yaml"], None, [], False, Selection(), ())[0][0].external_command
-    assert runs is not None
-    assert (runs.cwd, runs.start_limit, runs.answer_limit) == (f"{project}", 120.0, 0.5)
-    assert (runs.env["ROS_DOMAIN_ID"], runs.env["PYTHONPATH"]) == ("7", "/opt/mine")
+    (scenario,) = load_selection([project / "mine.scenario.yaml"], None, [], False, Selection(), ())[0]
+    stack_command = scenario.external_command
+    assert stack_command is not None
+    assert (stack_command.cwd, stack_command.start_limit, stack_command.answer_limit) == (f"{project}", 120.0, 0.5)
+    assert (stack_command.env["ROS_DOMAIN_ID"], stack_command.env["PYTHONPATH"]) == ("7", "/opt/mine")
 
 
 def test_stack_gets_the_environment_of_the_caller(simscen, project: Path, monkeypatch) -> None:
@@ -171,12 +176,12 @@ stacks:
 
 def test_errors_in_the_configuration_have_locations(simscen, project: Path) -> None:
     file = configure(project, WRONG)
-    ended = simscen("run", "mine.scenario.yaml")
-    assert ended.code == 2
-    found = [line.partition(" ")[0] for line in ended.err.splitlines() if line.startswith(str(file))]
-    places = [place.removeprefix(str(file)) for place in found]
-    assert places == [":1:1:", ":4:14:", ":5:26:", ":5:29:", ":6:10:", ":7:19:", ":8:5:"]
-    assert "put it in quotes" in ended.err
+    result = simscen("run", "mine.scenario.yaml")
+    assert result.code == 2
+    locations = [line.partition(" ")[0] for line in result.err.splitlines() if line.startswith(str(file))]
+    positions = [location.removeprefix(str(file)) for location in locations]
+    assert positions == [":1:1:", ":4:14:", ":5:26:", ":5:29:", ":6:10:", ":7:19:", ":8:5:"]
+    assert "put it in quotes" in result.err
 
 
 def test_configuration_is_read_only_if_needed(simscen, project: Path) -> None:
@@ -187,28 +192,28 @@ def test_configuration_is_read_only_if_needed(simscen, project: Path) -> None:
 
 def test_missing_program_is_reported_at_its_line_of_the_configuration(simscen, project: Path) -> None:
     file = configure(project, "stacks:\n  mine: {command: ./gone}\n")
-    ended = simscen("run", "mine.scenario.yaml")
-    assert ended.code == 2
-    assert f"{file}:2:19: error[SC061] no such file or directory: `./gone`" in ended.err
+    result = simscen("run", "mine.scenario.yaml")
+    assert result.code == 2
+    assert f"{file}:2:19: error[SC061] no such file or directory: `./gone`" in result.err
 
 
 def test_digest_includes_arguments_variables_and_file_contents(project: Path, monkeypatch) -> None:
     def digest_with(*stack_option: str) -> str:
         return scenario_digests(loaded("mine", *stack_option)[0]).run
 
-    before = digest_with("mine=./nav --map map.yaml")
-    assert digest_with("mine=./nav --map map.yaml") == before
+    original = digest_with("mine=./nav --map map.yaml")
+    assert digest_with("mine=./nav --map map.yaml") == original
     monkeypatch.setenv("TERM_SESSION", "another shell")
-    assert digest_with("mine=./nav --map map.yaml") == before
-    assert digest_with("mine=./nav --map other.yaml") != before
+    assert digest_with("mine=./nav --map map.yaml") == original
+    assert digest_with("mine=./nav --map other.yaml") != original
     (project / "map.yaml").write_text("x")
-    assert (with_map := digest_with("mine=./nav --map map.yaml")) != before
+    assert (with_map := digest_with("mine=./nav --map map.yaml")) != original
     (project / "nav").write_text("#!/bin/sh\nexit 1\n")
     assert digest_with("mine=./nav --map map.yaml") != with_map
     configure(project, "stacks: {mine: {command: ./nav, env: {A: '1'}}}\n")
-    one = digest_with()
+    with_variable = digest_with()
     configure(project, "stacks: {mine: {command: ./nav, env: {A: '2'}}}\n")
-    assert digest_with() != one
+    assert digest_with() != with_variable
 
 
 @pytest.mark.parametrize("command", ["python3 pkg/main.py", "python3 -m pkg", "python3 -m pkg.main"])
@@ -221,12 +226,12 @@ def test_digest_includes_modules_next_to_a_python_script(project: Path, command:
     def digest() -> str:
         return scenario_digests(loaded("mine", f"mine={command}")[0]).run
 
-    before = digest()
+    original = digest()
     (project / "pkg/notes.txt").write_text("not code")
-    (project / "pkg/venv/other.py").write_text("not its own")
-    assert digest() == before
+    (project / "pkg/venv/other.py").write_text("not of the stack")
+    assert digest() == original
     (project / "pkg/planner.py").write_text("gain = 2")
-    assert (changed := digest()) != before
+    assert (changed := digest()) != original
     (project / "pkg/deep/map.py").write_text("size = 2")
     assert digest() != changed
 

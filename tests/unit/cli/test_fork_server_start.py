@@ -16,7 +16,7 @@ def has_child():
 
 
 def test_fork_server_is_killed_if_the_session_does_not_begin(monkeypatch):
-    """It is killed at once, although it does not read from its pipe yet."""
+    """The server is killed at once, although it does not read from its pipe yet."""
     monkeypatch.setattr(fork_server_start, "FORK_SERVER", ("-c", "import time; time.sleep(600)"))
     with pytest.raises(ZeroDivisionError), early_fork_server(is_needed=True):
         assert has_child()

@@ -1,4 +1,4 @@
-"""Signals: the first stops a session cleanly, the second one immediately."""
+"""Tests of signals: the first one stops a session cleanly, the second one immediately."""
 
 import os
 import signal
@@ -40,15 +40,15 @@ def run_program(signal_times, second="SIGINT"):
 
 
 def test_second_signal_exits_and_names_the_report_command():
-    done = run_program([0.0, 3.0])
-    assert (done.returncode, done.stdout) == (130, "interrupted by 2\n")
-    assert done.stderr.startswith("simscen: stopped without reports; run `simscen report`")
+    result = run_program([0.0, 3.0])
+    assert (result.returncode, result.stdout) == (130, "interrupted by 2\n")
+    assert result.stderr.startswith("simscen: stopped without reports; run `simscen report`")
     assert run_program([0.0, 3.0], "SIGTERM").returncode == 143
 
 
 def test_repeated_signal_of_one_key_press_counts_once():
-    done = run_program([0.0, 0.01])
-    assert (done.returncode, done.stdout) == (0, "interrupted by 2\nreports are written\n")
+    result = run_program([0.0, 0.01])
+    assert (result.returncode, result.stdout) == (0, "interrupted by 2\nreports are written\n")
 
 
 @pytest.fixture

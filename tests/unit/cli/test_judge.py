@@ -1,4 +1,4 @@
-"""`simscen judge` on logs of simscen, with their recorded criteria and with those of a file."""
+"""Tests of `simscen judge` on logs of simscen, with the recorded criteria and with a criteria file."""
 
 import errno
 import json
@@ -48,8 +48,8 @@ def out(recorded: Path, tmp_path: Path) -> Path:
 
 
 def _log(out: Path, name: str) -> Path:
-    (found,) = out.rglob(f"{name}/seed-1/run.mcap")
-    return found
+    (log,) = out.rglob(f"{name}/seed-1/run.mcap")
+    return log
 
 
 def test_run_folder_is_judged_as_its_log(simscen, out: Path) -> None:
@@ -62,50 +62,52 @@ def test_run_folder_is_judged_as_its_log(simscen, out: Path) -> None:
 def test_internal_error_for_one_log_keeps_the_verdicts_of_the_others(
     simscen, out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail_on_bad(key: RunKey, *rest: object) -> RunResult:
+    def fail_on_bad(key: RunKey, *arguments: object) -> RunResult:
         if key.scenario == "bad":
             raise AssertionError("a defect")
-        return judge_run(key, *rest)  # type: ignore[arg-type]
+        return judge_run(key, *arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(logs, "judge_run", fail_on_bad)
-    ended = simscen("judge", "out")
-    bad, good, total = ended.out.splitlines()
-    assert ended.code == 3
-    assert "internal: AssertionError: a defect; judge this log alone for the traceback" in bad
-    assert good.startswith("  ✓ ") and total == "1 passed, 1 could not be judged"
+    result = simscen("judge", "out")
+    bad_line, good_line, summary = result.out.splitlines()
+    assert result.code == 3
+    assert "internal: AssertionError: a defect; judge this log alone for the traceback" in bad_line
+    assert good_line.startswith("  ✓ ") and summary == "1 passed, 1 could not be judged"
     assert simscen("judge", str(_log(out, "bad"))).code == 4
 
 
 def test_output_folder_gives_one_line_per_log(simscen, out: Path) -> None:
-    ended = simscen("judge", "out")
-    bad, good, total = ended.out.splitlines()
-    assert ended.code == 1
-    assert bad.startswith(f"  ✗ {_log(out, 'bad').relative_to(out.parent)} ") and "speed: " in bad
-    assert good.startswith(f"  ✓ {_log(out, 'good').relative_to(out.parent)} ") and good.endswith(" s recorded")
-    assert total == "1 passed, 1 failed"
+    result = simscen("judge", "out")
+    bad_line, good_line, summary = result.out.splitlines()
+    assert result.code == 1
+    assert bad_line.startswith(f"  ✗ {_log(out, 'bad').relative_to(out.parent)} ") and "speed: " in bad_line
+    assert good_line.startswith(f"  ✓ {_log(out, 'good').relative_to(out.parent)} ") and good_line.endswith(
+        " s recorded"
+    )
+    assert summary == "1 passed, 1 failed"
     assert len(json.loads(simscen("judge", "out", "--json").out)["runs"]) == 2
 
 
 def test_criteria_file_gives_a_table_of_margins(simscen, out: Path) -> None:
     (out.parent / "limits.yaml").write_text("pass:\n  - speed: {max: 9 m/s}\n  - collisions: {max: 2}\n")
-    ended = simscen("judge", "out", "--scenario", "limits.yaml")
-    head, bad, good, total = ended.out.splitlines()
-    assert (ended.code, total) == (0, "2 passed")
-    assert head.split() == ["log", "speed", "collisions"]
-    assert [row.split()[0] for row in (bad, good)] == ["✓", "✓"]
-    assert all(row.split()[2].startswith("+8.") and row.split()[-1] == "+2" for row in (bad, good))
+    result = simscen("judge", "out", "--scenario", "limits.yaml")
+    header, bad_line, good_line, summary = result.out.splitlines()
+    assert (result.code, summary) == (0, "2 passed")
+    assert header.split() == ["log", "speed", "collisions"]
+    assert [row.split()[0] for row in (bad_line, good_line)] == ["✓", "✓"]
+    assert all(row.split()[2].startswith("+8.") and row.split()[-1] == "+2" for row in (bad_line, good_line))
 
 
-def test_log_with_numeric_goal_name_is_judged(simscen, out: Path) -> None:
+def test_log_with_a_goal_name_that_looks_like_a_number_is_judged(simscen, out: Path) -> None:
     assert simscen("judge", str(_log(out, "good"))).code == 0
 
 
 def test_criteria_file_can_extend_and_use_defaults(simscen, out: Path) -> None:
     (out.parent / "base.yaml").write_text("# limits of the site\npass:\n  - speed: {max: 0.05 m/s}\n")
     (out.parent / "site.scenario.yaml").write_text("extends: base.yaml\ntags: [site]\n")
-    ended = simscen("judge", str(_log(out, "good")), "--scenario", "site.scenario.yaml")
-    assert ended.code == 1
-    assert "site.scenario.yaml:3" not in ended.out, "that line is one of base.yaml"
+    result = simscen("judge", str(_log(out, "good")), "--scenario", "site.scenario.yaml")
+    assert result.code == 1
+    assert "site.scenario.yaml:3" not in result.out, "the line is in base.yaml"
     (out.parent / "sub").mkdir()
     (out.parent / "sub/only.scenario.yaml").write_text("name: only\n")
     (out.parent / "sub/defaults.yaml").write_text("pass:\n  - speed: {max: 9 m/s}\n")
@@ -115,9 +117,9 @@ def test_criteria_file_can_extend_and_use_defaults(simscen, out: Path) -> None:
 def test_errors_in_criteria_have_file_and_line(simscen, out: Path) -> None:
     (out.parent / "base.yaml").write_text("# limits\npass:\n  - speeed: {max: 1}\n")
     (out.parent / "site.yaml").write_text("\n\nextends: base.yaml\n")
-    ended = simscen("judge", str(_log(out, "good")), "--scenario", "site.yaml")
-    assert ended.code == 2
-    assert ended.err.startswith("base.yaml:3:5: error[SC012] unknown key `speeed`")
+    result = simscen("judge", str(_log(out, "good")), "--scenario", "site.yaml")
+    assert result.code == 2
+    assert result.err.startswith("base.yaml:3:5: error[SC012] unknown key `speeed`")
     (out.parent / "empty.yaml").write_text("name: nothing\n")
     assert "missing key `pass`" in simscen("judge", str(_log(out, "good")), "--scenario", "empty.yaml").err
 
@@ -132,14 +134,14 @@ def test_errors_in_criteria_have_file_and_line(simscen, out: Path) -> None:
         ("goal_active, goal: dock", False),
     ],
 )
-def test_nothing_is_shown_by_names_that_the_scenario_of_the_log_does_not_have(
+def test_criterion_with_a_name_unknown_to_the_scenario_of_the_log_is_inconclusive(
     simscen, out: Path, condition: str, is_known: bool
 ) -> None:
     (out.parent / "limits.yaml").write_text(f"pass: [{{always: {{not: {{signal: {condition}}}}}}}]\n")
-    ended = simscen("judge", str(_log(out, "good")), "--scenario", "limits.yaml")
+    result = simscen("judge", str(_log(out, "good")), "--scenario", "limits.yaml")
     kind, _, name = condition.partition(", ")[2].partition(": ")
-    assert (ended.code == 0) is is_known
-    assert (f"inconclusive: the scenario has no {kind} `{name}`" in ended.out) is not is_known
+    assert (result.code == 0) is is_known
+    assert (f"inconclusive: the scenario has no {kind} `{name}`" in result.out) is not is_known
 
 
 @pytest.mark.parametrize(
@@ -153,38 +155,38 @@ def test_nothing_is_shown_by_names_that_the_scenario_of_the_log_does_not_have(
         ("shelf", "world: {simscen: 1, objects: [{name: shelf, box: [1, 1, 1], pose: {x: 3, y: 3}}]}", True),
     ],
 )
-def test_contacts_with_an_object_are_undecided_unless_a_file_has_this_object(
+def test_criterion_on_contacts_with_an_unknown_object_is_inconclusive(
     simscen, out: Path, name: str, world: str, is_known: bool
 ) -> None:
     criteria = f"[{{collisions: {{with: {name}}}}}, {{always: {{not: {{signal: in_collision, with: {name}}}}}}}]"
     (out.parent / "limits.yaml").write_text(f"{world}\npass: {criteria}\n")
-    ended = simscen("judge", str(_log(out, "good")), "--scenario", "limits.yaml")
-    assert (ended.code == 0) is is_known
+    result = simscen("judge", str(_log(out, "good")), "--scenario", "limits.yaml")
+    assert (result.code == 0) is is_known
     reason = f"inconclusive: neither the log nor the world of the criteria file has an object `{name}`"
-    assert ended.out.count(reason) == (0 if is_known else 2)
+    assert result.out.count(reason) == (0 if is_known else 2)
 
 
 def test_violated_criterion_names_the_line_of_the_criteria_file(simscen, out: Path) -> None:
     (out.parent / "limits.yaml").write_text("# site\n\npass:\n  - collisions: {max: 0}\n  - speed: {max: 0.05 m/s}\n")
-    ended = simscen("judge", str(_log(out, "good")), "--scenario", "limits.yaml")
-    assert "limits.yaml:5" in ended.out
+    result = simscen("judge", str(_log(out, "good")), "--scenario", "limits.yaml")
+    assert "limits.yaml:5" in result.out
 
 
 def test_unusable_log_among_several_is_an_error_result(simscen, out: Path) -> None:
     _log(out, "bad").write_bytes(_log(out, "bad").read_bytes()[:3000])
-    ended = simscen("judge", "out")
-    assert ended.code == 3
-    assert "1 passed, 0 failed" not in ended.out
-    assert ended.out.splitlines()[-1] == "1 passed, 1 could not be judged"
+    result = simscen("judge", "out")
+    assert result.code == 3
+    assert "1 passed, 0 failed" not in result.out
+    assert result.out.splitlines()[-1] == "1 passed, 1 could not be judged"
     assert simscen("judge", str(_log(out, "bad"))).code == 2
 
 
 @pytest.mark.parametrize("folder", ["out", "."])
 def test_run_without_log_is_reported(simscen, out: Path, folder: str) -> None:
     _log(out, "bad").unlink()
-    ended = simscen("judge", folder)
-    assert ended.code == 3
-    assert "the run left no log" in ended.out
+    result = simscen("judge", folder)
+    assert result.code == 3
+    assert "the run left no log" in result.out
 
 
 def test_session_that_planned_no_runs_has_no_missing_logs(simscen, out: Path) -> None:
@@ -202,14 +204,14 @@ def test_unreadable_folder_is_an_error(simscen, out: Path, monkeypatch: pytest.M
         return scandir(path)
 
     monkeypatch.setattr(os, "scandir", deny)
-    ended = simscen("judge", "out")
-    assert ended.code == 2
-    assert "out/runs/bad: error[SC800]" in ended.err
+    result = simscen("judge", "out")
+    assert result.code == 2
+    assert "out/runs/bad: error[SC800]" in result.err
 
 
 def test_folder_without_logs_is_an_error(simscen, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
-    ended = simscen("judge", "empty")
-    assert ended.code == 5
-    assert "no logs found in `empty`" in ended.err
+    result = simscen("judge", "empty")
+    assert result.code == 5
+    assert "no logs found in `empty`" in result.err
     assert simscen("judge", "nowhere").code == 2

@@ -1,4 +1,4 @@
-"""`simscen run --last-failed`, as pytest's --last-failed."""
+"""Tests of `simscen run --last-failed`, which works as the option of pytest."""
 
 import json
 from pathlib import Path
@@ -18,6 +18,7 @@ FAILING = ROOM.replace("collisions: {max: 0}", "clearance: {min: 2}")
 
 @pytest.fixture
 def project(simscen, tmp_path: Path):
+    """Return a folder with a scenario that passes and two scenarios that fail."""
     (tmp_path / "good.scenario.yaml").unlink()
     for name, text in (("a", ROOM), ("b", FAILING), ("c", FAILING)):
         (tmp_path / f"{name}.scenario.yaml").write_text(text)
@@ -31,20 +32,20 @@ def runs_of(folder: Path) -> list[tuple[str, int, str]]:
 
 @pytest.mark.slow
 def test_only_failed_runs_are_repeated(simscen, project: Path) -> None:
-    ended = simscen("run", ".", "--last-failed")
-    assert ended.err == "simscen: there is no earlier session in simscen-out: all selected scenarios run\n"
+    result = simscen("run", ".", "--last-failed")
+    assert result.err == "simscen: there is no earlier session in simscen-out: all selected scenarios run\n"
     assert len(runs_of(project)) == 3
-    ended = simscen("run", ".", "--lf")
-    assert (ended.code, ended.err) == (1, "simscen: 2 runs failed when last run\n")
+    result = simscen("run", ".", "--lf")
+    assert (result.code, result.err) == (1, "simscen: 2 runs failed when last run\n")
     assert runs_of(project) == [("b", 1, "failed"), ("c", 1, "failed")]
     (project / "b.scenario.yaml").write_text(ROOM)
     (project / "new.scenario.yaml").write_text(FAILING)
     (project / "c.scenario.yaml").rename(project / "d.scenario.yaml")
-    ended = simscen("run", ".", "--lf")
-    assert (ended.code, ended.err) == (0, "simscen: 2 runs failed when last run: 1 selected, 1 not\n")
+    result = simscen("run", ".", "--lf")
+    assert (result.code, result.err) == (0, "simscen: 2 runs failed when last run: 1 selected, 1 not\n")
     assert runs_of(project) == [("b", 1, "passed")]
-    ended = simscen("run", "a.scenario.yaml", "--lf")
-    assert ended.err == "simscen: 1 run failed when last run, but none is selected: all selected scenarios run\n"
+    result = simscen("run", "a.scenario.yaml", "--lf")
+    assert result.err == "simscen: 1 run failed when last run, but none is selected: all selected scenarios run\n"
     assert runs_of(project) == [("a", 1, "passed")]
 
 
@@ -60,11 +61,11 @@ def test_failed_run_keeps_its_seed(simscen, project: Path) -> None:
 @pytest.mark.slow
 def test_sessions_are_searched_next_to_the_output_folder(simscen, project: Path) -> None:
     simscen("run", "a.scenario.yaml", "--out", "ci/1")
-    ended = simscen("run", "a.scenario.yaml", "--out", "ci/2", "--lf")
-    nothing = f"simscen: no run in {project}/ci failed when it last ran: all selected scenarios run\n"
-    assert (ended.code, ended.err) == (0, nothing)
+    result = simscen("run", "a.scenario.yaml", "--out", "ci/2", "--lf")
+    message = f"simscen: no run in {project}/ci failed when it last ran: all selected scenarios run\n"
+    assert (result.code, result.err) == (0, message)
 
 
 def test_last_failed_and_resume_exclude_each_other(simscen, project: Path) -> None:
-    ended = simscen("run", ".", "--resume", "out", "--last-failed")
-    assert (ended.code, ended.err) == (2, "simscen: --last-failed and --resume exclude each other\n")
+    result = simscen("run", ".", "--resume", "out", "--last-failed")
+    assert (result.code, result.err) == (2, "simscen: --last-failed and --resume exclude each other\n")

@@ -1,7 +1,9 @@
+"""Tests of `import_lazily`, which delays the import of a library until its first use."""
+
 import subprocess
 import sys
 
-LATER = """
+PROGRAM = """
 import sys
 from simscen.cli.main import import_lazily
 import_lazily("{name}")
@@ -14,20 +16,20 @@ assert late.__file__ == early.__file__
 """
 
 
-def _run(name: str, probe: str, use: str) -> None:
-    code = LATER.format(name=name, probe=probe, use=use)
+def run_program(name: str, probe: str, use: str) -> None:
+    code = PROGRAM.format(name=name, probe=probe, use=use)
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_library_is_imported_on_first_use() -> None:
-    _run("numpy", "numpy.linalg", "assert early.hypot(3, 4) == 5 and early.random.default_rng(1).random() < 1")
+    run_program("numpy", "numpy.linalg", "assert early.hypot(3, 4) == 5 and early.random.default_rng(1).random() < 1")
 
 
 def test_library_is_imported_with_its_submodule() -> None:
-    _run("numpy", "numpy.linalg", "import numpy.typing as npt; assert npt.NDArray[early.float64]")
+    run_program("numpy", "numpy.linalg", "import numpy.typing as npt; assert npt.NDArray[early.float64]")
 
 
-def test_imported_library_is_kept() -> None:
+def test_library_that_is_already_imported_is_kept() -> None:
     subprocess.run(
         [
             sys.executable,
@@ -53,7 +55,7 @@ from importlib.metadata import distribution
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_other_attribute_imports_the_library() -> None:
+def test_other_attribute_of_a_library_with_a_lazy_function_imports_the_library() -> None:
     code = """
 from simscen.cli.main import import_lazily
 import_lazily("importlib.metadata", "entry_points")

@@ -1,17 +1,20 @@
+"""Tests of `simscen list`."""
+
 from pathlib import Path
 
 import pytest
 
 
 @pytest.fixture(autouse=True)
-def _three(simscen, tmp_path: Path) -> None:
-    good = (tmp_path / "good.scenario.yaml").read_text()
+def _three_scenarios(simscen, tmp_path: Path) -> None:
+    """Add two scenarios in the folder `faults`: one with a name and tags, and one without."""
+    scenario = (tmp_path / "good.scenario.yaml").read_text()
     (tmp_path / "faults").mkdir()
     (tmp_path / "faults/off.scenario.yaml").write_text(
-        good.replace("drive", "lidar off").replace("smoke", "fault, lidar")
+        scenario.replace("drive", "lidar off").replace("smoke", "fault, lidar")
     )
     (tmp_path / "faults/slip.scenario.yaml").write_text(
-        good.replace("name: drive\n", "").replace("tags: [smoke]\n", "")
+        scenario.replace("name: drive\n", "").replace("tags: [smoke]\n", "")
     )
 
 
@@ -41,13 +44,13 @@ def test_keyword_and_tag_select_scenarios(simscen) -> None:
     ],
 )
 def test_empty_or_invalid_selection_is_an_error(simscen, arguments: list[str], code: int, expected_text: str) -> None:
-    ended = simscen("list", ".", *arguments)
-    assert (ended.code, ended.out) == (code, "")
-    assert expected_text in ended.err
+    result = simscen("list", ".", *arguments)
+    assert (result.code, result.out) == (code, "")
+    assert expected_text in result.err
 
 
 def test_invalid_scenario_is_an_error(simscen, tmp_path: Path) -> None:
     (tmp_path / "bad.scenario.yaml").write_text("simscen: 1\n")
-    ended = simscen("list", ".")
-    assert ended.code == 2
-    assert "missing key `world`" in ended.err
+    result = simscen("list", ".")
+    assert result.code == 2
+    assert "missing key `world`" in result.err

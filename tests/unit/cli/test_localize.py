@@ -1,4 +1,4 @@
-"""`simscen localize` on recorded and handwritten logs of a drive past a crate."""
+"""Tests of `simscen localize` on recorded and handwritten logs of a drive past a crate."""
 
 import json
 import math
@@ -22,41 +22,41 @@ def test_drive_with_slipping_wheels_is_localized_in_every_format(simscen, tmp_pa
     write_map(tmp_path)
     write_csv(tmp_path) if kind == "csv" else write_carmen(tmp_path, kind)
     log = "drive.csv" if kind == "csv" else "drive.log"
-    ended = simscen("localize", log, *OPTIONS, "--json", "--picture", "path.png")
-    assert ended.code == 0, ended.err
-    found = json.loads(ended.out)
-    assert found["scans"] == 150
-    assert found["error"]["max"] < 0.2
-    assert found["error"]["rmse"] < 0.1
-    assert found["lost"] == []
-    assert "ms of CPU time per scan" in ended.err
+    result = simscen("localize", log, *OPTIONS, "--json", "--picture", "path.png")
+    assert result.code == 0, result.err
+    output = json.loads(result.out)
+    assert output["scans"] == 150
+    assert output["error"]["max"] < 0.2
+    assert output["error"]["rmse"] < 0.1
+    assert output["lost"] == []
+    assert "ms of CPU time per scan" in result.err
     assert (tmp_path / "path.png").stat().st_size > 1000
-    assert simscen("localize", log, *OPTIONS, "--json").out == ended.out
+    assert simscen("localize", log, *OPTIONS, "--json").out == result.out
 
 
 def test_picture_does_not_overwrite_the_map(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     write_csv(tmp_path)
     (image,) = tmp_path.glob("room.p*")
-    before = image.read_bytes()
+    original = image.read_bytes()
     assert simscen("localize", "drive.csv", *OPTIONS, "--picture", image.name).code == 2
-    assert image.read_bytes() == before
+    assert image.read_bytes() == original
 
 
 def test_drift_of_odometry_is_reported(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     write_csv(tmp_path)
     Path("stack.yaml").write_text("stack: {localizer: {type: odometry}}\npass: [{goals_reached: {}}]\n")
-    ended = simscen("localize", "drive.csv", *OPTIONS, "--scenario", "stack.yaml", "--lost", "0.2", "--json")
-    assert ended.code == 0, ended.err
-    found = json.loads(ended.out)
+    result = simscen("localize", "drive.csv", *OPTIONS, "--scenario", "stack.yaml", "--lost", "0.2", "--json")
+    assert result.code == 0, result.err
+    output = json.loads(result.out)
     times = np.array([t for t, *_ in drive()])
     true, odom = (np.array([row[k][:2] for row in drive()]) for k in (1, 2))
     errors = np.hypot(*(odom + np.array((1.0, 0.8)) - true).T)
-    assert [row[0] for row in found["error_over_time"]] == pytest.approx(times)
-    assert [row[1] for row in found["error_over_time"]] == pytest.approx(errors, abs=1e-9)
-    assert found["error"]["rmse"] == pytest.approx(np.sqrt(np.mean(errors**2)))
-    assert found["lost"][0]["since"] == pytest.approx(times[errors > 0.2][0])
+    assert [row[0] for row in output["error_over_time"]] == pytest.approx(times)
+    assert [row[1] for row in output["error_over_time"]] == pytest.approx(errors, abs=1e-9)
+    assert output["error"]["rmse"] == pytest.approx(np.sqrt(np.mean(errors**2)))
+    assert output["lost"][0]["since"] == pytest.approx(times[errors > 0.2][0])
 
 
 @pytest.mark.parametrize(("first_odometry", "first_reference"), [(0.0, 10.0), (4.0, 0.0), (4.0, 10.0), (4.1, 0.0)])
@@ -78,9 +78,9 @@ def test_log_without_reference_needs_a_start(simscen, tmp_path: Path) -> None:
     write_map(tmp_path)
     write_csv(tmp_path, pose_rows=False)
     assert simscen("localize", "drive.csv", *OPTIONS).code == 2
-    ended = simscen("localize", "drive.csv", *OPTIONS, "--start", "1,0.8,0")
-    assert ended.code == 0
-    assert "no reference to compare with" in ended.out
+    result = simscen("localize", "drive.csv", *OPTIONS, "--start", "1,0.8,0")
+    assert result.code == 0
+    assert "no reference to compare with" in result.out
 
 
 @pytest.mark.parametrize(
@@ -100,10 +100,10 @@ def test_log_without_reference_needs_a_start(simscen, tmp_path: Path) -> None:
 def test_unusable_log_is_reported(simscen, tmp_path: Path, name: str, text: str, expected_text: str) -> None:
     write_map(tmp_path)
     Path(name).write_text(text)
-    ended = simscen("localize", name, *OPTIONS)
-    assert ended.code == 2
-    assert expected_text in ended.err
-    assert "Traceback" not in ended.err
+    result = simscen("localize", name, *OPTIONS)
+    assert result.code == 2
+    assert expected_text in result.err
+    assert "Traceback" not in result.err
 
 
 def verdict_error(out: Path) -> dict[str, float]:
@@ -111,7 +111,8 @@ def verdict_error(out: Path) -> dict[str, float]:
     (run,) = json.loads((out / "results.json").read_text())["runs"]
     (verdict,) = run["verdicts"]
     return {
-        one["what"].removeprefix("localization_error").strip() or "max": one["value"] for one in verdict["findings"]
+        finding["what"].removeprefix("localization_error").strip() or "max": finding["value"]
+        for finding in verdict["findings"]
     }
 
 
@@ -139,15 +140,15 @@ def test_log_of_a_run_gives_the_errors_of_its_verdict(simscen, tmp_path: Path, s
     write_map(tmp_path)
     Path("room.scenario.yaml").write_text(SLIPPING + stack + PASS)
     assert simscen("run", "room.scenario.yaml", "--out", "out", "--seed", "3").code == 0
-    log, output = next(Path("out").rglob("run.mcap")), verdict_error(tmp_path / "out")
-    ended = simscen("localize", str(log), *OPTIONS, "--scenario", "room.scenario.yaml", "--seed", "3", "--json")
-    assert ended.code == 0, ended.err
-    found = json.loads(ended.out)
+    log, verdict_errors = next(Path("out").rglob("run.mcap")), verdict_error(tmp_path / "out")
+    result = simscen("localize", str(log), *OPTIONS, "--scenario", "room.scenario.yaml", "--seed", "3", "--json")
+    assert result.code == 0, result.err
+    output = json.loads(result.out)
     # A log has ranges in single precision, so that the particles differ after a while.
     for name, tolerance in (("max", 0.03), ("rmse", 0.01), ("final", 0.03)):
-        assert found["error"][name] == pytest.approx(output[name], abs=tolerance)
-    assert output["max"] < 0.5
-    assert found["lost"] == []
+        assert output["error"][name] == pytest.approx(verdict_errors[name], abs=tolerance)
+    assert verdict_errors["max"] < 0.5
+    assert output["lost"] == []
 
 
 SCAN_MATCHING = "stack: {localizer: {type: scan_matching_amcl}}\n"
@@ -160,12 +161,12 @@ def test_kidnapped_robot_is_lost_with_plain_amcl_and_found_by_relocalization(sim
     Path("drive.csv").write_text("\n".join(lines) + "\n")
     for name, recovery in (("plain", ""), ("scan_matching", SCAN_MATCHING), ("recovery", RECOVERY)):
         Path(f"{name}.yaml").write_text(recovery + "pass: [{goals_reached: {}}]\n")
-        ended = simscen("localize", "drive.csv", *OPTIONS, "--scenario", f"{name}.yaml", "--json")
-        assert ended.code == 0, ended.err
-        found = json.loads(ended.out)
-        assert found["lost"][0]["since"] == pytest.approx(5.0, abs=0.11)
-        assert (found["error"]["final"] < 0.3) == (name != "plain")
-        assert (found["lost"][-1]["until"] is None) == (name == "plain")
+        result = simscen("localize", "drive.csv", *OPTIONS, "--scenario", f"{name}.yaml", "--json")
+        assert result.code == 0, result.err
+        output = json.loads(result.out)
+        assert output["lost"][0]["since"] == pytest.approx(5.0, abs=0.11)
+        assert (output["error"]["final"] < 0.3) == (name != "plain")
+        assert (output["lost"][-1]["until"] is None) == (name == "plain")
 
 
 def kidnapped_drive() -> list[tuple[int, str, str]]:
@@ -194,6 +195,6 @@ def test_output_of_localize_fits_the_terminal(
     monkeypatch.setenv("COLUMNS", str(width))
     write_map(tmp_path)
     write_csv(tmp_path)
-    ended = simscen("localize", "drive.csv", *OPTIONS)
-    assert max(map(len, ended.out.splitlines())) <= width
-    assert "never lost (more than 1 m off)" in ended.out
+    result = simscen("localize", "drive.csv", *OPTIONS)
+    assert max(map(len, result.out.splitlines())) <= width
+    assert "never lost (more than 1 m off)" in result.out

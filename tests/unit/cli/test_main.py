@@ -1,3 +1,5 @@
+"""Tests of the main function: help, errors with their exit codes, and imports of commands."""
+
 import signal
 import subprocess
 import sys
@@ -10,16 +12,16 @@ from simscen.run.process.supervisor import Interrupted
 
 
 def test_help_lists_the_commands_without_importing_them(simscen) -> None:
-    ended = simscen("--help")
-    assert ended.code == 0
+    result = simscen("--help")
+    assert result.code == 0
     assert "validate Check scenario, world, robot, and stack files without running anything." in " ".join(
-        ended.out.split()
+        result.out.split()
     )
 
 
 def test_call_without_a_command_prints_the_help(simscen) -> None:
-    ended = simscen()
-    assert "Commands:" in ended.out + ended.err
+    result = simscen()
+    assert "Commands:" in result.out + result.err
 
 
 def test_version_is_printed(simscen) -> None:
@@ -35,9 +37,9 @@ def test_command_table_matches_the_help(simscen, name: str) -> None:
 
 
 def test_unknown_command_is_a_usage_error(simscen) -> None:
-    ended = simscen("rum")
-    assert ended.code == 2
-    assert "No such command 'rum'" in ended.err
+    result = simscen("rum")
+    assert result.code == 2
+    assert "No such command 'rum'" in result.err
 
 
 @pytest.mark.parametrize(
@@ -75,9 +77,9 @@ LONG = "a" * 300
     ],
 )
 def test_a_path_that_cannot_be_accessed_is_a_usage_error(simscen, arguments: tuple[str, ...]) -> None:
-    ended = simscen(*arguments)
-    assert ended.code == 2
-    assert "File name too long" in ended.err and "Traceback" not in ended.err
+    result = simscen(*arguments)
+    assert result.code == 2
+    assert "File name too long" in result.err and "Traceback" not in result.err
 
 
 @pytest.mark.parametrize(
@@ -88,9 +90,9 @@ def test_a_path_that_cannot_be_accessed_is_a_usage_error(simscen, arguments: tup
     ],
 )
 def test_a_file_whose_name_is_too_long_does_not_exist(simscen, arguments: tuple[str, ...], message: str) -> None:
-    ended = simscen(*arguments)
-    assert ended.code == 2
-    assert message in ended.err
+    result = simscen(*arguments)
+    assert result.code == 2
+    assert message in result.err
 
 
 def test_unexpected_exception_is_an_internal_error(simscen, monkeypatch) -> None:
@@ -98,12 +100,12 @@ def test_unexpected_exception_is_an_internal_error(simscen, monkeypatch) -> None
         raise ZeroDivisionError
 
     monkeypatch.setattr(cli, "app", broken)
-    ended = simscen()
-    assert ended.code == 4
-    assert "internal error" in ended.err
+    result = simscen()
+    assert result.code == 4
+    assert "internal error" in result.err
 
 
-LIGHT = """
+IMPORT_CHECK = """
 import sys
 from simscen.cli.main import main
 sys.argv = ["simscen", *{arguments}]
@@ -122,7 +124,7 @@ assert not heavy, heavy
 @pytest.mark.parametrize(
     "arguments", [["--help"], ["validate", "."], ["list", "."], ["schema"], ["explain", "amcl"], ["new", "x"]], ids=str
 )
-def test_light_commands_import_no_engine(simscen, arguments: list[str]) -> None:
-    code = LIGHT.format(arguments=arguments)
-    ended = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
-    assert ended.returncode == 0, ended.stderr
+def test_commands_without_a_run_import_no_engine(simscen, arguments: list[str]) -> None:
+    code = IMPORT_CHECK.format(arguments=arguments)
+    result = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr

@@ -1,4 +1,4 @@
-"""`simscen merge` and `--shard`: the merged results are those of a single session."""
+"""Tests of `simscen merge` and `--shard`: the merged results equal the results of a single session."""
 
 import json
 import re
@@ -23,7 +23,7 @@ pass: [{collisions: {max: 0}}, {clearance: {min: LIMIT}}]
 
 @pytest.fixture(scope="module")
 def sessions(simscen_in, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Three scenarios, of which one fails, in a single session `whole` and in the shards `s1` and `s2`."""
+    """Return a folder with a session `whole` of three scenarios, of which one fails, and its shards `s1` and `s2`."""
     folder = tmp_path_factory.mktemp("sessions")
     for name in "abc":
         text = SCENARIO.replace("LIMIT", "3 m" if name == "c" else "0.1 m")
@@ -34,7 +34,9 @@ def sessions(simscen_in, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_merged_results_are_those_of_a_single_session(simscen, sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_merged_results_equal_the_results_of_a_single_session(
+    simscen, sessions: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(sessions)
     assert simscen("merge", "s2", "s1", "--out", "all", "--junit", "all/ci/merged.xml").code == 1
     assert Path("all/ci/merged.xml").read_bytes() == Path("all/junit.xml").read_bytes()
@@ -52,9 +54,9 @@ def test_merged_results_are_those_of_a_single_session(simscen, sessions: Path, m
 def test_merged_folder_can_be_reported_again(simscen, sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(sessions)
     simscen("merge", "s1", "s2", "--out", "again")
-    before = Path("again/results.json").read_bytes()
+    original = Path("again/results.json").read_bytes()
     assert simscen("report", "again").code == 1
-    assert Path("again/results.json").read_bytes() == before
+    assert Path("again/results.json").read_bytes() == original
 
 
 def test_unfinished_runs_of_a_shard_are_errors(
@@ -64,7 +66,7 @@ def test_unfinished_runs_of_a_shard_are_errors(
     killed = tmp_path / "killed"
     killed.mkdir()
     lines = Path("s1/events.jsonl").read_bytes().splitlines(keepends=True)
-    (killed / "events.jsonl").write_bytes(b"".join(lines[:3]))  # the plan, and that a run started
+    (killed / "events.jsonl").write_bytes(b"".join(lines[:3]))  # the plan and the start of a run
     assert simscen("merge", killed, "s2", "--out", tmp_path / "all").code == 3
     kinds = [
         run["error"]["kind"] for run in json.loads((tmp_path / "all/results.json").read_text())["runs"] if run["error"]
@@ -75,9 +77,9 @@ def test_unfinished_runs_of_a_shard_are_errors(
 
 def test_runs_that_are_in_two_shards_are_refused(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(sessions)
-    done = CliRunner().invoke(app, ["merge", "whole", "s1", "--out", "twice"])
-    assert isinstance(done.exception, InvalidInput)
-    assert {problem.code for problem in done.exception.problems} == {"SC812"}
+    result = CliRunner().invoke(app, ["merge", "whole", "s1", "--out", "twice"])
+    assert isinstance(result.exception, InvalidInput)
+    assert {problem.code for problem in result.exception.problems} == {"SC812"}
     assert not Path("twice").exists()
 
 
@@ -86,9 +88,9 @@ def test_missing_shard_is_an_error_unless_it_is_allowed(
 ) -> None:
     """The merged session would otherwise pass without the scenario that fails."""
     monkeypatch.chdir(sessions)
-    done = CliRunner().invoke(app, ["merge", "s2", "--out", "partial"])
-    assert isinstance(done.exception, InvalidInput)
-    assert [problem.message for problem in done.exception.problems] == ["shard 1/2 is missing"]
+    result = CliRunner().invoke(app, ["merge", "s2", "--out", "partial"])
+    assert isinstance(result.exception, InvalidInput)
+    assert [problem.message for problem in result.exception.problems] == ["shard 1/2 is missing"]
     assert not Path("partial").exists()
     assert simscen("merge", "s2", "--out", "partial", "--allow-missing").code == 0
 
@@ -97,33 +99,35 @@ def test_unwritable_junit_is_an_error_before_anything_is_merged(
     simscen, sessions: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(sessions)
-    done = simscen("merge", "s1", "s2", "--out", "unmerged", "--junit", "a.scenario.yaml/junit.xml")
-    assert done.code == 2
+    result = simscen("merge", "s1", "s2", "--out", "unmerged", "--junit", "a.scenario.yaml/junit.xml")
+    assert result.code == 2
     assert not Path("unmerged").exists()
 
 
 def test_output_folder_must_be_empty(sessions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(sessions)
-    done = CliRunner().invoke(app, ["merge", "s1", "s2", "--out", "whole"])
-    assert isinstance(done.exception, UsageError)
+    result = CliRunner().invoke(app, ["merge", "s1", "s2", "--out", "whole"])
+    assert isinstance(result.exception, UsageError)
 
 
-class Titled:
+class TitledScenario:
+    """Scenario of which only the title is known."""
+
     def __init__(self, title: str) -> None:
         self.title = title
 
 
 def test_measured_times_balance_the_shards() -> None:
     """One scenario takes as long as all others; each scenario is in exactly one shard, in its order."""
-    scenarios = [Titled(name) for name in "abcdef"]
+    scenarios = [TitledScenario(name) for name in "abcdef"]
     times = {"a": 1.0, "b": 1.0, "c": 5.0, "d": 1.0, "e": 1.0}  # f counts as the median
-    first, second = ([one.title for one in scenarios_of_shard(scenarios, k, 2, times)] for k in (1, 2))  # type: ignore[arg-type]
+    first, second = ([scenario.title for scenario in scenarios_of_shard(scenarios, k, 2, times)] for k in (1, 2))  # type: ignore[arg-type]
     assert (first, second) == (["c"], ["a", "b", "d", "e", "f"])
 
 
 def test_without_times_each_shard_has_every_nth_scenario() -> None:
-    scenarios = [Titled(name) for name in "abcde"]
-    assert [one.title for one in scenarios_of_shard(scenarios, 2, 2, {})] == ["b", "d"]  # type: ignore[arg-type]
+    scenarios = [TitledScenario(name) for name in "abcde"]
+    assert [scenario.title for scenario in scenarios_of_shard(scenarios, 2, 2, {})] == ["b", "d"]  # type: ignore[arg-type]
     with pytest.raises(NothingSelected):
         scenarios_of_shard(scenarios, 6, 6, {})  # type: ignore[arg-type]
 

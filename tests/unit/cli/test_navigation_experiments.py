@@ -1,4 +1,4 @@
-"""Groups of experiments of `simscen bench nav`."""
+"""Tests of the groups of experiments of `simscen bench nav`."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ import pytest
 from simscen.cli.benchmarks.navigation_experiments import Sizes, experiment_groups
 
 PROJECT = Path(__file__).parents[3]
-MADE_QUICKLY = (
+QUICK_GROUPS = (
     "generated fields",
     "narrow fields",
     "dynamic fields",
@@ -16,19 +16,19 @@ MADE_QUICKLY = (
     "corner cases",
     "localization",
 )
-HERE = ("BARN", "random goals", "degraded sensing", "tb3_sandbox", *MADE_QUICKLY)
+AVAILABLE_GROUPS = ("BARN", "random goals", "degraded sensing", "tb3_sandbox", *QUICK_GROUPS)
 
 
 def test_experiment_groups_are_listed_in_order(tmp_path: Path) -> None:
-    assert {offer.name for offer in experiment_groups(None, None, PROJECT, tmp_path, Sizes())} == set(HERE)
+    assert {group.name for group in experiment_groups(None, None, PROJECT, tmp_path, Sizes())} == set(AVAILABLE_GROUPS)
 
 
 @pytest.mark.sample(2)
-@pytest.mark.parametrize("name", MADE_QUICKLY)
+@pytest.mark.parametrize("name", QUICK_GROUPS)
 def test_group_lists_the_names_of_its_experiments(tmp_path: Path, name: str) -> None:
     small = Sizes(seeds=1, fields=2, dynamic=1, goals=1, lost=1)
-    (offer,) = (offer for offer in experiment_groups(None, None, PROJECT, tmp_path, small) if offer.name == name)
-    assert [experiment.name for experiment in offer.write_experiments()] == (list(offer.other_names) or [name])
+    (group,) = (group for group in experiment_groups(None, None, PROJECT, tmp_path, small) if group.name == name)
+    assert [experiment.name for experiment in group.write_experiments()] == (list(group.other_names) or [name])
 
 
 @pytest.mark.slow
@@ -37,12 +37,12 @@ def test_first_number_changes_drives_but_not_names(tmp_path: Path) -> None:
         small = Sizes(first, seeds=1, fields=2, dynamic=1, goals=1, lost=1)
         return [
             f"{experiment.name}: {drive.file.stem} {list(drive.seeds)}"
-            for offer in experiment_groups(None, None, PROJECT, tmp_path / str(first), small)
-            if offer.name in ("narrow fields", "dynamic fields", "ramps", "two robots", "localization", "corner cases")
-            for experiment in offer.write_experiments()
+            for group in experiment_groups(None, None, PROJECT, tmp_path / str(first), small)
+            if group.name in ("narrow fields", "dynamic fields", "ramps", "two robots", "localization", "corner cases")
+            for experiment in group.write_experiments()
             for drive in experiment.drives
         ]
 
-    first_seeds, later_seeds = names(1), names(400)
-    assert len(first_seeds) == len(later_seeds)
-    assert not set(first_seeds) & set(later_seeds)
+    first, later = names(1), names(400)
+    assert len(first) == len(later)
+    assert not set(first) & set(later)

@@ -1,4 +1,4 @@
-"""Runs of the experiments of `simscen bench nav`."""
+"""Tests of the runs of the experiments of `simscen bench nav`."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,14 +19,14 @@ from simscen.core.records.session_events import Artifacts, RunFinished
 from simscen.testing.synthetic_trace import synthetic_trace
 
 
-def hall(folder: Path) -> Experiment:
+def ramps(folder: Path) -> Experiment:
     return generated_worlds.write_ramps(folder, (1, 2))
 
 
 def test_runs_with_another_stack_have_different_keys(tmp_path: Path) -> None:
     stack = tmp_path / "slow.stack.yaml"
     stack.write_text("simscen: 1\nstack: {controller: {desired_linear_vel: 0.3}}\n", encoding="utf-8")
-    experiments = [hall(tmp_path / "made/wide"), hall(tmp_path / "made/narrow")]
+    experiments = [ramps(tmp_path / "made/wide"), ramps(tmp_path / "made/narrow")]
     changed = experiments_with_stack(stack, experiments, tmp_path / "made", tmp_path)
     jobs, owners = _plan_jobs(changed, tmp_path / "out")
     assert [owners[job.key][0] for job in jobs] == [0, 0, 1, 1]
@@ -45,7 +45,9 @@ def test_problems_of_a_stack_file_have_paths_from_the_working_directory(
     assert [problem.path for problem in error.value.problems] == ["project/bad.stack.yaml"]
 
 
-def test_interval_of_the_anees_counts_only_the_runs_that_have_not_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_anees_interval_at_a_time_counts_only_the_runs_that_last_until_this_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def read_log(file: Path) -> Any:
         # An error of 0.1 m with a standard deviation of 0.1 m: the NEES is 1.
         drive = {"seconds": float(file.stem), "truth": [[0, 0, 0]], "belief": {"offset": [0.1, 0, 0]}}
@@ -76,7 +78,7 @@ def test_nav2_parameter_file_is_a_valid_stack_and_ignored_parameters_are_reporte
 ) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(NAV2, encoding="utf-8")
-    (other,) = experiments_with_stack(file, [hall(tmp_path / "made")], tmp_path / "made", tmp_path)
+    (other,) = experiments_with_stack(file, [ramps(tmp_path / "made")], tmp_path / "made", tmp_path)
     jobs, _ = _plan_jobs([other], tmp_path / "out")
     stack = jobs[0].scenario.spec.stack
     assert stack.controller.type == "regulated_pure_pursuit"
@@ -86,11 +88,11 @@ def test_nav2_parameter_file_is_a_valid_stack_and_ignored_parameters_are_reporte
 
 
 def test_experiments_without_fields_select_nothing(simscen: Any) -> None:
-    ended = simscen("bench", "nav", "--only", "generated fields", "--fields", "0")
-    assert ended.code == 5
-    assert "those that match have no data, fields, or drives" in ended.err
+    result = simscen("bench", "nav", "--only", "generated fields", "--fields", "0")
+    assert result.code == 5
+    assert "those that match have no data, fields, or drives" in result.err
 
 
 def test_experiments_with_duplicate_runs_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="ramp_1"):
-        _plan_jobs([hall(tmp_path / "wide"), hall(tmp_path / "narrow")], tmp_path / "out")
+        _plan_jobs([ramps(tmp_path / "wide"), ramps(tmp_path / "narrow")], tmp_path / "out")

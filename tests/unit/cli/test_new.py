@@ -1,3 +1,5 @@
+"""Tests of `simscen new`: new scenarios, copies, and base files."""
+
 import shlex
 from pathlib import Path
 
@@ -20,31 +22,31 @@ def test_suggested_command_works_for_a_name_with_spaces(simscen, tmp_path: Path)
 def test_verification_does_not_overwrite_the_recorded_log(simscen, tmp_path: Path) -> None:
     assert simscen("run", "good.scenario.yaml", "--out", "out").code == 0
     log = Path("out/runs/good/seed-1/run.mcap").rename("drive.verified.mcap")
-    before = log.read_bytes()
-    ended = simscen("new", "drive", "--from-log", log, "--verify")
-    assert ended.code == 2
-    assert "cannot write drive.verified.mcap: it is one of the input files" in ended.err
-    assert log.read_bytes() == before
+    original = log.read_bytes()
+    result = simscen("new", "drive", "--from-log", log, "--verify")
+    assert result.code == 2
+    assert "cannot write drive.verified.mcap: it is one of the input files" in result.err
+    assert log.read_bytes() == original
 
 
 def test_new_never_overwrites_a_file(simscen, tmp_path: Path) -> None:
     (tmp_path / "mine.scenario.yaml").write_text("precious")
-    ended = simscen("new", "mine")
-    assert ended.code == 2
-    assert "mine.scenario.yaml already exists" in ended.err
+    result = simscen("new", "mine")
+    assert result.code == 2
+    assert "mine.scenario.yaml already exists" in result.err
     assert (tmp_path / "mine.scenario.yaml").read_text() == "precious"
 
 
 @pytest.mark.parametrize("name", ["good.scenario.yaml/x", "x" * 300, "a\x00b"])
 def test_invalid_name_is_a_usage_error(simscen, name: str) -> None:
-    ended = simscen("new", name)
-    assert ended.code == 2
-    assert "Traceback" not in ended.err
+    result = simscen("new", name)
+    assert result.code == 2
+    assert "Traceback" not in result.err
 
 
 def test_copy_of_a_shipped_scenario_is_complete_and_valid(simscen, tmp_path: Path) -> None:
-    ended = simscen("new", "mine", "--like", "outdated_map")
-    assert ended.code == 0
+    result = simscen("new", "mine", "--like", "outdated_map")
+    assert result.code == 0
     assert {path.relative_to(tmp_path).as_posix() for path in (tmp_path / "mine").rglob("*")} == {
         "mine/house.world.yaml", "mine/house_last_year.yaml", "mine/house_last_year.pgm"
     }  # fmt: skip
@@ -69,8 +71,8 @@ def test_copy_in_the_same_project_keeps_files_and_comments(simscen, tmp_path: Pa
     [("outdated_mop", "did you mean `navigation/outdated_map`"), ("cart_crossing", "is ambiguous")],
 )
 def test_unknown_or_ambiguous_scenario_to_copy_is_an_error(simscen, like: str, expected_text: str) -> None:
-    ended = simscen("new", "mine", "--like", like)
-    assert (ended.code, expected_text in ended.err) == (2, True), ended.err
+    result = simscen("new", "mine", "--like", like)
+    assert (result.code, expected_text in result.err) == (2, True), result.err
     assert not Path("mine.scenario.yaml").exists()
 
 
@@ -96,5 +98,5 @@ def test_base_file_refers_to_the_partial_schema(simscen, tmp_path: Path, name: s
 
 def test_copy_includes_variations(simscen, tmp_path: Path) -> None:
     assert simscen("new", "mine", "--like", "speeds").code == 0
-    listed = simscen("list", "mine.scenario.yaml").out
-    assert listed.count("mine[desired_linear_vel=") == 4
+    output = simscen("list", "mine.scenario.yaml").out
+    assert output.count("mine[desired_linear_vel=") == 4

@@ -1,4 +1,4 @@
-"""The reference page of the commands lists all options and exit codes."""
+"""Tests of the reference page of the commands: options and exit codes."""
 
 import re
 
@@ -17,11 +17,12 @@ from simscen.core.errors import Exit
 
 
 def calls():
+    """Return the words of each command, such as "world inspect", and its function."""
     return [(words, function) for name in COMMANDS for words, function in functions_of_command(name)]
 
 
 def typer_command(words):
-    """Return the typer command with this name."""
+    """Return the typer command with these words."""
     command = typer.main.get_command(app)
     for word in words.split():
         command = command.get_command(None, word)

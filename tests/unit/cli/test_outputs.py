@@ -17,9 +17,9 @@ NOT_REGULAR = ("device", "fifo", "link", "dangling", "folder")
 
 @pytest.fixture
 def special_file(tmp_path: Path):
-    """Return a function that creates a path of this kind that is not a regular file."""
+    """Return a function that creates a path that is not a regular file; its kind is one of NOT_REGULAR."""
 
-    def special_file(kind: str) -> Path:
+    def create(kind: str) -> Path:
         path = tmp_path / f"special-{kind}.png"
         match kind:
             case "device":
@@ -35,7 +35,7 @@ def special_file(tmp_path: Path):
                 path.mkdir()
         return path
 
-    return special_file
+    return create
 
 
 @pytest.mark.parametrize("name", ["...scenario.yaml", "..scenario.yaml", ".scenario.yaml"])
@@ -43,9 +43,9 @@ def special_file(tmp_path: Path):
 def test_file_name_without_a_valid_id_is_rejected(simscen, tmp_path: Path, name, command) -> None:
     (tmp_path / "in").mkdir()
     (tmp_path / "good.scenario.yaml").rename(tmp_path / "in" / name)
-    ended = simscen(command, f"in/{name}")
-    assert ended.code == 2
-    assert f"in/{name}: error[SC041] its id would end in" in ended.out + ended.err
+    result = simscen(command, f"in/{name}")
+    assert result.code == 2
+    assert f"in/{name}: error[SC041] its id would end in" in result.out + result.err
     assert not list(tmp_path.rglob("*.mcap"))
 
 
@@ -69,11 +69,11 @@ def test_only_regular_files_are_overwritten(simscen, tmp_path: Path, special_fil
         "{simscen: 1, walls: [{points: [[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]}]}"
     )
     path = special_file(kind)
-    before = path.lstat()
-    ended = simscen(*command, str(path))
-    assert ended.code == 2
-    assert ended.err.startswith(f"simscen: cannot write {path}: ")
-    assert path.lstat().st_mode == before.st_mode
+    original_state = path.lstat()
+    result = simscen(*command, str(path))
+    assert result.code == 2
+    assert result.err.startswith(f"simscen: cannot write {path}: ")
+    assert path.lstat().st_mode == original_state.st_mode
     assert kind != "link" or (tmp_path / "precious").read_text() == "keep me"
     assert not list(tmp_path.rglob("*.mcap"))
 
@@ -82,17 +82,17 @@ def test_schemas_are_not_written_through_symbolic_links(simscen, tmp_path: Path)
     (tmp_path / "precious").write_text("keep me")
     (tmp_path / "schemas").mkdir()
     (tmp_path / "schemas/scenario.schema.json").symlink_to("../precious")
-    ended = simscen("schema", "--write", "schemas")
-    assert (ended.code, ended.err) == (
+    result = simscen("schema", "--write", "schemas")
+    assert (result.code, result.err) == (
         2, "simscen: cannot write schemas/scenario.schema.json: it is a symbolic link; name the file itself\n"
     )  # fmt: skip
     assert (tmp_path / "precious").read_text() == "keep me"
 
 
 def test_unwritable_schema_folder_is_an_error(simscen) -> None:
-    ended = simscen("schema", "--write", "good.scenario.yaml")
-    assert (ended.code, ended.out) == (2, "")
-    assert ended.err.startswith("simscen: cannot write good.scenario.yaml/scenario.schema.json: ")
+    result = simscen("schema", "--write", "good.scenario.yaml")
+    assert (result.code, result.out) == (2, "")
+    assert result.err.startswith("simscen: cannot write good.scenario.yaml/scenario.schema.json: ")
 
 
 def test_inputs_are_not_overwritten(simscen, tmp_path: Path) -> None:
@@ -106,9 +106,9 @@ def test_inputs_are_not_overwritten(simscen, tmp_path: Path) -> None:
         ("world", "inspect", "room.world.yaml", "--png", "room.world.yaml"),
         ("world", "convert", "room.world.yaml", "room.world.yaml"),
     ):
-        ended = simscen(*command)
-        assert ended.code == 2
-        assert ended.err.endswith("it is one of the input files\n")
+        result = simscen(*command)
+        assert result.code == 2
+        assert result.err.endswith("it is one of the input files\n")
     assert (tmp_path / "room.world.yaml").read_text() == world
     assert (tmp_path / "good.scenario.yaml").read_text() == scenario
 
@@ -119,21 +119,21 @@ def test_junit_can_be_in_a_subfolder_of_a_new_output_folder(simscen, tmp_path: P
 
 
 @pytest.mark.parametrize("name", ["results.json", "events.jsonl", "run.json", "report.html", "runs/good/junit.xml"])
-@pytest.mark.parametrize("before", [False, True])
-def test_junit_cannot_use_reserved_names(simscen, tmp_path: Path, name, before) -> None:
-    options = ("--out", "new") if before else ("--out", "out")
-    if before:
+@pytest.mark.parametrize("folder_exists", [False, True])
+def test_junit_cannot_use_reserved_names(simscen, tmp_path: Path, name, folder_exists) -> None:
+    options = ("--out", "new") if folder_exists else ("--out", "out")
+    if folder_exists:
         (tmp_path / "out").mkdir()
         (tmp_path / "out/events.jsonl").write_text("{}\n")
-    ended = simscen("run", "good.scenario.yaml", *options, "--junit", f"out/{name}")
-    assert ended.code == 2
-    assert ended.err == f"simscen: cannot write out/{name}: simscen writes another file with this name there\n"
+    result = simscen("run", "good.scenario.yaml", *options, "--junit", f"out/{name}")
+    assert result.code == 2
+    assert result.err == f"simscen: cannot write out/{name}: simscen writes another file with this name there\n"
 
 
 @pytest.mark.parametrize("name", [".", "..", "", "deep/", "deep/.", ".scenario.yaml"])
 def test_new_rejects_names_that_run_rejects(simscen, tmp_path: Path, name) -> None:
-    ended = simscen("new", name)
-    assert ended.code == 2
+    result = simscen("new", name)
+    assert result.code == 2
     assert [path.name for path in tmp_path.iterdir()] == ["good.scenario.yaml"]
 
 
@@ -160,8 +160,8 @@ def test_unwritten_report_is_not_named(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr("simscen.cli.session.output_files.write_atomically", write)
     reports = Reports(tmp_path, None, "simscen")
     assert not reports.write([])
-    ended = reports.finished_event([], 1.0, False)
-    assert (ended.junit, ended.page) == ("", "")
+    result = reports.finished_event([], 1.0, False)
+    assert (result.junit, result.page) == ("", "")
 
 
 def test_incomplete_journal_of_a_study_is_reported(simscen, monkeypatch) -> None:
@@ -169,6 +169,6 @@ def test_incomplete_journal_of_a_study_is_reported(simscen, monkeypatch) -> None
         journal.error = OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(Journal, "__call__", lose)
-    ended = simscen("study", "good.scenario.yaml", "--runs", "1", "--out", "out", "-j", "1")
-    assert ended.code == 3
-    assert "simscen: the journal in out is incomplete: No space left on device\n" in ended.err
+    result = simscen("study", "good.scenario.yaml", "--runs", "1", "--out", "out", "-j", "1")
+    assert result.code == 3
+    assert "simscen: the journal in out is incomplete: No space left on device\n" in result.err

@@ -1,4 +1,4 @@
-"""Problems name files relative to the working folder, although paths in scenarios are relative to their root."""
+"""Tests that problems name files relative to the working folder, although scenarios use paths from their root."""
 
 from pathlib import Path
 
@@ -11,13 +11,13 @@ INVALID_WORLD = "simscen: 1\nwalls: 3\n"
 
 
 def subfolder(root: Path) -> Path:
-    """Return a folder with a valid and an invalid scenario, in a repository, which is the root of all files."""
+    """Return a subfolder of a Git repository, which is the scenario root, with a valid and an invalid scenario."""
     folder = root / "sub"
     folder.mkdir()
     (root / ".git").mkdir()
-    good = (root / "good.scenario.yaml").read_text()
-    (folder / "good.scenario.yaml").write_text(good)
-    (folder / "bad.scenario.yaml").write_text(good.replace("name: drive", "nam: drive"))
+    scenario = (root / "good.scenario.yaml").read_text()
+    (folder / "good.scenario.yaml").write_text(scenario)
+    (folder / "bad.scenario.yaml").write_text(scenario.replace("name: drive", "nam: drive"))
     return folder
 
 
@@ -36,23 +36,23 @@ def subfolder(root: Path) -> Path:
         (["edit", "new", "--new", "--map", "bad.world.yaml"], "bad.world.yaml:2:8"),
     ],
 )
-def test_problems_of_a_file_in_a_subfolder_name_the_path_from_there(
+def test_problems_of_a_file_in_a_subfolder_name_the_path_from_the_working_folder(
     simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], place: str
 ) -> None:
     folder = subfolder(tmp_path)
-    good = (folder / "good.scenario.yaml").read_text()
-    (folder / "variations.scenario.yaml").write_text(good + "variations: {grid: 3}\n")
+    scenario = (folder / "good.scenario.yaml").read_text()
+    (folder / "variations.scenario.yaml").write_text(scenario + "variations: {grid: 3}\n")
     (folder / "bad.robot.yaml").write_text("simscen: 1\n")
     (folder / "bad.world.yaml").write_text(INVALID_WORLD)
     monkeypatch.chdir(folder)
-    ended = simscen(*arguments)
-    assert ended.code == 2
-    assert ended.err.startswith(place), ended.err
+    result = simscen(*arguments)
+    assert result.code == 2
+    assert result.err.startswith(place), result.err
 
 
 @pytest.mark.usefixtures("simscen")
 @pytest.mark.parametrize("function", [simulate, variations])
-def test_exceptions_of_the_python_interface_name_the_path_from_there(
+def test_exceptions_of_the_python_interface_name_the_path_from_the_working_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, function
 ) -> None:
     monkeypatch.chdir(subfolder(tmp_path))

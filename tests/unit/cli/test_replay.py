@@ -1,4 +1,4 @@
-"""`simscen replay`, and the replay pages of failed runs."""
+"""Tests of `simscen replay`, and of the replay pages of failed runs."""
 
 import json
 import subprocess
@@ -31,9 +31,9 @@ def out(simscen_in, tmp_path_factory: pytest.TempPathFactory) -> Path:
     home = tmp_path_factory.mktemp("home")
     (home / "good.scenario.yaml").write_text(GOOD)
     (home / "bad.scenario.yaml").write_text(BAD)
-    done = simscen_in(home, "run", ".", "-j1", "--out", "out")
-    assert done.code == 1, done.err
-    assert "replay    out/runs/bad/seed-1/replay.html" in done.out
+    result = simscen_in(home, "run", ".", "-j1", "--out", "out")
+    assert result.code == 1, result.err
+    assert "replay    out/runs/bad/seed-1/replay.html" in result.out
     return home / "out"
 
 
@@ -45,10 +45,10 @@ def test_failed_run_has_a_replay_that_all_reports_link(out: Path) -> None:
     assert "[[ATTACHMENT|out/runs/bad/seed-1/replay.html]]" in (out / "junit.xml").read_text()
 
 
-def test_replay_of_a_run_equals_that_of_the_command(simscen, out: Path, tmp_path: Path) -> None:
+def test_replay_of_a_failed_run_equals_the_replay_of_the_command(simscen, out: Path, tmp_path: Path) -> None:
     run = out / "runs" / "bad" / "seed-1"
-    ended = simscen("replay", str(run), "--out", "page.html")
-    assert (ended.code, ended.out) == (0, "page.html\n")
+    result = simscen("replay", str(run), "--out", "page.html")
+    assert (result.code, result.out) == (0, "page.html\n")
     assert (tmp_path / "page.html").read_bytes() == (run / "replay.html").read_bytes()
 
 
@@ -57,15 +57,15 @@ def test_log_with_damaged_scenery_is_an_error(simscen, out: Path, monkeypatch: p
         raise ValueError("not a scenery")
 
     monkeypatch.setattr("simscen.report.replay.page.scenery_from_header", damaged)
-    ended = simscen("replay", str(out / "runs" / "bad" / "seed-1"), "--out", "page.html")
-    assert ended.code == 2
-    assert "error[SC802] the log is damaged: not a scenery" in ended.err
+    result = simscen("replay", str(out / "runs" / "bad" / "seed-1"), "--out", "page.html")
+    assert result.code == 2
+    assert "error[SC802] the log is damaged: not a scenery" in result.err
 
 
 def test_every_log_in_a_folder_gets_a_replay(simscen, out: Path) -> None:
     page = out / "runs" / "good" / "seed-1" / "replay.html"
-    ended = simscen("replay", str(out))
-    assert ended.code == 0 and ended.out.splitlines() == [str(page).replace("good", name) for name in ("bad", "good")]
+    result = simscen("replay", str(out))
+    assert result.code == 0 and result.out.splitlines() == [str(page).replace("good", name) for name in ("bad", "good")]
     assert page.is_file()
     page.unlink()
 
@@ -76,8 +76,8 @@ def test_bag_is_named_after_its_whole_folder(tmp_path: Path) -> None:
 
 
 def test_two_runs_are_shown_side_by_side(simscen, out: Path, tmp_path: Path) -> None:
-    good, bad = (str(out / "runs" / name / "seed-1") for name in ("good", "bad"))
-    assert simscen("replay", good, "--against", bad, "--out", "both.html").code == 0
+    passed_run, failed_run = (str(out / "runs" / name / "seed-1") for name in ("good", "bad"))
+    assert simscen("replay", passed_run, "--against", failed_run, "--out", "both.html").code == 0
     assert "<title>good, seed 1, passed against bad, seed 1, failed</title>" in (tmp_path / "both.html").read_text()
 
 
@@ -90,20 +90,20 @@ def test_two_runs_are_shown_side_by_side(simscen, out: Path, tmp_path: Path) -> 
     ],
 )
 def test_invalid_log_is_an_error(simscen, arguments: tuple[str, ...], code: int, expected_text: str) -> None:
-    ended = simscen("replay", *arguments)
-    assert ended.code == code and expected_text.replace(":0:0", "") in ended.err
+    result = simscen("replay", *arguments)
+    assert result.code == code and expected_text.replace(":0:0", "") in result.err
 
 
 def test_one_page_for_several_runs_is_rejected(simscen, out: Path) -> None:
-    ended = simscen("replay", str(out), "--out", "page.html")
-    assert ended.code == 2 and "--out takes one run, but 2 were found" in ended.err
+    result = simscen("replay", str(out), "--out", "page.html")
+    assert result.code == 2 and "--out takes one run, but 2 were found" in result.err
 
 
 def test_log_is_not_overwritten(simscen, out: Path) -> None:
     log = out / "runs" / "bad" / "seed-1" / "run.mcap"
-    before = log.read_bytes()
+    original = log.read_bytes()
     assert simscen("replay", str(log), "--out", str(log)).code == 2
-    assert log.read_bytes() == before
+    assert log.read_bytes() == original
 
 
 def test_replay_needs_no_engine(out: Path, tmp_path: Path) -> None:
@@ -113,8 +113,8 @@ def test_replay_needs_no_engine(out: Path, tmp_path: Path) -> None:
         f"sys.argv = ['simscen', 'replay', {str(out / 'runs/bad/seed-1')!r}, '--out', {str(tmp_path / 'x.html')!r}]\n"
         f"atexit.register(lambda: print('imported:', *set(sys.modules) & {heavy!r}))\nmain()\n"
     )
-    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "imported:"
+    result = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    assert result.stdout.splitlines()[-1] == "imported:"
 
 
 def test_log_contains_both_costmaps_at_a_limited_rate(out: Path) -> None:

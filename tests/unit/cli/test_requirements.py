@@ -16,15 +16,15 @@ PYPROJECT = (Path(__file__).parents[3] / "pyproject.toml").read_text()
 
 @pytest.fixture
 def installed(monkeypatch):
-    """Return a function that fakes installed package versions and the requirements `needs` of simscen."""
+    """Return a function that fakes installed package versions and the requirements of simscen."""
 
-    def installed(needs, **versions):
+    def installed(requirement_texts, **versions):
         def version(name):
             if name not in versions:
                 raise importlib.metadata.PackageNotFoundError(name)
             return versions[name]
 
-        monkeypatch.setattr(importlib.metadata, "requires", lambda _: needs)
+        monkeypatch.setattr(importlib.metadata, "requires", lambda _: requirement_texts)
         monkeypatch.setattr(importlib.metadata, "version", version)
 
     return installed
@@ -36,7 +36,7 @@ def test_this_installation_meets_its_requirements() -> None:
 
 
 @pytest.mark.parametrize(
-    ("need", "version", "fits"),
+    ("requirement", "version", "is_met"),
     [
         ("numpy<3,>=1.26", "1.26", True),
         ("numpy<3,>=1.26", "1.26.0", True),
@@ -52,9 +52,9 @@ def test_this_installation_meets_its_requirements() -> None:
         ('numpy>=9; extra == "more"', "1", True),
     ],
 )
-def test_versions_are_compared(installed, need, version, fits) -> None:
-    installed([need], numpy=version)
-    assert (requirements.unmet_requirements() == []) is fits
+def test_versions_are_compared(installed, requirement, version, is_met) -> None:
+    installed([requirement], numpy=version)
+    assert (requirements.unmet_requirements() == []) is is_met
 
 
 def test_unmet_requirements_have_a_hint(installed) -> None:

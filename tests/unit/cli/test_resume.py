@@ -1,4 +1,4 @@
-"""`--resume` keeps verdicts whose logs exist, and marks them."""
+"""Tests of `--resume`, which keeps the verdicts of runs whose logs exist, and marks these runs."""
 
 import json
 import shutil
@@ -36,23 +36,23 @@ def session(finished, simscen, tmp_path):
     shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
 
     def resume():
-        ended = simscen(*RUN, "--resume", "out")
-        assert ended.code == 0
-        return ended.out
+        result = simscen(*RUN, "--resume", "out")
+        assert result.code == 0
+        return result.out
 
     return tmp_path / "out", resume
 
 
-def kept(folder):
+def kept_scenarios(folder):
     runs = json.loads((folder / "results.json").read_text())["runs"]
     return [run["scenario"] for run in runs if run.get("resumed")]
 
 
 def test_kept_verdicts_are_marked_in_console_and_reports(session):
     folder, resume = session
-    assert kept(folder) == []
+    assert kept_scenarios(folder) == []
     assert resume().count(", kept") == 2
-    assert kept(folder) == ["a", "b"]
+    assert kept_scenarios(folder) == ["a", "b"]
     marks = ElementTree.parse(folder / "junit.xml").findall(".//property[@name='resumed']")
     assert [mark.get("value") for mark in marks] == ["true", "true"]
 
@@ -62,28 +62,28 @@ def test_kept_verdicts_are_marked_in_console_and_reports(session):
 def test_run_with_missing_or_changed_log_is_repeated(session, damage):
     folder, resume = session
     log, other = folder / "runs/a/seed-1/run.mcap", folder / "runs/b/seed-1/run.mcap"
-    whole = log.read_bytes()
+    original = log.read_bytes()
     match damage:
         case "deleted":
             log.unlink()
         case "replaced":
             log.write_bytes(other.read_bytes())
         case "cut":
-            log.write_bytes(whole[: len(whole) // 2])
+            log.write_bytes(original[: len(original) // 2])
         case "emptied":
             log.write_bytes(b"")
     assert resume().count(", kept") == 1
-    assert kept(folder) == ["b"]
-    assert log.read_bytes() == whole
+    assert kept_scenarios(folder) == ["b"]
+    assert log.read_bytes() == original
 
 
 def test_runs_that_are_not_selected_again_are_named(session, simscen):
-    """Otherwise, a session with a failure would pass if it is resumed with a smaller selection."""
+    """Otherwise, a failed session could pass when it is resumed with a smaller selection."""
     folder, _ = session
-    ended = simscen("run", "b.scenario.yaml", "--resume", "out")
-    assert ended.code == 0
+    result = simscen("run", "b.scenario.yaml", "--resume", "out")
+    assert result.code == 0
     warning = "1 run of 2 of the session to resume, such as a (seed 1), will not be in its reports"
-    assert ended.err == f"simscen: warning: out: {warning}, because the selection has changed\n"
+    assert result.err == f"simscen: warning: out: {warning}, because the selection has changed\n"
     assert json.loads((folder / "results.json").read_text())["total"] == 1
 
 

@@ -33,6 +33,7 @@ CASTER = """
 
 
 def wheels(parent="base", r=0.05, x=0.0, half=0.2, name="", z=None):
+    """Return the URDF of a left and a right wheel with radius `r` on an axle of half length `half` at `x`, in m."""
     return "".join(
         WHEEL.format(name=f"{name}{side}", parent=parent.format(side=side), r=r, x=x, y=y, z=r if z is None else z)
         for side, y in (("left", half), ("right", -half))
@@ -40,6 +41,7 @@ def wheels(parent="base", r=0.05, x=0.0, half=0.2, name="", z=None):
 
 
 def urdf(*parts, size="0.4 0.3 0.1", mass=6, x=0.0, z=0.13, i=0.1):
+    """Return the URDF of a robot with a box as its base; each principal moment of inertia is `i`."""
     return f'<robot name="cart">{BOX.format(size=size, mass=mass, x=x, z=z, i=i)}{"".join(parts)}\n</robot>\n'
 
 
@@ -67,11 +69,13 @@ def check(tmp_path, monkeypatch, capsys):
 
 
 @pytest.fixture
-def figures(check):
-    def figures(robot, **files):
+def check_as_json(check):
+    """Return a function that writes files, checks a robot, and returns the JSON output."""
+
+    def check_as_json(robot, **files):
         return json.loads(check(robot, "--json", **files)[1])
 
-    return figures
+    return check_as_json
 
 
 @pytest.mark.sample(3)
@@ -90,8 +94,11 @@ def test_low_caster_is_reported_at_its_line(check):
     line = text[: text.index('<link name="caster"')].count("\n") + 1
     assert f"cart.urdf:{line}:3: warning[SC405] link 'caster' reaches 1.0 mm below the wheels" in output
     assert "simscen uses frictionless spheres as casters instead" in output
-    four = wheels(x=-0.15, name="rear_") + wheels(x=0.15, name="front_")
-    assert "simscen leaves it out of the hull" in check("cart.urdf", cart_urdf=urdf(four, CASTER.format(z=0.019)))[1]
+    four_wheels = wheels(x=-0.15, name="rear_") + wheels(x=0.15, name="front_")
+    assert (
+        "simscen leaves it out of the hull"
+        in check("cart.urdf", cart_urdf=urdf(four_wheels, CASTER.format(z=0.019)))[1]
+    )
 
 
 def test_caster_above_the_ground_is_reported(check):
@@ -100,13 +107,13 @@ def test_caster_above_the_ground_is_reported(check):
 
 
 def test_wheels_at_different_heights_are_reported(check):
-    four = wheels(x=-0.15, name="rear_") + wheels(x=0.15, name="front_", z=0.052)
-    output = check("cart.urdf", cart_urdf=urdf(four))[1]
+    four_wheels = wheels(x=-0.15, name="rear_") + wheels(x=0.15, name="front_", z=0.052)
+    output = check("cart.urdf", cart_urdf=urdf(four_wheels))[1]
     assert "the wheel on joint 'front_left_joint' is 2.0 mm higher than the lowest wheel" in output
 
 
-def test_consistent_robot_has_no_warnings(figures):
-    assert figures("cart.urdf", cart_urdf=urdf(wheels(), CASTER.format(z=0.02)))["problems"] == []
+def test_consistent_robot_has_no_warnings(check_as_json):
+    assert check_as_json("cart.urdf", cart_urdf=urdf(wheels(), CASTER.format(z=0.02)))["problems"] == []
 
 
 @pytest.mark.parametrize("with_spec", [False, True])
@@ -141,11 +148,11 @@ def test_wrong_wheel_separation_is_a_warning_of_the_scenario(simscen):
     text = robot_yaml(DIFFERENTIAL.format(0.05, 0.45)).replace("sensors: {}", f"sensors: {sensors}")
     Path("cart.robot.yaml").write_text(text)
     Path("cart.urdf").write_text(urdf(wheels()))
-    good = Path("good.scenario.yaml").read_text()
-    Path("good.scenario.yaml").write_text(good.replace("robot: {pose", "robot: {model: cart.robot.yaml, pose"))
-    ended = simscen("validate", "good.scenario.yaml")
-    assert "cart.robot.yaml:5:62: warning[SC404] wheel_separation is 0.45 m here, but 0.4 m in cart.urdf" in ended.out
-    assert ended.code == 0
+    scenario = Path("good.scenario.yaml").read_text()
+    Path("good.scenario.yaml").write_text(scenario.replace("robot: {pose", "robot: {model: cart.robot.yaml, pose"))
+    result = simscen("validate", "good.scenario.yaml")
+    assert "cart.robot.yaml:5:62: warning[SC404] wheel_separation is 0.45 m here, but 0.4 m in cart.urdf" in result.out
+    assert result.code == 0
 
 
 @pytest.mark.parametrize(
@@ -161,9 +168,9 @@ def test_validate_builds_urdf_robots(simscen, old, new, code, expected_text):
     """Regression: robots that no scenario can use were valid."""
     Path("cart.robot.yaml").write_text(robot_yaml(DIFFERENTIAL.format(0.05, 0.4)).replace(old, new))
     Path("cart.urdf").write_text(urdf(wheels()))
-    ended = simscen("validate", "cart.robot.yaml")
-    assert expected_text in ended.out
-    assert ended.code == code
+    result = simscen("validate", "cart.robot.yaml")
+    assert expected_text in result.out
+    assert result.code == code
     assert simscen("validate", "--fast", "cart.robot.yaml").code == 0
 
 
@@ -172,9 +179,9 @@ def test_validate_reports_a_dragging_body(simscen):
         "urdf: cart.urdf", "mass: 5\nbody: [{box: [0.3, 0.3, 0.2]}]"
     )
     Path("cart.robot.yaml").write_text(text)
-    ended = simscen("validate", "cart.robot.yaml")
-    assert "error[SC401] a part of the body of 'cart' reaches the ground" in ended.out
-    assert ended.code == 2
+    result = simscen("validate", "cart.robot.yaml")
+    assert "error[SC401] a part of the body of 'cart' reaches the ground" in result.out
+    assert result.code == 2
 
 
 def test_wrong_wheel_radius_is_reported_with_the_right_one(check):
@@ -190,15 +197,15 @@ SKID = "{{type: skid_steer, wheel_radius: 0.16, wheel_separation: 0.56, wheel_ba
 
 
 @pytest.mark.slow
-def test_suggested_turning_scale_passes_the_check(figures):
+def test_suggested_turning_scale_passes_the_check(check_as_json):
     """Skidding wheels turn a heavy base as with a larger wheel separation."""
-    four = wheels(x=-0.25, r=0.16, half=0.28, name="rear_") + wheels(x=0.25, r=0.16, half=0.28, name="front_")
-    files = {"cart_urdf": urdf(four, size="0.9 0.4 0.2", mass=45, z=0.25, i=1.5)}
+    four_wheels = wheels(x=-0.25, r=0.16, half=0.28, name="rear_") + wheels(x=0.25, r=0.16, half=0.28, name="front_")
+    files = {"cart_urdf": urdf(four_wheels, size="0.9 0.4 0.2", mass=45, z=0.25, i=1.5)}
     name = "turn: odometry against true angle"
 
     def measured_turn(scale):
-        found = figures("cart.robot.yaml", **files, cart_robot_yaml=robot_yaml(SKID.format(scale)))
-        return next(check for check in found["checks"] if check["name"] == name)
+        output = check_as_json("cart.robot.yaml", **files, cart_robot_yaml=robot_yaml(SKID.format(scale)))
+        return next(check for check in output["checks"] if check["name"] == name)
 
     wrong = measured_turn(1.44)
     assert not wrong["held"]
@@ -209,17 +216,19 @@ def test_suggested_turning_scale_passes_the_check(figures):
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("axles", [(-0.15, 0.15), (-0.25, 0.25), (-0.3, 0.3), (-0.25, 0, 0.25), (-0.3, -0.1, 0.1, 0.3)])
-def test_inferred_skid_steer_robot_turns_as_commanded(figures, axles):
+def test_inferred_skid_steer_robot_turns_as_commanded(check_as_json, axles):
     """Regression: robots with four wheels turned up to 31 % too little, and those with six up to twice as far."""
     parts = [wheels(x=x, r=0.1, half=0.25, name=f"axle_{index}_") for index, x in enumerate(axles)]
-    found = figures("cart.urdf", cart_urdf=urdf(*parts, size="0.6 0.4 0.2", mass=20, z=0.2, i=0.8))
-    turn = next(check for check in found["checks"] if check["name"] == "turn: true angle against command")
+    output = check_as_json("cart.urdf", cart_urdf=urdf(*parts, size="0.6 0.4 0.2", mass=20, z=0.2, i=0.8))
+    turn = next(check for check in output["checks"] if check["name"] == "turn: true angle against command")
     assert turn["value"] < 5
 
 
 def test_drifting_skid_steered_base_is_reported(check):
-    four = wheels(x=-0.25, r=0.16, half=0.28, name="rear_") + wheels(x=0.25, r=0.16, half=0.28, name="front_")
-    code, output, _ = check("cart.urdf", cart_urdf=urdf(four, size="0.7 0.4 0.2", mass=45, z=0.25, i=1.5, x=-0.1))
+    four_wheels = wheels(x=-0.25, r=0.16, half=0.28, name="rear_") + wheels(x=0.25, r=0.16, half=0.28, name="front_")
+    code, output, _ = check(
+        "cart.urdf", cart_urdf=urdf(four_wheels, size="0.7 0.4 0.2", mass=45, z=0.25, i=1.5, x=-0.1)
+    )
     assert code == 1
     assert "FAILED  turn: distance from the start" in output
     assert "behind the center of its wheels" in output
@@ -228,17 +237,21 @@ def test_drifting_skid_steered_base_is_reported(check):
 MECANUM = "{{type: mecanum, wheel_radius: 0.05, wheel_separation: {}, wheel_base: 0.4}}"
 
 
-def test_urdf_with_mecanum_wheels_drives_sideways(figures):
-    four = wheels(x=-0.2, name="rear_") + wheels(x=0.2, name="front_")
-    found = figures("cart.robot.yaml", cart_urdf=urdf(four), cart_robot_yaml=robot_yaml(MECANUM.format(0.4)))
-    assert found["passed"] and not found["problems"]
-    (sideways,) = (trial for trial in found["trials"] if trial["name"] == "sideways")
+def test_urdf_with_mecanum_wheels_drives_sideways(check_as_json):
+    four_wheels = wheels(x=-0.2, name="rear_") + wheels(x=0.2, name="front_")
+    output = check_as_json(
+        "cart.robot.yaml", cart_urdf=urdf(four_wheels), cart_robot_yaml=robot_yaml(MECANUM.format(0.4))
+    )
+    assert output["passed"] and not output["problems"]
+    (sideways,) = (trial for trial in output["trials"] if trial["name"] == "sideways")
     assert sideways["truth"]["end"]["y"] == pytest.approx(2.0, abs=0.01)
 
 
 def test_misplaced_mecanum_wheels_are_reported(check):
-    four = wheels(x=-0.2, name="rear_") + wheels(x=0.2, name="front_")
-    code, output, _ = check("cart.robot.yaml", cart_urdf=urdf(four), cart_robot_yaml=robot_yaml(MECANUM.format(0.5)))
+    four_wheels = wheels(x=-0.2, name="rear_") + wheels(x=0.2, name="front_")
+    code, output, _ = check(
+        "cart.robot.yaml", cart_urdf=urdf(four_wheels), cart_robot_yaml=robot_yaml(MECANUM.format(0.5))
+    )
     assert code == 1
     assert "wheel_separation is 0.5 m here, but 0.4 m in cart.urdf" in output
     assert "cot(roller_angle) 0.45 m: 0.4 m fits" in output

@@ -1,4 +1,4 @@
-"""Errors that `simscen run` reports before any run."""
+"""Tests of errors that `simscen run` reports before any run."""
 
 import errno
 import os
@@ -20,9 +20,9 @@ import pytest
     ],
 )
 def test_invalid_options_are_reported_before_any_run(simscen, tmp_path: Path, options, expected_text) -> None:
-    ended = simscen("run", "good.scenario.yaml", *options)
-    assert ended.code == 2
-    assert expected_text in ended.err
+    result = simscen("run", "good.scenario.yaml", *options)
+    assert result.code == 2
+    assert expected_text in result.err
     assert not list(tmp_path.rglob("*.mcap"))
     assert not (tmp_path / "simscen-out").exists()
 
@@ -34,15 +34,15 @@ def test_full_disk_is_reported_before_any_run(simscen, tmp_path: Path, monkeypat
     for sync in ("fsync", "fdatasync"):
         with monkeypatch.context() as patch:
             patch.setattr(os, sync, full)
-            ended = simscen("run", "good.scenario.yaml", "--out", sync)
-        assert ended.code == 2
-        assert ended.err.endswith(f"{sync}: No space left on device\n")
+            result = simscen("run", "good.scenario.yaml", "--out", sync)
+        assert result.code == 2
+        assert result.err.endswith(f"{sync}: No space left on device\n")
         assert not list((tmp_path / sync).rglob("*.mcap"))
 
 
 def test_empty_shard_selects_nothing(simscen) -> None:
-    ended = simscen("run", "good.scenario.yaml", "--shard", "2/2")
-    assert (ended.code, ended.err) == (5, "simscen: shard 2/2 of 1 scenarios is empty\n")
+    result = simscen("run", "good.scenario.yaml", "--shard", "2/2")
+    assert (result.code, result.err) == (5, "simscen: shard 2/2 of 1 scenarios is empty\n")
 
 
 SDF = """<sdf version='1.6'><world name='w'><model name='m'><static>1</static><link name='l'>
@@ -76,6 +76,6 @@ def test_determinism_is_checked_against_one_earlier_session(simscen, tmp_path: P
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "events.jsonl").write_text("")
-    ended = simscen("run", *arguments, "--check-determinism")
-    assert ended.code == 2
-    assert expected_text in ended.err
+    result = simscen("run", *arguments, "--check-determinism")
+    assert result.code == 2
+    assert expected_text in result.err

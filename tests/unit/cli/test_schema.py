@@ -1,3 +1,5 @@
+"""Tests of the JSON schemas, and of `simscen schema`."""
+
 import json
 import subprocess
 import sys
@@ -17,7 +19,7 @@ SHIPPED = {
     "world": sorted(ROOT.glob("worlds/**/*.world.yaml")),
     "robot": sorted(ROOT.glob("simscen/data/robots/*.robot.yaml")),
 }
-FORM = [
+SCHEMA_ERRORS = [
     "five_mistakes", "typo_in_a_key", "key_far_from_all", "wrong_types", "units", "choices", "empty_values", "names",
     "single_key_choices", "another_version", "misspelled_instead_of_missing",
 ]  # fmt: skip
@@ -47,7 +49,7 @@ def test_shipped_files_match_their_schema(kind: str) -> None:
 
 
 @pytest.mark.sample(4)
-@pytest.mark.parametrize("name", FORM)
+@pytest.mark.parametrize("name", SCHEMA_ERRORS)
 def test_invalid_files_do_not_match_their_schema(name: str) -> None:
     validator = jsonschema.Draft7Validator(schema_of("scenario"))
     assert not validator.is_valid(_load_yaml((DIAGNOSTICS / f"{name}.scenario.yaml").read_text()))
@@ -84,14 +86,14 @@ def test_every_key_has_a_hover_text() -> None:
             assert schema.get("description") or "$ref" in schema, f"{name}.{key}"
 
 
-def _walk(node: Any) -> list[dict[str, Any]]:
+def _mappings_in(node: Any) -> list[dict[str, Any]]:
     if isinstance(node, dict):
-        return [node, *(found for value in node.values() for found in _walk(value))]
-    return [found for item in node for found in _walk(item)] if isinstance(node, list) else []
+        return [node, *(inner for value in node.values() for inner in _mappings_in(value))]
+    return [inner for item in node for inner in _mappings_in(item)] if isinstance(node, list) else []
 
 
 def test_schema_has_no_nulls_and_no_large_defaults() -> None:
-    for node in _walk(schema_of("scenario")):
+    for node in _mappings_in(schema_of("scenario")):
         assert node.get("type") != "null"
         assert not isinstance(node.get("default"), dict)
 
@@ -107,10 +109,10 @@ def test_command_writes_the_committed_schemas(simscen, tmp_path: Path) -> None:
 def test_check_jsonschema_agrees() -> None:
     """Run the tool of the pre-commit hooks on a valid and an invalid file."""
     schema = str(ROOT / "schemas/scenario.schema.json")
-    for file, valid in ((SHIPPED["scenario"][0], True), (DIAGNOSTICS / "five_mistakes.scenario.yaml", False)):
+    for file, is_valid in ((SHIPPED["scenario"][0], True), (DIAGNOSTICS / "five_mistakes.scenario.yaml", False)):
         command = [sys.executable, "-m", "check_jsonschema", "--schemafile", schema, str(file)]
-        ended = subprocess.run(command, check=False, capture_output=True, text=True)
-        assert (ended.returncode == 0) == valid, ended.stdout
+        result = subprocess.run(command, check=False, capture_output=True, text=True)
+        assert (result.returncode == 0) == is_valid, result.stdout
 
 
 BASES = [
@@ -125,6 +127,6 @@ BASES = [
 
 
 @pytest.mark.sample(3)
-@pytest.mark.parametrize(("base", "fits"), BASES)
-def test_base_file_matches_the_base_schema(base: dict[str, Any], fits: bool) -> None:
-    assert jsonschema.Draft7Validator(schema_of("base")).is_valid(base) is fits
+@pytest.mark.parametrize(("base", "is_valid"), BASES)
+def test_base_file_matches_the_base_schema(base: dict[str, Any], is_valid: bool) -> None:
+    assert jsonschema.Draft7Validator(schema_of("base")).is_valid(base) is is_valid

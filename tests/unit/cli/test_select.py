@@ -1,4 +1,4 @@
-"""Selection of scenarios."""
+"""Tests of the selection of scenarios by paths, keywords, and shards."""
 
 from pathlib import Path
 
@@ -28,10 +28,10 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
 def test_every_scenario_is_in_exactly_one_shard(folder: Path, count: int) -> None:
-    shares = [load_selection([folder], folder, [], False, Selection(shard=(k + 1, count)))[0] for k in range(count)]
-    ids = [scenario.id for share in shares for scenario in share]
+    shards = [load_selection([folder], folder, [], False, Selection(shard=(k + 1, count)))[0] for k in range(count)]
+    ids = [scenario.id for shard in shards for scenario in shard]
     assert sorted(ids) == ["a", "b", "c", "d", "e"]
-    assert max(map(len, shares)) - min(map(len, shares)) <= 1
+    assert max(map(len, shards)) - min(map(len, shards)) <= 1
 
 
 @pytest.mark.parametrize("text", ["", "1", "0/2", "3/2", "1/0", "-1/2", "a/b", "1/2/3", "１/２x"])
@@ -49,9 +49,9 @@ def test_invalid_file_stops_the_session_even_if_not_selected(folder: Path) -> No
 def test_notes_of_a_world_are_reported_once(folder: Path) -> None:
     sdf = """<sdf version='1.6'><world name='w'><model name='m'><static>1</static><link name='l'><collision name='c'>
     <geometry><box><size>1 1 1</size></box></geometry></collision></link></model></world><world name='x'/></sdf>"""
-    (folder / "two.sdf").write_text(sdf)
+    (folder / "two_worlds.sdf").write_text(sdf)
     for name in "xy":
-        text = TEXT.replace("room.world.yaml", "two.sdf\nmap: none").replace("{x: 1, y: 1}", "{x: 3, y: 3}")
+        text = TEXT.replace("room.world.yaml", "two_worlds.sdf\nmap: none").replace("{x: 1, y: 1}", "{x: 3, y: 3}")
         (folder / f"{name}.scenario.yaml").write_text(text)
     _, warnings = load_selection([folder], folder, [], False, Selection(keyword="x or y"))
     assert [warning.severity for warning in warnings] == ["warning"]
@@ -59,5 +59,5 @@ def test_notes_of_a_world_are_reported_once(folder: Path) -> None:
     assert load_selection([folder], folder, [], False, Selection(keyword="a"))[1] == []
 
 
-def test_a_session_without_runs_is_not_passed() -> None:
+def test_session_without_runs_does_not_pass() -> None:
     assert exit_code([]) is Exit.NOTHING_SELECTED

@@ -1,4 +1,4 @@
-"""`simscen shrink` and `simscen falsify` on scenarios whose cause of failure is known.
+"""Tests of `simscen shrink` and `simscen falsify` on scenarios whose cause of failure is known.
 
 The robot is stationary, and its clearance to crate-3 is too small. All other parts are irrelevant.
 """
@@ -55,8 +55,8 @@ def load_yaml(file: Path) -> Any:
 
 
 def runs_of(folder: Path) -> list[Any]:
-    found: list[Any] = json.loads((folder / "results.json").read_text())["runs"]
-    return found
+    runs: list[Any] = json.loads((folder / "results.json").read_text())["runs"]
+    return runs
 
 
 def verdicts_of(run: Any) -> list[Any]:
@@ -65,8 +65,8 @@ def verdicts_of(run: Any) -> list[Any]:
 
 def test_shrink_keeps_only_the_cause_of_the_failure(simscen: Callable[..., Any], tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
-    done = simscen("shrink", "a.scenario.yaml", "-j", 2)
-    assert done.code == 0, done.err
+    result = simscen("shrink", "a.scenario.yaml", "-j", 2)
+    assert result.code == 0, result.err
     file = tmp_path / "a.minimal.scenario.yaml"
     shrunk = load_yaml(file)
     assert [item["name"] for item in shrunk["world"]["obstacles"]] == ["crate-3"]
@@ -75,8 +75,8 @@ def test_shrink_keeps_only_the_cause_of_the_failure(simscen: Callable[..., Any],
     assert set(shrunk["robot"]) == {"pose"}
     assert "# There must be space to turn." in file.read_text()
     for text in ("world.obstacles[0] (crate-1)", "events", "faults", "stack", "robot.motor_torque"):
-        assert f"  {text}\n" in done.out, done.out
-    assert "-> " in done.out
+        assert f"  {text}\n" in result.out, result.out
+    assert "-> " in result.out
     assert simscen("run", file.name).code == 1
 
 
@@ -85,10 +85,10 @@ def test_a_run_in_an_output_folder_is_shrunk_with_its_variation(simscen: Callabl
     varied = SCENARIO + "variations: {grid: {robot.pose.x: [4, 6], robot.motor_torque: [90 %, 100 %]}}\n"
     (tmp_path / "a.scenario.yaml").write_text(varied)
     assert simscen("run", ".", "--out", "out").code == 1
-    run = next(one for one in runs_of(tmp_path / "out") if one["outcome"] == "failed")
+    run = next(run for run in runs_of(tmp_path / "out") if run["outcome"] == "failed")
     folder = Path("out", run["artifacts"]["mcap"]).parent
-    done = simscen("shrink", folder, "--keep-world", "--runs", 8)
-    assert done.code == 1, done.err
+    result = simscen("shrink", folder, "--keep-world", "--runs", 8)
+    assert result.code == 1, result.err
     shrunk = load_yaml(tmp_path / "a.minimal.scenario.yaml")
     assert shrunk["robot"]["pose"]["x"] == 6
     assert "variations" not in shrunk
@@ -109,14 +109,14 @@ def test_unshrinkable_run_is_an_error(
     simscen: Callable[..., Any], tmp_path: Path, options: list[str], message: str
 ) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
-    good = SCENARIO.replace("min: 1 m", "min: 10 cm")
-    (tmp_path / "good.scenario.yaml").write_text(good)
+    passing_scenario = SCENARIO.replace("min: 1 m", "min: 10 cm")
+    (tmp_path / "good.scenario.yaml").write_text(passing_scenario)
     (tmp_path / "expected.scenario.yaml").write_text(f"{SCENARIO}expected: {{fail: clearance}}\n")
-    (tmp_path / "inconclusive.scenario.yaml").write_text(f"{good}  - smoothness: {{min_sparc: -3}}\n")
-    done = simscen("shrink", *options)
-    assert done.code == 2
-    assert message in done.err
-    assert "Traceback" not in done.err
+    (tmp_path / "inconclusive.scenario.yaml").write_text(f"{passing_scenario}  - smoothness: {{min_sparc: -3}}\n")
+    result = simscen("shrink", *options)
+    assert result.code == 2
+    assert message in result.err
+    assert "Traceback" not in result.err
 
 
 @pytest.mark.parametrize(
@@ -134,9 +134,9 @@ def test_unusable_options_of_shrink_are_an_error(
     simscen: Callable[..., Any], tmp_path: Path, options: list[str], message: str
 ) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
-    done = simscen("shrink", *options)
-    assert done.code == 2
-    assert message in done.err
+    result = simscen("shrink", *options)
+    assert result.code == 2
+    assert message in result.err
 
 
 def test_other_folder_of_a_session_is_not_the_folder_of_a_run(
@@ -145,17 +145,17 @@ def test_other_folder_of_a_session_is_not_the_folder_of_a_run(
     monkeypatch.setattr(shrink, "read_journal", lambda _: SimpleNamespace(planned=[]))
     (tmp_path / "out" / "page").mkdir(parents=True)
     (tmp_path / "out" / shrink.JOURNAL_FILE).touch()
-    done = simscen("shrink", "out/page")
-    assert done.code == 2
-    assert "out/page is not the folder of a run" in done.err
+    result = simscen("shrink", "out/page")
+    assert result.code == 2
+    assert "out/page is not the folder of a run" in result.err
 
 
 @pytest.mark.slow
 def test_a_spent_budget_still_writes_a_smaller_scenario(simscen: Callable[..., Any], tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
-    done = simscen("shrink", "a.scenario.yaml", "--runs", 6)
-    assert done.code == 1, done.err
-    assert "not enough to try everything; increase --runs" in done.out
+    result = simscen("shrink", "a.scenario.yaml", "--runs", 6)
+    assert result.code == 1, result.err
+    assert "not enough to try everything; increase --runs" in result.out
     assert simscen("run", "a.minimal.scenario.yaml").code == 1
     second = simscen("shrink", "a.scenario.yaml", "--runs", 6, "-j", 1, "--out", "one.scenario.yaml")
     assert second.code == 1
@@ -178,18 +178,18 @@ def test_a_found_failure_is_written_as_a_scenario_that_fails(
     simscen: Callable[..., Any], tmp_path: Path, method: str
 ) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO + RANGES)
-    done = simscen("falsify", "a.scenario.yaml", "--method", method, "--out", "out", "-j", 2)
-    assert done.code == 1, done.err
+    result = simscen("falsify", "a.scenario.yaml", "--method", method, "--out", "out", "-j", 2)
+    assert result.code == 1, result.err
     file = tmp_path / "a.failure-1.scenario.yaml"
     assert 5.6 < load_yaml(file)["robot"]["pose"]["x"] < 6.0  # crate-3 starts at 6.93 m; radius 0.22 m
     assert "variations" not in load_yaml(file)
     assert simscen("run", file.name, "--out", "rerun").code == 1
     (rerun,) = runs_of(tmp_path / "rerun")
     assert verdicts_of(rerun) in [verdicts_of(run) for run in runs_of(tmp_path / "out")]
-    assert "smaller: simscen shrink a.failure-1.scenario.yaml" in done.out
+    assert "smaller: simscen shrink a.failure-1.scenario.yaml" in result.out
     assert {run["again"] for run in runs_of(tmp_path / "out")} == {""}
     assert json.loads((tmp_path / "out/run.json").read_text()).keys() >= {"plugins", "stacks"}
-    assert "--variation" not in done.out
+    assert "--variation" not in result.out
     if method == "tpe":  # the method that depends on the order of the results
         simscen("falsify", "a.scenario.yaml", "--method", method, "--out", "out1", "-j", 1)
         assert (tmp_path / "out/results.json").read_bytes() == (tmp_path / "out1/results.json").read_bytes()
@@ -198,9 +198,9 @@ def test_a_found_failure_is_written_as_a_scenario_that_fails(
 def test_search_that_could_not_save_a_failure_does_not_start(simscen: Callable[..., Any], tmp_path: Path) -> None:
     file = tmp_path / f"{238 * 'a'}.scenario.yaml"  # its name with `.failure-1` is too long
     file.write_text(SCENARIO + RANGES)
-    done = simscen("falsify", file.name, "--out", "out")
-    assert done.code == 2
-    assert "File name too long" in done.err
+    result = simscen("falsify", file.name, "--out", "out")
+    assert result.code == 2
+    assert "File name too long" in result.err
     assert not (tmp_path / "out").exists()
 
 
@@ -236,18 +236,18 @@ def test_random_search_with_too_few_runs_for_its_probability_is_undecided(
 ) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO + RANGES.replace("[3, 6]", "[3, 5]"))
     options = ("--method", "random", "--probability", "0.1", "--runs", "8")
-    done = simscen("falsify", "a.scenario.yaml", *options)
-    assert done.code == 6, done.err
-    assert "undecided: too few runs for --probability; increase --runs" in done.out
+    result = simscen("falsify", "a.scenario.yaml", *options)
+    assert result.code == 6, result.err
+    assert "undecided: too few runs for --probability; increase --runs" in result.out
 
 
 @pytest.mark.slow
 def test_random_search_without_a_failure_bounds_the_failure_rate(simscen: Callable[..., Any], tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO + RANGES.replace("[3, 6]", "[3, 5]"))
-    done = simscen("falsify", "a.scenario.yaml", "--method", "random", "--probability", "0.1")
-    assert done.code == 0, done.err
-    assert "found no failure in 32 runs" in done.out  # 29 are needed, in batches of 8
-    assert "with 95% confidence, at most 8.94 % of random values fail" in done.out  # 1 - 0.05 ** (1 / 32)
+    result = simscen("falsify", "a.scenario.yaml", "--method", "random", "--probability", "0.1")
+    assert result.code == 0, result.err
+    assert "found no failure in 32 runs" in result.out  # 29 are needed, in batches of 8
+    assert "with 95% confidence, at most 8.94 % of random values fail" in result.out  # 1 - 0.05 ** (1 / 32)
     assert not list(tmp_path.glob("*.failure-*"))
 
 
@@ -268,9 +268,9 @@ def test_unsearchable_scenario_is_an_error(
     simscen: Callable[..., Any], tmp_path: Path, ranges: str, options: list[str], message: str
 ) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO + ranges)
-    done = simscen("falsify", "a.scenario.yaml", *options)
-    assert done.code == (5 if "skip" in ranges else 2)
-    assert message in done.err
+    result = simscen("falsify", "a.scenario.yaml", *options)
+    assert result.code == (5 if "skip" in ranges else 2)
+    assert message in result.err
     if "marked" in message:
         assert not (tmp_path / "simscen-out").exists()
 
@@ -328,8 +328,8 @@ def test_runs_before_a_signal_during_a_search_are_reported(tmp_path: Path) -> No
     text = SCENARIO.replace("clearance: {min: 1 m}", "clearance: {min: 0.1 m}")
     (tmp_path / "crates.scenario.yaml").write_text(text + TORQUES)
     program = [sys.executable, "-c", SIGNAL_BETWEEN_BATCHES]
-    done = subprocess.run(program, cwd=tmp_path, check=False, capture_output=True, text=True)
-    assert done.returncode == 143, done.stderr
+    result = subprocess.run(program, cwd=tmp_path, check=False, capture_output=True, text=True)
+    assert result.returncode == 143, result.stderr
     assert len(runs_of(tmp_path / "out")) == 2
 
 
@@ -338,11 +338,11 @@ def test_an_interrupted_search_without_runs_names_no_report(
 ) -> None:
     (tmp_path / "crates.scenario.yaml").write_text(SCENARIO + TORQUES)
     change_before_batch(monkeypatch, 0, lambda: os.kill(os.getpid(), signal.SIGTERM))
-    done = simscen(*SOBOL)
-    assert done.code == 143, done.err
-    assert "interrupted: 0 passed" in done.out
-    assert "--resume" not in done.out  # simscen falsify has no such option
-    assert "report.html" not in done.out and not (tmp_path / "out/report.html").exists()
+    result = simscen(*SOBOL)
+    assert result.code == 143, result.err
+    assert "interrupted: 0 passed" in result.out
+    assert "--resume" not in result.out  # simscen falsify has no such option
+    assert "report.html" not in result.out and not (tmp_path / "out/report.html").exists()
 
 
 def test_the_junit_report_of_a_search_does_not_replace_its_world(simscen: Callable[..., Any], tmp_path: Path) -> None:
@@ -350,7 +350,7 @@ def test_the_junit_report_of_a_search_does_not_replace_its_world(simscen: Callab
     (tmp_path / "hall.world.yaml").write_text(world)
     start, end = SCENARIO.partition("world:\n")[0], SCENARIO.partition("robot:\n")[2]
     (tmp_path / "a.scenario.yaml").write_text(f"{start}world: hall.world.yaml\nrobot:\n{end}{RANGES}")
-    done = simscen("falsify", "a.scenario.yaml", "--runs", "1", "--junit", "hall.world.yaml")
-    assert done.code == 2, done.out
-    assert "cannot write hall.world.yaml: it is one of the input files" in done.err
+    result = simscen("falsify", "a.scenario.yaml", "--runs", "1", "--junit", "hall.world.yaml")
+    assert result.code == 2, result.out
+    assert "cannot write hall.world.yaml: it is one of the input files" in result.err
     assert (tmp_path / "hall.world.yaml").read_text() == world

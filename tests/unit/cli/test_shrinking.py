@@ -1,4 +1,4 @@
-"""Delta debugging against properties of random failures."""
+"""Tests of delta debugging with random causes of failure."""
 
 from collections.abc import Sequence
 
@@ -37,9 +37,9 @@ def test_no_single_part_can_be_removed_from_the_result(causes: set[frozenset[int
 
     if not fails(range(10)):
         return
-    left = minimize(range(10), first_failing)
-    assert fails(left)
-    assert not any(fails([part for part in left if part != one]) for one in left)
+    kept = minimize(range(10), first_failing)
+    assert fails(kept)
+    assert not any(fails([part for part in kept if part != removed]) for removed in kept)
 
 
 def test_an_aborted_run_is_no_failure_to_shrink_unless_the_stack_aborted_it() -> None:

@@ -1,4 +1,4 @@
-"""`--stack` for scenarios with several robots."""
+"""Tests of `--stack` for scenarios with several robots."""
 
 from pathlib import Path
 
@@ -51,10 +51,11 @@ def project(simscen, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def loaded(name: str, *stacks: str):
+    """Return the scenarios that are run for a scenario file and values of `--stack`."""
     return load_selection([Path(f"{name}.scenario.yaml")], None, [], False, Selection(), stacks)[0]
 
 
-def runs(scenario) -> dict[str, str]:
+def stacks_by_robot(scenario) -> dict[str, str]:
     """Return the stack of each robot: the words of its command, or the type of the in-process stack."""
     return {
         name: " ".join(view.external_command.argv) if view.external_command else type(view.spec.stack).__name__
@@ -62,61 +63,61 @@ def runs(scenario) -> dict[str, str]:
     }
 
 
-def test_command_for_the_stack_name_of_one_robot_drives_only_that_robot(project: Path) -> None:
-    (one,) = loaded("mixed", "mine=./nav --mine")
-    assert runs(one) == {"a": "./nav --mine", "b": "StackSpec", "c": "./nav --other"}
-    assert one.stack == "mine=./nav --mine"
-    assert one.robots["b"].spec.stack.controller.type == "dwb"
+def test_command_for_the_stack_name_of_one_robot_applies_only_to_this_robot(project: Path) -> None:
+    (scenario,) = loaded("mixed", "mine=./nav --mine")
+    assert stacks_by_robot(scenario) == {"a": "./nav --mine", "b": "StackSpec", "c": "./nav --other"}
+    assert scenario.stack == "mine=./nav --mine"
+    assert scenario.robots["b"].spec.stack.controller.type == "dwb"
 
 
 def test_other_stack_replaces_the_stacks_of_all_robots(project: Path) -> None:
-    (one,) = loaded("mixed", "v2=./nav --v2")
-    assert runs(one) == dict.fromkeys("abc", "./nav --v2")
-    assert one.robots["a"].spec.stack.controller_frequency == 10.0
-    (one,) = loaded("mixed", "reference")
-    assert runs(one) == dict.fromkeys("abc", "StackSpec")
-    assert one.robots["b"].spec.stack.controller.type == "dwb"
-    assert one.robots["a"].spec.stack.controller_frequency == 10.0
+    (scenario,) = loaded("mixed", "v2=./nav --v2")
+    assert stacks_by_robot(scenario) == dict.fromkeys("abc", "./nav --v2")
+    assert scenario.robots["a"].spec.stack.controller_frequency == 10.0
+    (scenario,) = loaded("mixed", "reference")
+    assert stacks_by_robot(scenario) == dict.fromkeys("abc", "StackSpec")
+    assert scenario.robots["b"].spec.stack.controller.type == "dwb"
+    assert scenario.robots["a"].spec.stack.controller_frequency == 10.0
     (project / "mppi.stack.yaml").write_text("simscen: 1\nstack: {controller: {type: mppi}}\n")
-    (one,) = loaded("mixed", "m=mppi.stack.yaml")
-    assert {view.spec.stack.controller.type for view in one.robots.values()} == {"mppi"}
+    (scenario,) = loaded("mixed", "m=mppi.stack.yaml")
+    assert {view.spec.stack.controller.type for view in scenario.robots.values()} == {"mppi"}
 
 
 def test_stack_of_the_scenario_applies_to_robots_without_their_own(project: Path) -> None:
-    (one,) = loaded("all", "mine=./nav")
-    assert runs(one) == {"a": "./nav", "b": "./nav", "c": "StackSpec"}
-    assert one.robots["b"].spec.stack.controller_frequency == 10.0
-    (one,) = loaded("all", "reference")
-    assert runs(one) == dict.fromkeys("abc", "StackSpec")
+    (scenario,) = loaded("all", "mine=./nav")
+    assert stacks_by_robot(scenario) == {"a": "./nav", "b": "./nav", "c": "StackSpec"}
+    assert scenario.robots["b"].spec.stack.controller_frequency == 10.0
+    (scenario,) = loaded("all", "reference")
+    assert stacks_by_robot(scenario) == dict.fromkeys("abc", "StackSpec")
 
 
-def test_recorded_scenario_contains_the_used_stacks(project: Path) -> None:
-    for name, given in (("mixed", "v2=./nav"), ("all", "reference")):
-        (one,) = loaded(name, given)
-        kept = spec_of_text(resolved_text(one), "kept")
-        assert kept.robots is not None
-        for robot, view in one.robots.items():
-            own = kept.robots[robot].stack or kept.stack
-            assert own == view.spec.stack
+def test_recorded_scenario_contains_the_stack_of_each_robot(project: Path) -> None:
+    for name, stack_option in (("mixed", "v2=./nav"), ("all", "reference")):
+        (scenario,) = loaded(name, stack_option)
+        recorded = spec_of_text(resolved_text(scenario), "kept")
+        assert recorded.robots is not None
+        for robot, view in scenario.robots.items():
+            stack = recorded.robots[robot].stack or recorded.stack
+            assert stack == view.spec.stack
 
 
 def test_undefined_name_is_reported_for_each_robot(simscen, project: Path) -> None:
-    ended = simscen("run", "mixed.scenario.yaml")
-    assert ended.code == 2
-    assert "mixed.scenario.yaml:6:45: error[SC060] the external stack `mine` has no command" in ended.err
-    assert ended.err.count("SC060") == 1
+    result = simscen("run", "mixed.scenario.yaml")
+    assert result.code == 2
+    assert "mixed.scenario.yaml:6:45: error[SC060] the external stack `mine` has no command" in result.err
+    assert result.err.count("SC060") == 1
     assert simscen("run", "all.scenario.yaml").err.count("SC060") == 1
     assert simscen("validate", ".").out.count("warning[SC060]") == 2
 
 
 def test_two_stack_names_of_one_scenario_are_rejected(simscen, project) -> None:
-    ended = simscen("run", "mixed.scenario.yaml", "--stack", "mine=./nav", "--stack", "other=./nav")
-    assert ended.code == 2
+    result = simscen("run", "mixed.scenario.yaml", "--stack", "mine=./nav", "--stack", "other=./nav")
+    assert result.code == 2
     assert (
         "error[SC042] robots of this scenario have the stacks `mine` and `other`, but a run can have only one --stack"
-        in ended.err
+        in result.err
     )
-    assert "home/simscen/config.yaml" in ended.err
+    assert "home/simscen/config.yaml" in result.err
 
 
 def test_invalid_robots_are_reported_with_any_stack(simscen, project: Path) -> None:
@@ -126,18 +127,18 @@ def test_invalid_robots_are_reported_with_any_stack(simscen, project: Path) -> N
 
 def test_variation_of_a_replaced_stack_is_reported(simscen, project: Path) -> None:
     kept, replaced = "robots.a.stack.controller_frequency: [5 Hz, 20 Hz]", "robots.c.stack.external: [third, fourth]"
-    for path, lost in ((kept, False), (replaced, True)):
+    for path, is_rejected in ((kept, False), (replaced, True)):
         (project / "varied.scenario.yaml").write_text(MIXED + f"variations: {{grid: {{{path}}}}}\n")
-        ended = simscen("validate", "varied.scenario.yaml", "--stack", "v2=./nav")
-        assert ("SC062" in ended.out, ended.code) == (lost, 2 if lost else 0), ended.out
+        result = simscen("validate", "varied.scenario.yaml", "--stack", "v2=./nav")
+        assert ("SC062" in result.out, result.code) == (is_rejected, 2 if is_rejected else 0), result.out
 
 
 def test_digest_includes_the_stack_of_each_robot(project: Path) -> None:
-    before = scenario_digests(loaded("mixed", "mine=./nav")[0]).run
-    assert scenario_digests(loaded("mixed", "mine=./nav")[0]).run == before
-    assert scenario_digests(loaded("mixed", "mine=./nav 2")[0]).run != before
+    original = scenario_digests(loaded("mixed", "mine=./nav")[0]).run
+    assert scenario_digests(loaded("mixed", "mine=./nav")[0]).run == original
+    assert scenario_digests(loaded("mixed", "mine=./nav 2")[0]).run != original
     (project / "home/simscen/config.yaml").write_text("stacks: {other: {command: ./nav --else}}\n")
-    assert scenario_digests(loaded("mixed", "mine=./nav")[0]).run != before
+    assert scenario_digests(loaded("mixed", "mine=./nav")[0]).run != original
 
 
 def test_list_shows_the_stacks_of_robots(simscen, project: Path) -> None:

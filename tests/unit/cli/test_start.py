@@ -1,4 +1,4 @@
-"""The installed command in its own process."""
+"""Tests of the installed command in a separate process."""
 
 import os
 import subprocess
@@ -37,11 +37,11 @@ HEAVY = [
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
 )
 def test_output_and_exit_code_of_the_command_are_complete(simscen, arguments, code: int, expected_text: str) -> None:
-    good = Path("good.scenario.yaml").read_text()
-    Path("bad.scenario.yaml").write_text(good.replace("goals: [{pose:", "goals: [{pose2:"))
-    done = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, check=False)
-    assert done.returncode == code, done.stderr
-    assert expected_text in done.stdout + done.stderr
+    scenario = Path("good.scenario.yaml").read_text()
+    Path("bad.scenario.yaml").write_text(scenario.replace("goals: [{pose:", "goals: [{pose2:"))
+    result = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, check=False)
+    assert result.returncode == code, result.stderr
+    assert expected_text in result.stdout + result.stderr
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
@@ -59,7 +59,7 @@ def test_closed_pipe_prints_no_error(simscen, unbuffered: str) -> None:
 
 def test_simple_world_is_validated_without_numpy_and_engines(simscen) -> None:
     probe = f"import os, sys; os._exit = lambda code: print('imported:', *set(sys.modules) & set({HEAVY}));"
-    done = subprocess.run(
+    result = subprocess.run(
         [*COMMAND[:2], probe + COMMAND[2], "validate", "good.scenario.yaml"], capture_output=True, text=True, check=True
     )
-    assert done.stdout.splitlines() == ["1 scenario is valid", "imported:"]
+    assert result.stdout.splitlines() == ["1 scenario is valid", "imported:"]

@@ -51,39 +51,40 @@ def results(folder: Path, name: str = "out") -> Any:
 
 
 def case(folder: Path) -> ET.Element:
-    found = ET.parse(folder / "out/junit.xml").find("testsuite/testcase")
-    assert found is not None
-    return found
+    testcase = ET.parse(folder / "out/junit.xml").find("testsuite/testcase")
+    assert testcase is not None
+    return testcase
 
 
 def test_study_finds_the_parameter_that_lowers_the_margin(study: Callable[..., Any], tmp_path: Path) -> None:
-    done = study(SCENARIO + RANDOM, "--out", "out")
-    assert done.code == 1, done.err
-    runs = [line for line in done.out.splitlines() if line.startswith("  ") and " s simulated" in line]
+    result = study(SCENARIO + RANDOM, "--out", "out")
+    assert result.code == 1, result.err
+    runs = [line for line in result.out.splitlines() if line.startswith("  ") and " s simulated" in line]
     columns = {line.index(" s simulated") for line in runs}
     assert len(columns) == 1
-    found = results(tmp_path)["study"]
-    xs = [float(each["values"]["robot.pose.x"].removesuffix(" m")) for each in found["values"]]
-    radius = 0.22 + 0.05  # of the robot, and half of the wall
-    assert found["passed"] == pytest.approx(sum(x - radius >= 1.0 for x in xs), abs=1)  # it moves while it settles
-    assert found["passed"] + found["failed"] == 24
-    assert [each["seed"] for each in found["values"]] == [
-        int(each["variation"].removeprefix("variation-")) for each in found["values"]
+    output = results(tmp_path)["study"]
+    xs = [float(row["values"]["robot.pose.x"].removesuffix(" m")) for row in output["values"]]
+    radius = 0.22 + 0.05  # radius of the robot, and half the thickness of the wall
+    expected = sum(x - radius >= 1.0 for x in xs)
+    assert output["passed"] == pytest.approx(expected, abs=1)  # the robot moves while it settles
+    assert output["passed"] + output["failed"] == 24
+    assert [row["seed"] for row in output["values"]] == [
+        int(row["variation"].removeprefix("variation-")) for row in output["values"]
     ]
-    strongest, *others = found["effects"]
+    strongest, *others = output["effects"]
     assert (strongest["path"], strongest["criterion"]) == ("robot.pose.x", "clearance")
     assert strongest["effect"] == pytest.approx(1.0)
     assert strongest["p"] < 1e-6
     assert all(other["p"] > 0.05 for other in others)
-    rates = [row["passed"] / row["runs"] for row in found["rates"] if row["path"] == "robot.pose.x"]
+    rates = [row["passed"] / row["runs"] for row in output["rates"] if row["path"] == "robot.pose.x"]
     assert rates == sorted(rates)
     assert rates[-1] == 1.0
-    worst = found["worst"]["clearance"]
+    worst = output["worst"]["clearance"]
     assert worst["margin"] == pytest.approx(min(xs) - radius - 1.0, abs=2e-3)
-    assert "robot.pose.x on clearance   +1.00" in done.out
+    assert "robot.pose.x on clearance   +1.00" in result.out
     page = (tmp_path / "out/report.html").read_text()
     assert "margin of clearance against robot.pose.x" in page
-    assert page.count('<circle class="bad"') == 2 * found["failed"]
+    assert page.count('<circle class="bad"') == 2 * output["failed"]
     assert 'href="./runs/s.study/' in page
 
 
@@ -111,28 +112,28 @@ def test_a_claim_has_its_own_exit_code_and_testcase(
     study: Callable[..., Any], tmp_path: Path, x: str, claim: str, code: int, status: str, element: str
 ) -> None:
     text = SCENARIO.replace("{x: 1,", f"{{x: {x},") + f"acceptance: {{pass_rate: {claim}}}\n"
-    done = study(text, "--out", "out")
-    assert done.code == code, done.err
+    result = study(text, "--out", "out")
+    assert result.code == code, result.err
     assert results(tmp_path)["study"]["claim"]["status"] == status
-    message = case(tmp_path)
-    assert message.get("name", "").startswith("s.study [pass rate >= 0.8 (confidence 0.95)]")
-    assert [child.tag for child in message] == [element]
+    testcase = case(tmp_path)
+    assert testcase.get("name", "").startswith("s.study [pass rate >= 0.8 (confidence 0.95)]")
+    assert [child.tag for child in testcase] == [element]
     if element == "error":
-        assert message[0].get("type") == "simscen.undecided"
-    assert f"claim: pass rate of at least 80 % with 95 % confidence: {status}" in done.out
+        assert testcase[0].get("type") == "simscen.undecided"
+    assert f"claim: pass rate of at least 80 % with 95 % confidence: {status}" in result.out
 
 
 @pytest.mark.slow
 def test_a_sequential_claim_stops_early_and_can_be_resumed(study: Callable[..., Any], tmp_path: Path) -> None:
     text = SCENARIO.replace("{x: 1,", "{x: 2,") + "acceptance: {pass_rate: {min: 80 %, method: anytime, runs: 500}}\n"
     assert study(text, "--out", "out").code == 0
-    found = results(tmp_path)
-    assert found["total"] == 32
-    assert found["study"]["claim"]["runs"] < 32
-    again = study(text, "--resume", "out")
-    assert again.code == 0
+    output = results(tmp_path)
+    assert output["total"] == 32
+    assert output["study"]["claim"]["runs"] < 32
+    resumed = study(text, "--resume", "out")
+    assert resumed.code == 0
     assert all(run["resumed"] for run in results(tmp_path)["runs"])
-    assert results(tmp_path)["study"] == found["study"]
+    assert results(tmp_path)["study"] == output["study"]
 
 
 @pytest.mark.slow
@@ -141,14 +142,14 @@ def test_pairwise_values_have_no_confidence_interval_and_no_claim(study: Callabl
         "variations: {pairwise: {robot.pose.x: [1 m, 2 m, 3 m], robot.pose.y: [9, 10, 11], "
         "robot.motor_torque: [0.8, 0.9, 1]}}\n"
     )
-    done = study(SCENARIO + pairwise, "--out", "out", "--repeat", 2)
-    assert done.code == 1, done.err
-    found = results(tmp_path)["study"]
-    assert found["sampling"] == "designed"
-    assert found["interval"] is None
-    assert found["pair_coverage"] == 1.0
-    assert found["passed"] + found["failed"] == 20
-    assert "the values were chosen" in done.out
+    result = study(SCENARIO + pairwise, "--out", "out", "--repeat", 2)
+    assert result.code == 1, result.err
+    output = results(tmp_path)["study"]
+    assert output["sampling"] == "designed"
+    assert output["interval"] is None
+    assert output["pair_coverage"] == 1.0
+    assert output["passed"] + output["failed"] == 20
+    assert "the values were chosen" in result.out
     claimed = study(SCENARIO + pairwise + "acceptance: {pass_rate: {min: 80 %}}\n")
     assert claimed.code == 2
     assert "not independent random draws" in claimed.err
@@ -157,13 +158,13 @@ def test_pairwise_values_have_no_confidence_interval_and_no_claim(study: Callabl
 @pytest.mark.slow
 def test_values_meet_the_conditions_and_their_share_is_reported(study: Callable[..., Any], tmp_path: Path) -> None:
     text = SCENARIO + RANDOM + "  require: ['robot.pose.x > 1.4']\n"
-    done = study(text, "--out", "out")
-    assert done.code == 0, done.err
-    found = results(tmp_path)["study"]
-    assert found["passed"] == 24
-    assert 0.3 < found["accepted"] < 0.7
-    last = max(int(each["variation"].removeprefix("variation-")) for each in found["values"])
-    assert found["accepted"] == pytest.approx(24 / last)
+    result = study(text, "--out", "out")
+    assert result.code == 0, result.err
+    output = results(tmp_path)["study"]
+    assert output["passed"] == 24
+    assert 0.3 < output["accepted"] < 0.7
+    last = max(int(row["variation"].removeprefix("variation-")) for row in output["values"])
+    assert output["accepted"] == pytest.approx(24 / last)
     impossible = study(SCENARIO + RANDOM + "  require: ['robot.pose.x > 9']\n")
     assert impossible.code == 2
     assert "none of 10000 draws in a row meets the conditions" in impossible.err
@@ -182,7 +183,7 @@ def test_printed_command_repeats_a_failed_run(
 
 
 @pytest.mark.parametrize(
-    ("more", "options", "message"),
+    ("extra_text", "options", "message"),
     [
         ("", [], "the number of runs is missing"),
         ("variations: {grid: {seed: [1, 2]}}\n", ["--runs", 3], "--runs is for random seeds"),
@@ -194,12 +195,12 @@ def test_printed_command_repeats_a_failed_run(
     ],
 )
 def test_invalid_studies_are_refused(
-    simscen: Callable[..., Any], tmp_path: Path, more: str, options: list[object], message: str
+    simscen: Callable[..., Any], tmp_path: Path, extra_text: str, options: list[object], message: str
 ) -> None:
-    (tmp_path / "s.study.yaml").write_text(SCENARIO + more)
-    done = simscen("study", "s.study.yaml", *map(str, options))
-    assert done.code in (2, 5)
-    assert message in done.err
+    (tmp_path / "s.study.yaml").write_text(SCENARIO + extra_text)
+    result = simscen("study", "s.study.yaml", *map(str, options))
+    assert result.code in (2, 5)
+    assert message in result.err
 
 
 def test_pairs_are_counted_only_for_pairwise_values(study: Callable[..., Any], tmp_path: Path) -> None:
@@ -218,9 +219,9 @@ def test_logs_of_passed_runs_are_deleted_on_request(
         assert ("mcap" in run["artifacts"]) == (run["outcome"] == "failed")
         assert (folder / "run.mcap").exists() == (run["outcome"] == "failed")
         assert [file.name for file in folder.iterdir()] == ["result.json"] or run["outcome"] == "failed"
-    before = (tmp_path / "out/results.json").read_bytes()
+    original = (tmp_path / "out/results.json").read_bytes()
     assert simscen("report", "out").code == 1
-    assert (tmp_path / "out/results.json").read_bytes() == before
+    assert (tmp_path / "out/results.json").read_bytes() == original
 
 
 def test_runs_before_an_error_between_two_batches_are_reported(
@@ -236,9 +237,9 @@ def test_runs_before_an_error_between_two_batches_are_reported(
 
     monkeypatch.setattr(study_session, "BATCH_SIZE", 4)
     monkeypatch.setattr(study_session._StudySession, "_load", load_after_change)
-    done = study(SCENARIO + RANDOM, "--out", "out")
-    assert done.code == 2
-    assert "s.study.yaml has changed since the study began" in done.err
+    result = study(SCENARIO + RANDOM, "--out", "out")
+    assert result.code == 2
+    assert "s.study.yaml has changed since the study began" in result.err
     assert results(tmp_path)["total"] == 4
 
 
@@ -267,6 +268,6 @@ main()
 def test_runs_before_a_signal_between_two_batches_are_reported(tmp_path: Path) -> None:
     (tmp_path / "s.study.yaml").write_text(SCENARIO + RANDOM)
     program = [sys.executable, "-c", SIGNAL_BETWEEN_BATCHES]
-    done = subprocess.run(program, cwd=tmp_path, check=False, capture_output=True, text=True)
-    assert done.returncode == 143, done.stderr
+    result = subprocess.run(program, cwd=tmp_path, check=False, capture_output=True, text=True)
+    assert result.returncode == 143, result.stderr
     assert results(tmp_path)["total"] == 4

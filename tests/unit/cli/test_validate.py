@@ -1,3 +1,5 @@
+"""Tests of `simscen validate`."""
+
 import json
 from pathlib import Path
 
@@ -10,16 +12,16 @@ BAD = "simscen: 1\nwrold: x\nrobot: {pose: {x: 1, y: 2 s}}\npass: [{goals_reache
 
 def test_valid_files_are_counted_by_kind(simscen, tmp_path: Path) -> None:
     (tmp_path / "a.world.yaml").write_text("simscen: 1\n")
-    ended = simscen("validate", ".")
-    assert ended == (0, "1 world and 1 scenario are valid\n", "")
+    result = simscen("validate", ".")
+    assert result == (0, "1 world and 1 scenario are valid\n", "")
 
 
 def test_every_problem_is_shown_with_its_line(simscen, tmp_path: Path) -> None:
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub/bad.scenario.yaml").write_text(BAD)
-    ended = simscen("validate", ".")
-    assert ended.code == 2
-    assert ended.out == (
+    result = simscen("validate", ".")
+    assert result.code == 2
+    assert result.out == (
         "sub/bad.scenario.yaml:2:1: error[SC012] unknown key `wrold`\n"
         "    2 | wrold: x\n"
         "      | ^^^^^\n"
@@ -34,9 +36,9 @@ def test_every_problem_is_shown_with_its_line(simscen, tmp_path: Path) -> None:
 
 def test_json_is_printed(simscen, tmp_path: Path) -> None:
     (tmp_path / "bad.scenario.yaml").write_text(BAD)
-    ended = simscen("validate", ".", "--format", "json")
-    output = json.loads(ended.out)
-    assert (ended.code, output["valid"], output["files"]) == (2, False, 2)
+    result = simscen("validate", ".", "--format", "json")
+    output = json.loads(result.out)
+    assert (result.code, output["valid"], output["files"]) == (2, False, 2)
     assert output["problems"][0] == {
         "path": "bad.scenario.yaml", "line": 2, "col": 1, "code": "SC012", "severity": "error",
         "message": "unknown key `wrold`", "hint": "did you mean `world`?",
@@ -52,20 +54,20 @@ def test_github_annotations_are_printed(simscen, tmp_path: Path) -> None:
 
 
 def test_missing_file_is_printed_in_the_chosen_format(simscen) -> None:
-    ended = simscen("validate", "missing.yaml", "--format", "json")
-    output = json.loads(ended.out)
-    assert (ended.code, output["valid"], output["files"]) == (2, False, 0)
+    result = simscen("validate", "missing.yaml", "--format", "json")
+    output = json.loads(result.out)
+    assert (result.code, output["valid"], output["files"]) == (2, False, 0)
     assert [(problem["path"], problem["code"]) for problem in output["problems"]] == [("missing.yaml", "SC001")]
-    ended = simscen("validate", "missing.yaml", "--format", "github")
-    assert (ended.code, ended.out[:25]) == (2, "::error file=missing.yaml")
+    result = simscen("validate", "missing.yaml", "--format", "github")
+    assert (result.code, result.out[:25]) == (2, "::error file=missing.yaml")
 
 
 def test_goal_in_a_wall_is_found_without_a_run(simscen, tmp_path: Path) -> None:
-    good = (tmp_path / "good.scenario.yaml").read_text()
-    (tmp_path / "bad.scenario.yaml").write_text(good.replace("x: 5, y: 3", "x: 3, y: 2"))
-    ended = simscen("validate", "bad.scenario.yaml")
-    assert ended.code == 2
-    assert 'is inside obstacle "crate"' in ended.out
+    scenario = (tmp_path / "good.scenario.yaml").read_text()
+    (tmp_path / "bad.scenario.yaml").write_text(scenario.replace("x: 5, y: 3", "x: 3, y: 2"))
+    result = simscen("validate", "bad.scenario.yaml")
+    assert result.code == 2
+    assert 'is inside obstacle "crate"' in result.out
 
 
 @pytest.mark.parametrize(
@@ -78,10 +80,10 @@ def test_goal_in_a_wall_is_found_without_a_run(simscen, tmp_path: Path) -> None:
 )
 def test_invalid_arguments_are_errors(simscen, tmp_path: Path, argument: str, code: int, expected_text: str) -> None:
     (tmp_path / "empty").mkdir()
-    ended = simscen("validate", argument)
-    assert ended.code == code
-    assert expected_text in ended.err
-    assert "Traceback" not in ended.err
+    result = simscen("validate", argument)
+    assert result.code == code
+    assert expected_text in result.err
+    assert "Traceback" not in result.err
 
 
 @pytest.mark.parametrize("name", ["[/red]", "::error::x", "##[error]x", "]]><script>", "a\nb"])
@@ -98,20 +100,20 @@ def test_control_sequences_in_file_names_are_escaped(simscen, tmp_path: Path, na
 def test_number_of_printed_problems_is_limited(simscen, tmp_path: Path) -> None:
     keys = "".join(f"k{i}: 1\n" for i in range(80))
     (tmp_path / "bad.scenario.yaml").write_text("simscen: 1\n" + keys)
-    ended = simscen("validate", "bad.scenario.yaml")
-    assert "bad.scenario.yaml: … and 33 more" in ended.out
-    assert ended.out.endswith("83 problems in 1 of 1 file\n")
+    result = simscen("validate", "bad.scenario.yaml")
+    assert "bad.scenario.yaml: … and 33 more" in result.out
+    assert result.out.endswith("83 problems in 1 of 1 file\n")
 
 
 SEALED = "{points: [[4, 0], [4, 4]], name: partition}, "
 
 
 def test_geometric_problems_are_drawn_on_request(simscen, tmp_path: Path) -> None:
-    good = (tmp_path / "good.scenario.yaml").read_text()
+    scenario = (tmp_path / "good.scenario.yaml").read_text()
     (tmp_path / "sub").mkdir()
-    (tmp_path / "sub/bad.scenario.yaml").write_text(good.replace("walls: [", f"walls: [{SEALED}"))
-    ended = simscen("validate", ".", "--picture", "pictures")
-    assert (ended.code, ended.out.count("picture: pictures/sub/bad.png")) == (2, 1)
+    (tmp_path / "sub/bad.scenario.yaml").write_text(scenario.replace("walls: [", f"walls: [{SEALED}"))
+    result = simscen("validate", ".", "--picture", "pictures")
+    assert (result.code, result.out.count("picture: pictures/sub/bad.png")) == (2, 1)
     assert [path.name for path in (tmp_path / "pictures").rglob("*.png")] == ["bad.png"]
 
 
@@ -122,27 +124,27 @@ def test_picture_does_not_overwrite_the_map_of_the_world(simscen, tmp_path: Path
     text = (tmp_path / "good.scenario.yaml").read_text()
     world = yaml.safe_dump({**yaml.safe_load(text), "world": "hall.yaml", "robot": {"pose": {"x": 20, "y": 1}}})
     (tmp_path / "hall.scenario.yaml").write_text(world)
-    before = (tmp_path / "hall.png").read_bytes()
-    ended = simscen("validate", "hall.scenario.yaml", "--picture", ".")
-    assert (ended.code, "cannot write the picture hall.png: it is one of the input files" in ended.err) == (2, True)
-    assert (tmp_path / "hall.png").read_bytes() == before
+    original = (tmp_path / "hall.png").read_bytes()
+    result = simscen("validate", "hall.scenario.yaml", "--picture", ".")
+    assert (result.code, "cannot write the picture hall.png: it is one of the input files" in result.err) == (2, True)
+    assert (tmp_path / "hall.png").read_bytes() == original
 
 
 def test_unwritable_picture_is_an_error(simscen, tmp_path: Path) -> None:
-    good = (tmp_path / "good.scenario.yaml").read_text()
-    (tmp_path / "bad.scenario.yaml").write_text(good.replace("walls: [", f"walls: [{SEALED}"))
+    scenario = (tmp_path / "good.scenario.yaml").read_text()
+    (tmp_path / "bad.scenario.yaml").write_text(scenario.replace("walls: [", f"walls: [{SEALED}"))
     (tmp_path / "file").write_text("")
-    ended = simscen("validate", "bad.scenario.yaml", "--picture", "file")
-    assert (ended.code, "cannot write the picture file/bad.png" in ended.err) == (2, True)
+    result = simscen("validate", "bad.scenario.yaml", "--picture", "file")
+    assert (result.code, "cannot write the picture file/bad.png" in result.err) == (2, True)
 
 
 def test_fast_skips_only_geometric_checks(simscen, tmp_path: Path) -> None:
-    good = (tmp_path / "good.scenario.yaml").read_text()
-    (tmp_path / "sealed.scenario.yaml").write_text(good.replace("walls: [", f"walls: [{SEALED}"))
+    scenario = (tmp_path / "good.scenario.yaml").read_text()
+    (tmp_path / "sealed.scenario.yaml").write_text(scenario.replace("walls: [", f"walls: [{SEALED}"))
     assert simscen("validate", "sealed.scenario.yaml").code == 2
     assert simscen("validate", "sealed.scenario.yaml", "--fast").code == 0
     (tmp_path / "late.scenario.yaml").write_text(
-        f"{good}time_limit: 9 s\nevents: [{{when: {{time: 9 s}}, do: {{cancel_goal: {{}}}}}}]\n"
+        f"{scenario}time_limit: 9 s\nevents: [{{when: {{time: 9 s}}, do: {{cancel_goal: {{}}}}}}]\n"
     )
     assert "can never happen" in simscen("validate", "late.scenario.yaml", "--fast").out
 
@@ -153,9 +155,9 @@ def test_base_file_is_counted_and_checked(simscen, tmp_path: Path) -> None:
     assert simscen("validate", "aisle.base.yaml", "defaults.yaml") == (0, "2 bases are valid\n", "")
     assert simscen("validate", ".") == (0, "1 base and 1 scenario are valid\n", "")
     (tmp_path / "defaults.yaml").write_text("tag: [smoke]\n")
-    ended = simscen("validate", "defaults.yaml")
-    assert ended.code == 2
-    assert "defaults.yaml:1:1: error[SC012] unknown key `tag`" in ended.out
+    result = simscen("validate", "defaults.yaml")
+    assert result.code == 2
+    assert "defaults.yaml:1:1: error[SC012] unknown key `tag`" in result.out
 
 
 DOCK = """\
@@ -168,12 +170,14 @@ places: {up: {x: 1, y: 2}, shelf: {x: 6, y: 2}}
 
 
 @pytest.mark.parametrize(
-    ("ramps", "inside"),
+    ("ramps", "places_inside"),
     [("ramps: [{name: ramp, start: [3.5, 2], end: [2, 2], width: 2, height: 12 cm}]", ["shelf"]),
      ("ramps: []", ["up", "shelf"])],
     ids=["with ramp", "without ramp"],
 )  # fmt: skip
-def test_place_can_be_on_a_platform_behind_a_ramp(simscen, tmp_path: Path, ramps: str, inside: list[str]) -> None:
+def test_place_can_be_on_a_platform_behind_a_ramp(
+    simscen, tmp_path: Path, ramps: str, places_inside: list[str]
+) -> None:
     (tmp_path / "dock.world.yaml").write_text(DOCK.replace("RAMP", ramps))
-    ended = simscen("validate", "dock.world.yaml")
-    assert [name for name in ("up", "shelf") if f"place `{name}` is inside obstacle" in ended.out] == inside
+    result = simscen("validate", "dock.world.yaml")
+    assert [name for name in ("up", "shelf") if f"place `{name}` is inside obstacle" in result.out] == places_inside

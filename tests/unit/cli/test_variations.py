@@ -1,4 +1,4 @@
-"""`variations`: each is a separate run in all reports."""
+"""Tests of `variations`: each variation is a separate run in all reports."""
 
 import json
 import shlex
@@ -32,16 +32,16 @@ def project(simscen, tmp_path: Path) -> Path:
 
 def results(folder: Path) -> list[dict[str, object]]:
     """Return the runs of results.json."""
-    found: list[dict[str, object]] = json.loads((folder / "results.json").read_text())["runs"]
-    return found
+    runs: list[dict[str, object]] = json.loads((folder / "results.json").read_text())["runs"]
+    return runs
 
 
 def test_every_variation_runs_with_every_seed(simscen, project: Path) -> None:
-    ended = simscen("run", ".", "--repeat", "2", "--out", "out")
-    assert ended.code == 0, ended.err
-    assert ended.out.startswith("simscen")
-    assert "1 scenario · 6 runs" in ended.out
-    assert "a[x=50cm] (seed 2)" in ended.out
+    result = simscen("run", ".", "--repeat", "2", "--out", "out")
+    assert result.code == 0, result.err
+    assert result.out.startswith("simscen")
+    assert "1 scenario · 6 runs" in result.out
+    assert "a[x=50cm] (seed 2)" in result.out
     folders = sorted(log.parent.name for log in project.rglob("run.mcap"))
     assert folders == sorted(f"seed-{seed}-{name}" for seed in (1, 2) for name in NAMES)
     assert [(run["variation"], run["seed"]) for run in results(project / "out")] == [
@@ -70,10 +70,10 @@ def test_repeat_command_repeats_one_variation(simscen, project: Path) -> None:
 @pytest.mark.slow
 def test_stacks_are_compared_for_each_variation(simscen, project: Path) -> None:
     (project / "dwb.stack.yaml").write_text("simscen: 1\nstack: {controller: {type: dwb}}\n")
-    both = ("--stack", "ref=reference", "--stack", "dwb=dwb.stack.yaml")
-    ended = simscen("run", ".", *both, "-k", "x=1 or x=2", "--check-determinism", "--out", "out")
-    assert ended.code == 0, ended.out
-    assert "dwb against ref: 2 pairs" in ended.out
+    stack_options = ("--stack", "ref=reference", "--stack", "dwb=dwb.stack.yaml")
+    result = simscen("run", ".", *stack_options, "-k", "x=1 or x=2", "--check-determinism", "--out", "out")
+    assert result.code == 0, result.out
+    assert "dwb against ref: 2 pairs" in result.out
     folders = {log.parent.name for log in project.rglob("run.mcap")}
     assert {"seed-1-x=1@ref", "seed-1-x=2@dwb", "seed-1-x=2@dwb.again"} < folders
     document = json.loads((project / "out/results.json").read_text())
@@ -83,9 +83,9 @@ def test_stacks_are_compared_for_each_variation(simscen, project: Path) -> None:
 @pytest.mark.slow
 def test_resume_runs_missing_variations(simscen, project: Path) -> None:
     assert simscen("run", ".", "--variation", "x=1", "--out", "out").code == 0
-    before = (project / "out/runs/a/seed-1-x=1/run.mcap").stat().st_mtime_ns
+    original_time = (project / "out/runs/a/seed-1-x=1/run.mcap").stat().st_mtime_ns
     assert simscen("run", ".", "--resume", "out").code == 0
-    assert (project / "out/runs/a/seed-1-x=1/run.mcap").stat().st_mtime_ns == before
+    assert (project / "out/runs/a/seed-1-x=1/run.mcap").stat().st_mtime_ns == original_time
     assert [run["variation"] for run in results(project / "out")] == NAMES
 
 
@@ -95,27 +95,27 @@ def test_shards_and_lists_contain_variations(simscen, project: Path) -> None:
     assert sorted(name for text in shards for name in NAMES if f"a[{name}]" in text) == sorted(NAMES)
 
 
-def test_unknown_variation_is_an_error_with_the_known_ones(simscen, project: Path) -> None:
-    ended = simscen("run", ".", "--variation", "x=51cm")
-    assert ended.code == 5
-    assert "no variation is called `x=51cm`; did you mean `x=50cm`?" in ended.err
+def test_unknown_variation_is_an_error_with_a_suggestion(simscen, project: Path) -> None:
+    result = simscen("run", ".", "--variation", "x=51cm")
+    assert result.code == 5
+    assert "no variation is called `x=51cm`; did you mean `x=50cm`?" in result.err
 
 
 def test_geometric_problem_names_its_variation(simscen, project: Path) -> None:
     (project / "a.scenario.yaml").write_text(SHORT.replace("50 cm", "5.95"))
-    ended = simscen("validate", ".")
-    assert ended.code == 2
-    assert "error[SC301] the robot's start (5.95, 1) is inside obstacle" in ended.out
-    assert "in the variation `x=5.95`" in ended.out
+    result = simscen("validate", ".")
+    assert result.code == 2
+    assert "error[SC301] the robot's start (5.95, 1) is inside obstacle" in result.out
+    assert "in the variation `x=5.95`" in result.out
     assert simscen("run", ".", "--variation", "x=1").code == 2
 
 
 def test_variation_of_a_replaced_stack_is_rejected(simscen, project: Path) -> None:
     grid = "{grid: {stack.controller.desired_linear_vel: [0.1, 0.2]}}"
     (project / "a.scenario.yaml").write_text(SHORT.replace("{grid: {robot.pose.x: [1, 2, 50 cm]}}", grid))
-    ended = simscen("run", "a.scenario.yaml", "--stack", "mine=/bin/true")
-    assert ended.code == 2
-    assert "`stack.controller.desired_linear_vel` changes nothing with --stack mine=/bin/true" in ended.err
+    result = simscen("run", "a.scenario.yaml", "--stack", "mine=/bin/true")
+    assert result.code == 2
+    assert "`stack.controller.desired_linear_vel` changes nothing with --stack mine=/bin/true" in result.err
 
 
 def test_python_interface_lists_and_runs_variations(project: Path) -> None:

@@ -1,4 +1,4 @@
-"""Scenarios that `--watch` runs after changes of files."""
+"""Tests of `--watch`: the scenarios that run after files have changed."""
 
 import io
 import json
@@ -19,19 +19,21 @@ def files(tmp_path: Path):
 
 
 @pytest.fixture
-def watching(files: Path) -> WatchState:
-    found = WatchState(lambda: sorted(files.glob("*.scenario.yaml")), [files])
-    found.begin([files])
-    for name, others in (("a", ["room", "robot"]), ("b", ["robot"])):
+def watch_state(files: Path) -> WatchState:
+    """Return the state after a session in which scenario a passed and scenario b failed."""
+    state = WatchState(lambda: sorted(files.glob("*.scenario.yaml")), [files])
+    state.begin([files])
+    for name, other_files in (("a", ["room", "robot"]), ("b", ["robot"])):
         scenario = str(files / f"{name}.scenario.yaml")
-        made_of = [scenario, *(str(files / f"{other}.yaml") for other in others)]
-        found.update(json.dumps({"scenario": scenario, "files": made_of}))
-        found.update(json.dumps({"scenario": scenario, "good": name == "a"}))
-    found.end(Exit.FAILED)
-    return found
+        files_of_scenario = [scenario, *(str(files / f"{file}.yaml") for file in other_files)]
+        state.update(json.dumps({"scenario": scenario, "files": files_of_scenario}))
+        state.update(json.dumps({"scenario": scenario, "good": name == "a"}))
+    state.end(Exit.FAILED)
+    return state
 
 
 def names(paths) -> str:
+    """Return the names of files without their extensions, separated by spaces."""
     return " ".join(path.name.partition(".")[0] for path in paths)
 
 
@@ -39,34 +41,34 @@ def names(paths) -> str:
     ("saved", "names_to_run"), [("room.yaml", "a"), ("robot.yaml", "a b"), ("b.scenario.yaml", "b"), ("notes.txt", "")]
 )
 def test_scenarios_that_use_a_changed_file_run_again(
-    watching: WatchState, files: Path, saved: str, names_to_run: str
+    watch_state: WatchState, files: Path, saved: str, names_to_run: str
 ) -> None:
-    assert names(watching.scenarios_to_run({files / saved})) == names_to_run
+    assert names(watch_state.scenarios_to_run({files / saved})) == names_to_run
 
 
-def test_new_scenario_runs_and_removed_one_is_dropped(watching: WatchState, files: Path) -> None:
+def test_new_scenario_runs_and_removed_one_is_dropped(watch_state: WatchState, files: Path) -> None:
     (files / "new.scenario.yaml").write_text("")
     (files / "b.scenario.yaml").unlink()
-    assert names(watching.scenarios_to_run({files})) == "new"
-    assert names(watching.scenarios) == "a new"
-    assert watching.failed == []
+    assert names(watch_state.scenarios_to_run({files})) == "new"
+    assert names(watch_state.scenarios) == "a new"
+    assert watch_state.failed == []
 
 
-def test_failed_scenarios_are_known_until_they_run_again(watching: WatchState, files: Path) -> None:
-    assert names(watching.failed) == "b"
-    watching.begin([files / "b.scenario.yaml"])
-    assert watching.failed == []
+def test_scenario_counts_as_failed_until_it_runs_again(watch_state: WatchState, files: Path) -> None:
+    assert names(watch_state.failed) == "b"
+    watch_state.begin([files / "b.scenario.yaml"])
+    assert watch_state.failed == []
 
 
-def test_session_with_an_invalid_file_is_repeated_after_a_change(watching: WatchState, files: Path) -> None:
-    watching.begin([files / "b.scenario.yaml"])
+def test_session_with_an_invalid_file_is_repeated_after_a_change(watch_state: WatchState, files: Path) -> None:
+    watch_state.begin([files / "b.scenario.yaml"])
     report = io.StringIO()
     WatchReporter(report).write_invalid_files([Problem(str(files / "world.yaml"), 1, 1, "SC012", "unknown key")])
-    watching.update(report.getvalue())
-    watching.end(Exit.USAGE)
-    assert files / "world.yaml" in watching.files
-    assert names(watching.scenarios_to_run({files / "world.yaml"})) == "b"
-    assert names(watching.scenarios_to_run({files / "room.yaml"})) == "a b"
+    watch_state.update(report.getvalue())
+    watch_state.end(Exit.USAGE)
+    assert files / "world.yaml" in watch_state.files
+    assert names(watch_state.scenarios_to_run({files / "world.yaml"})) == "b"
+    assert names(watch_state.scenarios_to_run({files / "room.yaml"})) == "a b"
 
 
 def test_stamp_changes_when_a_file_is_saved_created_or_deleted(files: Path) -> None:
@@ -80,11 +82,11 @@ def test_stamp_changes_when_a_file_is_saved_created_or_deleted(files: Path) -> N
     assert stamps[0] != stamps[1] != stamps[2] == {file: None}
 
 
-def test_new_subfolders_are_watched_except_output_folders(watching: WatchState, files: Path) -> None:
+def test_new_subfolders_are_watched_except_output_folders(watch_state: WatchState, files: Path) -> None:
     (files / "new" / "deep").mkdir(parents=True)
     (files / ".hidden").mkdir()
     (files / "out" / "runs").mkdir(parents=True)
     (files / "out" / "events.jsonl").write_text("")
-    watching.scenarios_to_run({files})
-    folders = {path.relative_to(files).as_posix() for path in watching.files if path.is_dir()}
+    watch_state.scenarios_to_run({files})
+    folders = {path.relative_to(files).as_posix() for path in watch_state.files if path.is_dir()}
     assert folders == {".", "new", "new/deep"}

@@ -1,4 +1,4 @@
-"""`simscen world`: inspect, export, and convert."""
+"""Tests of `simscen world`: inspect, export, and convert."""
 
 import json
 from pathlib import Path
@@ -26,18 +26,19 @@ SDF = """<sdf version='1.6'><world name='shop'><model name='m'><static>1</static
 
 @pytest.fixture
 def room(tmp_path: Path) -> Path:
+    """Return a folder with the world file of a room."""
     (tmp_path / "room.world.yaml").write_text(ROOM)
     return tmp_path
 
 
 def test_inspect_prints_the_content(simscen, room: Path) -> None:
-    ended = simscen("world", "inspect", "room.world.yaml")
-    assert ended.code == 0
-    assert "  bounds    x -0.05 … 6.05 m, y -0.05 … 4.05 m (6.10 x 4.10 m)\n" in ended.out
-    assert "  static    5 solids: 4 extrusion, 1 box\n  moving    1 object\n" in ended.out
-    assert "    crate   box            12 triangles  x 2.50 … 3.50  y 1.50 … 2.50  z 0.00 … 1.00\n" in ended.out
-    assert "z 0.00 … 1.00  5 kg\n" in ended.out
-    assert ended.out.endswith("  places    dock\n  regions   bay\n")
+    result = simscen("world", "inspect", "room.world.yaml")
+    assert result.code == 0
+    assert "  bounds    x -0.05 … 6.05 m, y -0.05 … 4.05 m (6.10 x 4.10 m)\n" in result.out
+    assert "  static    5 solids: 4 extrusion, 1 box\n  moving    1 object\n" in result.out
+    assert "    crate   box            12 triangles  x 2.50 … 3.50  y 1.50 … 2.50  z 0.00 … 1.00\n" in result.out
+    assert "z 0.00 … 1.00  5 kg\n" in result.out
+    assert result.out.endswith("  places    dock\n  regions   bay\n")
 
 
 def test_inspect_draws_cross_section_and_map(simscen, room: Path) -> None:
@@ -60,7 +61,7 @@ def test_long_lists_are_cut_without_all(simscen, room: Path) -> None:
     assert simscen("world", "inspect", "many.world.yaml", "--all").out.count("post") == 30
 
 
-def test_notes_of_the_importer_are_printed(simscen, room: Path) -> None:
+def test_unsupported_sdf_is_an_error_or_with_lenient_a_warning(simscen, room: Path) -> None:
     (room / "shop.sdf").write_text(SDF.format(more="<include><uri>model://nowhere</uri></include>"))
     strict = simscen("world", "inspect", "shop.sdf")
     assert strict.code == 2
@@ -71,8 +72,8 @@ def test_notes_of_the_importer_are_printed(simscen, room: Path) -> None:
 
 
 def test_exported_map_equals_the_map_of_a_lidar(simscen, room: Path) -> None:
-    ended = simscen("world", "export", "room.world.yaml", "--map", "maps/room.yaml")
-    assert (ended.code, ended.out) == (0, "maps/room.yaml: 162 x 122 cells of 0.05 m\n")
+    result = simscen("world", "export", "room.world.yaml", "--map", "maps/room.yaml")
+    assert (result.code, result.out) == (0, "maps/room.yaml: 162 x 122 cells of 0.05 m\n")
     loaded = load_world_file(room / "maps/room.yaml", room).map
     assert loaded is not None
     grid, _ = load_map(loaded.spec, loaded.image)
@@ -82,8 +83,8 @@ def test_exported_map_equals_the_map_of_a_lidar(simscen, room: Path) -> None:
 
 def test_changes_of_a_converted_world_are_printed(simscen, room: Path) -> None:
     (room / "shop.sdf").write_text(SDF.format(more=""))
-    ended = simscen("world", "convert", "shop.sdf", "shop.world.yaml")
-    assert (ended.code, ended.out) == (
+    result = simscen("world", "convert", "shop.sdf", "shop.world.yaml")
+    assert (result.code, result.out) == (
         0,
         "changed: m::l::c: a sphere; replaced by an upright prism over its cross section at 0.2 m\n"
         "shop.world.yaml: 1 walls, obstacles, objects, and doors; 1 changed\n",
@@ -93,8 +94,10 @@ def test_changes_of_a_converted_world_are_printed(simscen, room: Path) -> None:
 
 def test_world_file_is_converted_without_changes(simscen, room: Path) -> None:
     assert simscen("world", "convert", "room.world.yaml", "sub/copy.world.yaml").code == 0
-    before, after = (load_world_file(room / name, room).spec for name in ("room.world.yaml", "sub/copy.world.yaml"))
-    assert after == before
+    original, converted = (
+        load_world_file(room / name, room).spec for name in ("room.world.yaml", "sub/copy.world.yaml")
+    )
+    assert converted == original
 
 
 def test_ros_map_stays_a_separate_file(simscen, room: Path) -> None:
@@ -110,11 +113,11 @@ def test_world_too_large_for_a_file_is_an_error(simscen, room: Path) -> None:
     boxes = "".join(box.format(number) for number in range(10_001))
     model = f"<model name='x'><static>1</static><pose>0 0 1 0 0 0</pose><link name='l'>{boxes}</link></model>"
     (room / "big.sdf").write_text(SDF.format(more=model))
-    ended = simscen("world", "convert", "big.sdf", "big.world.yaml")
-    assert ended.code == 2
+    result = simscen("world", "convert", "big.sdf", "big.world.yaml")
+    assert result.code == 2
     assert (
         "big.sdf: error[SC312] the world cannot be written as a world file: obstacles: List should have at most"
-        in ended.err
+        in result.err
     )
     assert not (room / "big.world.yaml").exists()
 
@@ -124,9 +127,9 @@ def test_object_named_like_a_model_cannot_be_converted(simscen, room: Path) -> N
     (room / "cart.sdf").write_text(SDF.format(more=f"<model name='cart'><link name='l'>{box}</link></model>"))
     objects = "objects: [{name: cart, box: [1, 1, 1], pose: {x: 3, y: 3}}]"
     (room / "cart.world.yaml").write_text(f"simscen: 1\nsdf: cart.sdf\n{objects}\n")
-    ended = simscen("world", "convert", "cart.world.yaml", "copy.world.yaml")
-    assert ended.code == 2
-    assert "as a world file: several objects have the name `cart`" in ended.err
+    result = simscen("world", "convert", "cart.world.yaml", "copy.world.yaml")
+    assert result.code == 2
+    assert "as a world file: several objects have the name `cart`" in result.err
 
 
 @pytest.mark.parametrize(
@@ -140,9 +143,9 @@ def test_object_named_like_a_model_cannot_be_converted(simscen, room: Path) -> N
     ],
 )
 def test_impossible_conversions_are_errors(simscen, room: Path, arguments, expected_text) -> None:
-    ended = simscen("world", *arguments)
-    assert ended.code == 2
-    assert expected_text in ended.err
+    result = simscen("world", *arguments)
+    assert result.code == 2
+    assert expected_text in result.err
 
 
 @pytest.mark.parametrize(
@@ -159,9 +162,9 @@ def test_map_of_a_world_is_not_overwritten(simscen, room: Path, arguments) -> No
     assert simscen("world", "export", "room.world.yaml", "--map", "plan.yaml").code == 0
     (room / "plan.yaml").rename(room / "hall.yaml")
     (room / "site.world.yaml").write_text("simscen: 1\nmap: hall.yaml\n")
-    before = {file.name: file.read_bytes() for file in room.iterdir()}
+    originals = {file.name: file.read_bytes() for file in room.iterdir()}
     assert simscen("world", *arguments).code == 2
-    assert {file.name: file.read_bytes() for file in room.iterdir()} == before
+    assert {file.name: file.read_bytes() for file in room.iterdir()} == originals
 
 
 @pytest.mark.parametrize(
@@ -173,14 +176,16 @@ def test_map_of_a_world_is_not_overwritten(simscen, room: Path, arguments) -> No
 )
 def test_a_map_that_would_be_too_large_is_an_error_of_the_file(simscen, room: Path, arguments, alternative) -> None:
     (room / "vast.world").write_text(SDF.format(more="").replace("<radius>1<", "<radius>300<"))
-    ended = simscen("world", *arguments)
-    assert ended.code == 2
-    assert ended.err.startswith("vast.world: error[SC330] map too large: 12")
-    assert " ".join(ended.err.split()).endswith(f'"m" makes the map large; move or remove this model, or {alternative}')
+    result = simscen("world", *arguments)
+    assert result.code == 2
+    assert result.err.startswith("vast.world: error[SC330] map too large: 12")
+    assert " ".join(result.err.split()).endswith(
+        f'"m" makes the map large; move or remove this model, or {alternative}'
+    )
 
 
 def test_a_world_with_a_large_map_is_exported_with_larger_cells(simscen, room: Path) -> None:
     (room / "vast.world").write_text(SDF.format(more="").replace("<radius>1<", "<radius>300<"))
-    ended = simscen("world", "export", "vast.world", "--map", "vast.yaml", "--resolution", "0.5")
-    assert ended.code == 0
-    assert "of 0.5 m" in ended.out
+    result = simscen("world", "export", "vast.world", "--map", "vast.yaml", "--resolution", "0.5")
+    assert result.code == 0
+    assert "of 0.5 m" in result.out
