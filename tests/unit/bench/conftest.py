@@ -1,4 +1,4 @@
-"""Make `finishedruns.py` importable in the tests of this folder."""
+"""Make `finished_runs.py` importable in the tests of this folder, which pytest's importlib mode does not."""
 
 import sys
 from pathlib import Path

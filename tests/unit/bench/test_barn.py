@@ -1,3 +1,5 @@
+"""Tests of the worlds of the BARN challenge: their list and their scenarios."""
+
 from pathlib import Path
 
 import pytest
@@ -19,7 +21,7 @@ def test_a_scenario_of_the_challenge_is_valid(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "given"),
+    ("text", "expected_text"),
     [
         ("world,length\n1,12\n", "no column 'ref_path_len'"),
         ("world,ref_path_len\n1,12\n2,far\n", "line 3: could not convert string to float: 'far'"),
@@ -28,12 +30,12 @@ def test_a_scenario_of_the_challenge_is_valid(tmp_path: Path) -> None:
         ("world,ref_path_len\n", "lists no worlds"),
     ],
 )
-def test_invalid_list_of_worlds_is_reported(tmp_path: Path, text: str, given: str) -> None:
+def test_invalid_list_of_worlds_is_reported(tmp_path: Path, text: str, expected_text: str) -> None:
     (tmp_path / "scenarios.csv").write_text(text)
-    with pytest.raises(UsageError) as raised:
+    with pytest.raises(UsageError) as error:
         read_barn_worlds(tmp_path)
-    assert f"{tmp_path / 'scenarios.csv'}" in str(raised.value)
-    assert given in str(raised.value)
+    assert f"{tmp_path / 'scenarios.csv'}" in str(error.value)
+    assert expected_text in str(error.value)
 
 
 def test_list_of_worlds_from_a_spreadsheet_is_read(tmp_path: Path) -> None:
@@ -46,7 +48,7 @@ def test_folder_without_a_list_of_worlds_is_reported(tmp_path: Path) -> None:
         read_barn_worlds(tmp_path)
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="the worlds of others are not here: see CONTRIBUTING.md")
+@pytest.mark.skipif(not DATA.is_dir(), reason="the BARN worlds are not in this folder: see CONTRIBUTING.md")
 def test_worlds_of_the_dataset_have_their_reference_lengths() -> None:
     worlds = {world.file.stem: world for world in read_barn_worlds(DATA)}
     assert len(worlds) == 6

@@ -1,3 +1,5 @@
+"""Tests of the bounds that the average NEES of a consistent estimator keeps."""
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from simscen.criteria.trace_signals.estimation_errors import nees
 @pytest.mark.parametrize(
     ("runs", "low", "high"), [(20, 2.02, 4.17), (50, 2.36, 3.72), (100, 2.54, 3.50), (1000, 2.85, 3.15)]
 )
-def test_the_bounds_are_those_of_the_literature(runs: int, low: float, high: float) -> None:
+def test_bounds_equal_those_of_the_literature(runs: int, low: float, high: float) -> None:
     assert anees_bounds(runs) == pytest.approx((low, high), abs=0.01)
 
 
@@ -21,7 +23,7 @@ def test_a_consistent_estimator_lies_within_the_bounds() -> None:
     assert low < np.mean(values) < high
 
 
-def filtered(rng: np.random.Generator, campaigns: int, buildings: int, shared: float) -> Array:
+def filter_nees(rng: np.random.Generator, campaigns: int, buildings: int, shared: float) -> Array:
     """Return the NEES (campaigns, buildings, 25) of a Kalman filter of a random walk, in five logs at five times each.
 
     A measurement has an independent error (variance 4), and an error that all measurements in its building share
@@ -29,37 +31,39 @@ def filtered(rng: np.random.Generator, campaigns: int, buildings: int, shared: f
     correlated, too.
     """
     walk, noise = 0.25, 4.0
-    before = (walk + np.sqrt(walk**2 + 4 * walk * noise)) / 2  # the Riccati equation's steady state, of one coordinate
-    gain = before / (before + noise)
-    variance = (1 - gain) * before + shared
+    predicted_variance = (walk + np.sqrt(walk**2 + 4 * walk * noise)) / 2  # steady state of the Riccati equation
+    gain = predicted_variance / (predicted_variance + noise)
+    variance = (1 - gain) * predicted_variance + shared
     error = np.sqrt(variance - shared) * rng.standard_normal((campaigns, buildings, 5, 3))
-    common = np.sqrt(shared) * rng.standard_normal((campaigns, buildings, 1, 3))
+    shared_error = np.sqrt(shared) * rng.standard_normal((campaigns, buildings, 1, 3))
     values = []
     for step in range(20):
-        walked = error + np.sqrt(walk) * rng.standard_normal(error.shape)
-        error = (1 - gain) * walked + gain * np.sqrt(noise) * rng.standard_normal(error.shape)
+        predicted_error = error + np.sqrt(walk) * rng.standard_normal(error.shape)
+        error = (1 - gain) * predicted_error + gain * np.sqrt(noise) * rng.standard_normal(error.shape)
         if step % 4 == 3:
-            values.append(np.square(error + common).sum(axis=-1) / variance)
+            values.append(np.square(error + shared_error).sum(axis=-1) / variance)
     return np.stack(values, axis=-1).reshape(campaigns, buildings, 25)
 
 
 @pytest.mark.parametrize("shared", [0.0, 0.3])
 def test_bounds_over_buildings_contain_only_a_consistent_filter(shared: float) -> None:
     """An inconsistent filter, whose standard deviations are 1.5 times too small or too large, is outside the bounds."""
-    values = filtered(np.random.default_rng(3), 400, 8, shared)
+    values = filter_nees(np.random.default_rng(3), 400, 8, shared)
 
-    def kept(times: float) -> float:
-        campaigns = (values * times).mean(axis=2)
+    def share_within_bounds(factor: float) -> float:
+        campaigns = (values * factor).mean(axis=2)
         limits = [correlated_anees_bounds(campaign.tolist()) for campaign in campaigns]
-        return float(np.mean([low < one.mean() < high for one, (low, high) in zip(campaigns, limits, strict=True)]))
+        return float(
+            np.mean([low < campaign.mean() < high for campaign, (low, high) in zip(campaigns, limits, strict=True)])
+        )
 
-    assert 0.92 < kept(1.0) < 0.98
-    assert kept(1.5**2) < 0.03
-    assert kept(1.5**-2) < 0.03
+    assert 0.92 < share_within_bounds(1.0) < 0.98
+    assert share_within_bounds(1.5**2) < 0.03
+    assert share_within_bounds(1.5**-2) < 0.03
 
 
 def test_independent_bounds_are_too_narrow_for_correlated_logs() -> None:
-    values = filtered(np.random.default_rng(3), 400, 8, 0.3)
+    values = filter_nees(np.random.default_rng(3), 400, 8, 0.3)
     low, high = anees_bounds(8 * 25)
     means = values.mean(axis=(1, 2))
     assert np.mean((low < means) & (means < high)) < 0.85

@@ -15,32 +15,33 @@ PROJECT = Path(__file__).parents[3]
 SANDBOX = PROJECT.parent / "shared" / "data" / "nav2_tb3_sandbox"
 
 
-def loads(experiment: Experiment) -> None:
+def load_drives(experiment: Experiment) -> None:
+    """Load the scenario of each drive, which raises InvalidInput if a scenario is invalid."""
     for drive in experiment.drives:
         load_scenario(drive.file, experiment.root, experiment.world_path)
 
 
 def test_generated_fields_load_and_carry_their_reference_length(tmp_path: Path) -> None:
     fields = write_generated_fields(tmp_path, (1,))
-    loads(fields)
+    load_drives(fields)
     assert (fields.drives[0].reference_length or 0.0) >= 10.0
 
 
 def test_dynamic_fields_load_at_three_speeds(tmp_path: Path) -> None:
     experiments = write_dynamic_fields(tmp_path, (1,))
-    assert [each.name for each in experiments] == [
+    assert [experiment.name for experiment in experiments] == [
         "dynamic fields, 0.74 m/s",
         "dynamic fields, 1.23 m/s",
         "dynamic fields, 1.72 m/s",
     ]
-    for each in experiments:
-        loads(each)
+    for experiment in experiments:
+        load_drives(experiment)
 
 
 def test_localization_drives_have_different_wrong_estimates(tmp_path: Path) -> None:
     experiments = write_localization_experiments(tmp_path, PROJECT / "worlds", range(1, 21), range(1, 4))
     for experiment in experiments:
-        loads(experiment)
+        load_drives(experiment)
     _, misled, unknown, _ = experiments
     assert list(unknown.drives[0].seeds) == [1, 2, 3]
     assert len({drive.file.read_text() for drive in misled.drives}) == 3
@@ -50,13 +51,13 @@ def test_every_corner_case_that_ships_is_an_experiment() -> None:
     cases = corner_cases(PROJECT / "scenarios", range(1, 21))
     assert {"narrow doorway", "dead end", "u trap"} <= {case.name for case in cases}
     for case in cases:
-        loads(case)
+        load_drives(case)
 
 
-@pytest.mark.skipif(not SANDBOX.is_dir(), reason="the worlds of others are not here: see CONTRIBUTING.md")
+@pytest.mark.skipif(not SANDBOX.is_dir(), reason="the worlds of Nav2 are not in this folder: see CONTRIBUTING.md")
 def test_the_sandbox_loads_with_and_without_the_box(tmp_path: Path) -> None:
     for experiment in write_sandbox(tmp_path, SANDBOX, [1]):
-        loads(experiment)
+        load_drives(experiment)
 
 
 NAV2 = """\
@@ -76,7 +77,7 @@ def test_every_experiment_accepts_a_nav2_parameter_file(tmp_path: Path) -> None:
         *corner_cases(PROJECT / "scenarios", range(1, 2)),
         *write_localization_experiments(tmp_path / "made", PROJECT / "worlds", range(1, 2), range(1, 2)),
     ]
-    for other in experiments_with_stack(tmp_path / "ours.stack.yaml", experiments, tmp_path / "made", PROJECT):
-        for drive in other.drives:
-            stack = load_scenario(drive.file, other.root, other.world_path).spec.stack
+    for experiment in experiments_with_stack(tmp_path / "ours.stack.yaml", experiments, tmp_path / "made", PROJECT):
+        for drive in experiment.drives:
+            stack = load_scenario(drive.file, experiment.root, experiment.world_path).spec.stack
             assert (stack.controller.type, stack.controller.vx_max, stack.planner.type) == ("mppi", 0.4, "navfn")

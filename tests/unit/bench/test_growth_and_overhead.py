@@ -1,4 +1,4 @@
-"""Scenarios of `simscen bench growth` and the sample of `simscen bench suite`."""
+"""Tests of the scenarios of `simscen bench growth`, and of the sample and figures of `simscen bench suite`."""
 
 import pytest
 
@@ -10,15 +10,16 @@ from simscen.loading.loaded import LoadedScenario
 from simscen.loading.scenario import load_scenario
 
 
-def count(axis: str, loaded: LoadedScenario) -> int:
+def count(quantity: str, loaded: LoadedScenario) -> int:
+    """Return the amount of a quantity, such as the number of obstacles or lidar beams, in a scenario."""
     spec, world = loaded.spec, load_world(loaded)
-    match axis:
+    match quantity:
         case "obstacles":
             return sum(solid.name.startswith("crate") for solid in world.solids)
         case "objects":
             return sum(body.mass > 0 for body in world.bodies)
         case "moving objects":
-            return sum(body.path is not None for body in world.bodies) - 1  # the patrol's own cart
+            return sum(body.path is not None for body in world.bodies) - 1  # one of them is the cart of the patrol
         case "beams":
             return next(sensor.lidar.beams for sensor in load_robot(loaded)[0].sensors.values() if sensor.lidar)
         case "particles":
@@ -28,10 +29,10 @@ def count(axis: str, loaded: LoadedScenario) -> int:
 
 
 @pytest.mark.parametrize(
-    ("axis", "many"), [(axis, many) for axis, counts in QUANTITIES.items() for many in counts[::2]]
+    ("quantity", "amount"), [(quantity, amount) for quantity, counts in QUANTITIES.items() for amount in counts[::2]]
 )
-def test_growth_scenario_has_the_stated_amount(tmp_path, axis, many):
-    assert count(axis, load_scenario(write_scaled_patrol(tmp_path, axis, many), tmp_path)) == many
+def test_growth_scenario_has_the_stated_amount(tmp_path, quantity, amount):
+    assert count(quantity, load_scenario(write_scaled_patrol(tmp_path, quantity, amount), tmp_path)) == amount
 
 
 def test_short_patrol_has_the_stated_time_limit(tmp_path):

@@ -1,4 +1,4 @@
-"""Worlds of `simscen bench worlds`."""
+"""Tests of the worlds of `simscen bench worlds`."""
 
 import pytest
 
@@ -27,8 +27,8 @@ def test_hall_has_movable_meshes_and_reachable_goals(tmp_path):
 def test_arena_is_100_m_wide_and_its_goals_are_reachable(tmp_path):
     file = write_arena(tmp_path / "arena")
     prepared = prepare(load_scenario(file, file.parent))
-    cells = prepared.built.map
-    assert cells.resolution * cells.cells.shape[1] == pytest.approx(100.0)
+    grid = prepared.built.map
+    assert grid.resolution * grid.cells.shape[1] == pytest.approx(100.0)
     assert all(length is not None and length < 100 for length in prepared.case.shortest.values())
 
 

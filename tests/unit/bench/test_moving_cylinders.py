@@ -15,7 +15,7 @@ from simscen.bench.navigation.moving_cylinders import (
 
 @pytest.fixture(scope="module")
 def fields() -> list[DynamicField]:
-    """Twenty fields of each speed."""
+    """Return twenty fields of each speed."""
     return [generate_dynamic_field(number, speed) for speed in SPEEDS_M_S for number in range(1, 21)]
 
 
@@ -41,19 +41,19 @@ def test_cylinders_stay_in_the_arena_and_start_at_different_points_of_their_path
 def test_the_mean_speed_is_as_requested_and_no_segment_is_much_faster_or_slower(
     speed: float, fields: list[DynamicField]
 ) -> None:
-    means = []
+    mean_speeds = []
     for field in (field for field in fields if field.speed == speed):
         for mover in field.movers:
-            each = np.hypot(*np.diff(mover.points, axis=0).T) / np.diff(mover.times)
+            speeds = np.hypot(*np.diff(mover.points, axis=0).T) / np.diff(mover.times)
             assert (
-                speed - 2 * MAX_SPEED_DEVIATION_M_S - 1e-9 <= each.min()
-                and each.max() <= speed + 2 * MAX_SPEED_DEVIATION_M_S + 1e-9
+                speed - 2 * MAX_SPEED_DEVIATION_M_S - 1e-9 <= speeds.min()
+                and speeds.max() <= speed + 2 * MAX_SPEED_DEVIATION_M_S + 1e-9
             )
-            means.append(float(each.mean()))
-    assert np.mean(means) == pytest.approx(speed, abs=0.04)
+            mean_speeds.append(float(speeds.mean()))
+    assert np.mean(mean_speeds) == pytest.approx(speed, abs=0.04)
 
 
 def test_cylinders_move_along_both_axes(fields: list[DynamicField]) -> None:
     spans = [np.ptp(mover.points, axis=0) for field in fields for mover in field.movers]
-    wide = sum(bool(span[0] > span[1]) for span in spans)
-    assert 0.25 < wide / len(spans) < 0.75
+    wide_count = sum(bool(span[0] > span[1]) for span in spans)
+    assert 0.25 < wide_count / len(spans) < 0.75

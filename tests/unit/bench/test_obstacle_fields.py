@@ -1,3 +1,5 @@
+"""Tests of generated obstacle fields against the geometry library shapely."""
+
 import numpy as np
 import pytest
 from shapely import MultiPoint, Point, box
@@ -14,8 +16,8 @@ from simscen.bench.navigation.obstacle_fields import (
 
 
 def test_field_depends_only_on_its_number() -> None:
-    first, again, other = generate_obstacle_field(3), generate_obstacle_field(3), generate_obstacle_field(4)
-    assert np.array_equal(first.centers, again.centers)
+    first, repeated, other = generate_obstacle_field(3), generate_obstacle_field(3), generate_obstacle_field(4)
+    assert np.array_equal(first.centers, repeated.centers)
     assert not np.array_equal(first.centers, other.centers)
 
 
@@ -23,10 +25,10 @@ def test_field_depends_only_on_its_number() -> None:
 def test_disc_can_pass_according_to_an_independent_library(number: int) -> None:
     field = generate_obstacle_field(number)
     lane = box(-30 * CELL_SIZE_M, 0.0, 0.0, GOAL.y + 1.0)
-    # 2 mm less than the disc: shapely's circles are polygons, and a lattice finds ways to its resolution only.
+    # The radius is reduced by 2 mm, because circles of shapely are polygons, and the search uses a lattice.
     free = lane.difference(MultiPoint(field.centers).buffer(CELL_SIZE_M / 2 + CROSSING_RADIUS_M - 0.002))
-    pieces = [piece for piece in getattr(free, "geoms", [free]) if piece.contains(Point(START.x, START.y))]
-    assert pieces and pieces[0].contains(Point(GOAL.x, GOAL.y))
+    parts = [part for part in getattr(free, "geoms", [free]) if part.contains(Point(START.x, START.y))]
+    assert parts and parts[0].contains(Point(GOAL.x, GOAL.y))
 
 
 def test_the_shortest_path_is_no_shorter_than_the_straight_line() -> None:
@@ -50,13 +52,13 @@ def test_narrow_field_width_matches_an_independent_library() -> None:
     field = generate_obstacle_field(2, crossing_radius, blocked_radius)
     lane = box(-30 * CELL_SIZE_M, 0.0, 0.0, GOAL.y + 1.0)
 
-    def crossable(radius: float) -> bool:
+    def is_crossable(radius: float) -> bool:
         free = lane.difference(MultiPoint(field.centers).buffer(CELL_SIZE_M / 2 + radius))
-        pieces = [piece for piece in getattr(free, "geoms", [free]) if piece.contains(Point(START.x, START.y))]
-        return bool(pieces) and bool(pieces[0].contains(Point(GOAL.x, GOAL.y)))
+        parts = [part for part in getattr(free, "geoms", [free]) if part.contains(Point(START.x, START.y))]
+        return bool(parts) and bool(parts[0].contains(Point(GOAL.x, GOAL.y)))
 
-    assert crossable(crossing_radius - 0.002)
-    assert not crossable(blocked_radius + CELL_SIZE_M / 3)  # as fine as the lattice on which that is looked for
+    assert is_crossable(crossing_radius - 0.002)
+    assert not is_crossable(blocked_radius + CELL_SIZE_M / 3)  # the resolution of the lattice that is searched
 
 
 def test_width_option_does_not_change_the_default_fields() -> None:

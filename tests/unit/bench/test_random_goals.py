@@ -32,41 +32,41 @@ def two_rooms() -> BuiltWorld:
     solids = [Solid(Box((10.2, 0.1, 1.0)), Pose3(5.0, y, 0.5), "wall") for y in (0.0, 6.0)] + [
         Solid(Box((0.1, 6.0, 1.0)), Pose3(x, 3.0, 0.5), "wall") for x in (0.0, 5.0, 10.0)
     ]
-    thing = Body("cart", (Solid(Box((0.4, 0.4, 0.4)), Pose3(), "cart"),), Pose3(2.0, 3.0, 0.2))
-    return build_world_and_map(World("rooms", tuple(solids), (thing,), bounds=(0.0, 0.0, 10.0, 6.0)), 0.2)
+    cart = Body("cart", (Solid(Box((0.4, 0.4, 0.4)), Pose3(), "cart"),), Pose3(2.0, 3.0, 0.2))
+    return build_world_and_map(World("rooms", tuple(solids), (cart,), bounds=(0.0, 0.0, 10.0, 6.0)), 0.2)
 
 
 def test_every_drive_is_reachable_with_free_start_and_goal() -> None:
-    found = list(random_drives(two_rooms(), 0.22, range(1, 21), min_length=2.0))
-    assert len(found) == 20
-    for one in found:
-        assert (one.start.x < 5.0) == (one.goal.x < 5.0)  # nothing leads through the wall
-        assert one.length >= max(2.0, one.start.distance(one.goal) - 1e-6)
-        for end in (one.start, one.goal):
+    drives = list(random_drives(two_rooms(), 0.22, range(1, 21), min_length=2.0))
+    assert len(drives) == 20
+    for drive in drives:
+        assert (drive.start.x < 5.0) == (drive.goal.x < 5.0)  # the wall has no door
+        assert drive.length >= max(2.0, drive.start.distance(drive.goal) - 1e-6)
+        for end in (drive.start, drive.goal):
             to_walls = min(abs(end.x - x) for x in (0.0, 5.0, 10.0)), min(end.y, 6.0 - end.y)
             assert min(to_walls) >= 0.05 + 0.22 + WALL_MARGIN_M - 0.01
             assert math.hypot(end.x - 2.0, end.y - 3.0) >= MOVABLE_MARGIN_M
 
 
 def test_drive_depends_only_on_its_number() -> None:
-    one, two, three = random_drives(two_rooms(), 0.22, (1, 2, 3), min_length=2.0)
-    assert [one, two, three] != [one, one, one]
-    assert list(random_drives(two_rooms(), 0.22, (3, 1), min_length=2.0)) == [three, one]
-    assert [each.number for each in (one, two, three)] == [1, 2, 3]
+    first, second, third = random_drives(two_rooms(), 0.22, (1, 2, 3), min_length=2.0)
+    assert [first, second, third] != [first, first, first]
+    assert list(random_drives(two_rooms(), 0.22, (3, 1), min_length=2.0)) == [third, first]
+    assert [drive.number for drive in (first, second, third)] == [1, 2, 3]
 
 
-def test_a_building_is_a_map_with_one_large_free_part_that_loads(tmp_path: Path) -> None:
+def test_office_map_has_one_large_free_part_and_loads(tmp_path: Path) -> None:
     for number in range(1, 7):
-        mapped, resolution = generate_office_map(number)
-        parts, _ = ndimage.label(mapped == FREE)
+        cells, resolution = generate_office_map(number)
+        parts, _ = ndimage.label(cells == FREE)
         largest = np.bincount(parts.ravel())[1:].max()
         assert largest * resolution**2 > 100.0
-        assert largest > 0.6 * np.count_nonzero(mapped == FREE)
+        assert largest > 0.6 * np.count_nonzero(cells == FREE)
     file = write_office_map(1, tmp_path)
     world = world_from_file(load_world_file(file, tmp_path), tmp_path)
     assert world.grid is not None
     assert world.grid.resolution == generate_office_map(1)[1]
-    assert np.array_equal(world.grid.cells == 0, np.flipud(generate_office_map(1)[0] == FREE)[::-1])
+    assert np.array_equal(world.grid.cells == 0, generate_office_map(1)[0] == FREE)
 
 
 def test_random_goals_and_degraded_drives_load(tmp_path: Path) -> None:
@@ -78,19 +78,21 @@ def test_random_goals_and_degraded_drives_load(tmp_path: Path) -> None:
     for drive in plain.drives:
         load_scenario(drive.file, plain.root, plain.world_path)
     assert len(weak.drives) == len(medium.drives) == len(strong.drives) == len(FAULTS)
-    for a, b in list(zip(weak.drives, strong.drives, strict=True))[::3]:
-        before, after = (load_scenario(drive.file, weak.root, weak.world_path).spec for drive in (a, b))
-        assert before.only_robot.pose == after.only_robot.pose and before.goals == after.goals
-        assert before.faults != after.faults
-        assert a.world == file.name  # its interval is over buildings, not over faults in one
+    for weak_drive, strong_drive in list(zip(weak.drives, strong.drives, strict=True))[::3]:
+        weak_spec, strong_spec = (
+            load_scenario(drive.file, weak.root, weak.world_path).spec for drive in (weak_drive, strong_drive)
+        )
+        assert weak_spec.only_robot.pose == strong_spec.only_robot.pose and weak_spec.goals == strong_spec.goals
+        assert weak_spec.faults != strong_spec.faults
+        assert weak_drive.world == file.name  # the confidence interval is over buildings, not over faults
 
 
 def test_corridors_and_ramps_load_and_differ(tmp_path: Path) -> None:
-    for made in (
-        generated_worlds.write_two_robots(tmp_path / "c", (1, 2, 3)),
+    for experiment in (
+        generated_worlds.write_two_robots(tmp_path / "corridors", (1, 2, 3)),
         generated_worlds.write_ramps(tmp_path / "r", (1, 2, 3)),
     ):
-        names = {load_scenario(drive.file, made.root).spec.name for drive in made.drives}
+        names = {load_scenario(drive.file, experiment.root).spec.name for drive in experiment.drives}
         assert len(names) == 3
 
 
@@ -106,19 +108,22 @@ OTHER = {"controller": {"desired_linear_vel": 0.3}, "localizer": {"type": "odome
 
 
 def test_a_variant_has_the_same_drives_with_other_parameters(tmp_path: Path) -> None:
-    made = generated_worlds.write_ramps(tmp_path / "r", (1, 2))
-    other = with_stack_parameters(made, "slow", OTHER, tmp_path / "v")
-    for before, after in zip(made.drives, other.drives, strict=True):
-        one = load_scenario(before.file, made.root).spec
-        two = load_scenario(after.file, other.root, other.world_path).spec
-        assert one.goals == two.goals
-        assert (two.stack.controller.desired_linear_vel, two.stack.localizer.type) == (0.3, "odometry")
+    original = generated_worlds.write_ramps(tmp_path / "r", (1, 2))
+    variant = with_stack_parameters(original, "slow", OTHER, tmp_path / "v")
+    for original_drive, variant_drive in zip(original.drives, variant.drives, strict=True):
+        original_spec = load_scenario(original_drive.file, original.root).spec
+        variant_spec = load_scenario(variant_drive.file, variant.root, variant.world_path).spec
+        assert original_spec.goals == variant_spec.goals
+        assert (variant_spec.stack.controller.desired_linear_vel, variant_spec.stack.localizer.type) == (
+            0.3,
+            "odometry",
+        )
 
 
 def test_a_variant_of_drives_without_a_map_keeps_the_localizer_that_needs_none(tmp_path: Path) -> None:
-    made = replace(generated_worlds.write_ramps(tmp_path / "r", (1,)), is_mapless=True)
-    other = with_stack_parameters(made, "slow", OTHER, tmp_path / "v")
-    spec = load_scenario(other.drives[0].file, other.root, other.world_path).spec
+    original = replace(generated_worlds.write_ramps(tmp_path / "r", (1,)), is_mapless=True)
+    variant = with_stack_parameters(original, "slow", OTHER, tmp_path / "v")
+    spec = load_scenario(variant.drives[0].file, variant.root, variant.world_path).spec
     assert (spec.stack.controller.desired_linear_vel, spec.stack.localizer.type) == (0.3, "amcl")
 
 
@@ -128,5 +133,5 @@ def test_reference_page_lists_every_fault() -> None:
     rows = {row.split("`")[1]: row for row in table.splitlines() if row.startswith("| `")}
     assert set(FAULTS) <= set(rows)
     for fault, (_, values) in FAULTS.items():
-        if "sector" not in fault:  # which has a width
+        if "sector" not in fault:  # its values are widths
             assert all(f"| {value} " in rows[fault] for value in values)

@@ -1,7 +1,9 @@
+"""Tests of the summary of an experiment: outcomes, rates, times, and scores."""
+
 from dataclasses import replace
 
 import pytest
-from finishedruns import ARRIVED, GAVE_UP, HIT, LATE, run
+from finished_runs import ARRIVED, GAVE_UP, HIT, LATE, run
 
 from simscen.bench.navigation.summary import Trial, TrialOutcome, summarize
 from simscen.core.records.run_result import Outcome
@@ -51,7 +53,7 @@ def test_scenario_without_an_arrival_has_no_sct() -> None:
 
 def test_times_of_several_robots_are_averaged() -> None:
     metrics = {"success": 1.0, "a/time_to_goal": 10.0, "b/time_to_goal": 14.0, "a/shortest_length": 6.0}
-    both = replace(ARRIVED, result=replace(ARRIVED.result, metrics=metrics))
-    assert Trial(both).metric("time_to_goal") == 12.0
-    assert Trial(both, top_speed=0.5).sct == 1.0
-    assert Trial(both, top_speed=1.0).sct == 0.5
+    finished = replace(ARRIVED, result=replace(ARRIVED.result, metrics=metrics))
+    assert Trial(finished).metric("time_to_goal") == 12.0
+    assert Trial(finished, top_speed=0.5).sct == 1.0
+    assert Trial(finished, top_speed=1.0).sct == 0.5

@@ -1,5 +1,7 @@
+"""Tests of the confidence intervals of an experiment, and of the comparison of two stacks."""
+
 import pytest
-from finishedruns import ARRIVED, HIT, run
+from finished_runs import ARRIVED, HIT, run
 
 from simscen.bench.navigation.summary import Trial, compare_experiment, success_interval, summarize
 from simscen.core.records.run_result import Outcome
@@ -10,11 +12,13 @@ SLOW = run(Outcome.PASSED, seconds=12.0)
 
 
 def test_interval_is_over_worlds_not_seeds() -> None:
-    few = [Trial(r, world=f"{n}") for n, r in enumerate((ARRIVED, HIT, ARRIVED, ARRIVED, HIT, ARRIVED))]
-    many = [Trial(trial.run, world=trial.world) for trial in few for _ in range(20)]
-    assert success_interval(few) == success_interval(many)
-    low, high = success_interval(few) or (0.0, 0.0)
-    assert low == pytest.approx(1 / 3, abs=0.01)  # of six worlds, four or so good ones: 2.5 % have at most two
+    trials = [Trial(r, world=f"{n}") for n, r in enumerate((ARRIVED, HIT, ARRIVED, ARRIVED, HIT, ARRIVED))]
+    repeated = [Trial(trial.run, world=trial.world) for trial in trials for _ in range(20)]
+    assert success_interval(trials) == success_interval(repeated)
+    low, high = success_interval(trials) or (0.0, 0.0)
+    assert low == pytest.approx(
+        1 / 3, abs=0.01
+    )  # with probability 2.5 %, at most two of six worlds drawn are successful
     assert high == 1.0
 
 
@@ -28,11 +32,11 @@ def test_mixed_outcomes_give_a_nonempty_interval() -> None:
 
 
 def test_worlds_are_weighted_by_their_number_of_drives() -> None:
-    many, once = [Trial(HIT, world="a")] * 15, [Trial(ARRIVED, world=f"{n}") for n in range(5)]
-    row = summarize("maps", many + once)
+    many_drives, single_drives = [Trial(HIT, world="a")] * 15, [Trial(ARRIVED, world=f"{n}") for n in range(5)]
+    row = summarize("maps", many_drives + single_drives)
     assert row.success == 0.25
-    # Of six worlds drawn the one with 15 drives is k times: 1, 1/4, 1/10 … of them arrived; P(k = 0) = 0.33,
-    # P(k <= 2) = 0.94, P(k <= 3) = 0.991.
+    # If the world with 15 drives is k of six worlds drawn, then 1, 1/4, 1/10 … of the drives arrived;
+    # P(k = 0) = 0.33, P(k <= 2) = 0.94, P(k <= 3) = 0.991.
     assert row.success_interval == pytest.approx((3 / 48, 1.0))
 
 
@@ -41,40 +45,42 @@ def test_one_world_has_no_interval() -> None:
 
 
 def test_stacks_are_compared_on_drives_that_both_completed() -> None:
-    before = [Trial(r, 10.0, f"{n}") for n, r in enumerate((ARRIVED, ARRIVED, HIT, HIT, ARRIVED, run(Outcome.ERROR)))]
-    after = [Trial(r, 10.0, f"{n}") for n, r in enumerate((SLOW, SLOW, SLOW, HIT, HIT, ARRIVED))]
-    compared = compare_experiment("fields", before, after)
-    assert (compared.pairs, compared.better, compared.worse) == (5, 1, 1)
-    assert compared.success.mean == 0.0
-    assert compared.seconds is not None and compared.seconds.mean == 4.0  # of the two drives in which both arrived
+    baseline = [Trial(r, 10.0, f"{n}") for n, r in enumerate((ARRIVED, ARRIVED, HIT, HIT, ARRIVED, run(Outcome.ERROR)))]
+    candidate = [Trial(r, 10.0, f"{n}") for n, r in enumerate((SLOW, SLOW, SLOW, HIT, HIT, ARRIVED))]
+    comparison = compare_experiment("fields", baseline, candidate)
+    assert (comparison.pairs, comparison.better, comparison.worse) == (5, 1, 1)
+    assert comparison.success.mean == 0.0
+    assert comparison.seconds is not None and comparison.seconds.mean == 4.0  # of the two drives in which both arrived
     # 10 m at 2 m/s: 0.5 for 8 s, 5/12 for 12 s
-    assert compared.score is not None and compared.score.mean == pytest.approx((3 * 5 / 12 - 3 * 0.5) / 5)
+    assert comparison.score is not None and comparison.score.mean == pytest.approx((3 * 5 / 12 - 3 * 0.5) / 5)
 
 
-def test_the_interval_of_a_difference_is_that_of_the_binomial_distribution_by_hand() -> None:
-    before = [Trial(r, 10.0, f"{n}") for n, r in enumerate((HIT, ARRIVED, ARRIVED, HIT, HIT))]
-    after = [Trial(r, 10.0, f"{n}") for n, r in enumerate((ARRIVED, ARRIVED, ARRIVED, HIT, HIT))]
-    compared = compare_experiment("fields", before, after).success
+def test_interval_of_a_difference_equals_the_binomial_distribution() -> None:
+    baseline = [Trial(r, 10.0, f"{n}") for n, r in enumerate((HIT, ARRIVED, ARRIVED, HIT, HIT))]
+    candidate = [Trial(r, 10.0, f"{n}") for n, r in enumerate((ARRIVED, ARRIVED, ARRIVED, HIT, HIT))]
+    comparison = compare_experiment("fields", baseline, candidate).success
     # The one world that differs is drawn k times of five, k ~ B(5, 1/5): P(k <= 2) = 0.942, P(k <= 3) = 0.993.
-    assert (compared.mean, compared.interval) == (pytest.approx(0.2), pytest.approx((0.0, 0.6)))
+    assert (comparison.mean, comparison.interval) == (pytest.approx(0.2), pytest.approx((0.0, 0.6)))
 
 
 def test_difference_equals_that_of_the_rates_in_the_table() -> None:
     worlds = ("a", "a", "a", "b", "c", "d", "e", "f")
-    before = [Trial(ARRIVED, 10.0, world) for world in worlds]
-    after = [Trial(HIT if world == "a" else SLOW, 10.0, world) for world in worlds]
-    compared = compare_experiment("maps", before, after)
-    assert compared.success.mean == pytest.approx(summarize("", after).success - summarize("", before).success)
-    one, two = summarize("", before).score, summarize("", after).score
-    assert compared.score is not None and one is not None and two is not None
-    assert compared.score.mean == pytest.approx(two - one)
+    baseline = [Trial(ARRIVED, 10.0, world) for world in worlds]
+    candidate = [Trial(HIT if world == "a" else SLOW, 10.0, world) for world in worlds]
+    comparison = compare_experiment("maps", baseline, candidate)
+    assert comparison.success.mean == pytest.approx(summarize("", candidate).success - summarize("", baseline).success)
+    baseline_score, candidate_score = summarize("", baseline).score, summarize("", candidate).score
+    assert comparison.score is not None and baseline_score is not None and candidate_score is not None
+    assert comparison.score.mean == pytest.approx(candidate_score - baseline_score)
 
 
-@pytest.mark.parametrize("runs", [ARRIVED, HIT])
-def test_stacks_that_never_differ_may_still_differ_in_other_worlds(runs: RunFinished) -> None:
-    same = [Trial(runs, world=f"{n}") for n in range(10)]
-    most = 1.0 - wilson_interval(10, 10)[0]
-    assert compare_experiment("fields", same, same).success.interval == pytest.approx((-most, most))
+@pytest.mark.parametrize("finished", [ARRIVED, HIT])
+def test_stacks_that_never_differ_may_still_differ_in_other_worlds(finished: RunFinished) -> None:
+    trials = [Trial(finished, world=f"{n}") for n in range(10)]
+    max_difference = 1.0 - wilson_interval(10, 10)[0]
+    assert compare_experiment("fields", trials, trials).success.interval == pytest.approx(
+        (-max_difference, max_difference)
+    )
 
 
 def test_runs_of_other_drives_are_not_compared() -> None:
