@@ -22,14 +22,14 @@ ROUND = {"round": round_robot()}
 @pytest.mark.sample(15)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_broken_component_fails_its_contract_test(case: Case) -> None:
-    (promise,) = [each for each in promises_of(case.spec, robots=ROUND) if each.name.startswith(case.promise)]
+    (promise,) = [promise for promise in promises_of(case.spec, robots=ROUND) if promise.name.startswith(case.promise)]
     with pytest.raises(PromiseBroken) as broken:
         promise.check(limit=1.0 if case.name == "NeverReturns" else 60.0)
     assert case.message in str(broken.value)
 
 
 def test_every_contract_test_has_a_broken_component() -> None:
-    caught = {case.promise for case in CASES}
+    broken_promises = {case.promise for case in CASES}
     specs = (
         planners.PLANNER,
         controllers.CONTROLLER,
@@ -44,5 +44,7 @@ def test_every_contract_test_has_a_broken_component() -> None:
         language.HasNoDescription(),
         language.HasNoUnit(),
     )
-    every = {promise.name for spec in specs for promise in promises_of(spec, robots=ROUND)}
-    assert [name for name in sorted(every) if not any(name.startswith(each) for each in caught)] == []
+    all_promises = {promise.name for spec in specs for promise in promises_of(spec, robots=ROUND)}
+    assert [
+        name for name in sorted(all_promises) if not any(name.startswith(promise) for promise in broken_promises)
+    ] == []

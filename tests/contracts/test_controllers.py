@@ -65,6 +65,6 @@ def test_failure_on_a_free_path_breaks_a_promise() -> None:
 
     contract = ControllerContract(RegulatedPurePursuit(), robot=round_robot())
     contract.build = Fails  # type: ignore[method-assign]
-    (promise,) = [each for each in contract.promises() if each.name.startswith("it follows the path")]
+    (promise,) = [promise for promise in contract.promises() if promise.name.startswith("it follows the path")]
     with pytest.raises(PromiseBroken, match="fails with NO_VALID_CONTROL: no sample is free"):
         promise.check()

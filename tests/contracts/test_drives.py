@@ -14,11 +14,12 @@ from tests.single_robot import SingleRobotSimulation
 
 ROBOTS = Path(__file__).parents[2] / "simscen/data/robots"
 NAMES = sorted(path.name.removesuffix(".robot.yaml") for path in ROBOTS.glob("*.robot.yaml"))
-FIRMWARE = 4  # ticks between two steps of a ramp
+RAMP_PERIOD_TICKS = 4
 
 
 @pytest.fixture(params=NAMES)
 def robot(request):
+    """Return the specification of each shipped robot, and its simulation."""
     spec = RobotSpec.model_validate(yaml.safe_load((ROBOTS / f"{request.param}.robot.yaml").read_text()))
     simulation = SingleRobotSimulation(build_robot_body(spec))
     yield spec, simulation
@@ -34,7 +35,7 @@ def test_drive_respects_speed_and_acceleration_limits(robot):
     spec, simulation = robot
     limits, rng = spec.limits, random.Random(5)
     lateral = limits.lateral or limits.linear if isinstance(spec.drive, Holonomic) else 0.0
-    fastest = max(limits.linear_acceleration, limits.linear_deceleration or 0.0)
+    max_acceleration = max(limits.linear_acceleration, limits.linear_deceleration or 0.0)
     before = STOP
     for _ in range(40):
         simulation.drive(Twist(*(rng.uniform(-9, 9) for _ in range(3))))
@@ -46,7 +47,7 @@ def test_drive_respects_speed_and_acceleration_limits(robot):
         if isinstance(spec.drive, Holonomic):
             assert abs(now.vy) <= lateral * 1.01
         if spec.drive.type == "differential":
-            assert abs(now.vx - before.vx) <= fastest * (24 + FIRMWARE) / 240 * 1.1
+            assert abs(now.vx - before.vx) <= max_acceleration * (24 + RAMP_PERIOD_TICKS) / 240 * 1.1
         before = now
 
 

@@ -17,14 +17,17 @@ from simscen.testing.targets import promises_of_target
 from simscen.triggers.base import Trigger
 
 
-def examples(choice: type[Choice], below: str = "", skipped: tuple[str, ...] = ()) -> Iterator[Promise]:
+def examples(choice: type[Choice], key_of_choice: str = "", skipped: tuple[str, ...] = ()) -> Iterator[Promise]:
+    """Yield the promises of the docstring example of each type; the type is below `key_of_choice` in the example."""
     for key, field in choice.choices().items():
         if key not in skipped:
             text = re.search(r"Example: `(.+)`", annotation_of(choice.model_fields[field]).__doc__ or "")
             assert text, key
-            words = yaml.safe_load(text[1])
-            words = {"off" if name is False else name: value for name, value in words.get(below, words).items()}
-            chosen = {name: value for name, value in words.items() if name in {*choice.choices(), *choice.modifiers}}
+            fields = yaml.safe_load(text[1])
+            fields = {
+                "off" if name is False else name: value for name, value in fields.get(key_of_choice, fields).items()
+            }
+            chosen = {name: value for name, value in fields.items() if name in {*choice.choices(), *choice.modifiers}}
             yield from promises_of(choice.model_validate(chosen).chosen, key)
 
 

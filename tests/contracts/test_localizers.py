@@ -40,12 +40,12 @@ def test_component_meets_its_contract(promise: Promise) -> None:
 @pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
 def test_belief_after_reset_equals_the_estimate(spec: LocalizerSpec) -> None:
     """This is stricter than the contract, which allows the deviation of random particles."""
-    used = build_localizer(spec, Estimate(Pose2(3, 3, 3)), 1)
+    localizer = build_localizer(spec, Estimate(Pose2(3, 3, 3)), 1)
     run_localizer(
-        used, RoomDrive(short_drive().truth[:80], short_drive().steps[:80], short_drive().ranges[:20]), 1, imu=True
+        localizer, RoomDrive(short_drive().truth[:80], short_drive().steps[:80], short_drive().ranges[:20]), 1, imu=True
     )
-    used.reset(start_estimate())
-    assert used.belief.pose == start_estimate().pose
-    assert np.allclose(used.belief.covariance, np.diag(np.square(start_estimate().std)))
-    used.on_odometry(Odometry("odom", 0, Pose2(-8, 4, 2), Twist()))
-    assert used.belief.pose == pytest.approx(start_estimate().pose)
+    localizer.reset(start_estimate())
+    assert localizer.belief.pose == start_estimate().pose
+    assert np.allclose(localizer.belief.covariance, np.diag(np.square(start_estimate().std)))
+    localizer.on_odometry(Odometry("odom", 0, Pose2(-8, 4, 2), Twist()))
+    assert localizer.belief.pose == pytest.approx(start_estimate().pose)

@@ -26,7 +26,7 @@ SPECS = {
     "dubins": (Spec(state_space="dubins"), CAR),
 }
 PROMISES = [
-    each for name, (spec, robot) in SPECS.items() for each in PlannerContract(spec, name, robot=robot).promises()
+    promise for name, (spec, robot) in SPECS.items() for promise in PlannerContract(spec, name, robot=robot).promises()
 ]
 
 
@@ -51,6 +51,6 @@ def test_path_of_a_car_keeps_its_turning_radius(space: str, kind: str) -> None:
         assert (turn <= step / CAR.turning_radius + 1e-3).all()
         moving = step > 1e-3
         heading = np.arctan2(*np.diff(points[:, :2], axis=0).T[::-1])
-        off = np.abs((heading - points[:-1, 2] + np.pi) % (2 * np.pi) - np.pi)
-        along = off < 0.1 if space == "dubins" else (off < 0.1) | (off > np.pi - 0.1)
-        assert along[moving].all()
+        deviation = np.abs((heading - points[:-1, 2] + np.pi) % (2 * np.pi) - np.pi)
+        is_along = deviation < 0.1 if space == "dubins" else (deviation < 0.1) | (deviation > np.pi - 0.1)
+        assert is_along[moving].all()

@@ -35,14 +35,14 @@ def load(name):
 
 
 def without_noise(spec):
-    """Return the robot with sensors without noise."""
-    quiet = {
+    """Return the specification of the robot with noise-free sensors."""
+    noise_free = {
         "lidar": {"noise": 0.0},
         "odometry": {"translation_noise": 0.0, "rotation_noise": 0.0, "drift_noise": 0.0},
         "imu": {"gyro_noise": 0.0, "gyro_bias": 0.0, "accelerometer_noise": 0.0},
     }
     sensors = {
-        name: sensor.model_copy(update={sensor.kind: sensor.chosen.model_copy(update=quiet.get(sensor.kind, {}))})
+        name: sensor.model_copy(update={sensor.kind: sensor.chosen.model_copy(update=noise_free.get(sensor.kind, {}))})
         for name, sensor in spec.sensors.items()
     }
     return spec.model_copy(update={"sensors": sensors})
@@ -68,18 +68,20 @@ class Rig:
 
 @pytest.fixture
 def rig():
-    made = []
+    """Return a function that creates rigs, and close them after the test."""
+    rigs = []
 
-    def make(*args, **more):
-        made.append(Rig(*args, **more))
-        return made[-1]
+    def make(*args, **options):
+        rigs.append(Rig(*args, **options))
+        return rigs[-1]
 
     yield make
-    for each in made:
-        each.simulation.close()
+    for robot_rig in rigs:
+        robot_rig.simulation.close()
 
 
 def equal(a, b):
+    """Return whether two readings are equal."""
     return type(a) is type(b) and all(
         np.array_equal(x, y, equal_nan=True) if isinstance(x, np.ndarray) else x == y
         for x, y in ((getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
@@ -93,8 +95,8 @@ def test_equal_world_and_generator_give_equal_readings(rig, name):
     assert all(equal(a, b) for a, b in zip(first, second, strict=True))
 
 
-def test_scans_at_rest_differ_only_with_noise(rig):
-    for spec, differ in ((load("turtlebot"), True), (without_noise(load("turtlebot")), False)):
+def test_readings_at_rest_differ_only_with_noise(rig):
+    for spec, has_noise in ((load("turtlebot"), True), (without_noise(load("turtlebot")), False)):
         scene = rig(spec)
         scene.simulation.step(240)
         for sensor in scene.sensors:
@@ -103,7 +105,7 @@ def test_scans_at_rest_differ_only_with_noise(rig):
             if isinstance(first, Odometry | Bump | Image):
                 assert equal(first, second)  # encoders at rest count nothing; pictures have no noise
             else:
-                assert equal(first, second) is not differ
+                assert equal(first, second) is not has_noise
 
 
 def test_readings_do_not_change_later(rig):
@@ -140,7 +142,7 @@ def test_a_lidar_in_a_room_measures_its_walls_while_driving(rig):
     assert isinstance(scan, Scan)
     hits = np.abs(pose.apply(scan.points()))
     assert len(hits) == 360
-    # The room's half, half a step of the range, and 20 µrad of lean.
+    # Errors: half a step of the range, and the height error of a robot that leans by 20 µrad.
     assert np.abs(hits.max(axis=1) - 4.0).max() < 0.0015
 
 

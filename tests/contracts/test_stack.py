@@ -19,10 +19,11 @@ SPECS = {
         Mppi(type="mppi", batch_size=300),
     )
 }
-every = pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
+every_spec = pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
 
 
-def start(spec: StackSpec, *goals: Goal) -> Drive:
+def start_drive(spec: StackSpec, *goals: Goal) -> Drive:
+    """Return a drive in a room with a mapped box and an unmapped disc."""
     world = Flatland().room(6, 4)
     world.boxes.append((2.9, 0.0, 3.0, 2.4))
     grid = world.grid((-0.5, -0.5, 6.5, 4.5))
@@ -31,12 +32,12 @@ def start(spec: StackSpec, *goals: Goal) -> Drive:
 
 
 @pytest.mark.sample(1)
-@every
+@every_spec
 def test_stack_reaches_a_goal_around_an_unmapped_obstacle(spec: StackSpec) -> None:
-    d = start(spec, Goal("g", Pose2(5, 1, 0.5))).run(60)
-    assert d.result == "SUCCEEDED"
-    assert d.pose.distance(Pose2(5, 1)) <= 0.25
-    assert d.min_clearance > 0
+    finished_drive = start_drive(spec, Goal("g", Pose2(5, 1, 0.5))).run(60)
+    assert finished_drive.result == "SUCCEEDED"
+    assert finished_drive.pose.distance(Pose2(5, 1)) <= 0.25
+    assert finished_drive.min_clearance > 0
 
 
 @pytest.mark.parametrize("promise", [p for name, spec in SPECS.items() for p in promises_of(spec, name)], ids=str)

@@ -48,22 +48,22 @@ QUICK = settings(max_examples=150, deadline=None, suppress_health_check=[HealthC
 
 @pytest.fixture
 def load(tmp_path: Path) -> Any:
-    """Loads a text or bytes, and checks what holds of every answer."""
+    """Return a function that loads a text or bytes. The result is a scenario, or problems with valid positions."""
     path = tmp_path / "a.scenario.yaml"
 
-    def loaded(content: str | bytes) -> LoadedScenario | list[Problem]:
+    def load_content(content: str | bytes) -> LoadedScenario | list[Problem]:
         raw = content.encode("utf-8", "surrogatepass") if isinstance(content, str) else content
         path.write_bytes(raw)
-        answer = try_scenario(path, tmp_path)
-        if isinstance(answer, list):
-            assert answer, "neither a scenario nor a problem"
-            _lie_inside(answer, raw)
-        return answer
+        result = try_scenario(path, tmp_path)
+        if isinstance(result, list):
+            assert result, "neither a scenario nor a problem"
+            _assert_positions_inside(result, raw)
+        return result
 
-    return loaded
+    return load_content
 
 
-def _lie_inside(problems: list[Problem], raw: bytes) -> None:
+def _assert_positions_inside(problems: list[Problem], raw: bytes) -> None:
     lines = raw.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     for problem in problems:
         if problem.line:
@@ -72,7 +72,7 @@ def _lie_inside(problems: list[Problem], raw: bytes) -> None:
     assert escape_control(expected := as_text(problems)) == expected
 
 
-def test_the_scenario_that_is_varied_is_valid(load: Any) -> None:
+def test_unchanged_scenario_is_valid(load: Any) -> None:
     assert isinstance(load(SCENARIO), LoadedScenario)
 
 
@@ -92,8 +92,8 @@ def test_any_yaml_characters_are_loaded_or_refused(load: Any, text: str) -> None
 @given(
     st.integers(0, len(SCENARIO)), st.integers(0, 40), st.text(st.sampled_from(":-[]{}\"'#&*!\n \tx1~\0é"), max_size=5)
 )
-def test_scenario_with_any_edit_is_loaded_or_refused(load: Any, at: int, cut: int, inserted: str) -> None:
-    load(SCENARIO[:at] + inserted + SCENARIO[at + cut :])
+def test_scenario_with_any_edit_is_loaded_or_refused(load: Any, start: int, length: int, insertion: str) -> None:
+    load(SCENARIO[:start] + insertion + SCENARIO[start + length :])
 
 
 JSON = st.recursive(
@@ -109,36 +109,36 @@ JSON = st.recursive(
 
 
 def _paths(node: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    below = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
-    return [path, *(found for key, value in below for found in _paths(value, (*path, key)))]
+    children = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    return [path, *(found for key, value in children for found in _paths(value, (*path, key)))]
 
 
-PLACES = _paths(PLAIN)[1:]
+PATHS = _paths(PLAIN)[1:]
 
 
 @QUICK
-@given(st.sampled_from(PLACES), JSON)
+@given(st.sampled_from(PATHS), JSON)
 def test_scenario_with_any_value_is_loaded_or_refused(load: Any, path: tuple[Any, ...], value: Any) -> None:
-    varied = deepcopy(PLAIN)
-    holder = varied
+    changed = deepcopy(PLAIN)
+    parent = changed
     for key in path[:-1]:
-        holder = holder[key]
-    holder[path[-1]] = value
-    load(yaml.safe_dump(varied, allow_unicode=True))
+        parent = parent[key]
+    parent[path[-1]] = value
+    load(yaml.safe_dump(changed, allow_unicode=True))
 
 
 @QUICK
-@given(st.sampled_from(PLACES), st.text("abcdefghijklmnopqrstuvwxyz_", min_size=1, max_size=12))
+@given(st.sampled_from(PATHS), st.text("abcdefghijklmnopqrstuvwxyz_", min_size=1, max_size=12))
 def test_unknown_key_is_reported_at_its_position(load: Any, path: tuple[Any, ...], key: str) -> None:
-    varied = deepcopy(PLAIN)
-    holder = varied
+    changed = deepcopy(PLAIN)
+    parent = changed
     for part in path:
-        holder = holder[part]
-    named = path and path[-1] in ("places", "regions")
-    if not isinstance(holder, dict) or named:
+        parent = parent[part]
+    has_any_keys = path and path[-1] in ("places", "regions")
+    if not isinstance(parent, dict) or has_any_keys:
         return
-    holder[f"{key}_zz"] = 1
-    problems = load(yaml.safe_dump(varied))
+    parent[f"{key}_zz"] = 1
+    problems = load(yaml.safe_dump(changed))
     assert isinstance(problems, list)
     assert any(
         p.code == "SC012" and f"`{key}_zz`" in p.message and p.source[p.col - 1 :].startswith(f"{key}_zz")

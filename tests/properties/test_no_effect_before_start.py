@@ -61,7 +61,7 @@ NEVER = "when: {time: 1 s, probability: 0}, required: false"
 UNDISTURBED_S = 2.5
 """Duration of the run without disturbances that all others are compared with."""
 
-VALUES = {
+FAULT_VALUES = {
     ("noise", "Odometry"): "{linear: 5 cm, angular: 5 deg}",
     ("noise", "Imu"): "{gyro: 0.1 rad/s, accelerometer: 0.5}",
     ("noise", "Image"): "{std: 5 cm, colour: 10 %}",
@@ -77,40 +77,41 @@ VALUES = {
     ("gain", "Command"): "{linear: 80 %}",
     ("saturation", "Command"): "{linear: 0.2 m/s, angular_acceleration: 0.5}",
 }
-"""Values of faults with a docstring example for another kind of target."""
+"""Values of faults whose docstring has an example only for another kind of target."""
 ACTIONS: dict[str, str] = {}
-"""Values of `do` for actions with a docstring example for another world."""
+"""Values of `do` for actions whose docstring example does not fit the world of SCENARIO."""
 
 
 def example(choice: type[Choice], key: str) -> str:
+    """Return the example in the docstring of a type."""
     text = re.search(r"Example: `(.+)`", annotation_of(choice.model_fields[choice.choices()[key]]).__doc__ or "")
     assert text, f"`{key}` has no example"
     return text[1]
 
 
-def fault_example(word: str, kind: str) -> str:
-    if (word, kind) in VALUES:
-        return VALUES[word, kind]
-    _, _, rest = example(AnyFault, word).partition(f"{word}: ")
-    depth = [rest[: k + 1].count("{") - rest[: k + 1].count("}") for k in range(len(rest))]
-    return rest[: depth.index(0) + 1]
+def fault_example(key: str, kind: str) -> str:
+    """Return example values of a fault for a kind of target."""
+    if (key, kind) in FAULT_VALUES:
+        return FAULT_VALUES[key, kind]
+    _, _, text = example(AnyFault, key).partition(f"{key}: ")
+    depth = [text[: k + 1].count("{") - text[: k + 1].count("}") for k in range(len(text))]
+    return text[: depth.index(0) + 1]
 
 
-def kinds_of(word: str) -> list[str]:
-    affects = annotation_of(AnyFault.model_fields[AnyFault.choices()[word]]).affects
+def kinds_of(key: str) -> list[str]:
+    """Return the kinds of targets that a fault can affect, except the map."""
+    affects = annotation_of(AnyFault.model_fields[AnyFault.choices()[key]]).affects
     return sorted(affects - {MAP})  # a fault of the map lasts for the whole run
 
 
 NAMES = {kind: name for name, kind in KIND_BY_TARGET_NAME.items()}
 NAMES |= {"Scan": "lidar", "Odometry": "odom", "Imu": "imu", "Bump": "bumper", "Image": "camera"}
 FAULTS = [
-    (f"{word} on {NAMES[kind]}", f"{{sensor: {NAMES[kind]}, {word}: {fault_example(word, kind)}, WHEN}}")
-    for word in AnyFault.choices()
-    for kind in kinds_of(word)
+    (f"{key} on {NAMES[kind]}", f"{{sensor: {NAMES[kind]}, {key}: {fault_example(key, kind)}, WHEN}}")
+    for key in AnyFault.choices()
+    for kind in kinds_of(key)
 ]
-EVENTS = [
-    (word, f"{{name: {word}, WHEN, {ACTIONS.get(word) or example(AnyAction, word)}}}") for word in AnyAction.choices()
-]
+EVENTS = [(key, f"{{name: {key}, WHEN, {ACTIONS.get(key) or example(AnyAction, key)}}}") for key in AnyAction.choices()]
 
 
 @pytest.fixture(scope="module")
@@ -119,9 +120,9 @@ def play(tmp_path_factory):
     (folder / "observer.robot.yaml").write_text(ROBOT)
     file = folder / "own.scenario.yaml"
 
-    def play(faults: list[str], events: list[str], seconds: float, shut: bool = True) -> list[Moment]:
+    def play(faults: list[str], events: list[str], seconds: float, is_closed: bool = True) -> list[Moment]:
         lists = ["".join(f"\n  - {entry}" for entry in entries) or " []" for entries in (faults, events)]
-        file.write_text(SCENARIO % (str(shut).lower(), f"{seconds:.3f} s", *lists))
+        file.write_text(SCENARIO % (str(is_closed).lower(), f"{seconds:.3f} s", *lists))
         loaded = load_scenario(file, Path(folder))
         scope = NameScope(loaded)
         assert [*unknown_sensors(scope), *unsuitable_faults(scope)] == []
@@ -145,24 +146,24 @@ class MomentLog:
 @pytest.fixture(scope="module")
 def undisturbed(play):
     """Return the moments of runs without disturbances, by whether the door is closed at the start."""
-    return {shut: play([], [], UNDISTURBED_S, shut) for shut in (True, False)}
+    return {is_closed: play([], [], UNDISTURBED_S, is_closed) for is_closed in (True, False)}
 
 
-def is_identical(one: Any, other: Any) -> bool:
+def is_identical(first: Any, second: Any) -> bool:
     """Return whether two objects are bit-identical."""
-    if type(one) is not type(other):
+    if type(first) is not type(second):
         return False
-    if isinstance(one, np.ndarray):
-        return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
-    if isinstance(one, Moment):  # compare samples that are computed on first access by their values
-        one, other = (replace(each, sample=each.truth) for each in (one, other))
-    if is_dataclass(one):
-        return all(is_identical(getattr(one, field.name), getattr(other, field.name)) for field in fields(one))
-    if isinstance(one, list | tuple):
-        return len(one) == len(other) and all(map(is_identical, one, other))
-    if isinstance(one, dict):
-        return list(one) == list(other) and all(is_identical(one[key], other[key]) for key in one)
-    return repr(one) == repr(other)
+    if isinstance(first, np.ndarray):
+        return first.dtype == second.dtype and first.shape == second.shape and first.tobytes() == second.tobytes()
+    if isinstance(first, Moment):  # compare samples that are computed on first access by their values
+        first, second = (replace(each, sample=each.truth) for each in (first, second))
+    if is_dataclass(first):
+        return all(is_identical(getattr(first, field.name), getattr(second, field.name)) for field in fields(first))
+    if isinstance(first, list | tuple):
+        return len(first) == len(second) and all(map(is_identical, first, second))
+    if isinstance(first, dict):
+        return list(first) == list(second) and all(is_identical(first[key], second[key]) for key in first)
+    return repr(first) == repr(second)
 
 
 def first_tick_of(moments: list[Moment], kind: EventKind) -> int:
@@ -175,31 +176,31 @@ def random_time(name: str) -> float:
     return round(random.Random(name).uniform(0.6, 1.4), 3)
 
 
-def at(seconds: float) -> str:
+def trigger_at(seconds: float) -> str:
     return f"when: {{time: {seconds} s}}"
 
 
-def assert_identical_until(moments: list[Moment], other: list[Moment], tick: int) -> None:
-    before = [moment for moment in other if moment.tick < tick]
+def assert_identical_until(moments: list[Moment], undisturbed: list[Moment], tick: int) -> None:
+    before = [moment for moment in undisturbed if moment.tick < tick]
     assert before
-    for moment, known in zip(moments, before, strict=False):
-        assert is_identical(moment, known), f"tick {moment.tick}"
+    for moment, expected in zip(moments, before, strict=False):
+        assert is_identical(moment, expected), f"tick {moment.tick}"
 
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize(("name", "fault"), FAULTS, ids=[name for name, _ in FAULTS])
 def test_run_is_unchanged_until_a_fault_starts(play, undisturbed, name: str, fault: str) -> None:
     start = random_time(name)
-    moments = play([fault.replace("WHEN", at(start))], [], start + 0.3)
+    moments = play([fault.replace("WHEN", trigger_at(start))], [], start + 0.3)
     assert_identical_until(moments, undisturbed[True], first_tick_of(moments, EventKind.FAULT_STARTED))
 
 
 @pytest.mark.sample(6)
 @pytest.mark.parametrize(("name", "event"), EVENTS, ids=[name for name, _ in EVENTS])
 def test_run_is_unchanged_until_an_event_starts(play, undisturbed, name: str, event: str) -> None:
-    start, shut = random_time(name), name != "close"
-    moments = play([], [event.replace("WHEN", at(start))], start + 0.1, shut)
-    assert_identical_until(moments, undisturbed[shut], first_tick_of(moments, EventKind.EVENT_STARTED))
+    start, is_closed = random_time(name), name != "close"
+    moments = play([], [event.replace("WHEN", trigger_at(start))], start + 0.1, is_closed)
+    assert_identical_until(moments, undisturbed[is_closed], first_tick_of(moments, EventKind.EVENT_STARTED))
 
 
 def test_entries_that_never_start_do_not_change_the_run(play, undisturbed) -> None:
@@ -209,18 +210,18 @@ def test_entries_that_never_start_do_not_change_the_run(play, undisturbed) -> No
         UNDISTURBED_S,
     )
     assert len(moments) == len(undisturbed[True])
-    for moment, known in zip(moments, undisturbed[True], strict=True):
-        assert is_identical(moment, known), f"tick {moment.tick}"
+    for moment, expected in zip(moments, undisturbed[True], strict=True):
+        assert is_identical(moment, expected), f"tick {moment.tick}"
 
 
 MAPS = [
-    word for word in AnyFault.choices() if MAP in annotation_of(AnyFault.model_fields[AnyFault.choices()[word]]).affects
+    key for key in AnyFault.choices() if MAP in annotation_of(AnyFault.model_fields[AnyFault.choices()[key]]).affects
 ]
 
 
-@pytest.mark.parametrize("word", MAPS)
-def test_map_fault_applies_from_the_first_cycle(play, undisturbed, word: str) -> None:
-    moments = play([f"{{sensor: map, {word}: {fault_example(word, MAP)}}}"], [], 0.2)
+@pytest.mark.parametrize("key", MAPS)
+def test_map_fault_applies_from_the_first_cycle(play, undisturbed, key: str) -> None:
+    moments = play([f"{{sensor: map, {key}: {fault_example(key, MAP)}}}"], [], 0.2)
     assert first_tick_of(moments, EventKind.FAULT_STARTED) == first_tick_of(moments, EventKind.FAULT_TOOK_EFFECT) == 0
 
 
@@ -240,6 +241,6 @@ def test_every_fault_is_tested_on_each_target(play, tmp_path: Path) -> None:
     file.write_text(SCENARIO % ("true", "1 s", " []", " []"))
     loaded = load_scenario(file, tmp_path)
     assert loaded.robot.spec is not None
-    known = {instance.kind for instance in fault_targets(loaded, loaded.robot.spec).values()}
-    affected = {kind for word in AnyFault.choices() for kind in kinds_of(word)}
-    assert affected == known - {MAP}
+    target_kinds = {instance.kind for instance in fault_targets(loaded, loaded.robot.spec).values()}
+    affected = {kind for key in AnyFault.choices() for kind in kinds_of(key)}
+    assert affected == target_kinds - {MAP}

@@ -41,12 +41,12 @@ def disturbances(draw, names):
     outcomes = []
     for name in draw(names):
         happened = draw(st.booleans())
-        ordered = Disturbance(name, "event", "time: 1", required=draw(st.booleans()))
-        outcomes.append(DisturbanceOutcome(ordered, (240,) if happened else (), happened, "why"))
+        disturbance = Disturbance(name, "event", "time: 1", required=draw(st.booleans()))
+        outcomes.append(DisturbanceOutcome(disturbance, (240,) if happened else (), happened, "why"))
     return outcomes
 
 
-def judged(verdicts, outcomes):
+def all_verdicts(verdicts, outcomes):
     """Return all verdicts of a run, as judge_run orders them."""
     return [*(verdict for verdict, _ in missing_disturbances(TRACE, outcomes, verdicts)), *verdicts]
 
@@ -54,10 +54,10 @@ def judged(verdicts, outcomes):
 @settings(deadline=None)
 @given(criteria(), disturbances(st.lists(st.sampled_from(DISTURBANCES), max_size=3)), st.booleans())
 def test_each_verdict_of_a_run_has_its_own_name(verdicts, outcomes, is_expected):
-    found = judged(verdicts, outcomes)
+    judged = all_verdicts(verdicts, outcomes)
     expected = ExpectedFailure("NAV-1") if is_expected else None
-    _, expectation = apply_expectation(expected, found, outcome_of_verdicts(found), is_complete=True)
-    names = [verdict.id for verdict in [*found, *([expectation] if expectation else [])]]
+    _, expectation = apply_expectation(expected, judged, outcome_of_verdicts(judged), is_complete=True)
+    names = [verdict.id for verdict in [*judged, *([expectation] if expectation else [])]]
     assert len(set(names)) == len(names), names
 
 
@@ -77,35 +77,35 @@ UNIQUE = st.lists(st.sampled_from(["door", "lidar.off"]), unique=True, max_size=
 
 @settings(deadline=None, max_examples=300)
 @given(criteria(), disturbances(UNIQUE), st.sets(st.sampled_from(["speed", "stuck", "door", "lidar.off"])))
-def test_run_fails_as_expected_only_if_exactly_the_named_entries_fail(verdicts, outcomes, named):
+def test_run_fails_as_expected_only_if_exactly_the_named_entries_fail(verdicts, outcomes, expected_ids):
     """The table in docs/guides/variations.md, with the named events and faults, which must not happen."""
-    verdicts = [verdict for verdict in verdicts if verdict.id not in {one.disturbance.name for one in outcomes}]
-    found = judged(verdicts, outcomes)
-    before = outcome_of_verdicts(found)
+    verdicts = [verdict for verdict in verdicts if verdict.id not in {entry.disturbance.name for entry in outcomes}]
+    judged = all_verdicts(verdicts, outcomes)
+    before = outcome_of_verdicts(judged)
     outcome, expectation = apply_expectation(
-        ExpectedFailure("NAV-1", tuple(sorted(named))),
-        found,
+        ExpectedFailure("NAV-1", tuple(sorted(expected_ids))),
+        judged,
         before,
         is_complete=True,
-        happened={one.disturbance.name for one in outcomes if one.happened},
+        happened={entry.disturbance.name for entry in outcomes if entry.happened},
     )
     criteria_by_status = {
         status: {v.id for v in verdicts if v.status is status and v.severity == "fail"} for status in Status
     }
-    absent = {one.disturbance.name for one in outcomes if one.missing}
-    present = {one.disturbance.name for one in outcomes if one.happened}
+    missing_names = {entry.disturbance.name for entry in outcomes if entry.missing}
+    happened_names = {entry.disturbance.name for entry in outcomes if entry.happened}
     if before is Outcome.ERROR:
         assert outcome is Outcome.ERROR and expectation is None
-    elif named:
-        failed, undecided = criteria_by_status[FAIL] | absent, criteria_by_status[INCONCLUSIVE]
+    elif expected_ids:
+        failed, undecided = criteria_by_status[FAIL] | missing_names, criteria_by_status[INCONCLUSIVE]
         is_as_expected = (
-            bool(named & failed)
-            and not named & (criteria_by_status[PASS] | present)
-            and not (failed | undecided) - named
+            bool(expected_ids & failed)
+            and not expected_ids & (criteria_by_status[PASS] | happened_names)
+            and not (failed | undecided) - expected_ids
         )
         assert (outcome is Outcome.FAILED_AS_EXPECTED) == is_as_expected
     else:
-        assert (outcome is Outcome.FAILED_AS_EXPECTED) == (bool(criteria_by_status[FAIL]) and not absent)
+        assert (outcome is Outcome.FAILED_AS_EXPECTED) == (bool(criteria_by_status[FAIL]) and not missing_names)
     if before is not Outcome.ERROR:
         assert outcome in (Outcome.FAILED, Outcome.FAILED_AS_EXPECTED)
         assert expectation is not None
@@ -119,9 +119,9 @@ def sequences(draw):
         started = draw(st.integers(0, length))
         for step in range(length):
             after = len(outcomes) - 1 if step else None
-            ordered = Disturbance(f"{number}.{step}", "event", "time: 1", required=draw(st.booleans()), after=after)
+            disturbance = Disturbance(f"{number}.{step}", "event", "time: 1", required=draw(st.booleans()), after=after)
             fired = (240,) if step < started else ()
-            outcomes.append(DisturbanceOutcome(ordered, fired, bool(fired) and draw(st.booleans()), "why"))
+            outcomes.append(DisturbanceOutcome(disturbance, fired, bool(fired) and draw(st.booleans()), "why"))
     return outcomes
 
 
@@ -129,10 +129,10 @@ def sequences(draw):
 @given(sequences())
 def test_missing_steps_are_reported_up_to_the_first_that_never_started(outcomes):
     expected, blocked = [], set()
-    for one in outcomes:
-        sequence = one.disturbance.name[0]
-        if one.missing and (one.fired or sequence not in blocked):
-            expected.append(one.disturbance.name)
-        if one.missing and not one.fired:
+    for entry in outcomes:
+        sequence = entry.disturbance.name[0]
+        if entry.missing and (entry.fired or sequence not in blocked):
+            expected.append(entry.disturbance.name)
+        if entry.missing and not entry.fired:
             blocked.add(sequence)
     assert [verdict.id for verdict, _ in missing_disturbances(TRACE, outcomes)] == expected

@@ -148,16 +148,18 @@ def test_counts_of_junit_results_and_exit_code_agree(runs):
     document = json.loads("".join(json_parts(runs)))
     root = ElementTree.fromstring(b"".join(xml_parts(runs)))
     counts = Counter(run.outcome for run in runs)
-    assert {outcome: document[outcome.value] for outcome in Outcome} == {one: counts[one] for one in Outcome}
+    assert {outcome: document[outcome.value] for outcome in Outcome} == {
+        outcome: counts[outcome] for outcome in Outcome
+    }
     for element, part in [(root, runs), *((suite, _runs_of(suite, runs)) for suite in root)]:
-        own = Counter(run.outcome for run in part)
+        part_counts = Counter(run.outcome for run in part)
         assert [int(element.get(key)) for key in ("tests", "failures", "errors")] == [
             len(part),
-            own[Outcome.FAILED],
-            own[Outcome.ERROR],
+            part_counts[Outcome.FAILED],
+            part_counts[Outcome.ERROR],
         ]
         if element is not root:
-            assert int(element.get("skipped")) == own[Outcome.SKIPPED] + own[Outcome.FAILED_AS_EXPECTED]
+            assert int(element.get("skipped")) == part_counts[Outcome.SKIPPED] + part_counts[Outcome.FAILED_AS_EXPECTED]
     is_good = exit_code(runs) in (Exit.PASSED, Exit.NOTHING_SELECTED)
     assert is_good == all(run.outcome in GOOD for run in runs)
 
@@ -166,7 +168,7 @@ def _runs_of(suite, runs):
     return [run for run in runs if run.result.path == suite.get("name")]
 
 
-def planned(runs):
+def planned_runs(runs):
     return [PlannedRun(run.key, run.result.path, "digest", run.again, stack=run.result.stack) for run in runs]
 
 
@@ -174,7 +176,7 @@ def write_session(folder, runs, finished):
     """Write a session that plans all `runs` and ends after those in `finished`."""
     folder.mkdir(exist_ok=True)
     journal = Journal(folder, sync=False)
-    journal.plan(planned(runs), "1", 2)
+    journal.plan(planned_runs(runs), "1", 2)
     for run in finished:
         journal(RunStarted(run.key, run.result.path))
         journal(run)
@@ -191,7 +193,7 @@ def test_merged_shards_give_the_reports_of_one_session(tmp_path_factory, runs, r
     for number, part in enumerate(parts, start=1):
         folder = tmp_path_factory.mktemp("session")
         journal = Journal(folder, sync=False)
-        journal.plan(planned(part), "1", 2, (number, 2))
+        journal.plan(planned_runs(part), "1", 2, (number, 2))
         for run in random.sample(part, len(part)):
             journal(run)
         journal.close()
@@ -214,22 +216,22 @@ def test_resumed_session_runs_each_planned_run_that_has_no_result(tmp_path_facto
     first_line = content.index(b"\n") + 1
     share = data.draw(st.floats(0, 1))  # the times in the journal have different lengths
     file.write_bytes(content[: first_line + round(share * (len(content) - first_line))])
-    survived = [run for run in runs if run.key in read_journal(folder).finished]
+    kept_runs = [run for run in runs if run.key in read_journal(folder).finished]
     changed = data.draw(st.sets(st.sampled_from([run.key for run in runs]))) if runs else set()
-    plan = [replace(one, digest="new") if one.key in changed else one for one in planned(runs)]
+    plan = [replace(run, digest="new") if run.key in changed else run for run in planned_runs(runs)]
     jobs = [SimpleNamespace(key=run.key) for run in runs]
     journal = Journal(folder, resume=True, sync=False)
     remaining, reused = divide_runs(jobs, plan, reusable_results(previous_session(journal)))
     journal.plan(plan, "1", 2)
     write_reused(journal, reused)
-    done = [replace(run, wall=7.0) for run in runs if run.key in {job.key for job in remaining}]
-    for run in done:
+    new_runs = [replace(run, wall=7.0) for run in runs if run.key in {job.key for job in remaining}]
+    for run in new_runs:
         journal(run)
     journal.close()
-    assert Counter(run.key for run in (*reused, *done)) == Counter(run.key for run in runs)
+    assert Counter(run.key for run in (*reused, *new_runs)) == Counter(run.key for run in runs)
     assert all(run.resumed and run.outcome is not Outcome.ERROR for run in reused)
     assert {run.key for run in reused}.isdisjoint(changed)
-    assert {run.key for run in reused} <= {run.key for run in survived}
+    assert {run.key for run in reused} <= {run.key for run in kept_runs}
     session = read_journal(folder)
     assert not session.interrupted
     assert [(run.key, run.result) for run in session.runs] == [(run.key, run.result) for run in runs]

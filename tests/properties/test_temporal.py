@@ -10,6 +10,7 @@ from simscen.criteria.stl.evaluation import EvaluationContext, robustness
 
 
 def as_rtamt(formula):
+    """Return a formula in the syntax of rtamt."""
     match formula:
         case {"all": parts}:
             return "(" + " and ".join(as_rtamt(part) for part in parts) + ")"

@@ -32,41 +32,42 @@ HALF_BEATS = st.integers(1, 8).map(lambda n: n / 20)
 
 @st.composite
 def conditions(draw: Any, names: list[str], depth: int = 1) -> dict[str, Any]:
-    """A condition, perhaps combined of others, with or without `for`."""
+    """Return a condition, which can be a combination of other conditions, with or without `for`."""
     kinds = ["time", "travelled", "speed_above", "event"] + (["all", "any", "not"] if depth else [])
-    found: dict[str, Any]
+    condition: dict[str, Any]
     match kind := draw(st.sampled_from(kinds)):
         case "time":
-            found = {kind: draw(HALF_BEATS)}
+            condition = {kind: draw(HALF_BEATS)}
         case "travelled":
-            found = {kind: draw(st.integers(0, 6)) / 4}
+            condition = {kind: draw(st.integers(0, 6)) / 4}
         case "speed_above":
-            found = {kind: 0.5}
+            condition = {kind: 0.5}
         case "event":
             status = draw(st.sampled_from(["started", "ended"]))
-            found = {kind: {"name": draw(st.sampled_from(names)), "status": status}}
+            condition = {kind: {"name": draw(st.sampled_from(names)), "status": status}}
         case "not":
-            found = {kind: draw(conditions(names, depth - 1))}
+            condition = {kind: draw(conditions(names, depth - 1))}
         case _:
-            found = {kind: draw(st.lists(conditions(names, depth - 1), min_size=1, max_size=2))}
-    return found | ({"for": draw(HALF_BEATS)} if draw(RARELY) else {})
+            condition = {kind: draw(st.lists(conditions(names, depth - 1), min_size=1, max_size=2))}
+    return condition | ({"for": draw(HALF_BEATS)} if draw(RARELY) else {})
 
 
 @st.composite
 def triggers(draw: Any, names: list[str], may_repeat: bool) -> dict[str, Any]:
-    found = draw(conditions(names))
+    """Return a trigger: a condition with or without an edge, a delay, and repetitions."""
+    trigger = draw(conditions(names))
     if draw(RARELY):
-        found["edge"] = "falling"
+        trigger["edge"] = "falling"
     if draw(RARELY):
-        found["delay"] = draw(HALF_BEATS)
+        trigger["delay"] = draw(HALF_BEATS)
     if may_repeat and draw(st.booleans()):
-        found["times"] = draw(st.integers(2, 3))
-    return found
+        trigger["times"] = draw(st.integers(2, 3))
+    return trigger
 
 
 @st.composite
 def scenarios(draw: Any) -> Scenario:
-    """Events with sequences, and faults, that may wait for each other."""
+    """Return events with sequences, and faults, which can wait for each other."""
     lengths = draw(st.lists(st.integers(0, 3), min_size=1, max_size=3))
     names = [f"event-{k + 1}" for k in range(len(lengths))]
     names += [f"event-{k + 1} then {n + 1}" for k, length in enumerate(lengths) for n in range(length)]
@@ -91,6 +92,7 @@ def scenarios(draw: Any) -> Scenario:
 
 @st.composite
 def drives(draw: Any) -> Drive:
+    """Return a drive of 10 to 25 beats."""
     fast = draw(st.lists(st.booleans(), min_size=10, max_size=25))
     steps = draw(st.lists(st.integers(0, 2), min_size=len(fast), max_size=len(fast)))
     return fast, [sum(steps[:k]) / 4 for k in range(len(fast))]
@@ -109,7 +111,8 @@ class RecordingStage(FakeStage):
 class Entry:
     """An event, a step, or a fault of the oracle.
 
-    `first_beat` and `first_line` are the beat from which it is due (None: not due yet), and the length of the log then.
+    first_beat: beat from which the entry is due (None: not due yet)
+    first_line: length of the log when the entry became due
     """
 
     name: str
@@ -131,31 +134,31 @@ class Oracle:
         self.visible: dict[tuple[str, int], int] = {}
 
     def run(self, events: list[dict[str, Any]], faults: list[dict[str, Any]]) -> list[tuple[int, str, str]]:
-        stories = []
+        sequences = []
         for number, event in enumerate(events):
             name = f"event-{number + 1}"
-            story = [(Entry(name, event["when"]), event)]
+            sequence = [(Entry(name, event["when"]), event)]
             for n, step in enumerate(event["then"]):
                 trigger = step.get("when", {"time": 0})
-                story.append((Entry(f"{name} then {n + 1}", trigger, first_beat=None), step))
-            stories.append(story)
-        silent = [(Entry(f"{fault['sensor']}.off", fault["when"]), fault) for fault in faults]
+                sequence.append((Entry(f"{name} then {n + 1}", trigger, first_beat=None), step))
+            sequences.append(sequence)
+        fault_entries = [(Entry(f"{fault['sensor']}.off", fault["when"]), fault) for fault in faults]
         ends: dict[str, float] = {}
         for beat in range(len(self.fast)):
-            for story in stories:
-                for place, (entry, words) in enumerate(story):
+            for sequence in sequences:
+                for position, (entry, fields) in enumerate(sequence):
                     for _ in range(self.firings(entry, beat)):
                         self.write(beat, "event.started", entry.name)
-                        if "do" in words:
+                        if "do" in fields:
                             self.write(beat, "mark", "a mark")
                         self.write(beat, "event.ended", entry.name)
-                        for following, _ in story[place + 1 : place + 2]:
-                            following.first_beat, following.first_line = beat, len(self.log)
+                        for next_entry, _ in sequence[position + 1 : position + 2]:
+                            next_entry.first_beat, next_entry.first_line = beat, len(self.log)
             for name in [f"{fault['sensor']}.off" for fault in faults]:
                 if name in ends and beat * BEAT_TICKS >= ends[name]:
                     del ends[name]
                     self.write(beat, "fault.ended", name)
-            for entry, fault in silent:
+            for entry, fault in fault_entries:
                 if self.firings(entry, beat) and entry.name not in ends:
                     ends[entry.name] = beat * BEAT_TICKS + fault["for"] * 240
                     self.write(beat, "fault.started", entry.name)
@@ -165,7 +168,7 @@ class Oracle:
         self.log.append((beat * BEAT_TICKS, kind, name))
 
     def firings(self, entry: Entry, beat: int) -> int:
-        """Return how often the trigger fires at the beat: how many of its first edges are `delay` ago."""
+        """Return how often the trigger fires at the beat: how many of the first `times` edges are `delay` ago."""
         if entry.first_beat is None:
             return 0
         self.visible[entry.name, beat] = len(self.log)
@@ -184,7 +187,7 @@ class Oracle:
         return start <= beat and (beat - start) * BEAT_TICKS >= condition.get("for", 0) * 240
 
     def is_true(self, condition: dict[str, Any], entry: Entry, beat: int) -> bool:
-        """Return whether the condition is true at the beat, counted from the step before."""
+        """Return whether the condition is true at the beat. Times and distances count from `entry.first_beat`."""
         assert entry.first_beat is not None
         match condition:
             case {"time": seconds}:
@@ -194,9 +197,9 @@ class Oracle:
             case {"speed_above": _}:
                 return self.fast[beat]
             case {"event": {"name": name, "status": status}}:
-                seen = self.log[entry.first_line : self.visible[entry.name, beat]]
+                visible_lines = self.log[entry.first_line : self.visible[entry.name, beat]]
                 kinds = {f"event.{status}", f"fault.{status}", "mark"}
-                return any(kind in kinds and of == name for _, kind, of in seen)
+                return any(kind in kinds and event_name == name for _, kind, event_name in visible_lines)
             case {"all": parts}:
                 return all(self.holds(part, entry, beat) for part in parts)
             case {"any": parts}:

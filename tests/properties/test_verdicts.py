@@ -37,7 +37,7 @@ LIMITS = {
     "replans": ("max",),
     "recoveries": ("max",),
 }
-"""Of each criterion the bounds that are loosened by raising them."""
+"""Bounds of each criterion that become looser if they are raised."""
 LOWERED = {
     "clearance": ("min",),
     "personal_space": ("min",),
@@ -45,7 +45,7 @@ LOWERED = {
     "replans": ("min",),
     "recoveries": ("min",),
 }
-"""And those that are loosened by lowering them."""
+"""Bounds of each criterion that become looser if they are lowered."""
 FIXED = {
     "stopped_within": {"after": "lidar.off"},
     "relocalized_within": {"after": "kidnapped"},
@@ -59,7 +59,7 @@ COUNTS = {("collisions", "max"), ("replans", "min"), ("replans", "max"), ("recov
 
 
 def eighths(low, high):
-    """Numbers that floats hold exactly, so that values lie on their bounds now and then."""
+    """Return multiples of 1/8, which are exact in floating point, so that some values are equal to their bounds."""
     return st.integers(low, high).map(lambda n: n / 8)
 
 
@@ -74,7 +74,7 @@ def waypoints(draw):
 
 @st.composite
 def runs(draw) -> dict:
-    """A run in the words of a sketch, which a failure can show."""
+    """Return the description of a run for `synthetic_trace`."""
     times = sorted(draw(st.lists(TIME, min_size=9, max_size=9)))
     kinds = [
         ("goal.accepted", "a", {}),
@@ -95,26 +95,26 @@ def runs(draw) -> dict:
         "objects": {"anna": draw(waypoints())},
         "clearance": [[0, draw(BOUND)], [SECONDS, draw(BOUND)]],
         "events": [[0, "object.spawned", "anna", {"person": True, "size": [0.25, 1.7]}]]
-        + [[t, *kind] for t, kind, there in zip(times, kinds, chosen, strict=True) if there],
+        + [[t, *kind] for t, kind, is_chosen in zip(times, kinds, chosen, strict=True) if is_chosen],
     }
 
 
 @st.composite
 def criteria(draw):
-    """The kind of a criterion and its words, with all its bounds."""
+    """Return the kind of a criterion, and its fields with all bounds."""
     kind = draw(st.sampled_from(sorted({*LIMITS, *LOWERED, *FIXED})))
-    words = dict(FIXED.get(kind, {}))
+    fields = dict(FIXED.get(kind, {}))
     for key in (*LIMITS.get(kind, ()), *LOWERED.get(kind, ())):
-        words[key] = draw(st.integers(0, 3)) if (kind, key) in COUNTS else draw(BOUND)
-    if {"min", "max"} <= words.keys():
-        words["min"], words["max"] = sorted((words["min"], words["max"]))
+        fields[key] = draw(st.integers(0, 3)) if (kind, key) in COUNTS else draw(BOUND)
+    if {"min", "max"} <= fields.keys():
+        fields["min"], fields["max"] = sorted((fields["min"], fields["max"]))
     if kind == "path_length":
-        words["max_ratio"] = max(1.0, words["max_ratio"])
-    return kind, words
+        fields["max_ratio"] = max(1.0, fields["max_ratio"])
+    return kind, fields
 
 
-def verdict(kind, words, trace, case=CASE):
-    (found,) = judge([AnyCriterion.model_validate({kind: words})], trace, synthetic_case(case))
+def verdict(kind, fields, trace, case=CASE):
+    (found,) = judge([AnyCriterion.model_validate({kind: fields})], trace, synthetic_case(case))
     return found
 
 
@@ -136,36 +136,36 @@ def test_the_sign_of_a_margin_is_the_verdict(run, criterion):
 @given(runs(), criteria(), st.data())
 @settings(deadline=None)
 def test_looser_bound_keeps_a_pass(run, criterion, data):
-    (kind, words), trace = criterion, synthetic_trace(run)
+    (kind, fields), trace = criterion, synthetic_trace(run)
     raised, lowered = LIMITS.get(kind, ()), LOWERED.get(kind, ())
     assume(raised or lowered)
     key = data.draw(st.sampled_from([*raised, *lowered]))
-    more = data.draw(st.integers(0, 3)) if (kind, key) in COUNTS else data.draw(BOUND)
+    change = data.draw(st.integers(0, 3)) if (kind, key) in COUNTS else data.draw(BOUND)
     if key in lowered:
-        looser = max(words[key] - more, 0)
+        looser = max(fields[key] - change, 0)
     else:
-        looser = words[key] + more
-    strict, loose = verdict(kind, words, trace), verdict(kind, {**words, key: looser}, trace)
+        looser = fields[key] + change
+    strict, loose = verdict(kind, fields, trace), verdict(kind, {**fields, key: looser}, trace)
     if strict.status is Status.PASS:
         assert loose.status is Status.PASS
     if loose.status is Status.FAIL:
         assert strict.status is Status.FAIL
 
 
-def shifted(trace: Trace, ticks: int) -> Trace:
-    """The same run, `ticks` later."""
+def shift(trace: Trace, ticks: int) -> Trace:
+    """Return the same run, `ticks` later."""
 
-    def later(samples: Samples) -> Samples:
+    def shift_samples(samples: Samples) -> Samples:
         return Samples(samples.ticks + ticks, samples.values)
 
     signals = ("truth", "velocity", "clearance", "belief", "odometry", "command")
     return replace(
         trace,
-        **{name: later(getattr(trace, name)) for name in signals},
+        **{name: shift_samples(getattr(trace, name)) for name in signals},
         scans=trace.scans + ticks,
         plans=tuple(replace(plan, tick=plan.tick + ticks) for plan in trace.plans),
         events=tuple(replace(event, tick=event.tick + ticks) for event in trace.events),
-        objects={name: later(poses) for name, poses in trace.objects.items()},
+        objects={name: shift_samples(poses) for name, poses in trace.objects.items()},
         end=trace.end + ticks,
     )
 
@@ -173,13 +173,15 @@ def shifted(trace: Trace, ticks: int) -> Trace:
 @given(runs(), criteria(), st.integers(1, 10_000))
 @settings(deadline=None)
 def test_shifted_run_has_the_same_verdict_at_shifted_ticks(run, criterion, ticks):
-    (kind, words), trace = criterion, synthetic_trace(run)
-    assume(kind != "relocalized_within" or "after" in words)
-    now, then = verdict(kind, words, trace), verdict(kind, words, shifted(trace, ticks))
-    assert [(f.status, f.what, f.value, f.margin) for f in now.findings] == [
-        (f.status, f.what, f.value, f.margin) for f in then.findings
+    (kind, fields), trace = criterion, synthetic_trace(run)
+    assume(kind != "relocalized_within" or "after" in fields)
+    original, delayed = verdict(kind, fields, trace), verdict(kind, fields, shift(trace, ticks))
+    assert [(f.status, f.what, f.value, f.margin) for f in original.findings] == [
+        (f.status, f.what, f.value, f.margin) for f in delayed.findings
     ]
-    assert [f.tick if f.tick is None else f.tick + ticks for f in now.findings] == [f.tick for f in then.findings]
+    assert [f.tick if f.tick is None else f.tick + ticks for f in original.findings] == [
+        f.tick for f in delayed.findings
+    ]
 
 
 @given(runs(), criteria(), st.integers(1, 400))
@@ -191,23 +193,23 @@ def test_truncated_log_never_turns_a_verdict_into_a_pass(run, criterion, cut):
     assert verdict(*criterion, replace(trace, events=events)).status is not Status.PASS
 
 
+NAVIGATION_EVENTS = [[0.5, "goal.accepted", "a"], [1, "event.started", "kidnapped"], [6, "goal.reached", "a"]]
+
+
 @pytest.mark.parametrize("column", [0, 1, 2])
 @given(criteria(), st.integers(0, 300), st.sampled_from([np.nan, np.inf, -np.inf]))
 @settings(deadline=None)
 def test_nan_pose_never_passes_a_criterion_that_uses_it(column, criterion, k, value):
-    trace = synthetic_trace({"seconds": SECONDS, "truth": [[0, 0, 0], [SECONDS, 4, 0]], "events": LOOKED_AT})
+    trace = synthetic_trace({"seconds": SECONDS, "truth": [[0, 0, 0], [SECONDS, 4, 0]], "events": NAVIGATION_EVENTS})
     trace.truth.values[k, column] = value
-    kind, words = criterion
+    kind, fields = criterion
     if kind in ("keepout", "path_length", "stuck", "localization_error", "relocalized_within"):
-        assert verdict(kind, words, trace).status is not Status.PASS
-
-
-LOOKED_AT = [[0.5, "goal.accepted", "a"], [1, "event.started", "kidnapped"], [6, "goal.reached", "a"]]
+        assert verdict(kind, fields, trace).status is not Status.PASS
 
 
 def test_events_of_the_same_tick_keep_their_order():
-    both = (Event(5, EventKind.GOAL_ACCEPTED, "a"), Event(5, EventKind.GOAL_REACHED, "a"))
+    events = (Event(5, EventKind.GOAL_ACCEPTED, "a"), Event(5, EventKind.GOAL_REACHED, "a"))
     trace = replace(
-        synthetic_trace({"seconds": 1, "truth": [[0, 2, 0, 0]]}), events=(*both, Event(240, EventKind.RUN_ENDED))
+        synthetic_trace({"seconds": 1, "truth": [[0, 2, 0, 0]]}), events=(*events, Event(240, EventKind.RUN_ENDED))
     )
     assert verdict("goals_reached", {"goals": ["a"]}, trace).status is Status.PASS

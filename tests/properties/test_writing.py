@@ -16,13 +16,13 @@ from simscen.loading.yaml.writing import to_yaml, world_text
 from simscen.model.world import WorldSpec
 from tests.scenario_files import spec_of_text
 
-ODD = [
+AMBIGUOUS_TEXTS = [
     *("1e3", "on", "off", "yes", "0o7", "017", "0x1f", "1:30", "12:30:45", "1_000", ".5", ".inf", ".nan", "null", "~"),
     *("", " ", "true", "2026-11-21", "<<", "=", "!tag", "&a", "*a", "- a", "a: b", "a #b", "#", "%", "@", "`", "'"),
     *('"', "\\", "a\nb", "\n", " a", "a ", "\t", "\x7f", "\x85", "\xa0", "\u2028", "\u202e", "\ufeff", "\U0001f916"),
     *("9" * 25, "-", "--- a", "...", "?", "? a", "|", ">", "[", "]", "{", "}", ",", "Ü", "+1", "1.", "0.0", "NULL"),
 ]
-TEXTS = st.sampled_from(ODD) | st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
+TEXTS = st.sampled_from(AMBIGUOUS_TEXTS) | st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
 NUMBERS = st.integers(-(10**17), 10**17) | st.floats(allow_nan=False)
 SCALARS = TEXTS | NUMBERS | st.booleans()
 KEYS = TEXTS.filter(lambda text: text != "<<")
@@ -33,14 +33,14 @@ TREES = st.recursive(
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A file to write to."""
+    """Return a file in a temporary folder."""
     return tmp_path_factory.mktemp("yaml") / "a.yaml"
 
 
 @given(data=st.dictionaries(KEYS, TREES, max_size=4))
 @settings(max_examples=3 * settings.default.max_examples, deadline=None)
 def test_written_yaml_is_read_back_equal_with_types(file: Path, data: dict[str, Any]) -> None:
-    """Also when it is written to a file, where the reader refuses control characters."""
+    """The text is written to a file, because the reader refuses control characters in files."""
     file.write_text(to_yaml(data), encoding="utf-8", newline="")
     text = read_text(file, "a")
     assert isinstance(text, str), text
@@ -75,4 +75,4 @@ def test_yaml_is_quoted_only_if_necessary() -> None:
     data = {"name": "lidar dropout", "when": {"time": 10.5}, "goals": ["1e3", "on"], "yaw": "90 deg"}
     text = to_yaml(data)
     assert text == "name: lidar dropout\nwhen:\n  time: 10.5\ngoals:\n- '1e3'\n- on\nyaw: 90 deg\n"
-    assert yaml.safe_load(text)["goals"][1] is True  # what YAML 1.1 makes of it
+    assert yaml.safe_load(text)["goals"][1] is True  # in YAML 1.1

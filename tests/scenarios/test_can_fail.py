@@ -57,15 +57,16 @@ Loader.yaml_implicit_resolvers = {
 
 
 def changed_scenario(scenario: str, changes) -> dict:
+    """Return the content of a shipped scenario with new values by path."""
     text = (ROOT / "scenarios" / f"{scenario}.scenario.yaml").read_text()
     spec = copy.deepcopy(yaml.load(text, Loader))
     spec.pop("variations", None)  # the changes apply to the scenario without variations
     for path, value in changes.items():
         *keys, last = [int(key) if key.isdigit() else key for key in path.split(".")]
-        place = spec
+        parent = spec
         for key in keys:
-            place = place[key] if isinstance(place, list) else place.setdefault(key, {})
-        place[last] = value
+            parent = parent[key] if isinstance(parent, list) else parent.setdefault(key, {})
+        parent[last] = value
     return spec
 
 

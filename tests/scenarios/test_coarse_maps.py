@@ -19,16 +19,16 @@ pass:
 """
 
 
-@pytest.mark.parametrize("cell", [0.15, 0.3, 0.4])
-def test_robot_on_a_coarse_map_arrives_where_it_reports(cell, tmp_path):
-    columns, rows = round(8 / cell), round(6 / cell)
+@pytest.mark.parametrize("resolution", [0.15, 0.3, 0.4])
+def test_robot_on_a_coarse_map_arrives_where_it_reports(resolution, tmp_path):
+    columns, rows = round(8 / resolution), round(6 / resolution)
     gray = np.full((rows, columns), 254, dtype=np.uint8)
     gray[[0, -1]] = gray[:, [0, -1]] = 0
     gray[: rows // 2, columns // 2] = 0  # a wall from the top to the middle
     header = f"P5\n{columns} {rows}\n255\n".encode()
     (tmp_path / "office.pgm").write_bytes(header + gray.tobytes())
     (tmp_path / "office.yaml").write_text(
-        f"image: office.pgm\nresolution: {cell}\norigin: [0, 0, 0]\n"
+        f"image: office.pgm\nresolution: {resolution}\norigin: [0, 0, 0]\n"
         "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
     )
     (tmp_path / "office.scenario.yaml").write_text(SCENARIO)

@@ -42,9 +42,9 @@ LOW_BOX = "box: [0.3, 0.5, 0.12], pose: {x: 3.5, y: 2}"
 TABLE_TOP = "box: [0.4, 0.6, 0.05], z: 0.5, pose: {x: 3.5, y: 2}"
 
 
-def outcome(tmp_path: Path, obstacle: str, camera: bool) -> dict[str, str]:
-    """Return the status of each criterion."""
-    (tmp_path / "waiter.robot.yaml").write_text(ROBOT + camera * CAMERA)
+def criterion_statuses(tmp_path: Path, obstacle: str, has_camera: bool) -> dict[str, str]:
+    """Simulate a drive past an obstacle; return the status of each criterion."""
+    (tmp_path / "waiter.robot.yaml").write_text(ROBOT + has_camera * CAMERA)
     file = tmp_path / "own.scenario.yaml"
     file.write_text(SCENARIO % obstacle)
     return {v.criterion: v.status.value for v in simulate(prepare(load_scenario(file, tmp_path))).result.verdicts}
@@ -53,5 +53,5 @@ def outcome(tmp_path: Path, obstacle: str, camera: bool) -> dict[str, str]:
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("obstacle", [LOW_BOX, TABLE_TOP], ids=["low box", "table top"])
 def test_depth_camera_prevents_a_collision_that_the_lidar_misses(tmp_path: Path, obstacle: str) -> None:
-    assert outcome(tmp_path, obstacle, camera=False)["collisions"] == "fail"
-    assert outcome(tmp_path, obstacle, camera=True) == {"goals_reached": "pass", "collisions": "pass"}
+    assert criterion_statuses(tmp_path, obstacle, has_camera=False)["collisions"] == "fail"
+    assert criterion_statuses(tmp_path, obstacle, has_camera=True) == {"goals_reached": "pass", "collisions": "pass"}

@@ -73,11 +73,12 @@ def test_cause_is_reported_first_in_run_and_judge(name, tmp_path):
     run = simulate(prepare(load_scenario(file, tmp_path)), log=log)
     finding = run.verdict(criterion).tightest
     assert finding.detail[0].startswith(expected), finding.detail
-    assert all(one.happened for one in run.result.disturbances)
-    assert again(log, run.result) == to_json(run.result)
+    assert all(outcome.happened for outcome in run.result.disturbances)
+    assert judge_log(log, run.result) == to_json(run.result)
 
 
-def again(log: Path, result) -> str:
+def judge_log(log: Path, result) -> str:
+    """Judge the log of a run; return the result as JSON."""
     read = read_log(log)
     criteria = criteria_of_text(read.header.scenario, "log", {}).pass_
     lines = result.lines[-len(criteria) :]

@@ -29,7 +29,8 @@ def run(text: str, folder: Path) -> tuple[RunResult, dict[str, str]]:
     file = folder / "own.scenario.yaml"
     file.write_text(HEAD + text)
     result = simulate(prepare(load_scenario(file, folder))).result
-    return result, {one.disturbance.name: f"{'-+'[one.happened]} {one.effect}" for one in result.disturbances}
+    outcomes = result.disturbances
+    return result, {each.disturbance.name: f"{'-+'[each.happened]} {each.effect}" for each in outcomes}
 
 
 def failed_lines(result: RunResult) -> dict[str, int]:
@@ -115,8 +116,8 @@ linger: 60
 """
     result, effects = run(text, tmp_path)
     assert failed_lines(result).keys() == {"too late", "lidar.off"}
-    late = "- it began only when the run ended at t = 20.00 s (time limit)"
-    assert effects["too late"] == effects["lidar.off"] == late
+    effect = "- it began only when the run ended at t = 20.00 s (time limit)"
+    assert effects["too late"] == effects["lidar.off"] == effect
 
 
 RANDOM = "events: [{{name: maybe, when: {{time: 1 s, probability: {}}}, do: {{push: {{impulse: [0, 0.1]}}}}{}}}]\n"
@@ -154,9 +155,9 @@ events:
 def test_stopped_sequence_fails_at_the_pending_step(tmp_path: Path) -> None:
     result, effects = run(SEQUENCES, tmp_path)
     assert failed_lines(result) == {"sequence then 2": 18, "required step": 27}
-    since = "it was due from t = 1.50 s, after sequence then 1; it never began"
+    reason = "it was due from t = 1.50 s, after sequence then 1; it never began"
     assert effects["sequence then 1"] == "+ its trigger fired"
-    assert effects["sequence then 2"].startswith(f"- {since}")
+    assert effects["sequence then 2"].startswith(f"- {reason}")
     assert effects["the end"].startswith("- it was not due, because sequence then 2 had not happened; it never began")
     assert effects["required step"].startswith("- it was not due, because never had not happened")
     assert result.outcome is Outcome.FAILED

@@ -33,6 +33,8 @@ goals: [{pose: {x: 4, y: 1}}]
 
 
 class MomentLog:
+    """A log that keeps all moments in memory."""
+
     def __init__(self) -> None:
         self.moments: list[Moment] = []
 
@@ -50,15 +52,16 @@ def play(text: str, folder: Path, head: str = ROOM, criteria: str = "pass: [{col
 
 
 def scans(moments: list[Moment]) -> list[tuple[int, Scan]]:
-    return [(moment.tick, one) for moment in moments for one in moment.readings if isinstance(one, Scan)]
+    """Return the tick of arrival of each scan, and the scan."""
+    return [(moment.tick, reading) for moment in moments for reading in moment.readings if isinstance(reading, Scan)]
 
 
 def ranges_to_walls(x: float, y: float, angles: np.ndarray) -> np.ndarray:
     """Return the distances to the walls of an empty room of 8 m by 4 m."""
     with np.errstate(divide="ignore"):
-        along = np.where(np.cos(angles) > 0, (8 - x) / np.cos(angles), -x / np.cos(angles))
-        across = np.where(np.sin(angles) > 0, (4 - y) / np.sin(angles), -y / np.sin(angles))
-    return np.minimum(along, across)
+        range_x = np.where(np.cos(angles) > 0, (8 - x) / np.cos(angles), -x / np.cos(angles))
+        range_y = np.where(np.sin(angles) > 0, (4 - y) / np.sin(angles), -y / np.sin(angles))
+    return np.minimum(range_x, range_y)
 
 
 STATIONARY = """\
@@ -78,18 +81,18 @@ time_limit: 1 s
 def test_beams_through_glass_measure_the_object_behind(tmp_path):
     _, moments = play("faults: [{sensor: lidar, glass: {of: [pane, crate]}}]\n", tmp_path, STATIONARY)
     for _, scan in scans(moments):
-        off = scan.ranges - ranges_to_walls(2.0, 2.0, scan.angles() + 0.3)
-        assert np.abs(off).max() < 0.06, "more than 0.01 m of noise: a beam hits the pane or the crate"
+        error = scan.ranges - ranges_to_walls(2.0, 2.0, scan.angles() + 0.3)
+        assert np.abs(error).max() < 0.06, "a beam hits the pane or the crate"
 
 
 def test_share_of_beams_passes_through_glass(tmp_path):
     _, moments = play("faults: [{sensor: lidar, glass: {of: [pane], probability: 70 %}}]\n", tmp_path, STATIONARY)
-    through = []
+    passes_pane = []
     for _, scan in scans(moments):
         bearing = scan.angles() + 0.3
         at_pane = np.abs(np.remainder(bearing + math.pi, 2 * math.pi) - math.pi) < math.atan2(1.4, 3)
-        through += (scan.ranges[at_pane] > 2.99 / np.cos(bearing[at_pane]) + 0.2).tolist()
-    assert np.mean(through) == pytest.approx(0.7, abs=0.06)
+        passes_pane += (scan.ranges[at_pane] > 2.99 / np.cos(bearing[at_pane]) + 0.2).tolist()
+    assert np.mean(passes_pane) == pytest.approx(0.7, abs=0.06)
 
 
 def test_rotated_lidar_measures_a_rotated_scene(tmp_path):
@@ -99,8 +102,8 @@ def test_rotated_lidar_measures_a_rotated_scene(tmp_path):
     _, moments = play(fault, tmp_path, STATIONARY.replace("box: [0.02, 3, 1]", "box: [0.02, 0.02, 1]"))
     x, y = 2 + 0.05 * math.cos(0.3), 2 + 0.05 * math.sin(0.3)
     for _, scan in scans(moments):
-        off = scan.ranges - ranges_to_walls(x, y, scan.angles() + 0.3 + math.radians(10))
-        assert np.mean(np.abs(off) < 0.06) > 0.9, "too many beams do not hit a wall"
+        error = scan.ranges - ranges_to_walls(x, y, scan.angles() + 0.3 + math.radians(10))
+        assert np.mean(np.abs(error) < 0.06) > 0.9, "too many beams do not hit a wall"
 
 
 LATE_LIDAR = """\
@@ -126,16 +129,17 @@ sensors: {lidar: {lidar: {noise: 0, latency: 200 ms}}, odom: {odometry: {}}}
 """
 
 
-@pytest.mark.parametrize("before", ["", "{sensor: lidar, delay: {latency: 100 ms}}, "])
-def test_a_displaced_lidar_measures_before_its_scans_are_delayed(before: str, tmp_path):
+@pytest.mark.parametrize("delay_fault", ["", "{sensor: lidar, delay: {latency: 100 ms}}, "])
+def test_a_displaced_lidar_measures_before_its_scans_are_delayed(delay_fault: str, tmp_path):
     (tmp_path / "late.robot.yaml").write_text(LATE_ROBOT)
-    _, moments = play(f"faults: [{before}{{sensor: lidar, extrinsic: {{yaw: 90 deg}}}}]\n", tmp_path, LATE_LIDAR)
+    _, moments = play(f"faults: [{delay_fault}{{sensor: lidar, extrinsic: {{yaw: 90 deg}}}}]\n", tmp_path, LATE_LIDAR)
     truth = {moment.tick: moment.truth.pose.plane for moment in moments if moment.truth}
-    late = [(truth[scan.tick], scan) for tick, scan in scans(moments) if tick >= scan.tick + 48 and scan.tick in truth]
-    assert len(late) > 20
-    for pose, scan in late:
-        off = scan.ranges - ranges_to_walls(pose.x, pose.y, scan.angles() + pose.yaw + math.radians(90))
-        assert np.mean(np.abs(off) < 0.06) > 0.95, "measured from the pose at its arrival"
+    arrivals = [(tick, scan) for tick, scan in scans(moments) if scan.tick in truth]
+    delayed = [(truth[scan.tick], scan) for tick, scan in arrivals if tick >= scan.tick + 48]
+    assert len(delayed) > 20
+    for pose, scan in delayed:
+        error = scan.ranges - ranges_to_walls(pose.x, pose.y, scan.angles() + pose.yaw + math.radians(90))
+        assert np.mean(np.abs(error) < 0.06) > 0.95, "measured from the pose at its arrival"
 
 
 def test_a_lidar_that_is_pitched_down_sees_the_floor_as_a_wall(tmp_path):
@@ -149,9 +153,9 @@ def test_a_lidar_that_is_pitched_down_sees_the_floor_as_a_wall(tmp_path):
 def test_delayed_scans_arrive_in_the_next_cycle_with_the_stamp_of_measurement(tmp_path):
     _, moments = play("faults: [{sensor: lidar, delay: {latency: 0.111 s}}]\ntime_limit: 3 s\n", tmp_path)
     beats = [moment.tick for moment in moments]
-    got = scans(moments)
-    assert [one.tick for _, one in got] == [24 * k for k in range(len(got))]
-    for tick, scan in got:
+    arrivals = scans(moments)
+    assert [scan.tick for _, scan in arrivals] == [24 * k for k in range(len(arrivals))]
+    for tick, scan in arrivals:
         assert tick == min(beat for beat in beats if beat >= scan.tick + round(0.111 * 240))
 
 
@@ -171,16 +175,16 @@ def test_base_stops_after_command_timeout_and_resumes(tmp_path):
 def test_delayed_command_is_executed_later(tmp_path):
     fault = "faults: [{sensor: cmd_vel, delay: {latency: 300 ms}}]\ntime_limit: 4 s\n"
     _, moments = play(fault, tmp_path)
-    wanted = next(moment.tick for moment in moments if moment.decision.command.vx > 0.02)
-    moved = next(moment.tick for moment in moments if moment.truth and moment.truth.twist.vx > 0.005)
-    assert 72 <= moved - wanted <= 72 + 18
+    command_tick = next(moment.tick for moment in moments if moment.decision.command.vx > 0.02)
+    motion_tick = next(moment.tick for moment in moments if moment.truth and moment.truth.twist.vx > 0.005)
+    assert 72 <= motion_tick - command_tick <= 72 + 18
 
 
-def test_weak_left_wheels_turn_left_and_odometry_measures_it(tmp_path):
+def test_robot_with_weak_left_wheels_turns_left_and_odometry_measures_the_turn(tmp_path):
     fault = "faults: [{sensor: wheels, saturation: {left: 0.1 m/s}, when: {time: 2 s}, for: 0.6 s}]\ntime_limit: 4 s\n"
     _, moments = play(fault, tmp_path)
-    turned = [moment.truth.twist.wz for moment in moments if moment.truth and 2.3 < moment.tick / 240 < 2.55]
-    assert np.mean(turned) > 0.5
+    turn_rates = [moment.truth.twist.wz for moment in moments if moment.truth and 2.3 < moment.tick / 240 < 2.55]
+    assert np.mean(turn_rates) > 0.5
     readings = [o for moment in moments for o in moment.readings if isinstance(o, Odometry) and o.tick == 600]
     truth = next(moment.truth for moment in moments if moment.tick == 600)
     assert readings[0].pose.yaw == pytest.approx(truth.pose.plane.yaw, abs=0.05)
@@ -189,20 +193,20 @@ def test_weak_left_wheels_turn_left_and_odometry_measures_it(tmp_path):
 def test_localizer_jump_shifts_the_estimate_during_the_fault(tmp_path):
     fault = "faults: [{sensor: localizer, jump: {y: 0.5 m}, when: {time: 2 s}, for: 1 s}]\ntime_limit: 4 s\n"
     _, moments = play(fault, tmp_path)
-    off = {}
+    errors_m = {}
     for moment in moments:
         if moment.truth and moment.decision.belief:
-            off[moment.tick / 240] = moment.decision.belief.pose.distance(moment.truth.pose.plane)
-    assert max(value for at, value in off.items() if at < 2.0) < 0.2
-    assert min(value for at, value in off.items() if 2.05 < at < 2.95) > 0.3
-    assert max(value for at, value in off.items() if at > 3.1) < 0.2
+            errors_m[moment.tick / 240] = moment.decision.belief.pose.distance(moment.truth.pose.plane)
+    assert max(error for time, error in errors_m.items() if time < 2.0) < 0.2
+    assert min(error for time, error in errors_m.items() if 2.05 < time < 2.95) > 0.3
+    assert max(error for time, error in errors_m.items() if time > 3.1) < 0.2
 
 
 def test_shifted_map_is_sent_to_the_stack_and_logged(tmp_path):
     fault = "faults: [{sensor: map, shift: {x: 30 cm}}]\ntime_limit: 6 s\n"
     run, moments = play(fault, tmp_path)
-    (one,) = run.result.disturbances
-    assert (one.happened, one.tick) == (True, 0)
+    (outcome,) = run.result.disturbances
+    assert (outcome.happened, outcome.tick) == (True, 0)
     last = [moment for moment in moments if moment.truth and moment.decision.belief][-1]
     assert last.decision.belief.pose.x - last.truth.pose.x == pytest.approx(0.3, abs=0.1)
 
@@ -246,13 +250,13 @@ def test_log_with_invalid_readings_is_judged_with_the_same_result(tmp_path, faul
     file.write_text(f"{ROOM}time_limit: 4 s\nfaults:\n{faults}{criteria}")
     run = simulate(prepare(load_scenario(file, tmp_path)), log=tmp_path / "run.mcap")
     log = read_log(tmp_path / "run.mcap")
-    written = criteria_of_text(log.header.scenario, file.name, {}).pass_
-    again = judge_run(run.result.key, run.result.path, written, log.trace, log.header.case, run.result.lines)
-    assert to_json(again) == to_json(run.result)
+    logged_criteria = criteria_of_text(log.header.scenario, file.name, {}).pass_
+    result = judge_run(run.result.key, run.result.path, logged_criteria, log.trace, log.header.case, run.result.lines)
+    assert to_json(result) == to_json(run.result)
     assert first_difference(run.trace, log.trace) is None
 
 
-TWO = """\
+TWO_ROBOTS = """\
 simscen: 1
 world:
   simscen: 1
@@ -275,7 +279,7 @@ time_limit: 5 s
 """
 
 
-def test_faults_apply_to_one_of_several_robots(tmp_path):
-    run, _ = play("", tmp_path, TWO)
-    happened = {one.disturbance.name: one.happened for one in run.result.disturbances}
+def test_fault_of_each_of_several_robots_happens(tmp_path):
+    run, _ = play("", tmp_path, TWO_ROBOTS)
+    happened = {outcome.disturbance.name: outcome.happened for outcome in run.result.disturbances}
     assert happened == dict.fromkeys(("a/cmd_vel.delay", "b/map.shift", "b/lidar.glass", "b/localizer.jump"), True)

@@ -57,6 +57,7 @@ def scenario(text: str, folder: Path) -> PreparedScenario:
 
 @pytest.fixture(scope="module")
 def through(tmp_path_factory):
+    """Return the finished run of THROUGH."""
     return simulate(scenario(THROUGH, tmp_path_factory.mktemp("through")))
 
 
@@ -92,16 +93,16 @@ def test_via_pose_is_judged_by_the_minimum_distance_of_the_robot(through):
     for finding in reached.findings:
         name = finding.what.removeprefix("goal ")
         if name in ("east", "north", "west"):
-            near = np.hypot(truth[:, 0] - POSES[name][0], truth[:, 1] - POSES[name][1]).min()
-            assert finding.value == pytest.approx(near)
-            assert finding.margin == pytest.approx((0.3 if name == "north" else 0.7) + 0.15 - near)
+            distance = np.hypot(truth[:, 0] - POSES[name][0], truth[:, 1] - POSES[name][1]).min()
+            assert finding.value == pytest.approx(distance)
+            assert finding.margin == pytest.approx((0.3 if name == "north" else 0.7) + 0.15 - distance)
     assert [finding.what for finding in reached.findings][-1] == "goal home heading"
 
 
 def test_trigger_counts_passed_via_poses(through):
-    (fired,) = through.trace.of_kind(EventKind.EVENT_STARTED)
+    (event_start,) = through.trace.of_kind(EventKind.EVENT_STARTED)
     second = through.trace.of_kind(EventKind.GOAL_PASSED)[1].tick
-    assert second < fired.tick <= second + 12
+    assert second < event_start.tick <= second + 12
 
 
 def test_robot_waits_at_waypoints_and_repeats_the_loop(tmp_path):
@@ -117,8 +118,8 @@ def test_robot_waits_at_waypoints_and_repeats_the_loop(tmp_path):
     assert ended.tick - reached["b#2"] == 240
     waiting = [(trace.command.ticks >= reached["a"]) & (trace.command.ticks < accepted["b"])]
     assert not trace.command.values[waiting[0]].any()
-    (fired,) = trace.of_kind(EventKind.EVENT_STARTED)
-    assert reached["a#2"] < fired.tick <= reached["a#2"] + 12
+    (event_start,) = trace.of_kind(EventKind.EVENT_STARTED)
+    assert reached["a#2"] < event_start.tick <= reached["a#2"] + 12
     waits = [f for v in run.result.verdicts for f in v.findings if f.what.endswith(" wait")]
     assert [(f.what, f.value, f.margin) for f in waits] == [
         ("goal a wait", 0.5, 0.0),
@@ -134,8 +135,8 @@ def test_robot_waits_at_waypoints_and_repeats_the_loop(tmp_path):
 def test_only_the_expected_failure_passes(tmp_path, expected, passes):
     result = simulate(scenario(MISSED % expected, tmp_path)).result
     assert (result.outcome is Outcome.PASSED) is passes
-    wrong = [f for verdict in result.verdicts for f in verdict.findings if f.status is not Status.PASS]
-    assert [f.what for f in wrong] == ([] if passes else ["goal in the crate"])
+    failing = [f for verdict in result.verdicts for f in verdict.findings if f.status is not Status.PASS]
+    assert [f.what for f in failing] == ([] if passes else ["goal in the crate"])
 
 
 def test_unexpected_success_fails(tmp_path):

@@ -26,11 +26,13 @@ pass:
 """
 
 
-@pytest.mark.parametrize(("width", "longest"), [(0.5, 26.0), (0.7, 12.0)], ids=["around", "through"])
-def test_a_robot_44_cm_wide_drives_through_the_gaps_that_it_plans(width: float, longest: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("width", "max_length"), [(0.5, 26.0), (0.7, 12.0)], ids=["around", "through"])
+def test_a_robot_44_cm_wide_drives_through_the_gaps_that_it_plans(
+    width: float, max_length: float, tmp_path: Path
+) -> None:
     """The direct path through the gap is 10.5 m long, the path around the wall 20 m."""
     low, high = 2.17 - width / 2, 2.17 + width / 2
-    text = SCENARIO.replace("LOW", f"{low:.3f}").replace("HIGH", f"{high:.3f}").replace("MAX_LENGTH", str(longest))
+    text = SCENARIO.replace("LOW", f"{low:.3f}").replace("HIGH", f"{high:.3f}").replace("MAX_LENGTH", str(max_length))
     (tmp_path / "gap.scenario.yaml").write_text(text)
     run = simscen.simulate(tmp_path / "gap.scenario.yaml", seed=2)
     assert run.passed, run.result

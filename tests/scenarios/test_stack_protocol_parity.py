@@ -13,12 +13,12 @@ from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
 ROOT = Path(__file__).parents[2]
-CHOSEN = [
-    "navigation/goal",
-    "navigation/goal_outside_map",
-    "faults/lidar_off",
-    "corner_cases/goal_blocked_for_good",
-    "robots/mecanum_errand",
+DEFAULT = [
+    "navigation/goal.scenario.yaml",
+    "navigation/goal_outside_map.scenario.yaml",
+    "faults/lidar_off.scenario.yaml",
+    "corner_cases/goal_blocked_for_good.scenario.yaml",
+    "robots/mecanum_errand.scenario.yaml",
 ]
 ALL_TYPES = """\
 simscen: 1
@@ -30,7 +30,7 @@ map: none
 robot: {model: watcher.robot.yaml, pose: {x: 1, y: 1}}
 stack:
   localizer: {type: ground_truth}
-  # The external stack does not receive images, so that the other one must ignore them.
+  # The external stack does not receive images, so the in-process stack must ignore them.
   costmap: {min_obstacle_height: 99 m, max_obstacle_height: 100 m}
   controller: {type: mppi, batch_size: 100}
   recovery: {number_of_retries: 0}
@@ -80,6 +80,7 @@ def messages_of_both(file: Path, root: Path, folder: Path) -> tuple[Messages, Me
 
 
 def messages(log: Path) -> Messages:
+    """Return topic, time in ns, and content of each message in the order of the log."""
     with log.open("rb") as file:
         records = make_reader(file).iter_messages(log_time_order=False)
         return [(channel.topic, message.log_time, message.data) for _, channel, message in records]
@@ -95,7 +96,8 @@ SHIPPED = sorted(
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
-    "name", SHIPPED if os.environ.get("SIMSCEN_SERVED") == "all" else [f"{name}.scenario.yaml" for name in CHOSEN]
+    "name",
+    SHIPPED if os.environ.get("SIMSCEN_SERVED") == "all" else DEFAULT,
 )
 def test_stack_protocol_gives_the_same_log_as_in_process(name: str, tmp_path: Path) -> None:
     in_process, external = messages_of_both(ROOT / "scenarios" / name, ROOT, tmp_path)
@@ -112,7 +114,7 @@ def test_stack_protocol_matches_for_all_message_and_goal_types(tmp_path: Path) -
     assert external == in_process
 
 
-TWO = """\
+TWO_ROBOTS = """\
 simscen: 1
 world: {simscen: 1, walls: [{points: [[0, 0], [8, 0], [8, 6], [0, 6], [0, 0]]}]}
 robots:
@@ -129,7 +131,7 @@ pass: [{collisions: {max: 0}}]
 
 @pytest.mark.slow
 def test_stack_protocol_matches_for_two_robots(tmp_path: Path) -> None:
-    (tmp_path / "two.scenario.yaml").write_text(TWO)
+    (tmp_path / "two.scenario.yaml").write_text(TWO_ROBOTS)
     in_process, external = messages_of_both(tmp_path / "two.scenario.yaml", tmp_path, tmp_path)
     assert sum(len(data) for _, _, data in in_process) > 20_000
     assert external == in_process
@@ -138,12 +140,13 @@ def test_stack_protocol_matches_for_two_robots(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_comparison_detects_another_stack(tmp_path: Path) -> None:
     prepared = prepare(load_scenario(ROOT / "scenarios/navigation/goal.scenario.yaml", ROOT))
-    other = with_external_reference(prepared)
-    argv = other.loaded.external_command and (
-        *other.loaded.external_command.argv[:-1],
+    other_stack = with_external_reference(prepared)
+    argv = other_stack.loaded.external_command and (
+        *other_stack.loaded.external_command.argv[:-1],
         '{"controller": {"desired_linear_vel": 0.3}}',
     )
-    other = replace(
-        other, loaded=replace(other.loaded, external_command=replace(other.loaded.external_command, argv=argv))
+    other_stack = replace(
+        other_stack,
+        loaded=replace(other_stack.loaded, external_command=replace(other_stack.loaded.external_command, argv=argv)),
     )
-    assert simulate(other).result.metrics != simulate(prepared).result.metrics
+    assert simulate(other_stack).result.metrics != simulate(prepared).result.metrics

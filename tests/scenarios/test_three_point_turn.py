@@ -9,7 +9,7 @@ from simscen.stack.kinematics import cusps
 
 ROOT = Path(__file__).parents[2]
 TURNING_RADIUS = 0.45 / np.tan(0.51)
-MOVING = 0.03
+MIN_SPEED_M_S = 0.03
 
 
 def test_a_car_turns_round_in_a_road_too_narrow_for_one_sweep():
@@ -19,9 +19,9 @@ def test_a_car_turns_round_in_a_road_too_narrow_for_one_sweep():
 
     assert len(cusps(trace.plans[0].points)) >= 2
     speed, turn = trace.velocity.values[:, 0], trace.velocity.values[:, 2]
-    ways = np.sign(speed[np.abs(speed) > MOVING])
-    assert np.count_nonzero(np.diff(ways)) >= 2, "forward and backward in turns"
+    directions = np.sign(speed[np.abs(speed) > MIN_SPEED_M_S])
+    assert np.count_nonzero(np.diff(directions)) >= 2, "forward and backward in turns"
     driving = np.abs(speed) > 0.1
     assert (np.abs(turn[driving]) <= np.abs(speed[driving]) / TURNING_RADIUS * 1.1 + 0.05).all()
-    still = np.abs(speed) < 0.01
-    assert np.abs(turn[still]).max() < 0.1, "it never turns on the spot"
+    is_stationary = np.abs(speed) < 0.01
+    assert np.abs(turn[is_stationary]).max() < 0.1, "the car never turns in place"

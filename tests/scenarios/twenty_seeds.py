@@ -77,9 +77,9 @@ def run_all(folder: Path) -> Path:
     """Run all shipped scenarios, and return the folder of the session. Exits with a message if simscen fails."""
     out = folder / "out"
     command = [sys.executable, "-m", "simscen", "run", "scenarios/", "--repeat", str(SEEDS), "--out", str(out)]
-    done = subprocess.run(command, cwd=ROOT, check=False)
-    if done.returncode not in (0, 1):  # 1: some runs have failed, which the table shows
-        sys.exit(f"simscen ended with {done.returncode}")
+    process = subprocess.run(command, cwd=ROOT, check=False)
+    if process.returncode not in (0, 1):  # 1: some runs have failed, which the table shows
+        sys.exit(f"simscen ended with {process.returncode}")
     return out
 
 

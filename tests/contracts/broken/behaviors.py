@@ -13,9 +13,9 @@ SPIN, BACKUP = Spin(), BackUp()
 
 class CommandWrapper(Wrapper):
     def step(self, pose, costmap, seconds):
-        return self.changed(self.inner.step(pose, costmap, seconds), seconds)
+        return self.change(self.inner.step(pose, costmap, seconds), seconds)
 
-    def changed(self, command: Any, seconds: float) -> Any:
+    def change(self, command: Any, seconds: float) -> Any:
         return command
 
 
@@ -27,7 +27,7 @@ class NeverEnds(Wrapper):
 
 @breaks(SPIN, "it ends", "beyond the limits of the base")
 class ExceedsSpeedLimit(CommandWrapper):
-    def changed(self, command, seconds):
+    def change(self, command, seconds):
         return command and command._replace(wz=5.0)
 
 
@@ -53,7 +53,7 @@ class RaisesRuntimeError(Wrapper):
 
 @breaks(BACKUP, "the same calls", "two runs with the same seed differ")
 class UsesGlobalRandom(CommandWrapper):
-    def changed(self, command, seconds):
+    def change(self, command, seconds):
         return command and command._replace(vx=command.vx * (0.9 + 0.1 * random.random()))
 
 

@@ -1,4 +1,4 @@
-"""Decorators that register components, criteria, faults, and so on that break a promise."""
+"""Decorators that register components and scenario entries that break a promise."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,6 +12,14 @@ COUNT = count()
 
 @dataclass(frozen=True)
 class Case:
+    """A broken component.
+
+    name: class name of the component
+    spec: specification of the component
+    promise: start of the name of the promise that the component breaks
+    message: part of the error message
+    """
+
     name: str
     spec: Any
     promise: str
@@ -35,10 +43,10 @@ def breaks(spec: Any, promise: str, message: str) -> Callable[[type[Wrapper]], t
     """Register a wrapper with which the component of `spec` breaks a promise; the error contains `message`."""
 
     def add(wrapper: type[Wrapper]) -> type[Wrapper]:
-        def made(inner: Any, setting: Any) -> Any:
+        def build(inner: Any, setting: Any) -> Any:
             return wrapper(type(spec).implementation()(inner, setting), setting)
 
-        kind = type(wrapper.__name__, (type(spec),), {"implementation": classmethod(lambda cls: made)})
+        kind = type(wrapper.__name__, (type(spec),), {"implementation": classmethod(lambda cls: build)})
         CASES.append(Case(wrapper.__name__, kind.model_construct(**dict(spec)), promise, message))
         return wrapper
 

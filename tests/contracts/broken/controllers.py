@@ -14,42 +14,42 @@ CONTROLLER = RegulatedPurePursuit()
 
 class CommandWrapper(Wrapper):
     def command(self, *arguments):
-        return self.changed(self.inner.command(*arguments))
+        return self.change(self.inner.command(*arguments))
 
-    def changed(self, command: Twist) -> Any:
+    def change(self, command: Twist) -> Any:
         return command
 
 
 @breaks(CONTROLLER, "it follows the path", "from the end of the path")
 class NeverMoves(CommandWrapper):
-    def changed(self, command):
+    def change(self, command):
         return Twist()
 
 
 @breaks(CONTROLLER, "it follows the path", "deviates from the path by")
 class LeavesPath(CommandWrapper):
-    k = 0
+    commands = 0
 
-    def changed(self, command):
-        self.k += 1
-        return Twist(0.3, 0.0, 0.4) if self.k < 60 else command
+    def change(self, command):
+        self.commands += 1
+        return Twist(0.3, 0.0, 0.4) if self.commands < 60 else command
 
 
 @breaks(CONTROLLER, "no command exceeds", "beyond the limits of the base")
 class ExceedsAngularLimit(CommandWrapper):
-    def changed(self, command):
+    def change(self, command):
         return command._replace(wz=9.0)
 
 
 @breaks(CONTROLLER, "no command exceeds", "beyond the limits of the base")
 class CommandsLateralVelocity(CommandWrapper):
-    def changed(self, command):
+    def change(self, command):
         return command._replace(vy=0.1)
 
 
 @breaks(CONTROLLER, "no command exceeds", "nan")
 class CommandsNan(CommandWrapper):
-    def changed(self, command):
+    def change(self, command):
         return command._replace(vx=math.nan)
 
 
@@ -82,7 +82,7 @@ class HidesFailure(Wrapper):
 
 @breaks(CONTROLLER, "the same calls", "two drives with the same seed differ")
 class UsesGlobalRandom(CommandWrapper):
-    def changed(self, command):
+    def change(self, command):
         return command._replace(wz=command.wz * (1.0 + 1e-9 * random.random()))
 
 
@@ -102,13 +102,13 @@ class ChangesPath(Wrapper):
 
 @breaks(CONTROLLER, "path and costmap", "an old costmap affects a new command")
 class KeepsFirstCostmap(Wrapper):
-    kept = None
+    first_costmap = None
 
     def command(self, pose, twist, costmap, goal):
-        self.kept = self.kept or costmap
-        slower = 0.5 if (self.kept.costs == 254).all() else 1.0
+        self.first_costmap = self.first_costmap or costmap
+        speed_factor = 0.5 if (self.first_costmap.costs == 254).all() else 1.0
         command = self.inner.command(pose, twist, costmap, goal)
-        return command._replace(vx=slower * command.vx, wz=slower * command.wz)
+        return command._replace(vx=speed_factor * command.vx, wz=speed_factor * command.wz)
 
 
 @breaks(CONTROLLER, "its local plan", "not a path of finite poses")

@@ -39,14 +39,14 @@ class ComparesUnwrappedYaw(CheckerWrapper):
 
 @breaks(CHECKER, "a reset forgets", "because the previous one was")
 class IgnoresReset(CheckerWrapper):
-    content = False
+    was_reached = False
 
     def reset(self):
         pass
 
     def reached(self, *arguments):
-        self.content = self.content or self.inner.reached(*arguments)
-        return self.content
+        self.was_reached = self.was_reached or self.inner.reached(*arguments)
+        return self.was_reached
 
 
 @breaks(CHECKER, "a pose that is no number", "has reached the goal")

@@ -91,9 +91,9 @@ class ScanFault(Spec, Fault):
     affects: ClassVar[frozenset[str]] = frozenset({"Scan"})
 
     def begin(self, rng, wheels):
-        return DisturbingEffect(self.changed)
+        return DisturbingEffect(self.change)
 
-    def changed(self, reading):
+    def change(self, reading):
         return reading
 
 
@@ -109,13 +109,13 @@ class AffectsNothing(ScanFault):
 
 @breaks_contract("it returns the same type or none", "for a Scan")
 class ChangesSensorName(ScanFault):
-    def changed(self, reading):
+    def change(self, reading):
         return replace(reading, sensor="other")
 
 
 @breaks_contract("the same generator", "for the same")
 class FaultUsesGlobalRandom(ScanFault):
-    def changed(self, reading):
+    def change(self, reading):
         return replace(reading, ranges=reading.ranges + random.random())
 
 
@@ -131,7 +131,7 @@ class DelaysOneReadingMoreTheSecondTime(ScanFault):
 
 @breaks_contract("a reading is never changed", "changes the Scan")
 class ChangesReading(ScanFault):
-    def changed(self, reading):
+    def change(self, reading):
         reading.ranges[:] = 0.0
         return reading
 

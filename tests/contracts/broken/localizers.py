@@ -15,15 +15,15 @@ LOCALIZER = OdometryOnly(type="odometry")
 class BeliefWrapper(Wrapper):
     @property
     def belief(self) -> Belief:
-        return self.changed(self.inner.belief)
+        return self.change(self.inner.belief)
 
-    def changed(self, belief: Belief) -> Belief:
+    def change(self, belief: Belief) -> Belief:
         return belief
 
 
 @breaks(LOCALIZER, "the same calls", "two runs differ in pose")
 class UsesGlobalRandom(BeliefWrapper):
-    def changed(self, belief):
+    def change(self, belief):
         return replace(belief, pose=belief.pose._replace(x=belief.pose.x + 1e-9 * random.random()))
 
 
@@ -31,7 +31,7 @@ class UsesGlobalRandom(BeliefWrapper):
 class DriftsAtRest(BeliefWrapper):
     offset = 0.0
 
-    def changed(self, belief):
+    def change(self, belief):
         self.offset += 1e-3
         return replace(belief, pose=belief.pose._replace(x=belief.pose.x + self.offset))
 
@@ -42,7 +42,7 @@ class ReusesCovariance(BeliefWrapper):
         super().__init__(*arguments)
         self.array = np.zeros((3, 3))
 
-    def changed(self, belief):
+    def change(self, belief):
         self.array[:] = belief.covariance
         return replace(belief, covariance=self.array)
 
@@ -63,9 +63,9 @@ class KeepsScan(BeliefWrapper):
     def on_scan(self, scan):
         self.scan = scan
 
-    def changed(self, belief):
-        blind = self.scan is not None and np.isnan(self.scan.ranges).all()
-        return replace(belief, pose=belief.pose._replace(x=belief.pose.x + (1.0 if blind else 0.0)))
+    def change(self, belief):
+        is_blind = self.scan is not None and np.isnan(self.scan.ranges).all()
+        return replace(belief, pose=belief.pose._replace(x=belief.pose.x + (1.0 if is_blind else 0.0)))
 
 
 @breaks(LOCALIZER, "invalid ranges never make the belief invalid", "believes to be at")
@@ -75,7 +75,7 @@ class AcceptsNanRanges(BeliefWrapper):
     def on_scan(self, scan):
         self.last = float(scan.ranges[0]) if len(scan.ranges) else 0.0
 
-    def changed(self, belief):
+    def change(self, belief):
         return replace(belief, pose=belief.pose._replace(x=self.last))
 
 
@@ -86,13 +86,13 @@ class AcceptsNanGyro(BeliefWrapper):
     def on_imu(self, imu):
         self.rate = imu.angular_velocity[2]
 
-    def changed(self, belief):
+    def change(self, belief):
         return replace(belief, covariance=belief.covariance + self.rate)
 
 
 @breaks(LOCALIZER, "invalid odometry never makes the belief invalid", "not positive semidefinite")
 class HasNegativeCovariance(BeliefWrapper):
-    def changed(self, belief):
+    def change(self, belief):
         return replace(belief, covariance=-belief.covariance)
 
 
@@ -104,7 +104,7 @@ class RequiresAllBeams(Wrapper):
 
 @breaks(LOCALIZER, "scans of any size range and mount are accepted", "weights that add up to")
 class HasZeroWeights(BeliefWrapper):
-    def changed(self, belief):
+    def change(self, belief):
         return replace(belief, particles=np.zeros((3, 4)))
 
 

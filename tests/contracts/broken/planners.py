@@ -119,12 +119,12 @@ class ChangesCostmap(Wrapper):
 
 @breaks(PLANNER, "a costmap is neither", "an old costmap affects a new plan")
 class KeepsFirstCostmap(Wrapper):
-    kept = None
+    first_costmap = None
 
     def plan(self, costmap, start, goal, seed):
-        self.kept = self.kept or costmap
-        lethal = (self.kept.costs == 254).all()
-        return self.inner.plan(costmap, start, goal, seed + int(lethal))
+        self.first_costmap = self.first_costmap or costmap
+        is_lethal = (self.first_costmap.costs == 254).all()
+        return self.inner.plan(costmap, start, goal, seed + int(is_lethal))
 
 
 @breaks(PLANNER, "success begins", "not finite float64")

@@ -40,10 +40,10 @@ class UsesGlobalRandom(Wrapper):
 
 @breaks(Lidar(), "a reading does not change", "changes when the next one is taken")
 class ReusesArray(Wrapper):
-    kept = None
+    array = None
 
     def read(self, tick):
         scan = self.inner.read(tick)
-        self.kept = scan.ranges.copy() if self.kept is None else self.kept
-        self.kept[:] = scan.ranges
-        return replace(scan, ranges=self.kept)
+        self.array = scan.ranges.copy() if self.array is None else self.array
+        self.array[:] = scan.ranges
+        return replace(scan, ranges=self.array)

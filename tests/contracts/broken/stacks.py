@@ -21,43 +21,43 @@ class DecisionWrapper(Wrapper):
 
     def decide(self, tick, readings):
         self.tick = tick
-        return self.changed(self.inner.decide(tick, readings))
+        return self.change(self.inner.decide(tick, readings))
 
-    def changed(self, decision: Decision) -> Any:
+    def change(self, decision: Decision) -> Any:
         return decision
 
 
 @breaks(STACK, "it reaches a goal", "touches something")
 class DrivesIntoObstacles(DecisionWrapper):
-    def changed(self, decision):
-        near = self.tick < 1440
-        return replace(decision, command=Twist(0.5, 0.0, 0.0) if near else decision.command)
+    def change(self, decision):
+        is_early = self.tick < 1440
+        return replace(decision, command=Twist(0.5, 0.0, 0.0) if is_early else decision.command)
 
 
 @breaks(STACK, "it reaches a goal", "navigation ends with")
 class NeverMoves(DecisionWrapper):
-    def changed(self, decision):
+    def change(self, decision):
         return replace(decision, command=Twist())
 
 
 @breaks(STACK, "without a goal", "commands a velocity without a goal")
 class TurnsWithoutGoal(DecisionWrapper):
-    def changed(self, decision):
+    def change(self, decision):
         return replace(decision, command=decision.command if any(decision.command) else Twist(0.0, 0.0, 0.01))
 
 
 @breaks(STACK, "once a task has ended", "after the end of its task")
 class DrivesAfterEnd(DecisionWrapper):
-    ended = False
+    has_ended = False
 
-    def changed(self, decision):
-        self.ended = self.ended or any(event.kind == EventKind.NAVIGATION_ENDED for event in decision.events)
-        return replace(decision, command=Twist(0.05)) if self.ended else decision
+    def change(self, decision):
+        self.has_ended = self.has_ended or any(event.kind == EventKind.NAVIGATION_ENDED for event in decision.events)
+        return replace(decision, command=Twist(0.05)) if self.has_ended else decision
 
 
 @breaks(STACK, "a canceled task", "does not report that its goal is canceled")
 class HidesCancellation(DecisionWrapper):
-    def changed(self, decision):
+    def change(self, decision):
         kept = tuple(event for event in decision.events if event.kind != EventKind.GOAL_CANCELED)
         return replace(decision, events=kept)
 
@@ -76,21 +76,21 @@ class IgnoresPreemption(DecisionWrapper):
 
 @breaks(STACK, "every goal is accepted once", "accepts")
 class AcceptsGoalTwice(DecisionWrapper):
-    def changed(self, decision):
-        again = tuple(event for event in decision.events if event.kind == EventKind.GOAL_ACCEPTED)
-        return replace(decision, events=decision.events + again)
+    def change(self, decision):
+        repeated = tuple(event for event in decision.events if event.kind == EventKind.GOAL_ACCEPTED)
+        return replace(decision, events=decision.events + repeated)
 
 
 @breaks(STACK, "the same seed", "differ in their commands")
 class UsesGlobalRandom(DecisionWrapper):
-    def changed(self, decision):
+    def change(self, decision):
         vx, vy, wz = decision.command
         return replace(decision, command=Twist(vx, vy, wz * (1 + 1e-12 * random.random()) + 1e-15 * random.random()))
 
 
 @breaks(STACK, "without a goal", "the event goal.reached of tick -5")
 class ReportsPastEvent(DecisionWrapper):
-    def changed(self, decision):
+    def change(self, decision):
         return replace(decision, events=(Event(-5, EventKind.GOAL_REACHED, "x"),))
 
 
