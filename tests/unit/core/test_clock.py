@@ -1,3 +1,5 @@
+"""Tests of the clock: periods, ticks, and nanoseconds."""
+
 from fractions import Fraction
 
 import pytest
@@ -29,8 +31,8 @@ ticks = st.integers(0, 10**12)
 
 @given(rates, ticks)
 def test_every_tick_is_read_back_from_its_nanoseconds(rate: int, tick: int) -> None:
-    time = Clock(rate)
-    assert time.tick_at(time.nanoseconds(tick)) == tick
+    clock = Clock(rate)
+    assert clock.tick_at(clock.nanoseconds(tick)) == tick
 
 
 @given(rates, ticks)

@@ -1,4 +1,4 @@
-"""Tests of cached values."""
+"""Test of values that are cached on an instance."""
 
 import gc
 import weakref
@@ -6,24 +6,24 @@ import weakref
 from simscen.core.decorators import cached_on_instance
 
 
-class Thing:
-    pass
+class Owner:
+    """Instance that caches values."""
 
 
 def test_cached_value_is_computed_once_per_object_and_arguments():
-    asked = []
+    calls = []
 
     @cached_on_instance
-    def made(thing, more, last=0):
-        asked.append((more, last))
-        return thing, [more, last]
+    def cached_function(owner, argument, option=0):
+        calls.append((argument, option))
+        return owner, [argument, option]
 
-    one, other = Thing(), Thing()
-    assert made(one, 1) is made(one, 1)
-    assert made(one, 1, last=2) is made(one, 1, last=2)
-    assert made(other, 1) is not made(one, 1)
-    assert asked == [(1, 0), (1, 2), (1, 0)]
-    gone = weakref.ref(one)
-    del one
+    first, second = Owner(), Owner()
+    assert cached_function(first, 1) is cached_function(first, 1)
+    assert cached_function(first, 1, option=2) is cached_function(first, 1, option=2)
+    assert cached_function(second, 1) is not cached_function(first, 1)
+    assert calls == [(1, 0), (1, 2), (1, 0)]
+    reference = weakref.ref(first)
+    del first
     gc.collect()
-    assert gone() is None
+    assert reference() is None

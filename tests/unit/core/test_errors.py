@@ -20,11 +20,11 @@ PROBLEM = Problem("a.yaml", 3, 4, "SC001", "what is wrong", "how to mend it")
     ids=lambda error: type(error).__name__,
 )
 def test_errors_survive_pickling(error: SimscenError) -> None:
-    there = pickle.loads(pickle.dumps(error))
-    assert type(there) is type(error)
-    assert (str(there), there.exit, vars(there)) == (str(error), error.exit, vars(error))
+    restored = pickle.loads(pickle.dumps(error))
+    assert type(restored) is type(error)
+    assert (str(restored), restored.exit, vars(restored)) == (str(error), error.exit, vars(error))
 
 
 def test_every_error_class_is_tested() -> None:
-    tried = {InvalidInput, UsageError, NothingSelected, RunError}
-    assert set(SimscenError.__subclasses__()) == tried
+    tested = {InvalidInput, UsageError, NothingSelected, RunError}
+    assert set(SimscenError.__subclasses__()) == tested

@@ -1,3 +1,5 @@
+"""Tests of random streams: reproducible, and independent of other streams."""
+
 import numpy as np
 import pytest
 
@@ -5,8 +7,8 @@ from simscen.core.random_streams import MAX_SEED, Streams
 
 
 def test_the_same_seed_and_name_give_the_same_stream():
-    one, two = Streams(7).generator("sensor.lidar"), Streams(7).generator("sensor.lidar")
-    assert np.array_equal(one.normal(size=1000), two.normal(size=1000))
+    first, second = Streams(7).generator("sensor.lidar"), Streams(7).generator("sensor.lidar")
+    assert np.array_equal(first.normal(size=1000), second.normal(size=1000))
 
 
 @pytest.mark.parametrize(("seed", "name"), [(8, "sensor.lidar"), (7, "sensor.odom")])

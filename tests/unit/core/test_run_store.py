@@ -26,7 +26,7 @@ RUNS = [run(seed, path) for path in ("b.scenario.yaml", "a.scenario.yaml") for s
 
 @pytest.fixture(params=[0, 3, 100])
 def store(request, monkeypatch) -> RunStore:
-    """Return a store of RUNS; how many results are not compressed is the parameter."""
+    """Return a store of RUNS; the parameter is the number of results that are not compressed."""
     monkeypatch.setattr(run_store, "MAX_UNCOMPRESSED", request.param)
     return RunStore(RUNS)
 
@@ -59,13 +59,13 @@ def test_reports_do_not_depend_on_compression(store: RunStore) -> None:
 
 def test_last_result_of_a_run_replaces_earlier_ones(store: RunStore) -> None:
     finished = FinishedRuns()
-    for each in store:
-        finished.add(each.key, each)
-    again = replace(RUNS[0], wall=9.0)
-    finished.add(again.key, again)
-    assert finished[again.key] == again
-    assert len(finished) == len({each.key for each in RUNS})
-    assert set(finished) == {each.key for each in RUNS}
+    for finished_run in store:
+        finished.add(finished_run.key, finished_run)
+    newer = replace(RUNS[0], wall=9.0)
+    finished.add(newer.key, newer)
+    assert finished[newer.key] == newer
+    assert len(finished) == len({finished_run.key for finished_run in RUNS})
+    assert set(finished) == {finished_run.key for finished_run in RUNS}
     assert finished.get(RunKey("unknown", 1)) is None
 
 

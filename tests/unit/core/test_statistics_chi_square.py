@@ -1,4 +1,4 @@
-"""Chi-square quantiles against scipy."""
+"""Tests of chi-square quantiles and probabilities against scipy."""
 
 import pytest
 from scipy.stats import chi2

@@ -1,4 +1,4 @@
-"""Tests that a save changes only what was edited, and does not overwrite changes by other programs."""
+"""Tests that a save changes only the edited values, and does not overwrite changes by other programs."""
 
 import stat
 from pathlib import Path
@@ -34,11 +34,11 @@ def test_file_that_changed_on_disk_is_not_overwritten(tmp_path: Path) -> None:
     document = Document(file, "a.yaml")
     _, version = document.read()
     file.write_text("a: 2\n")
-    with pytest.raises(FileChanged, match="was changed by another program") as refused:
+    with pytest.raises(FileChanged, match="was changed by another program") as error:
         document.save("a: 3\n", version)
-    assert refused.value.content.text == "a: 2\n"
+    assert error.value.content.text == "a: 2\n"
     assert file.read_text() == "a: 2\n"
-    document.save("a: 3\n", refused.value.content.version)
+    document.save("a: 3\n", error.value.content.version)
     assert file.read_text() == "a: 3\n"
 
 
@@ -64,7 +64,7 @@ def test_saving_keeps_the_permissions_of_the_file(tmp_path: Path) -> None:
     document = Document(file, "a.yaml")
     document.save("a: 2\n", document.read().version)
     assert stat.S_IMODE(file.stat().st_mode) == 0o640
-    assert [one.name for one in tmp_path.iterdir()] == ["a.yaml"]
+    assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
 
 
 def test_missing_folder_is_an_error_with_a_reason(tmp_path: Path) -> None:
@@ -86,13 +86,13 @@ def test_file_that_changes_while_it_is_read_is_not_overwritten(tmp_path: Path, m
     monkeypatch.setattr("simscen.editor.document.decode", decode_slowly)
     text, version = document.read()
     assert text == "mine\n"
-    with pytest.raises(FileChanged) as refused:
+    with pytest.raises(FileChanged) as error:
         document.save("mine, edited\n", version)
-    assert refused.value.content.text == "theirs\n"
+    assert error.value.content.text == "theirs\n"
     assert file.read_text() == "theirs\n"
 
 
-def test_file_that_is_deleted_while_it_is_read_has_the_content_that_was_read(tmp_path: Path, monkeypatch) -> None:
+def test_file_that_is_deleted_while_it_is_read_keeps_the_content_that_was_read(tmp_path: Path, monkeypatch) -> None:
     file = tmp_path / "a.yaml"
     file.write_text("a: 1\n")
 

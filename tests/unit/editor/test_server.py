@@ -1,4 +1,4 @@
-"""The server of the editor answers only its own page."""
+"""Tests of the editor server, which answers only its own page."""
 
 import http.client
 import json
@@ -15,28 +15,31 @@ from simscen.editor.session import EditorSession
 from simscen.run.process.jobs import Backend
 
 POLL_INTERVAL_S = 0.01
-"""Time in which `shutdown` ends the server; the default is 0.5 s."""
+"""Maximum time in s until the server notices `shutdown`; the default is 0.5 s."""
 TEXT = "simscen: 1\nworld: {simscen: 1}\nrobot: {pose: {x: 1, y: 1}}\ngoals: [{pose: {x: 3, y: 1}}]\npass: []\n"
 
 
 def _no_backend() -> Backend:
-    raise AssertionError("nothing runs in these tests")
+    raise AssertionError("no run starts in these tests")
 
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[EditorServer]:
+    """Yield a running server for a scenario in a folder with another file."""
     file = tmp_path / "a.scenario.yaml"
     file.write_text(TEXT)
     (tmp_path / "secret.txt").write_text("secret")
-    running = EditorServer(EditorSession(EditedFile(file, "scenario", tmp_path), _no_backend))
-    threading.Thread(target=running.serve_forever, args=(POLL_INTERVAL_S,), daemon=True).start()
-    yield running
-    running.shutdown()
-    running.server_close()
-    running.stop_runs()
+    editor_server = EditorServer(EditorSession(EditedFile(file, "scenario", tmp_path), _no_backend))
+    threading.Thread(target=editor_server.serve_forever, args=(POLL_INTERVAL_S,), daemon=True).start()
+    yield editor_server
+    editor_server.shutdown()
+    editor_server.server_close()
+    editor_server.stop_runs()
 
 
 class Reply:
+    """Status, headers, and body of an HTTP response."""
+
     def __init__(self, answer: http.client.HTTPResponse) -> None:
         self.status, self.headers, self.body = answer.status, answer.headers, answer.read()
 
@@ -46,13 +49,14 @@ class Reply:
 
 
 def request(server: EditorServer, method: str, path: str, body: Any = None, **headers: str) -> Reply:
+    """Send an HTTP request with bytes or JSON as body; an underscore in a header name stands for a hyphen."""
     connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=10)
-    given = {name.replace("_", "-"): value for name, value in headers.items()}
+    all_headers = {name.replace("_", "-"): value for name, value in headers.items()}
     data = None
     if body is not None:
         data = body if isinstance(body, bytes) else json.dumps(body).encode()
-        given.setdefault("Content-Type", "application/json")
-    connection.request(method, path, data, given)
+        all_headers.setdefault("Content-Type", "application/json")
+    connection.request(method, path, data, all_headers)
     try:
         return Reply(connection.getresponse())
     finally:
@@ -60,17 +64,18 @@ def request(server: EditorServer, method: str, path: str, body: Any = None, **he
 
 
 def ask(server: EditorServer, name: str, **data: Any) -> Reply:
+    """Send a request of the page."""
     return request(server, "POST", f"/{server.token}/api/{name}", data)
 
 
-def test_it_listens_on_this_machine_only_at_a_random_port_with_a_random_token(server: EditorServer) -> None:
+def test_server_listens_only_on_this_machine_at_a_random_port_with_a_random_token(server: EditorServer) -> None:
     assert server.server_address[0] == "127.0.0.1"
     assert server.url == f"http://127.0.0.1:{server.server_port}/{server.token}/"
     assert len(server.token) >= 32
 
 
 @pytest.mark.parametrize("path", ["/", "/page.html", "/wrong/", "/wrong/page.js", "//", "/../", "/%2e%2e/page.html"])
-def test_a_request_without_the_token_gets_nothing(server: EditorServer, path: str) -> None:
+def test_request_without_the_token_is_refused(server: EditorServer, path: str) -> None:
     assert request(server, "GET", path).status == 403
     answer = request(server, "POST", f"{path}api/open", {})
     assert answer.status == 403 and TEXT not in answer.body.decode()
@@ -116,7 +121,7 @@ def test_no_path_leads_to_other_files(server: EditorServer, path: str) -> None:
 
 
 @pytest.mark.parametrize("body", [b"", b"[]", b"nonsense", b"\xff\xfe", b'{"text": 1}', b"[" * 100_000, b"1e999"])
-def test_a_malformed_request_is_an_error_of_the_page_not_of_the_program(server: EditorServer, body: bytes) -> None:
+def test_malformed_request_is_a_client_error(server: EditorServer, body: bytes) -> None:
     for name in ("scene", "problems", "edit", "form", "preview", "save"):
         assert 400 <= request(server, "POST", f"/{server.token}/api/{name}", body).status < 500
     assert ask(server, "open").status == 200
@@ -192,7 +197,7 @@ def test_saving_requires_the_version_that_was_read(server: EditorServer) -> None
     assert server.session.file.path.read_text() == TEXT
 
 
-def test_the_page_is_told_why_a_file_cannot_be_saved(server: EditorServer) -> None:
+def test_answer_contains_the_reason_why_a_file_cannot_be_saved(server: EditorServer) -> None:
     opened, file = ask(server, "open").data, server.session.file.path
     file.rename(file.with_name("other.yaml"))
     file.symlink_to("other.yaml")
@@ -201,7 +206,7 @@ def test_the_page_is_told_why_a_file_cannot_be_saved(server: EditorServer) -> No
     assert "a.scenario.yaml: cannot be written: it is a symbolic link" in refused.data["error"]
 
 
-def test_a_world_file_has_a_page_of_its_own_as_soon_as_the_scenario_names_it(server: EditorServer) -> None:
+def test_world_file_has_a_separate_page_as_soon_as_the_scenario_names_the_file(server: EditorServer) -> None:
     world = server.session.file.path.with_name("b.world.yaml")
     world.write_text("simscen: 1\n")
     assert request(server, "GET", f"/{server.token}/world-1/").status == 404
@@ -217,10 +222,10 @@ def test_a_world_file_has_a_page_of_its_own_as_soon_as_the_scenario_names_it(ser
 def test_internal_error_is_reported_and_the_server_continues(
     server: EditorServer, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def broken(_: object) -> dict[str, Any]:
+    def raise_error(_: object) -> dict[str, Any]:
         raise RuntimeError("broken")
 
-    monkeypatch.setattr(server.session, "requests", {**server.session.requests, "scene": broken})
+    monkeypatch.setattr(server.session, "requests", {**server.session.requests, "scene": raise_error})
     assert ask(server, "scene").status == 500
     assert "RuntimeError: broken" in capsys.readouterr().err
     assert ask(server, "open").status == 200

@@ -1,6 +1,6 @@
 """Tests of the data that the editor page gets about a text: objects on the map, problems, forms, and paths."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -44,37 +44,41 @@ goals: [{pose: {x: 3, y: 1}}]
 stack: {profile: advanced}
 pass: [goals_reached: {}]
 """
-MakeSession = Any
+SessionFactory = Callable[..., EditorSession]
 
 
 @pytest.fixture
-def session(tmp_path: Path) -> Iterator[MakeSession]:
-    made: list[EditorSession] = []
+def make_session(tmp_path: Path) -> Iterator[SessionFactory]:
+    """Return a function that opens a text in an editor session."""
+    sessions: list[EditorSession] = []
 
     def make(text: str = TEXT, name: str = "a.scenario.yaml", kind: str = "scenario") -> EditorSession:
         (tmp_path / name).write_text(text)
-        made.append(EditorSession(EditedFile(tmp_path / name, kind, tmp_path), _no_backend))
-        return made[-1]
+        sessions.append(EditorSession(EditedFile(tmp_path / name, kind, tmp_path), _no_backend))
+        return sessions[-1]
 
     yield make
-    for one in made:
-        one.runs.close()
+    for session in sessions:
+        session.runs.close()
 
 
 def _no_backend() -> Backend:
-    raise AssertionError("nothing runs in these tests")
+    raise AssertionError("no run starts in these tests")
 
 
-def things(session: EditorSession, text: str = TEXT) -> dict[str, Any]:
-    return {one["id"]: one for one in session.scene({"text": text})["objects"]}
+def map_objects(session: EditorSession, text: str = TEXT) -> dict[str, Any]:
+    """Return the objects on the map of a text by id, such as `goals/0`."""
+    return {item["id"]: item for item in session.scene({"text": text})["objects"]}
 
 
-def test_every_object_with_a_pose_is_on_the_map(session: MakeSession) -> None:
-    found = things(session())
-    where = {
-        name: [(handle["x"], handle["y"]) for handle in one["handles"]] for name, one in found.items() if one["handles"]
+def test_every_object_with_a_pose_is_on_the_map(make_session: SessionFactory) -> None:
+    objects = map_objects(make_session())
+    positions = {
+        name: [(handle["x"], handle["y"]) for handle in item["handles"]]
+        for name, item in objects.items()
+        if item["handles"]
     }
-    assert where == {
+    assert positions == {
         "robot": [(1, 1)],
         "goals/0": [(1, 1)],
         "goals/1": [(7, 2)],
@@ -88,152 +92,165 @@ def test_every_object_with_a_pose_is_on_the_map(session: MakeSession) -> None:
         "world/places/dock": [(1, 1)],
         "world/regions/lane": [(3, 0.5), (5, 0.5), (5, 2)],
     }
-    assert found["events/0/when/any/0/robot_in"]["region"] == "lane"
-    assert found["stack/keepout/0"]["region"] == "lane"
-    assert found["faults/0/when/robot_within"]["follows"] == "cart"
-    assert found["world/obstacles/0"]["parts"][0][0] == [0.5, 0]
-    assert found["world/objects/0/move"]["origin"] == (2, 4)
-    assert found["robot"]["handles"][0]["place"] == "dock"
-    assert all(one["editable"] for one in found.values())
-    assert found["goals/0"]["at"] == 10 and found["world/regions/lane"]["at"] == 8
+    assert objects["events/0/when/any/0/robot_in"]["region"] == "lane"
+    assert objects["stack/keepout/0"]["region"] == "lane"
+    assert objects["faults/0/when/robot_within"]["follows"] == "cart"
+    assert objects["world/obstacles/0"]["parts"][0][0] == [0.5, 0]
+    assert objects["world/objects/0/move"]["origin"] == (2, 4)
+    assert objects["robot"]["handles"][0]["place"] == "dock"
+    assert all(item["editable"] for item in objects.values())
+    assert objects["goals/0"]["at"] == 10 and objects["world/regions/lane"]["at"] == 8
 
 
-def test_a_text_with_mistakes_still_has_a_map(session: MakeSession) -> None:
-    one = session()
-    found = things(one, TEXT.replace("x: 7, y: 2", "x: seven, y: 2").replace("speed: 1 m/s", "speed: fast"))
-    assert found["goals/1"]["handles"] == [] and found["goals/0"]["handles"]
+def test_a_text_with_mistakes_still_has_a_map(make_session: SessionFactory) -> None:
+    session = make_session()
+    objects = map_objects(session, TEXT.replace("x: 7, y: 2", "x: seven, y: 2").replace("speed: 1 m/s", "speed: fast"))
+    assert objects["goals/1"]["handles"] == [] and objects["goals/0"]["handles"]
     with pytest.raises(RequestRefused, match="not a YAML mapping"):
-        one.scene({"text": "a: [1"})
+        session.scene({"text": "a: [1"})
     half_written = TEXT.replace("through: [[3, 4]], speed: 1 m/s", "keyframes: [5, [], [1, 3, 4, 0]]")
-    path = things(one, half_written)["world/objects/0/move"]
+    path = map_objects(session, half_written)["world/objects/0/move"]
     assert [handle["keys"][-1] for handle in path["handles"]] == [2]
 
 
-def test_problems_refer_to_objects_on_the_map(session: MakeSession) -> None:
-    one = session()
-    (note,) = one.problems({"text": TEXT})["problems"]
+def test_problems_refer_to_objects_on_the_map(make_session: SessionFactory) -> None:
+    session = make_session()
+    (note,) = session.problems({"text": TEXT})["problems"]
     assert (note["severity"], note["object"], note["where"]) == ("warning", "goals/0", "10:9")
-    found = one.problems({"text": TEXT.replace("x: 7, y: 2", "x: 4, y: 4")})["problems"]
-    errors = [problem for problem in found if problem["severity"] == "error"]
+    problems = session.problems({"text": TEXT.replace("x: 7, y: 2", "x: 4, y: 4")})["problems"]
+    errors = [problem for problem in problems if problem["severity"] == "error"]
     assert [(problem["code"], problem["object"], problem["where"]) for problem in errors] == [
         ("SC301", "goals/1", "10:22")
     ]
-    found = one.problems({"text": TEXT.replace("distance: 1}", "distence: 1}")})["problems"]
-    assert {problem["object"] for problem in found} == {"events/0/when/any/1/robot_within"}
-    assert one.problems({"text": "a: [1"})["problems"][0]["code"] == "SC003"
+    problems = session.problems({"text": TEXT.replace("distance: 1}", "distence: 1}")})["problems"]
+    assert {problem["object"] for problem in problems} == {"events/0/when/any/1/robot_within"}
+    assert session.problems({"text": "a: [1"})["problems"][0]["code"] == "SC003"
 
 
 @pytest.mark.parametrize("line_break", ["\r", "\x85", "\u2028", "\u2029"])
-def test_lines_of_problems_are_counted_as_in_yaml(session: MakeSession, line_break: str) -> None:
+def test_lines_of_problems_are_counted_as_in_yaml(make_session: SessionFactory, line_break: str) -> None:
     text = f"# one{line_break}# two\n" + TEXT.replace("distance: 1}", "distence: 1}")
-    found = session().problems({"text": text})["problems"]
-    assert {problem["object"] for problem in found} == {"events/0/when/any/1/robot_within"}
+    problems = make_session().problems({"text": text})["problems"]
+    assert {problem["object"] for problem in problems} == {"events/0/when/any/1/robot_within"}
 
 
-def test_the_kind_of_a_fault_or_criterion_is_not_one_of_its_modifiers(session: MakeSession) -> None:
+def test_the_kind_of_a_fault_or_criterion_is_not_one_of_its_modifiers(make_session: SessionFactory) -> None:
     text = TEXT.replace("{sensor: lidar, off: {}, ", "{for: 1 s, sensor: lidar, required: false, off: {}, ").replace(
         "for: 1 s}\n", "}\n"
     )
-    objects = things(session(), text.replace("pass: [", "pass: [{severity: warn, then: [], collisions: {max: 0}}, "))
+    objects = map_objects(
+        make_session(), text.replace("pass: [", "pass: [{severity: warn, then: [], collisions: {max: 0}}, ")
+    )
     assert (objects["faults/0"]["label"], objects["pass/0"]["label"]) == ("lidar off", "collisions")
 
 
-def test_a_form_shows_a_number_that_is_not_finite_as_text(session: MakeSession) -> None:
+def test_a_form_shows_a_number_that_is_not_finite_as_text(make_session: SessionFactory) -> None:
     text = TEXT.replace("speed: 1 m/s", "speed: 1 m/s, repeat: .nan")
-    form = session().form({"text": text, "keys": ["world", "objects", 0, "move"]})
-    assert [one["value"] for one in form["fields"] if one["key"] == "repeat"] == ["nan"]
+    form = make_session().form({"text": text, "keys": ["world", "objects", 0, "move"]})
+    assert [field["value"] for field in form["fields"] if field["key"] == "repeat"] == ["nan"]
 
 
 @pytest.mark.parametrize("keys", [None, [{}], [[1]], [-1], [None]])
-def test_a_form_needs_a_list_of_keys(session: MakeSession, keys: Any) -> None:
+def test_a_form_needs_a_list_of_keys(make_session: SessionFactory, keys: Any) -> None:
     with pytest.raises(RequestRefused, match="no list of keys"):
-        session().form({"text": TEXT, "keys": keys})
+        make_session().form({"text": TEXT, "keys": keys})
 
 
-def test_problem_is_not_assigned_to_another_object_in_the_same_line(session: MakeSession) -> None:
+def test_problem_is_not_assigned_to_another_object_in_the_same_line(make_session: SessionFactory) -> None:
     text = TEXT.replace("goals: [dock, ", "goals: [{name: first one, pose: {x: 4, y: 4.0}}, {pose: {x: 6, y: 2}}, ")
-    found = session().problems({"text": text})["problems"]
-    assert [problem["object"] for problem in found] == ["goals/0"]
+    problems = make_session().problems({"text": text})["problems"]
+    assert [problem["object"] for problem in problems] == ["goals/0"]
 
 
-def test_moving_an_object_at_a_place_writes_a_pose(session: MakeSession) -> None:
-    one = session()
+def test_moving_an_object_at_a_place_writes_a_pose(make_session: SessionFactory) -> None:
+    session = make_session()
 
     def moved(keys: list[Any], **to: float) -> str:
-        return str(one.edit({"text": TEXT, "edits": [{"op": "pose", "keys": keys, **to}]})["text"])
+        return str(session.edit({"text": TEXT, "edits": [{"op": "pose", "keys": keys, **to}]})["text"])
 
     assert moved(["robot", "pose"], x=2, y=1.5, yaw=0) == TEXT.replace(
         "pose: dock}\ngoals", "pose: {x: 2, y: 1.5}}\ngoals"
     )
     assert moved(["goals", 0, "pose"], x=2, y=3) == TEXT.replace("goals: [dock, {", "goals: [{pose: {x: 2, y: 3}}, {")
     point = {"op": "point", "keys": ["events", 0, "do", 0, "pedestrian", "goals", 0], "x": 2, "y": 3}
-    assert one.edit({"text": TEXT, "edits": [point]})["text"] == TEXT.replace("goals: [dock]}}", "goals: [[2, 3]]}}")
+    assert session.edit({"text": TEXT, "edits": [point]})["text"] == TEXT.replace(
+        "goals: [dock]}}", "goals: [[2, 3]]}}"
+    )
 
 
-def test_paths_and_clearances_are_updated_after_edits(session: MakeSession) -> None:
-    one = session()
-    before = one.preview({"text": TEXT, "edits": []})["robots"]["robot"]
-    assert [leg["length"] for leg in before["legs"]] == [0, 6.08]
-    near = one.preview({"text": TEXT, "edits": [{"op": "pose", "keys": ["goals", 1, "pose"], "x": 4, "y": 4.2}]})
-    assert near["robots"]["robot"]["legs"][1]["length"] is None
-    assert near["robots"]["robot"]["clearances"][2] < 0
-    assert one.preview({"text": TEXT + "raduis: 1\n"})["reason"].startswith("No path is shown until this is corrected")
+def test_paths_and_clearances_are_updated_after_edits(make_session: SessionFactory) -> None:
+    session = make_session()
+    preview = session.preview({"text": TEXT, "edits": []})["robots"]["robot"]
+    assert [leg["length"] for leg in preview["legs"]] == [0, 6.08]
+    near_obstacle = session.preview(
+        {"text": TEXT, "edits": [{"op": "pose", "keys": ["goals", 1, "pose"], "x": 4, "y": 4.2}]}
+    )
+    assert near_obstacle["robots"]["robot"]["legs"][1]["length"] is None
+    assert near_obstacle["robots"]["robot"]["clearances"][2] < 0
+    assert session.preview({"text": TEXT + "raduis: 1\n"})["reason"].startswith(
+        "No path is shown until this is corrected"
+    )
 
 
-def test_path_avoids_a_dragged_obstacle_at_its_new_position(session: MakeSession) -> None:
-    one = session()
+def test_path_avoids_a_dragged_obstacle_at_its_new_position(make_session: SessionFactory) -> None:
+    session = make_session()
     moved = [{"op": "pose", "keys": ["world", "obstacles", 0, "pose"], "x": 4.0, "y": 1.5}]
-    length = one.preview({"text": TEXT, "edits": moved})["robots"]["robot"]["legs"][1]["length"]
+    length = session.preview({"text": TEXT, "edits": moved})["robots"]["robot"]["legs"][1]["length"]
     assert length > 6.1
 
 
 def fields(form: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the fields of a form by key."""
     return {field["key"]: field for field in form["fields"]}
 
 
-def test_a_form_has_the_help_and_the_choices_of_the_schema(session: MakeSession) -> None:
-    one = session()
-    form = one.form({"text": TEXT, "keys": ["events", 0, "do", 0, "pedestrian"]})
+def test_a_form_has_the_help_and_the_choices_of_the_schema(make_session: SessionFactory) -> None:
+    session = make_session()
+    form = session.form({"text": TEXT, "keys": ["events", 0, "do", 0, "pedestrian"]})
     assert form["help"].startswith("Add a person who walks to goals and avoids walls")
     assert fields(form)["name"]["type"] == "text" and fields(form)["name"]["required"]
-    offered = {each["key"]: each for each in form["addable"]}
+    offered = {key_form["key"]: key_form for key_form in form["addable"]}
     assert offered["behavior"]["value"] == "regular" and "Reaction to the robot" in offered["behavior"]["help"]
-    form = one.form({"text": TEXT, "keys": ["world", "obstacles", 0]})
+    form = session.form({"text": TEXT, "keys": ["world", "obstacles", 0]})
     assert fields(form)["cylinder"]["fields"][0]["value"] == "50 cm"
     assert fields(form)["cylinder"]["fields"][0]["example"] == "1.5 m"
-    form = one.form({"text": TEXT, "keys": ["faults", 0]})
-    assert "noise" not in {each["key"] for each in form["addable"]}, "a fault has exactly one kind"
+    form = session.form({"text": TEXT, "keys": ["faults", 0]})
+    assert "noise" not in {key_form["key"] for key_form in form["addable"]}, "a fault has exactly one kind"
 
 
-def test_every_form_offers_only_keys_that_the_file_accepts(session: MakeSession) -> None:
-    one = session()
-    for thing in things(one).values():
-        form = one.form({"text": TEXT, "keys": thing["keys"]})
+def test_every_form_offers_only_keys_that_the_file_accepts(make_session: SessionFactory) -> None:
+    session = make_session()
+    for map_object in map_objects(session).values():
+        form = session.form({"text": TEXT, "keys": map_object["keys"]})
         for offered in form.get("addable", []):
-            edit = {"op": "set", "keys": [*thing["keys"], offered["key"]], "value": offered["value"]}
-            text = one.edit({"text": TEXT, "edits": [edit]})["text"]
-            codes = {problem["code"] for problem in one.problems({"text": text})["problems"]}
-            assert not codes & {"SC003", "SC011", "SC012", "SC013", "SC014", "SC015"}, (thing["id"], offered, codes)
+            edit = {"op": "set", "keys": [*map_object["keys"], offered["key"]], "value": offered["value"]}
+            text = session.edit({"text": TEXT, "edits": [edit]})["text"]
+            codes = {problem["code"] for problem in session.problems({"text": text})["problems"]}
+            assert not codes & {"SC003", "SC011", "SC012", "SC013", "SC014", "SC015"}, (
+                map_object["id"],
+                offered,
+                codes,
+            )
 
 
-def test_values_of_a_base_file_are_shown_and_can_be_overridden(session: MakeSession, tmp_path: Path) -> None:
+def test_values_of_a_base_file_are_shown_and_can_be_overridden(make_session: SessionFactory, tmp_path: Path) -> None:
     (tmp_path / "hall.base.yaml").write_text(TEXT)
-    own = "extends: hall.base.yaml\nname: mine\n"
-    one = session(own)
-    found = things(one, own)
-    assert found["robot"]["editable"] and not found["goals/1"]["editable"]
-    moved = one.edit({"text": own, "edits": [{"op": "pose", "keys": ["robot", "pose"], "x": 2, "y": 1, "yaw": 0}]})
-    assert moved["text"] == f"{own}robot: {{pose: {{x: 2, y: 1}}}}\n"
+    text = "extends: hall.base.yaml\nname: mine\n"
+    session = make_session(text)
+    objects = map_objects(session, text)
+    assert objects["robot"]["editable"] and not objects["goals/1"]["editable"]
+    moved = session.edit({"text": text, "edits": [{"op": "pose", "keys": ["robot", "pose"], "x": 2, "y": 1, "yaw": 0}]})
+    assert moved["text"] == f"{text}robot: {{pose: {{x: 2, y: 1}}}}\n"
     with pytest.raises(RequestRefused, match="not written out in this file"):
-        one.edit({"text": own, "edits": [{"op": "pose", "keys": ["goals", 1, "pose"], "x": 2, "y": 1}]})
+        session.edit({"text": text, "edits": [{"op": "pose", "keys": ["goals", 1, "pose"], "x": 2, "y": 1}]})
 
 
-def test_a_scenario_with_problems_does_not_run(session: MakeSession) -> None:
+def test_a_scenario_with_problems_does_not_run(make_session: SessionFactory) -> None:
     with pytest.raises(RequestRefused, match="inside obstacle"):
-        session().run({"text": TEXT.replace("x: 7, y: 2", "x: 4, y: 4")})
+        make_session().run({"text": TEXT.replace("x: 7, y: 2", "x: 4, y: 4")})
 
 
-def test_a_run_uses_the_stack_of_the_option_instead_of_that_of_the_text(
+def test_run_uses_the_stack_of_the_option_instead_of_the_stack_of_the_text(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "a.scenario.yaml").write_text(RUNNABLE)
@@ -250,4 +267,4 @@ def test_a_run_uses_the_stack_of_the_option_instead_of_that_of_the_text(
     monkeypatch.setattr(session.runs, "start", start)
     assert session.open({})["stack"] == "mine"
     session.run({"text": RUNNABLE})
-    assert [(one.stack, one.external_command) for one in started] == [("mine=drive", program)]
+    assert [(loaded.stack, loaded.external_command) for loaded in started] == [("mine=drive", program)]

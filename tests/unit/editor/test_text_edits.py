@@ -1,4 +1,4 @@
-"""An edit changes the text of one value and nothing else."""
+"""Tests that an edit changes only the text of one value."""
 
 import math
 from pathlib import Path
@@ -22,11 +22,12 @@ ROOT = Path(__file__).parents[3]
 SHIPPED = sorted([*ROOT.glob("scenarios/**/*.yaml"), *ROOT.glob("worlds/*.world.yaml")])
 
 
-def edited(text: str, *edits: Edit) -> str:
+def apply(text: str, *edits: Edit) -> str:
     return apply_edits(text, edits)
 
 
 def plain(text: str) -> Any:
+    """Return the YAML as simscen reads it, as dicts and lists."""
     tree, problems = parse_yaml(text, "")
     assert tree is not None and not problems
     return tree.plain
@@ -59,7 +60,7 @@ def plain(text: str) -> Any:
     ],
 )
 def test_a_value_keeps_its_notation(before: str, value: Any, after: str) -> None:
-    assert edited(before, SetValue(("x",), value)) == after
+    assert apply(before, SetValue(("x",), value)) == after
 
 
 @pytest.mark.parametrize(
@@ -74,31 +75,31 @@ def test_a_value_keeps_its_notation(before: str, value: Any, after: str) -> None
 )
 def test_long_text_keeps_its_scalar_style_if_possible(before: str, value: str, after: str) -> None:
     keys = ("d", "f") if "f:" in before else ("d",)
-    assert edited(before, SetValue(keys, value)) == after
+    assert apply(before, SetValue(keys, value)) == after
 
 
 def test_edited_alias_becomes_a_separate_value() -> None:
-    assert edited("a: &n 2.0\nb: *n\n", SetValue(("b",), 3)) == "a: &n 2.0\nb: 3\n"
+    assert apply("a: &n 2.0\nb: *n\n", SetValue(("b",), 3)) == "a: &n 2.0\nb: 3\n"
     with pytest.raises(EditRefused, match="is not written out in this file"):
-        edited("a: &n {x: 2}\nb: [*n]\n", SetValue(("b", 0, "x"), 3))
+        apply("a: &n {x: 2}\nb: [*n]\n", SetValue(("b", 0, "x"), 3))
 
 
 def test_edit_that_would_change_other_values_is_refused() -> None:
     with pytest.raises(EditRefused, match="without changing other values"):
-        edited("a: &n 2.0\nb: *n\n", SetValue(("a",), 3))
+        apply("a: &n 2.0\nb: *n\n", SetValue(("a",), 3))
 
 
 def test_new_keys_take_the_indentation_and_the_order_of_the_language() -> None:
     text = "simscen: 1\nrobot:\n    pose: {x: 1, y: 2}\n\n# criteria\npass:\n  - goals_reached: {}\n"
     order = ("simscen", "robot", "goals", "pass")
     goals = SetValue(("goals",), [{"name": "a"}], order)
-    assert edited(text, goals) == text.replace("y: 2}\n", "y: 2}\ngoals:\n  - {name: a}\n")
-    assert edited(text, SetValue(("robot", "model"), "amr")) == text.replace("y: 2}\n", "y: 2}\n    model: amr\n")
-    assert edited(text, SetValue(("robot", "pose", "yaw"), "5 deg")) == text.replace("y: 2}", "y: 2, yaw: 5 deg}")
-    assert edited(text, SetValue(("stack", "planner", "type"), "navfn")).endswith("stack: {planner: {type: navfn}}\n")
+    assert apply(text, goals) == text.replace("y: 2}\n", "y: 2}\ngoals:\n  - {name: a}\n")
+    assert apply(text, SetValue(("robot", "model"), "amr")) == text.replace("y: 2}\n", "y: 2}\n    model: amr\n")
+    assert apply(text, SetValue(("robot", "pose", "yaw"), "5 deg")) == text.replace("y: 2}", "y: 2, yaw: 5 deg}")
+    assert apply(text, SetValue(("stack", "planner", "type"), "navfn")).endswith("stack: {planner: {type: navfn}}\n")
     robots = "robots:\n  a:\n    robot: amr\n    pass: []\n"
     first_goal = SetValue(("robots", "a", "goals", "dock"), {"x": 1}, order)
-    assert edited(robots, first_goal) == robots.replace("amr\n", "amr\n    goals: {dock: {x: 1}}\n")
+    assert apply(robots, first_goal) == robots.replace("amr\n", "amr\n    goals: {dock: {x: 1}}\n")
 
 
 @pytest.mark.parametrize(
@@ -112,9 +113,9 @@ def test_new_keys_take_the_indentation_and_the_order_of_the_language() -> None:
         ("other: 1\n", "other: 1\nname: a\n"),
     ],
 )
-def test_a_key_that_the_language_puts_first_goes_before_its_successors(before: str, after: str) -> None:
+def test_new_key_is_inserted_in_the_order_of_the_language(before: str, after: str) -> None:
     keys = ("name",) if isinstance(plain(before), dict) else (0, "name")
-    assert edited(before, SetValue(keys, "a", ("simscen", "name", "robot", "pass"))) == after
+    assert apply(before, SetValue(keys, "a", ("simscen", "name", "robot", "pass"))) == after
 
 
 @pytest.mark.parametrize(
@@ -132,19 +133,19 @@ def test_a_key_that_the_language_puts_first_goes_before_its_successors(before: s
     ],
 )
 def test_a_new_item_looks_like_its_siblings(before: str, after: str) -> None:
-    assert edited(before, AddItem(("g",), 3)) == after
+    assert apply(before, AddItem(("g",), 3)) == after
 
 
 def test_an_item_is_inserted_before_an_item_with_an_anchor() -> None:
     text = "g:\n  - 1\n  - &b-c 2\n"
-    assert edited(text, AddItem(("g",), 3, 1)) == "g:\n  - 1\n  - 3\n  - &b-c 2\n"
+    assert apply(text, AddItem(("g",), 3, 1)) == "g:\n  - 1\n  - 3\n  - &b-c 2\n"
 
 
-def test_a_new_block_item_is_written_like_the_one_before() -> None:
+def test_new_block_item_has_the_style_of_the_previous_item() -> None:
     text = "goals:\n  - name: a\n    pose:\n      x: 1\n      y: 2\npass: []\n"
     goal = {"name": "b", "pose": {"x": 3, "y": 4.5}, "timeout": "5 s"}
     added = "  - name: b\n    pose:\n      x: 3\n      y: 4.5\n    timeout: 5 s\n"
-    assert edited(text, AddItem(("goals",), goal)) == text.replace("pass", f"{added}pass")
+    assert apply(text, AddItem(("goals",), goal)) == text.replace("pass", f"{added}pass")
 
 
 @pytest.mark.parametrize(
@@ -172,18 +173,19 @@ def test_a_new_block_item_is_written_like_the_one_before() -> None:
     ],
 )
 def test_removed_part_leaves_the_expected_text(before: str, keys: tuple[Key, ...], after: str) -> None:
-    assert edited(before, RemovePart(keys)) == after
+    assert apply(before, RemovePart(keys)) == after
 
 
 def _leaves(value: Any, keys: tuple[Key, ...] = ()) -> list[tuple[Key, ...]]:
+    """Return the keys that lead to each value that is neither a mapping nor a list."""
     if isinstance(value, dict):
-        return [leaf for key, one in value.items() for leaf in _leaves(one, (*keys, key))]
+        return [leaf for key, item in value.items() for leaf in _leaves(item, (*keys, key))]
     if isinstance(value, list):
-        return [leaf for index, one in enumerate(value) for leaf in _leaves(one, (*keys, index))]
+        return [leaf for index, item in enumerate(value) for leaf in _leaves(item, (*keys, index))]
     return [keys]
 
 
-def _at(value: Any, keys: tuple[Key, ...]) -> Any:
+def _value_at(value: Any, keys: tuple[Key, ...]) -> Any:
     for key in keys:
         value = value[key]
     return value
@@ -201,14 +203,14 @@ def test_any_edit_of_a_shipped_file_changes_only_its_span(data: st.DataObject) -
     source = parse_source(text)
     node = None if source is None else source_at(source, keys)
     assert node is not None
-    after = edited(text, SetValue(keys, value))
-    assert after.startswith(text[: node.start]) and after.endswith(text[node.end :])
-    assert is_same_value(_at(plain(after), keys), value)
+    edited = apply(text, SetValue(keys, value))
+    assert edited.startswith(text[: node.start]) and edited.endswith(text[node.end :])
+    assert is_same_value(_value_at(plain(edited), keys), value)
     if isinstance(value, float):
-        found = si_number(_at(plain(after), keys))
-        assert math.isclose(found, value, rel_tol=1e-9, abs_tol=2e-6)
+        edited_number = si_number(_value_at(plain(edited), keys))
+        assert math.isclose(edited_number, value, rel_tol=1e-9, abs_tol=2e-6)
     others = [leaf for leaf in _leaves(plain(text)) if leaf != keys]
-    assert all(_at(plain(after), leaf) == _at(plain(text), leaf) for leaf in others)
+    assert all(_value_at(plain(edited), leaf) == _value_at(plain(text), leaf) for leaf in others)
 
 
 @settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -217,22 +219,22 @@ def test_removing_an_added_part_restores_a_shipped_file(data: st.DataObject) -> 
     text = data.draw(st.sampled_from(SHIPPED)).read_text(encoding="utf-8")
     lists = [("goals",), ("events",), ("pass",), ("obstacles",), ("walls",), ("regions", "hall"), ("tags",)]
     keys = data.draw(st.sampled_from(lists))
-    found = plain(text)
+    items = plain(text)
     for key in keys:
-        found = found.get(key) if isinstance(found, dict) else None
-    if not isinstance(found, list):
+        items = items.get(key) if isinstance(items, dict) else None
+    if not isinstance(items, list):
         return
-    added = edited(text, AddItem(keys, {"name": "new", "pose": {"x": 1.5, "y": 2}}))
-    assert edited(added, RemovePart((*keys, len(found)))) == text
+    added = apply(text, AddItem(keys, {"name": "new", "pose": {"x": 1.5, "y": 2}}))
+    assert apply(added, RemovePart((*keys, len(items)))) == text
 
 
 @pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.name)
 def test_setting_each_value_to_itself_does_not_change_a_shipped_file(file: Path) -> None:
     text = file.read_text(encoding="utf-8")
     data = plain(text)
-    numbers = [keys for keys in _leaves(data) if isinstance(_at(data, keys), int | float)]
-    kept = [SetValue(keys, _at(data, keys)) for keys in numbers]
-    assert edited(text, *kept) == text
+    numbers = [keys for keys in _leaves(data) if isinstance(_value_at(data, keys), int | float)]
+    kept = [SetValue(keys, _value_at(data, keys)) for keys in numbers]
+    assert apply(text, *kept) == text
 
 
 @pytest.mark.parametrize("value", [10**400, math.inf, True, "1 lightyear"])
@@ -241,7 +243,7 @@ def test_values_that_are_not_finite_numbers_are_not_shown_on_the_map(value: Any)
 
 
 def test_keyframe_that_is_not_in_the_text_is_refused() -> None:
-    """Its time is unknown, so that the list cannot be written."""
+    """The time of the keyframe is unknown, so that the list cannot be written."""
     change = {"op": "keyframe", "keys": ["events", 0, "do", "move", "keyframes", 1], "x": 1, "y": 2}
     with pytest.raises(EditRefused, match="not a list in this file"):
         read_edits([change], "simscen: 1\nextends: base.scenario.yaml\n", "scenario")

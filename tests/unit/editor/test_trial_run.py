@@ -1,4 +1,4 @@
-"""A run of the editor can be watched and stopped, and leaves nothing behind."""
+"""Tests of trial runs of the editor: progress, cancellation, errors, and deleted files."""
 
 import threading
 import time
@@ -26,7 +26,7 @@ pass: [goals_reached: {}]
 
 
 class EndlessBackend:
-    """Runs that report progress for ever."""
+    """Backend whose run reports progress until it is canceled."""
 
     def __enter__(self) -> "EndlessBackend":
         return self
@@ -50,31 +50,32 @@ def loaded(tmp_path: Path) -> LoadedScenario:
     return TextChecks(EditedFile(tmp_path / "a.scenario.yaml", "scenario", tmp_path)).load(TEXT)[0]
 
 
-def until(holds: Callable[[], bool]) -> None:
+def wait_until(condition: Callable[[], bool]) -> None:
+    """Return as soon as the condition is true; fail after 10 s."""
     for _ in range(1000):
-        if holds():
+        if condition():
             return
         time.sleep(0.01)
-    raise AssertionError("it never happened")
+    raise AssertionError("the condition is still false after 10 s")
 
 
 def test_a_run_shows_its_progress_until_it_is_stopped(loaded: LoadedScenario) -> None:
     runs = TrialRuns(EndlessBackend)
     trial = runs.start(loaded)
-    until(lambda: trial.seconds > 2)
+    wait_until(lambda: trial.seconds > 2)
     assert trial.data()["state"] == "running" and trial.data()["limit"] == 60
     trial.is_canceled = True
-    until(lambda: trial.state == "canceled")
+    wait_until(lambda: trial.state == "canceled")
     assert not trial.data()["replay"]
     runs.close()
 
 
-def test_new_run_stops_the_previous_one_and_exit_deletes_their_files(loaded: LoadedScenario) -> None:
+def test_new_run_stops_the_previous_one_and_closing_deletes_all_files(loaded: LoadedScenario) -> None:
     runs = TrialRuns(EndlessBackend)
     trials: list[TrialRun] = []
     for _ in range(2):
         trials.append(runs.start(loaded))
-        until(lambda: trials[-1].seconds > 1)
+        wait_until(lambda: trials[-1].seconds > 1)
     assert trials[0].state == "canceled"
     folder = trials[0].folder.parent
     assert folder.is_dir() and folder.name.startswith("simscen-edit-")
@@ -86,7 +87,7 @@ def test_a_run_that_is_stopped_before_its_turn_starts_no_process(loaded: LoadedS
     started, is_released = [], threading.Event()
 
     class WaitingBackend(EndlessBackend):
-        def run(self, jobs: Iterable[Job], *rest: object) -> Iterator[JobUpdate]:
+        def run(self, jobs: Iterable[Job], *arguments: object) -> Iterator[JobUpdate]:
             (job,) = jobs
             started.append(job.folder.name)
             is_released.wait(10)
@@ -97,12 +98,14 @@ def test_a_run_that_is_stopped_before_its_turn_starts_no_process(loaded: LoadedS
     second = runs.start(loaded)
     second.is_canceled = True
     is_released.set()
-    until(lambda: second.state == "canceled")
+    wait_until(lambda: second.state == "canceled")
     assert started == ["1"]
     runs.close()
 
 
 class BrokenBackend(EndlessBackend):
+    """Backend that raises an error when a run starts."""
+
     def run(self, *_: object) -> Iterator[JobUpdate]:
         raise RuntimeError("broken")
 
@@ -110,7 +113,7 @@ class BrokenBackend(EndlessBackend):
 def test_an_unexpected_error_ends_the_run(loaded: LoadedScenario, capsys: pytest.CaptureFixture[str]) -> None:
     runs = TrialRuns(BrokenBackend)
     trial = runs.start(loaded)
-    until(lambda: trial.state == "error" and trial.message != "")
+    wait_until(lambda: trial.state == "error" and trial.message != "")
     assert trial.message == "internal error: RuntimeError; this is a bug in simscen"
     assert "RuntimeError: broken" in capsys.readouterr().err
     runs.close()

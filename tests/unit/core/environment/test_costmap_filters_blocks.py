@@ -1,3 +1,5 @@
+"""Tests of the rectangular blocks of equal cells of a filter mask."""
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,13 +17,13 @@ CELLS = arrays(
 @given(CELLS)
 def test_blocks_of_a_mask_contain_each_marked_cell_once(cells):
     mask = mask_blocks(OccupancyGrid(cells, 0.1, Pose2(1.0, 2.0, 0.3)))
-    given_value = np.where(cells > 0, cells, 0)
-    again = mask.grid
-    rows, columns = again.shape
-    whole = np.zeros_like(cells)
-    whole[:rows, :columns] = again.cells
-    np.testing.assert_array_equal(whole, given_value)
-    assert sum(width * height for _, _, width, height, _ in mask.blocks) == np.count_nonzero(given_value)
+    positive_cells = np.where(cells > 0, cells, 0)
+    block_grid = mask.grid
+    rows, columns = block_grid.shape
+    padded = np.zeros_like(cells)
+    padded[:rows, :columns] = block_grid.cells
+    np.testing.assert_array_equal(padded, positive_cells)
+    assert sum(width * height for _, _, width, height, _ in mask.blocks) == np.count_nonzero(positive_cells)
     assert (mask.resolution, mask.origin) == (0.1, Pose2(1.0, 2.0, 0.3))
 
 

@@ -10,8 +10,8 @@ from simscen.core.geometry.kinematics import MecanumWheels, Twist
 
 YOUBOT = MecanumWheels(radius=0.0475, half_track=0.15, half_base=0.235)
 SPEED = st.floats(-3, 3)
-PLACES = ((1, 1), (1, -1), (-1, 1), (-1, -1))
-"""Signs of x and y of the wheels, in their order."""
+WHEEL_SIGNS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
+"""Signs of the x and y coordinates of the wheels, in the order of MecanumWheels."""
 
 
 @pytest.mark.parametrize(
@@ -38,12 +38,12 @@ def test_mecanum_kinematics_match_the_published_equations():
 
 @given(SPEED, SPEED, SPEED, st.floats(0.3, 1.3))
 def test_no_roller_slips_along_its_axis(vx, vy, wz, angle):
-    """The roller on the ground lies at `angle` to the axle; along it the base moves just as the wheel's rim does."""
+    """The roller on the ground has the angle `angle` to the axle. Along its axis, base and rim have the same speed."""
     wheels = MecanumWheels(0.05, 0.2, 0.3, 1 / math.tan(angle))
-    for speed, (ahead, left) in zip(wheels.speeds(Twist(vx, vy, wz)), PLACES, strict=True):
-        over_ground = (vx - wz * left * 0.2, vy + wz * ahead * 0.3)
-        axis = (math.sin(angle), -ahead * left * math.cos(angle))
-        slip = (over_ground[0] - 0.05 * speed) * axis[0] + over_ground[1] * axis[1]
+    for speed, (sign_x, sign_y) in zip(wheels.speeds(Twist(vx, vy, wz)), WHEEL_SIGNS, strict=True):
+        ground_velocity = (vx - wz * sign_y * 0.2, vy + wz * sign_x * 0.3)
+        axis = (math.sin(angle), -sign_x * sign_y * math.cos(angle))
+        slip = (ground_velocity[0] - 0.05 * speed) * axis[0] + ground_velocity[1] * axis[1]
         assert slip == pytest.approx(0, abs=1e-9)
 
 
@@ -54,5 +54,5 @@ def test_encoder_increments_reproduce_the_motion(vx, vy, wz, angle):
 
 
 def test_inconsistent_wheel_speeds_give_no_motion():
-    """One direction of the four speeds is no motion at all: the pseudo-inverse leaves it out."""
+    """Three motions have four wheel speeds. The pseudo-inverse ignores the combination that is no motion."""
     assert YOUBOT.motion((1.0, 1.0, -1.0, -1.0)) == pytest.approx((0, 0, 0), abs=1e-12)

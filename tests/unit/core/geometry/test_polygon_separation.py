@@ -1,3 +1,5 @@
+"""Tests of convex pieces of polygons, and of the distance of moving polygons."""
+
 import math
 import tracemalloc
 
@@ -12,12 +14,12 @@ from simscen.core.environment.world_model import disc_outline
 from simscen.core.geometry.polygon_separation import convex_pieces, separation
 from simscen.core.geometry.polygons import polygon_defect
 
-L = ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))
+L_SHAPE = ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))
 RINGS = st.lists(st.tuples(st.integers(-6, 6), st.integers(-6, 6)), min_size=3, max_size=9, unique=True)
 
 
 @given(RINGS)
-def test_the_pieces_are_convex_counterclockwise_and_cover_the_ring_exactly_once(ring):
+def test_pieces_are_convex_and_counterclockwise_and_cover_the_ring_exactly_once(ring):
     if polygon_defect(ring) is not None:
         return
     pieces = [shapely.Polygon(piece) for piece in convex_pieces(ring)]
@@ -27,7 +29,7 @@ def test_the_pieces_are_convex_counterclockwise_and_cover_the_ring_exactly_once(
     assert shapely.union_all(pieces).symmetric_difference(shapely.Polygon(ring)).area == pytest.approx(0, abs=1e-9)
 
 
-def test_pentagram_is_not_convex():
+def test_polygon_that_crosses_itself_has_no_pieces():
     corners = [(math.cos(0.8 * math.pi * k), math.sin(0.8 * math.pi * k)) for k in range(5)]
     with pytest.raises(ValueError, match="crosses itself"):
         convex_pieces(corners)
@@ -37,7 +39,7 @@ def test_convex_ring_is_a_single_piece():
     angles = np.linspace(0, 2 * np.pi, 32, endpoint=False)
     ring = tuple((float(np.cos(a)), float(np.sin(a))) for a in angles)
     assert convex_pieces(ring) == [ring]
-    assert len(convex_pieces(L)) == 2
+    assert len(convex_pieces(L_SHAPE)) == 2
 
 
 def test_distances_at_many_poses_need_little_memory():

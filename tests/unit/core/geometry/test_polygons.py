@@ -1,3 +1,5 @@
+"""Tests of polygons against shapely: validity, containment, distances, and inscribed radius."""
+
 import numpy as np
 import pytest
 import shapely

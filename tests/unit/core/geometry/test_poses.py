@@ -1,3 +1,5 @@
+"""Tests of poses and angles against matrices."""
+
 import math
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Tests of the names of runs."""
+"""Tests of the names, folders, and order of runs."""
 
 from itertools import product
 
@@ -11,10 +11,10 @@ def test_run_id_has_the_variation_in_brackets_as_in_pytest() -> None:
 
 
 def test_no_two_runs_of_a_session_have_the_same_folder() -> None:
-    """Names of variations may hold dashes, dots and the names of stacks."""
-    several = [RunKey("a", 1, v, s) for v, s in product(("x", "x-b", "x.again"), ("a", "b-a", "a.again"))]
-    alone = [RunKey("a", 1, v) for v in ("x", "x-b", "again", "x.again")]
-    for keys in (several, [*alone, *(key.repetition for key in alone)]):
+    """Names of variations can contain dashes, dots, and the names of stacks."""
+    keys_with_stacks = [RunKey("a", 1, v, s) for v, s in product(("x", "x-b", "x.again"), ("a", "b-a", "a.again"))]
+    keys_without_stack = [RunKey("a", 1, v) for v in ("x", "x-b", "again", "x.again")]
+    for keys in (keys_with_stacks, [*keys_without_stack, *(key.repetition for key in keys_without_stack)]):
         assert len({key.folder for key in keys}) == len(keys)
 
 
