@@ -1,4 +1,4 @@
-"""Pages in a real browser: Chromium, driven by Playwright, with axe-core from npm.
+"""Fixtures for pages in a real browser: Chromium, Playwright, and axe-core from npm.
 
 Without Chromium, the tests are skipped; in CI with root rights, it is installed.
 """
@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
+from browser_tab import BrowserTab, Pages, TabOpener
 from editor_page import TEXT, Edit, settle
-from rig import Opened, Opener, Pages
 
 from simscen.cli.session.backends import backend_of
 from simscen.editor.document import EditedFile
@@ -30,38 +30,38 @@ FOLDER = ROOT / ".browser"
 AXE = "axe-core@4.14.1"
 NAMES = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
 POLL_INTERVAL_S = 0.02
-"""Time until a server of the editor notices that it is shut down."""
+"""Maximum time in s until an editor server notices `shutdown`."""
 NPM = ["npm", "install", "--no-audit", "--no-fund", "--no-save", "--ignore-scripts", "--fetch-retries=0"]
 
 
 @pytest.fixture(scope="session")
 def chromium() -> str:
     """Return the path of Chromium; skip the test if there is none."""
-    found = next(filter(None, map(shutil.which, NAMES)), None)
-    if found is None and os.environ.get("CI") == "true" and os.geteuid() == 0 and shutil.which("apt-get"):
-        with _locked():
+    program = next(filter(None, map(shutil.which, NAMES)), None)
+    if program is None and os.environ.get("CI") == "true" and os.geteuid() == 0 and shutil.which("apt-get"):
+        with _InstallationLock():
             if shutil.which(NAMES[0]) is None:
                 apt = ["apt-get", "-o", "DPkg::Lock::Timeout=120"]
                 subprocess.run([*apt, "update"], check=False, capture_output=True, timeout=120)
                 install = [*apt, "install", "--yes", "--no-install-recommends", "chromium"]
-                done = subprocess.run(install, check=False, capture_output=True, text=True, timeout=300)
-                if done.returncode:
-                    pytest.skip(f"Chromium cannot be installed: {(done.stderr.strip().splitlines() or ['?'])[-1]}")
-        found = shutil.which(NAMES[0])
-    if found is None:
+                installation = subprocess.run(install, check=False, capture_output=True, text=True, timeout=300)
+                if installation.returncode:
+                    pytest.skip(f"Chromium cannot be installed: {_last_line(installation.stderr)}")
+        program = shutil.which(NAMES[0])
+    if program is None:
         pytest.skip(f"there is no browser: none of {', '.join(NAMES)} is on the PATH")
-    return found
+    return program
 
 
 @pytest.fixture(scope="session")
 def browser(chromium: str) -> Iterator[Any]:
     """Start one browser for all tests of this pytest process."""
-    driver = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    with driver.sync_playwright() as playwright:
+    playwright_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with playwright_api.sync_playwright() as playwright:
         arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
-        running = playwright.chromium.launch(executable_path=chromium, args=arguments)
-        yield running
-        running.close()
+        chromium_browser = playwright.chromium.launch(executable_path=chromium, args=arguments)
+        yield chromium_browser
+        chromium_browser.close()
 
 
 @pytest.fixture(scope="session")
@@ -71,16 +71,18 @@ def pages(browser: Any) -> Pages:
 
 
 @pytest.fixture
-def open_page(pages: Pages) -> Iterator[Opener]:
-    """Return a function that opens files; at the end, check for logged errors and requests of other files."""
-    opened: list[Opened] = []
+def open_tab(pages: Pages) -> Iterator[TabOpener]:
+    """Return a function that opens files in tabs; at the end, check for logged errors and requests of other files."""
+    tabs: list[BrowserTab] = []
 
-    def open_(file: Path | str, *, size: tuple[int, int] = (1280, 800), dark: bool = False, where: str = "") -> Opened:
-        opened.append(Opened(pages, file, size, dark, where))
-        return opened[-1]
+    def open_tab(
+        file: Path | str, *, size: tuple[int, int] = (1280, 800), dark: bool = False, fragment: str = ""
+    ) -> BrowserTab:
+        tabs.append(BrowserTab(pages, file, size, dark, fragment))
+        return tabs[-1]
 
-    yield open_
-    complaints = [complaint for one in opened for complaint in one.close()]
+    yield open_tab
+    complaints = [complaint for tab in tabs for complaint in tab.close()]
     assert complaints == []
 
 
@@ -90,18 +92,22 @@ def axe() -> str:
     if shutil.which("npm") is None:
         pytest.skip("there is no npm to install axe-core with")
     script = FOLDER / "node_modules" / "axe-core" / "axe.min.js"
-    with _locked():
+    with _InstallationLock():
         stamp = FOLDER / "installed"
         if not stamp.exists() or stamp.read_text() != AXE:
             command = [*NPM, "--fetch-timeout=8000", f"--prefix={FOLDER}", AXE]
-            done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=240)
-            if done.returncode:
-                pytest.skip(f"{AXE} cannot be installed: {(done.stderr.strip().splitlines() or ['?'])[-1]}")
+            installation = subprocess.run(command, capture_output=True, text=True, check=False, timeout=240)
+            if installation.returncode:
+                pytest.skip(f"{AXE} cannot be installed: {_last_line(installation.stderr)}")
             stamp.write_text(AXE)
     return script.read_text(encoding="utf-8")
 
 
-class _locked:
+def _last_line(text: str) -> str:
+    return (text.strip().splitlines() or ["?"])[-1]
+
+
+class _InstallationLock:
     """Lock against installations by other pytest processes."""
 
     def __enter__(self) -> None:
@@ -114,21 +120,21 @@ class _locked:
 
 
 @pytest.fixture
-def edit(open_page: Opener, tmp_path: Path) -> Iterator[Edit]:
-    """Return a function that opens a file in the editor."""
+def edit(open_tab: TabOpener, tmp_path: Path) -> Iterator[Edit]:
+    """Return a function that opens a file in the editor, in a new tab."""
     servers: list[EditorServer] = []
 
-    def open_(file: Path, kind: str = "scenario", root: Path | None = None, **given: Any) -> Opened:
+    def open_file(file: Path, kind: str = "scenario", root: Path | None = None, **options: Any) -> BrowserTab:
         session = EditorSession(EditedFile(file, kind, root or file.parent), lambda: backend_of(SessionOptions()))
         server = EditorServer(session)
         servers.append(server)
         threading.Thread(target=server.serve_forever, args=(POLL_INTERVAL_S,), daemon=True).start()
-        opened = open_page(server.url, **given)
-        opened.until("document.documentElement.dataset.ready !== undefined")
-        settle(opened)
-        return opened
+        tab = open_tab(server.url, **options)
+        tab.until("document.documentElement.dataset.ready !== undefined")
+        settle(tab)
+        return tab
 
-    yield open_
+    yield open_file
     for server in servers:
         server.shutdown()
         server.server_close()
@@ -137,6 +143,7 @@ def edit(open_page: Opener, tmp_path: Path) -> Iterator[Edit]:
 
 @pytest.fixture
 def hall(tmp_path: Path) -> Path:
+    """Return the file of the scenario TEXT."""
     file = tmp_path / "hall.scenario.yaml"
     file.write_text(TEXT)
     return file

@@ -1,4 +1,4 @@
-"""Helpers of the editor tests: mouse actions, text, and the edited scenario."""
+"""Helpers of the editor tests: a scenario, mouse actions, and changes of the text."""
 
 import re
 import sys
@@ -7,7 +7,7 @@ from difflib import SequenceMatcher
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from rig import Opened
+from browser_tab import BrowserTab
 
 TEXT = """\
 simscen: 1   # the version
@@ -34,47 +34,48 @@ events:
 pass:
   - goals_reached: {}
 """
-Edit = Callable[..., Opened]
+Edit = Callable[..., BrowserTab]
 
 
-def settle(opened: Opened) -> None:
+def settle(tab: BrowserTab) -> None:
     """Wait until the page has finished all updates."""
-    opened.until(
+    tab.until(
         "!editor.keyMove && !editor.previewing && document.documentElement.dataset.checked === "
         "String(editor.history.before.length)"
     )
 
 
-def pixel(opened: Opened, x: float, y: float) -> tuple[float, float]:
+def pixel(tab: BrowserTab, x: float, y: float) -> tuple[float, float]:
     """Return the screen position of a point in the world."""
     script = (
         "([x, y]) => { const b = editor.view.canvas.getBoundingClientRect(); const [u, v] = editor.view.pixel(x, y);"
     )
-    u, v = opened.page.evaluate(script + " return [b.left + u, b.top + v]; }", [x, y])
+    u, v = tab.page.evaluate(script + " return [b.left + u, b.top + v]; }", [x, y])
     return u, v
 
 
-def drag(opened: Opened, start: tuple[float, float], end: tuple[float, float]) -> None:
+def drag(tab: BrowserTab, start: tuple[float, float], end: tuple[float, float]) -> None:
     """Drag with the mouse between two points of the world."""
-    before = opened.page.evaluate("editor.history.before.length")
-    mouse = opened.page.mouse
-    mouse.move(*pixel(opened, *start))
+    edit_count = tab.page.evaluate("editor.history.before.length")
+    mouse = tab.page.mouse
+    mouse.move(*pixel(tab, *start))
     mouse.down()
-    mouse.move(*pixel(opened, *((a + b) / 2 for a, b in zip(start, end, strict=True))))
-    mouse.move(*pixel(opened, *end))
+    mouse.move(*pixel(tab, *((a + b) / 2 for a, b in zip(start, end, strict=True))))
+    mouse.move(*pixel(tab, *end))
     mouse.up()
-    opened.until(f"editor.history.before.length > {before}")
-    settle(opened)
+    tab.until(f"editor.history.before.length > {edit_count}")
+    settle(tab)
 
 
-def text(opened: Opened) -> str:
-    shown = opened.page.input_value("#text")
-    assert shown == opened.page.evaluate("editor.text")
-    return str(shown)
+def text(tab: BrowserTab) -> str:
+    """Return the text in the editor."""
+    content = tab.page.input_value("#text")
+    assert content == tab.page.evaluate("editor.text")
+    return str(content)
 
 
-def changes(before: str, after: str) -> list[tuple[str, str]]:
+def changes(old: str, new: str) -> list[tuple[str, str]]:
     """Return pairs of old and new words where the texts differ."""
-    words = [re.findall(r"[\w.-]+|\W", one) for one in (before, after)]
+    words = [re.findall(r"[\w.-]+|\W", content) for content in (old, new)]
     steps = SequenceMatcher(None, *words, autojunk=False).get_opcodes()
-    return [("".join(words[0][a:b]), "".join(words[1][c:d])) for what, a, b, c, d in steps if what != "equal"]
+    return [("".join(words[0][a:b]), "".join(words[1][c:d])) for kind, a, b, c, d in steps if kind != "equal"]

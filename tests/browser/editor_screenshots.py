@@ -40,14 +40,14 @@ def main() -> None:
     """Open a scenario in the editor, and take a screenshot with the light theme."""
     file = ROOT / "scenarios" / "house.scenario.yaml"
     session = EditorSession(EditedFile(file, "scenario", ROOT), lambda: backend_of(SessionOptions()), TEXT)
-    with EditorServer(session) as server, browser() as running:
+    with EditorServer(session) as server, browser() as chromium:
         threading.Thread(target=server.serve_forever, daemon=True).start()
-        shown = running.new_context(viewport={"width": 1280, "height": 760}, color_scheme="light").new_page()
-        shown.goto(server.url)
-        shown.wait_for_selector("html[data-checked]", state="attached")
-        shown.get_by_role("button", name="anna at").click()
-        shown.wait_for_timeout(1000)
-        save(shown.screenshot(), IMAGES / "edit.png")
+        tab = chromium.new_context(viewport={"width": 1280, "height": 760}, color_scheme="light").new_page()
+        tab.goto(server.url)
+        tab.wait_for_selector("html[data-checked]", state="attached")
+        tab.get_by_role("button", name="anna at").click()
+        tab.wait_for_timeout(1000)
+        save(tab.screenshot(), IMAGES / "edit.png")
         server.shutdown()
         server.stop_runs()
 

@@ -1,4 +1,4 @@
-"""A log with HTML and escape sequences in every name."""
+"""Log in which each name contains HTML and escape sequences."""
 
 from simscen.core.geometry import Pose2
 from simscen.core.messages.goals import Goal
@@ -10,8 +10,8 @@ from simscen.record.log_header import LogHeader
 from simscen.record.log_reader import Log
 from simscen.testing.synthetic_trace import synthetic_trace
 
-EVIL = "</script><img src=x onerror=pwned()>\u202eevil\u2066 \x1b[31m{{data}}"
-TEXT = f'simscen: 1\nname: "{EVIL}"\n# --> ]]> <!-- <script>pwned()</script>\n'
+MARKUP = "</script><img src=x onerror=pwned()>\u202eevil\u2066 \x1b[31m{{data}}"
+TEXT = f'simscen: 1\nname: "{MARKUP}"\n# --> ]]> <!-- <script>pwned()</script>\n'
 
 
 def hostile_log() -> tuple[Log, RunResult]:
@@ -21,19 +21,19 @@ def hostile_log() -> tuple[Log, RunResult]:
             "seconds": 4,
             "truth": [[0, 0, 0], [4, 2, 0]],
             "events": [
-                [0.5, "goal.accepted", EVIL, {"x": 2.0, "y": 0.0}],
-                [1, "mark", EVIL, {"note": EVIL}],
-                [2, "object.spawned", EVIL, {"x": 1.0, "y": 1.0, "yaw": 0.0, "shape": EVIL, "size": []}],
-                [3, "fault.started", EVIL, {"entry": 0, "sensor": EVIL, "fault": EVIL}],
+                [0.5, "goal.accepted", MARKUP, {"x": 2.0, "y": 0.0}],
+                [1, "mark", MARKUP, {"note": MARKUP}],
+                [2, "object.spawned", MARKUP, {"x": 1.0, "y": 1.0, "yaw": 0.0, "shape": MARKUP, "size": []}],
+                [3, "fault.started", MARKUP, {"entry": 0, "sensor": MARKUP, "fault": MARKUP}],
             ],
-            "objects": {EVIL: [[0, 1, 1], [4, 2, 1]]},
+            "objects": {MARKUP: [[0, 1, 1], [4, 2, 1]]},
         }
     )
-    case = Case(Pose2(0, 0), (Goal(EVIL, Pose2(2, 0)),), regions={EVIL: ((0, 0), (1, 0), (1, 1))})
-    header = LogHeader(EVIL, 1, case, TEXT, facts={"stack": EVIL, "variation": EVIL})
-    finding = Finding(Status.FAIL, EVIL, EVIL, EVIL, -1.0, "m", 2.0, 480, (1.0, 0.0), (EVIL,))
-    verdicts = (Verdict(EVIL, EVIL, "fail", (finding,)),)
+    case = Case(Pose2(0, 0), (Goal(MARKUP, Pose2(2, 0)),), regions={MARKUP: ((0, 0), (1, 0), (1, 1))})
+    header = LogHeader(MARKUP, 1, case, TEXT, facts={"stack": MARKUP, "variation": MARKUP})
+    finding = Finding(Status.FAIL, MARKUP, MARKUP, MARKUP, -1.0, "m", 2.0, 480, (1.0, 0.0), (MARKUP,))
+    verdicts = (Verdict(MARKUP, MARKUP, "fail", (finding,)),)
     result = RunResult(
-        RunKey(EVIL, 1, EVIL, EVIL), EVIL, outcome_of_verdicts(verdicts), verdicts, ended=EVIL, simulated=4.0
+        RunKey(MARKUP, 1, MARKUP, MARKUP), MARKUP, outcome_of_verdicts(verdicts), verdicts, ended=MARKUP, simulated=4.0
     )
     return Log(header, trace, "", True), result

@@ -1,4 +1,4 @@
-"""What a stand-in for Nav2 reports during a drive: changes of its behavior tree, log lines, and parameters."""
+"""Invented report of Nav2 during a drive: changes of the behavior tree, log lines, and parameters."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -20,13 +20,16 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     },
     "/local_costmap/local_costmap": {"inflation_layer.inflation_radius": 0.55, "plugins": [], "rolling_window": True},
 }
-CONTROLS = ("NavigateRecovery", "NavigateWithReplanning")
-NAV2, INFO, WARNING, ERROR = "NavigateRecovery", 20, 30, 40
+ROOT_NODES = ("NavigateRecovery", "NavigateWithReplanning")
+NAV2_ROOT, INFO, WARNING, ERROR = "NavigateRecovery", 20, 30, 40
 
 
 def tree_changes(seconds: float) -> Iterator[tuple[float, str, str, str]]:
-    """Yield a tree that plans once per second, and whose controller fails at three quarters of the time."""
-    for node in CONTROLS:
+    """Yield changes of node status: time in s, node, old status, and new status.
+
+    The tree plans once per second, and its controller fails at three quarters of the time.
+    """
+    for node in ROOT_NODES:
         yield 0.1, node, "IDLE", "RUNNING"
     failure = round(0.75 * seconds, 2)
     second = 0.2
@@ -46,7 +49,7 @@ def tree_changes(seconds: float) -> Iterator[tuple[float, str, str, str]]:
 def with_nav2_report(
     log_: Log, parameters: Mapping[str, Mapping[str, Any]] = PARAMETERS, lines: tuple[tuple[int, str], ...] = ()
 ) -> Log:
-    """Return the log with what a Nav2 would have reported, and with further (severity, text) lines at its end."""
+    """Return the log with the report of Nav2, and with further lines (severity, text) at its end."""
     rate, time = log_.trace.tick_rate, Clock(log_.trace.tick_rate)
     end = log_.trace.end
     messages = [

@@ -26,33 +26,33 @@ from simscen.run.simulate import simulate
 ROOT = Path(__file__).parents[2]
 IMAGES = ROOT / "docs" / "images"
 SCENARIO = ROOT / "scenarios" / "localization" / "kidnapped.scenario.yaml"
-HARDER = {"time: 120 s": "time: 12 s", "timeout: 240 s": "timeout: 60 s", "../../worlds/": "worlds/"}
+REPLACEMENTS = {"time: 120 s": "time: 12 s", "timeout: 240 s": "timeout: 60 s", "../../worlds/": "worlds/"}
 SEEDS = range(2, 12)
 
 
 def main() -> None:
     """Run the scenario, write the replay pages, and take their screenshots."""
-    with tempfile.TemporaryDirectory() as folder, browser() as running:
+    with tempfile.TemporaryDirectory() as folder, browser() as chromium:
         failed, passed = _runs(Path(folder))
         pages = {"replay-failure": [failed], "replay-against": [failed, passed]}
         for name, logs in pages.items():
             page = Path(folder) / f"{name}.html"
-            read = [read_run(log, with_sensors=True) for log in logs]
-            write_replay(page, [(log, from_json(log.result)) for log in read])
-            _shoot(running, page, name, "#t=20" if len(logs) > 1 else "")
+            logs_ = [read_run(log, with_sensors=True) for log in logs]
+            write_replay(page, [(log, from_json(log.result)) for log in logs_])
+            _take_screenshot(chromium, page, name, "#t=20" if len(logs) > 1 else "")
 
 
 @contextmanager
 def browser() -> Iterator[Any]:
     """Start Chromium."""
-    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if found is None:
+    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if program is None:
         sys.exit("there is no Chromium to take pictures with")
     with sync_playwright() as playwright:
         arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
-        running = playwright.chromium.launch(executable_path=found, args=arguments)
-        yield running
-        running.close()
+        chromium = playwright.chromium.launch(executable_path=program, args=arguments)
+        yield chromium
+        chromium.close()
 
 
 def save(picture: "Image.Image | bytes", file: Path) -> None:
@@ -64,30 +64,30 @@ def save(picture: "Image.Image | bytes", file: Path) -> None:
 def _runs(folder: Path) -> tuple[Path, Path]:
     """Return the logs of a failed and a passed run."""
     text = SCENARIO.read_text()
-    for before, after in HARDER.items():
-        assert before in text, before
-        text = text.replace(before, after)
+    for old, new in REPLACEMENTS.items():
+        assert old in text, old
+        text = text.replace(old, new)
     shutil.copytree(ROOT / "worlds", folder / "worlds")
-    file, found = folder / "kidnapped.scenario.yaml", dict[bool, Path]()
+    file, logs = folder / "kidnapped.scenario.yaml", dict[bool, Path]()
     file.write_text(text)
     for seed in SEEDS:
         log = folder / f"{seed}.mcap"
-        found.setdefault(simulate(prepare(load_scenario(file, folder)), seed, log=log).passed, log)
-        if len(found) == 2:
-            return found[False], found[True]
-    sys.exit(f"seeds {SEEDS} all ended alike")
+        logs.setdefault(simulate(prepare(load_scenario(file, folder)), seed, log=log).passed, log)
+        if len(logs) == 2:
+            return logs[False], logs[True]
+    sys.exit(f"all of the seeds {SEEDS} passed, or all failed")
 
 
-def _shoot(browser: Any, page: Path, name: str, where: str) -> None:
+def _take_screenshot(browser: Any, page: Path, name: str, fragment: str) -> None:
     """Take a screenshot with the light theme, and of the failed run also with the dark one."""
     for scheme in ("light", "dark") if name == "replay-failure" else ("light",):
         context = browser.new_context(viewport={"width": 1280, "height": 800}, color_scheme=scheme)
-        shown = context.new_page()
-        shown.goto(page.as_uri() + where)
-        shown.wait_for_selector("html[data-ready]", state="attached")
-        shown.wait_for_timeout(300)
+        tab = context.new_page()
+        tab.goto(page.as_uri() + fragment)
+        tab.wait_for_selector("html[data-ready]", state="attached")
+        tab.wait_for_timeout(300)
         file = IMAGES / f"{name}{'-dark' if scheme == 'dark' else ''}.png"
-        save(shown.screenshot(), file)
+        save(tab.screenshot(), file)
         context.close()
 
 

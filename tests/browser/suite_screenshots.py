@@ -29,9 +29,9 @@ WIDE, NARROW = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
 
 def main() -> None:
     """Run the sessions, and take the screenshots."""
-    with tempfile.TemporaryDirectory() as folder, browser() as running:
+    with tempfile.TemporaryDirectory() as folder, browser() as chromium:
         home = Path(folder)
-        _scenarios(home)
+        _copy_scenarios(home)
         _run(home, "20260101T080000Z-1a2b")
         harder = home / "scenarios/obstacles/door_closes.scenario.yaml"
         assert TIMEOUT in harder.read_text()
@@ -46,10 +46,10 @@ def main() -> None:
             ("suite-dark", WIDE, "dark"),
             ("suite-phone", NARROW, "light"),
         ):
-            _shoot(running, last / "report.html", name, size, scheme)
+            _take_screenshot(chromium, last / "report.html", name, size, scheme)
 
 
-def _scenarios(home: Path) -> None:
+def _copy_scenarios(home: Path) -> None:
     shutil.copytree(ROOT / "worlds", home / "worlds")
     for name in SCENARIOS:
         file = home / f"scenarios/{name}.scenario.yaml"
@@ -62,12 +62,12 @@ def _run(home: Path, session: str) -> None:
     subprocess.run(command, cwd=home, check=False, stdout=subprocess.DEVNULL)
 
 
-def _shoot(running: Any, page: Path, name: str, size: dict[str, int], scheme: str) -> None:
-    context = running.new_context(viewport=size, color_scheme=scheme)
-    shown = context.new_page()
-    shown.goto(page.as_uri())
-    shown.locator(".history").evaluate("one => one.open = true")
-    save(shown.screenshot(), IMAGES / f"{name}.png")
+def _take_screenshot(chromium: Any, page: Path, name: str, size: dict[str, int], scheme: str) -> None:
+    context = chromium.new_context(viewport=size, color_scheme=scheme)
+    tab = context.new_page()
+    tab.goto(page.as_uri())
+    tab.locator(".history").evaluate("element => element.open = true")
+    save(tab.screenshot(), IMAGES / f"{name}.png")
     context.close()
 
 

@@ -10,30 +10,30 @@ from editor_page import TEXT, Edit, drag, pixel, settle, text
 
 
 def test_dragging_the_robot_changes_its_coordinates_and_keeps_their_notation(edit: Edit, hall: Path) -> None:
-    opened = edit(hall)
-    drag(opened, (1, 2), (2.5, 1.5))
-    assert text(opened) == TEXT.replace("x: 1.00 m, y: 2,", "x: 2.50 m, y: 1.5,")
+    tab = edit(hall)
+    drag(tab, (1, 2), (2.5, 1.5))
+    assert text(tab) == TEXT.replace("x: 1.00 m, y: 2,", "x: 2.50 m, y: 1.5,")
 
 
 def test_dragging_a_goal_and_an_obstacle(edit: Edit, hall: Path) -> None:
-    opened = edit(hall)
-    drag(opened, (7.5, 2.2), (7.0, 1.2))
-    drag(opened, (4.5, 4), (5.5, 3.5))
-    wanted = TEXT.replace("{x: 7.5, y: 2.2}", "{x: 7.0, y: 1.2}").replace("{x: 4.5, y: 4}", "{x: 5.5, y: 3.5}")
-    assert text(opened) == wanted
+    tab = edit(hall)
+    drag(tab, (7.5, 2.2), (7.0, 1.2))
+    drag(tab, (4.5, 4), (5.5, 3.5))
+    expected = TEXT.replace("{x: 7.5, y: 2.2}", "{x: 7.0, y: 1.2}").replace("{x: 4.5, y: 4}", "{x: 5.5, y: 3.5}")
+    assert text(tab) == expected
 
 
 def test_dragging_a_corner_of_a_region_a_door_a_person_and_their_path(edit: Edit, hall: Path) -> None:
-    opened = edit(hall)
-    drag(opened, (5, 2), (5.5, 2.5))
-    drag(opened, (6.5, 0), (6.5, 0.5))
-    drag(opened, (8, 4), (8.5, 3.5))
-    drag(opened, (2, 4.5), (2.5, 4))
-    shown = text(opened)
-    assert "[[3, 0.5], [5, 0.5], [5.5, 2.5], [3, 2]]" in shown
-    assert "points: [[6, 0.5], [7, 0.5]]" in shown
-    assert "pose: {x: 8.5, y: 3.5}, goals: [[6, 4.5], [2.5, 4.0]]" in shown
-    assert "# a comment that must survive" in shown
+    tab = edit(hall)
+    drag(tab, (5, 2), (5.5, 2.5))
+    drag(tab, (6.5, 0), (6.5, 0.5))
+    drag(tab, (8, 4), (8.5, 3.5))
+    drag(tab, (2, 4.5), (2.5, 4))
+    content = text(tab)
+    assert "[[3, 0.5], [5, 0.5], [5.5, 2.5], [3, 2]]" in content
+    assert "points: [[6, 0.5], [7, 0.5]]" in content
+    assert "pose: {x: 8.5, y: 3.5}, goals: [[6, 4.5], [2.5, 4.0]]" in content
+    assert "# a comment that must survive" in content
 
 
 EVERYTHING = """\
@@ -100,79 +100,77 @@ def test_all_kinds_of_objects_can_be_dragged(
 ) -> None:
     file = tmp_path / "a.scenario.yaml"
     file.write_text(EVERYTHING)
-    opened = edit(file)
-    drag(opened, start, end)
-    assert text(opened) == EVERYTHING.replace(before, after, 1)
+    tab = edit(file)
+    drag(tab, start, end)
+    assert text(tab) == EVERYTHING.replace(before, after, 1)
 
 
 def test_dragging_a_trigger_and_its_radius(edit: Edit, hall: Path) -> None:
-    opened = edit(hall)
-    drag(opened, (6, 3), (5.5, 2.5))
-    drag(opened, (7.0, 2.5), (6.5, 2.5))
-    assert "robot_within: {of: [5.5, 2.5], distance: 1.0 m}" in text(opened)
+    tab = edit(hall)
+    drag(tab, (6, 3), (5.5, 2.5))
+    drag(tab, (7.0, 2.5), (6.5, 2.5))
+    assert "robot_within: {of: [5.5, 2.5], distance: 1.0 m}" in text(tab)
 
 
 def test_dragging_a_region_as_a_whole_moves_all_its_corners(edit: Edit, hall: Path) -> None:
-    opened = edit(hall)
-    drag(opened, (4, 1.2), (4.5, 1.7))
-    assert "regions: {lane: [[3.5, 1.0], [5.5, 1.0], [5.5, 2.5], [3.5, 2.5]]}" in text(opened)
+    tab = edit(hall)
+    drag(tab, (4, 1.2), (4.5, 1.7))
+    assert "regions: {lane: [[3.5, 1.0], [5.5, 1.0], [5.5, 2.5], [3.5, 2.5]]}" in text(tab)
 
 
 def test_turning_the_robot_writes_degrees(edit: Edit, hall: Path) -> None:
-    opened = edit(hall)
-    opened.page.evaluate("editor.select('robot')")
-    settle(opened)
-    knob = opened.page.evaluate("editor.view.turnKnob(editor.object)")
-    drag(opened, tuple(knob), (1, 3))
-    assert text(opened) == TEXT.replace("yaw: 0 deg", "yaw: 90 deg")
+    tab = edit(hall)
+    tab.page.evaluate("editor.select('robot')")
+    settle(tab)
+    knob = tab.page.evaluate("editor.view.turnKnob(editor.object)")
+    drag(tab, tuple(knob), (1, 3))
+    assert text(tab) == TEXT.replace("yaw: 0 deg", "yaw: 90 deg")
 
 
 def test_arrow_keys_move_the_selected_object_and_undo_goes_back(edit: Edit, hall: Path) -> None:
-    opened = edit(hall)
-    opened.page.get_by_role("button", name="goal shelf").focus()
-    opened.page.keyboard.press("Enter")
+    tab = edit(hall)
+    tab.page.get_by_role("button", name="goal shelf").focus()
+    tab.page.keyboard.press("Enter")
     for key in ("ArrowLeft", "ArrowLeft", "ArrowUp", "Control+ArrowUp"):
-        opened.page.keyboard.press(key)
-    opened.until("editor.history.before.length === 1 && !editor.keyMove")
-    settle(opened)
-    assert text(opened) == TEXT.replace("{x: 7.5, y: 2.2}", "{x: 7.3, y: 2.31}")
-    opened.page.keyboard.press("Control+z")
-    opened.until("editor.history.before.length === 0")
-    settle(opened)
-    assert text(opened) == TEXT
-    opened.page.keyboard.press("Control+y")
-    settle(opened)
-    assert "{x: 7.3, y: 2.31}" in text(opened)
+        tab.page.keyboard.press(key)
+    tab.until("editor.history.before.length === 1 && !editor.keyMove")
+    settle(tab)
+    assert text(tab) == TEXT.replace("{x: 7.5, y: 2.2}", "{x: 7.3, y: 2.31}")
+    tab.page.keyboard.press("Control+z")
+    tab.until("editor.history.before.length === 0")
+    settle(tab)
+    assert text(tab) == TEXT
+    tab.page.keyboard.press("Control+y")
+    settle(tab)
+    assert "{x: 7.3, y: 2.31}" in text(tab)
 
 
 def test_the_shortest_path_and_the_clearance_follow_while_dragging(edit: Edit, hall: Path) -> None:
-    opened = edit(hall)
-    opened.page.evaluate("editor.select('goals/0')")
-    settle(opened)
-    assert "shortest path 6.50 m" in opened.page.inner_text("#facts")
-    opened.page.mouse.move(*pixel(opened, 7.5, 2.2))
-    opened.page.mouse.down()
-    opened.page.mouse.move(*pixel(opened, 5, 2))
-    opened.until("document.getElementById('facts').textContent.includes('4.00 m')")
-    assert text(opened) == TEXT
-    opened.page.keyboard.press("Escape")
-    opened.page.mouse.up()
-    settle(opened)
-    assert text(opened) == TEXT
+    tab = edit(hall)
+    tab.page.evaluate("editor.select('goals/0')")
+    settle(tab)
+    assert "shortest path 6.50 m" in tab.page.inner_text("#facts")
+    tab.page.mouse.move(*pixel(tab, 7.5, 2.2))
+    tab.page.mouse.down()
+    tab.page.mouse.move(*pixel(tab, 5, 2))
+    tab.until("document.getElementById('facts').textContent.includes('4.00 m')")
+    assert text(tab) == TEXT
+    tab.page.keyboard.press("Escape")
+    tab.page.mouse.up()
+    settle(tab)
+    assert text(tab) == TEXT
 
 
 def test_fast_arrow_keys_add_up(edit: Edit, hall: Path) -> None:
-    opened = edit(hall)
-    opened.page.get_by_role("button", name="goal shelf").click()
+    tab = edit(hall)
+    tab.page.get_by_role("button", name="goal shelf").click()
     for count in range(12):
-        opened.page.keyboard.press("ArrowLeft")
-        opened.page.wait_for_timeout(count * 20)
-    opened.page.get_by_role("button", name="rack at").click()
-    opened.page.keyboard.press("ArrowLeft")
-    opened.page.keyboard.press("Control+z")
-    opened.page.keyboard.press("Control+y")
-    opened.until("!editor.keyMove && editor.text.includes('x: 4.4')")
-    settle(opened)
-    assert text(opened) == TEXT.replace("{x: 7.5, y: 2.2}", "{x: 6.3, y: 2.2}").replace(
-        "x: 4.5, y: 4}", "x: 4.4, y: 4}"
-    )
+        tab.page.keyboard.press("ArrowLeft")
+        tab.page.wait_for_timeout(count * 20)
+    tab.page.get_by_role("button", name="rack at").click()
+    tab.page.keyboard.press("ArrowLeft")
+    tab.page.keyboard.press("Control+z")
+    tab.page.keyboard.press("Control+y")
+    tab.until("!editor.keyMove && editor.text.includes('x: 4.4')")
+    settle(tab)
+    assert text(tab) == TEXT.replace("{x: 7.5, y: 2.2}", "{x: 6.3, y: 2.2}").replace("x: 4.5, y: 4}", "x: 4.4, y: 4}")

@@ -19,16 +19,19 @@ SCENARIO = ROOT / "scenarios" / "corner_cases" / "goal_blocked_for_good.scenario
 
 def main() -> None:
     """Run a shipped scenario, reconstruct it from its log, run that, and take the screenshot of the page."""
-    with tempfile.TemporaryDirectory(dir=ROOT / "scenarios") as folder, browser() as running:
-        log, again, page = (Path(folder) / name for name in ("run.mcap", "again.mcap", "page.html"))
+    with tempfile.TemporaryDirectory(dir=ROOT / "scenarios") as folder, browser() as chromium:
+        log, repeated_log, page = (Path(folder) / name for name in ("run.mcap", "again.mcap", "page.html"))
         simulate(prepare(load_scenario(SCENARIO, ROOT)), log=log)
-        made = scenario_from_log(log, Path(folder) / "goal_blocked.scenario.yaml", ReconstructionOptions(root=ROOT))
-        simulate(prepare(load_scenario(made.file, ROOT)), log=again)
-        verified = compare_with_run(made, again)
-        page.write_text(verification_page("goal blocked", made.static_world, made.contents.estimated.objects, verified))
-        shown = running.new_context(viewport={"width": 1100, "height": 930}, color_scheme="light").new_page()
-        shown.goto(page.as_uri())
-        save(shown.screenshot(), IMAGES / "verified.png")
+        reconstruction = scenario_from_log(
+            log, Path(folder) / "goal_blocked.scenario.yaml", ReconstructionOptions(root=ROOT)
+        )
+        simulate(prepare(load_scenario(reconstruction.file, ROOT)), log=repeated_log)
+        comparison = compare_with_run(reconstruction, repeated_log)
+        objects = reconstruction.contents.estimated.objects
+        page.write_text(verification_page("goal blocked", reconstruction.static_world, objects, comparison))
+        tab = chromium.new_context(viewport={"width": 1100, "height": 930}, color_scheme="light").new_page()
+        tab.goto(page.as_uri())
+        save(tab.screenshot(), IMAGES / "verified.png")
 
 
 if __name__ == "__main__":

@@ -56,24 +56,27 @@ def project(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def run(project: Path):
+    """Return a function that runs pytest in the project, and returns its exit code and output."""
+
     def call(*arguments: str, folder: str = ".") -> tuple[int, str]:
         plugin = ("-p", "no:simscen", "-p", "simscen.testing.plugin", "--strict-markers", "--color=no")
-        done = subprocess.run(
+        result = subprocess.run(
             [sys.executable, "-m", "pytest", *plugin, *arguments],
             cwd=project / folder, capture_output=True, text=True, check=False,
         )  # fmt: skip
-        return done.returncode, done.stdout + done.stderr
+        return result.returncode, result.stdout + result.stderr
 
     return call
 
 
-def collected(output: str) -> list[str]:
+def collected_items(output: str) -> list[str]:
+    """Return the ids of the items in the output of `--collect-only -q`."""
     return [line for line in output.splitlines() if "::" in line]
 
 
 def test_without_configuration_nothing_is_collected(run, project: Path) -> None:
     code, output = run("--collect-only", "-q")
-    assert (code, collected(output)) == (0, ["test_own.py::test_own"])
+    assert (code, collected_items(output)) == (0, ["test_own.py::test_own"])
     assert not (project / "simscen-out").exists()
 
 
@@ -94,19 +97,19 @@ def test_scenarios_are_collected_only_in_the_configured_folders(run, project: Pa
     paths = ("scenarios", "other", "test_own.py", "named.scenario.yaml")
     code, output = run("--collect-only", "-q", "-k", "good or elsewhere or named or test_own", *paths)
     assert code == 0, output
-    assert sorted(collected(output)) == [
+    assert sorted(collected_items(output)) == [
         "named.scenario.yaml::named", "scenarios/good.scenario.yaml::good", "test_own.py::test_own"
     ]  # fmt: skip
 
 
-def test_runs_are_items_with_name_and_tags_and_invalid_files_are_errors_with_line_and_hint(run, project: Path) -> None:
+def test_runs_are_items_with_their_tags_as_markers_and_invalid_files_are_errors(run, project: Path) -> None:
     (project / "scenarios/wrong.scenario.yaml").write_text(ROOM.replace("goals", "gaols"))
     (project / "scenarios/private.scenario.yaml").write_text(ROOM.replace("[smoke]", "[_private]"))
     code, output = run("--simscen", "--collect-only", "-q", "scenarios", "--simscen-repeat", "2", "-m", "smoke")
     assert code == 2, output
-    assert "_private" not in output, "pytest has no markers with an underscore; the tag is none"
+    assert "_private" not in output, "a tag that starts with an underscore is not a marker"
     assert "wrong.scenario.yaml:5:1: error[SC012]" in output and "Traceback" not in output
-    names = [line.partition("::")[2] for line in collected(output)]
+    names = [line.partition("::")[2] for line in collected_items(output)]
     assert names == [
         "good (seed 1)", "good (seed 2)", "held (seed 1)", "held (seed 2)", "later (seed 1)", "later (seed 2)",
         "speeds[time_limit=0.1s] (seed 1)", "speeds[time_limit=0.1s] (seed 2)",
@@ -126,12 +129,14 @@ def test_items_pass_fail_skip_and_xfail_with_the_messages_of_simscen(run, projec
     picture = re.search(r"^picture   (logs/\S+-pytest/runs/scenarios/bad/seed-1/map.png)$", output, re.MULTILINE)
     assert picture and (project / picture[1]).is_file()
     assert re.search(r"^FAILED scenarios/bad.scenario.yaml::bad - clearance: 0", output, re.MULTILINE)
-    assert "FAILED scenarios/held.scenario.yaml::held" in output  # strict, as for `simscen run`
+    assert (
+        "FAILED scenarios/held.scenario.yaml::held" in output
+    )  # an expected failure that passes fails, as for `simscen run`
     cases = {case.get("name"): case for case in ElementTree.parse(project / "junit.xml").iter("testcase")}
     failure = cases["bad"].find("failure")
     assert failure is not None and str(failure.get("message")).startswith("clearance: 0.")
     assert cases["known"].find("skipped").get("message") == "too near to the wall"  # type: ignore[union-attr]
-    assert {one.get("name") for one in cases["good"].iter("property")} >= {"seed", "log", "again"}
+    assert {item.get("name") for item in cases["good"].iter("property")} >= {"seed", "log", "again"}
 
 
 @pytest.mark.slow
@@ -142,7 +147,7 @@ def test_xdist_workers_share_one_output_folder_and_last_failed_is_known(run, pro
     assert re.search(r"^clearance: 0\.\d\d m < 2.00 m, at t = ", output, re.MULTILINE)
     assert len(list((project / "simscen-out").iterdir())) == 1
     _, output = run("--simscen", "-p", "no:xdist", "scenarios", "--lf", "--collect-only", "-q")
-    assert collected(output) == ["scenarios/bad.scenario.yaml::bad"]
+    assert collected_items(output) == ["scenarios/bad.scenario.yaml::bad"]
 
 
 @pytest.mark.slow
@@ -167,7 +172,7 @@ def test_seed_and_number_of_seeds_are_at_least_1(run, option: str) -> None:
     assert f"argument {option}: '0' is not a whole number of at least 1" in output
 
 
-def test_fixture_runs_a_scenario_with_a_world_in_a_configured_folder_and_reports_why_it_failed(
+def test_fixture_runs_scenarios_with_the_configured_world_path_and_reports_the_reason_of_a_failure(
     run, project: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     worlds = tmp_path_factory.mktemp("worlds")

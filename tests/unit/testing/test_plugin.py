@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-OWN = """
+OWN_COMPONENT = """
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
@@ -53,15 +53,16 @@ class Unannotated:
 
 @pytest.fixture
 def run(tmp_path: Path):
-    (tmp_path / "own.py").write_text(OWN)
+    """Return a function that runs pytest in a folder with the module `own` and a test, and returns code and output."""
+    (tmp_path / "own.py").write_text(OWN_COMPONENT)
     (tmp_path / "test_project.py").write_text("def test_project():\n    pass\n")
 
     def call(*arguments: str, probe: str = "pass") -> tuple[int, str]:
         code = f"import sys, pytest; sys.path.insert(0, '.'); code = pytest.main(sys.argv[1:]); {probe}; sys.exit(code)"
         plugin = ("-p", "no:simscen", "-p", "simscen.testing.plugin", "-p", "no:cacheprovider")
-        done = subprocess.run([sys.executable, "-c", code, *plugin, *arguments],
+        result = subprocess.run([sys.executable, "-c", code, *plugin, *arguments],
                               cwd=tmp_path, capture_output=True, text=True, check=False)  # fmt: skip
-        return done.returncode, done.stdout + done.stderr
+        return result.returncode, result.stdout + result.stderr
 
     return call
 
@@ -136,12 +137,12 @@ print(json.dumps(outputs))
 def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, str]]:
     """Return exit code and output for each invalid argument, from one process that runs pytest for all of them."""
     folder = tmp_path_factory.mktemp("results")
-    (folder / "own.py").write_text(OWN)
+    (folder / "own.py").write_text(OWN_COMPONENT)
     arguments = [f"--simscen-contract={target}" for target in INVALID_TARGETS]
     arguments += [f"--simscen-contract-limit={limit}" for limit in INVALID_LIMITS]
     command = [sys.executable, "-c", RUN_EACH_ARGUMENT, *arguments]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
-    outputs: dict[str, tuple[int, str]] = json.loads(done.stdout)
+    result = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
+    outputs: dict[str, tuple[int, str]] = json.loads(result.stdout)
     return outputs
 
 
@@ -165,6 +166,6 @@ def test_pytest_without_a_contract_imports_only_the_plug_in_of_simscen(run) -> N
     probe = "print('loaded', *sorted(m for m in sys.modules if m.startswith('simscen') or m in ('numpy', 'pydantic')))"
     code, output = run("-q", "-p", "no:xdist", probe=probe)
     assert code == 0, output
-    loaded = output.splitlines()[-1].split()[1:]
-    light = ["core", "core.version", "pytesting", "pytesting.plugin", "testing", "testing.plugin"]
-    assert loaded == ["simscen", *(f"simscen.{name}" for name in light)]
+    imported = output.splitlines()[-1].split()[1:]
+    modules = ["core", "core.version", "pytesting", "pytesting.plugin", "testing", "testing.plugin"]
+    assert imported == ["simscen", *(f"simscen.{name}" for name in modules)]

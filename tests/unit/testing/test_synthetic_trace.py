@@ -1,3 +1,5 @@
+"""Test of plans in synthetic traces."""
+
 from simscen.testing.synthetic_trace import synthetic_trace
 
 

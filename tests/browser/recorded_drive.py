@@ -1,4 +1,4 @@
-"""A short run with events, faults, and a failed criterion, for tests of pages."""
+"""Short run with events, a fault, and a failed criterion, for tests of pages."""
 
 from pathlib import Path
 
@@ -35,7 +35,7 @@ pass:
 """
 
 
-def drive(folder: Path, seed: int = 1) -> Path:
+def record_drive(folder: Path, seed: int = 1) -> Path:
     """Run the scenario, and return its log."""
     from simscen.loading.scenario import load_scenario
     from simscen.run.preparation import prepare

@@ -1,23 +1,23 @@
-"""Pages that are open in a browser, and their errors and requests."""
+"""Tabs of a browser, with a check for logged errors and for requests of other files."""
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-Opener = Callable[..., "Opened"]
+TabOpener = Callable[..., "BrowserTab"]
 TIMEOUT_MS = 30_000
-"""Time in ms until a page counts as hanging."""
-GRAVE = ("serious", "critical")
+"""Maximum time in ms for a condition of the page to become true."""
+SEVERE_IMPACTS = ("serious", "critical")
 
 
 class Pages:
-    """Blank pages in browser contexts of their own. A page of a file is used again, because new ones are expensive."""
+    """Blank pages, each in a separate browser context. Pages of files are reused, because new pages take long."""
 
     def __init__(self, browser: Any) -> None:
         self._browser = browser
         self._blank: list[Any] = []
 
-    def take(self, size: tuple[int, int], scheme: str) -> Any:
+    def open(self, size: tuple[int, int], scheme: str) -> Any:
         """Return a blank page."""
         viewport = {"width": size[0], "height": size[1]}
         if not self._blank:
@@ -29,7 +29,7 @@ class Pages:
         page.emulate_media(color_scheme=scheme)
         return page
 
-    def give_back(self, page: Any) -> None:
+    def release(self, page: Any) -> None:
         """Keep the page of a file, which stores nothing. Close the page of a server, which may have unsaved edits."""
         if not page.url.startswith("file:"):
             page.context.close()
@@ -38,11 +38,14 @@ class Pages:
         self._blank.append(page)
 
 
-class Opened:
-    """A page from a file or local server; `page` is the page object of Playwright."""
+class BrowserTab:
+    """Tab with a page from a file or a local server.
 
-    def __init__(self, pages: Pages, file: Path | str, size: tuple[int, int], dark: bool, where: str) -> None:
-        self._pages, self.page = pages, pages.take(size, "dark" if dark else "light")
+    page: page object of Playwright
+    """
+
+    def __init__(self, pages: Pages, file: Path | str, size: tuple[int, int], dark: bool, fragment: str) -> None:
+        self._pages, self.page = pages, pages.open(size, "dark" if dark else "light")
         self._complaints: list[str] = []
         self._uri = file if isinstance(file, str) else file.resolve().as_uri()
         self._listeners = {
@@ -53,10 +56,10 @@ class Opened:
         }
         for event, listener in self._listeners.items():
             self.page.on(event, listener)
-        self.page.goto(self._uri + where)
+        self.page.goto(self._uri + fragment)
 
     def until(self, condition: str) -> None:
-        """Wait until an expression is true. Playwright's wait needs `eval`, which the page's policy forbids."""
+        """Wait until an expression is true. Playwright's wait would need `eval`, which the page forbids."""
         from playwright.sync_api import Error  # tests are skipped without Playwright
 
         for _ in range(TIMEOUT_MS // 20):
@@ -64,30 +67,30 @@ class Opened:
                 if self.page.evaluate(condition):
                     return
             except Error as error:
-                if "context was destroyed" not in str(error):  # the page reloads itself
+                if "context was destroyed" not in str(error):  # the page has reloaded
                     raise
             self.page.wait_for_timeout(20)
         raise AssertionError(f"never true: {condition}")
 
-    def grave_findings(self, axe: str) -> list[str]:
+    def severe_findings(self, axe: str) -> list[str]:
         """Return the serious and critical findings of axe-core: rule, element, and summary."""
-        self.page.evaluate(axe)  # injected by the driver, so that the page's policy is not changed
-        found = self.page.evaluate("axe.run(document, {resultTypes: ['violations']})")
+        self.page.evaluate(axe)  # Playwright can evaluate it without a change of the content security policy
+        results = self.page.evaluate("axe.run(document, {resultTypes: ['violations']})")
         return [
-            f"{one['id']}: {node['target']} {node['failureSummary']}"
-            for one in found["violations"]
-            if one["impact"] in GRAVE
-            for node in one["nodes"]
+            f"{violation['id']}: {node['target']} {node['failureSummary']}"
+            for violation in results["violations"]
+            if violation["impact"] in SEVERE_IMPACTS
+            for node in violation["nodes"]
         ]
 
-    def forgive(self, prefix: str) -> None:
-        """Remove the complaints with this prefix, of which there must be one, for a test that causes them."""
+    def ignore_complaints(self, prefix: str) -> None:
+        """Ignore complaints that the test itself causes; at least one complaint must have the prefix."""
         assert any(complaint.startswith(prefix) for complaint in self._complaints)
         self._complaints = [complaint for complaint in self._complaints if not complaint.startswith(prefix)]
 
     def close(self) -> list[str]:
         """Close the page, and return its errors, warnings, dialogs, and requests of other files."""
-        self._pages.give_back(self.page)
+        self._pages.release(self.page)
         for event, listener in self._listeners.items():
             self.page.remove_listener(event, listener)
         return self._complaints

@@ -1,4 +1,4 @@
-"""yaml-language-server over stdio, spoken to as an editor does (Language Server Protocol 3.17)."""
+"""Client of yaml-language-server over stdio (Language Server Protocol 3.17)."""
 
 import itertools
 import json
@@ -8,8 +8,8 @@ from pathlib import Path
 from queue import Empty, Queue
 from typing import Any, NamedTuple
 
-PATIENCE = 60.0
-"""Seconds until a server that says nothing is taken for dead: no measure of its speed."""
+TIMEOUT_S = 60.0
+"""Maximum time in s until the next message of the server."""
 SETTINGS = {
     "yaml": {"schemaStore": {"enable": False}, "validate": True, "completion": True, "hover": True},
     "redhat": {"telemetry": {"enabled": False}},
@@ -17,7 +17,7 @@ SETTINGS = {
 
 
 class Diagnostic(NamedTuple):
-    """What an editor underlines: line and columns from 0, and what it says."""
+    """Text that an editor underlines: line, first and last column from 0, and message."""
 
     line: int
     begin: int
@@ -26,15 +26,15 @@ class Diagnostic(NamedTuple):
 
 
 class LanguageServer:
-    """One process, with the folder of the project as its workspace."""
+    """Server process with the folder of the project as its workspace."""
 
     def __init__(self, command: list[str], root: Path) -> None:
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-        self._numbers, self._told = itertools.count(1), Queue[dict[str, Any]]()
+        self._numbers, self._messages = itertools.count(1), Queue[dict[str, Any]]()
         self._answers: dict[int, Any] = {}
-        self._found: dict[str, list[Diagnostic]] = {}
-        threading.Thread(target=self._listen, daemon=True).start()
-        self._root, self._open = root, set[str]()
+        self._diagnostics: dict[str, list[Diagnostic]] = {}
+        threading.Thread(target=self._read_messages, daemon=True).start()
+        self._root, self._open_uris = root, set[str]()
         capabilities = {
             "workspace": {"configuration": True},
             "textDocument": {
@@ -47,30 +47,30 @@ class LanguageServer:
         self._send({"method": "workspace/didChangeConfiguration", "params": {"settings": SETTINGS}})
 
     def open(self, name: str, text: str) -> str:
-        """Show it a file of the project, which need not be there, for the first time; its address."""
+        """Open a file with a text, and return its URI. The file need not exist."""
         uri = (self._root / name).as_uri()
-        assert uri not in self._open
-        self._open.add(uri)
+        assert uri not in self._open_uris
+        self._open_uris.add(uri)
         document = {"uri": uri, "languageId": "yaml", "version": 1, "text": text}
         self._send({"method": "textDocument/didOpen", "params": {"textDocument": document}})
         return uri
 
     def diagnostics(self, uri: str) -> list[Diagnostic]:
-        """What it finds wrong with an open file, in the order of the lines."""
-        while uri not in self._found:
-            self._take()
-        return sorted(self._found[uri])
+        """Return the diagnostics of an open file, in the order of the lines."""
+        while uri not in self._diagnostics:
+            self._handle_next_message()
+        return sorted(self._diagnostics[uri])
 
     def completions(self, uri: str, line: int, column: int) -> dict[str, dict[str, Any]]:
-        """What it offers there, by label."""
-        offered = self._at("completion", uri, line, column) or []
-        items = offered["items"] if isinstance(offered, dict) else offered
+        """Return the completions at a position, by label."""
+        result = self._ask_at("completion", uri, line, column) or []
+        items = result["items"] if isinstance(result, dict) else result
         return {str(item["label"]): item for item in items}
 
     def hover(self, uri: str, line: int, column: int) -> str:
-        """What it shows for what stands there."""
-        shown = self._at("hover", uri, line, column)
-        contents = shown["contents"] if shown else ""
+        """Return the hover text at a position."""
+        result = self._ask_at("hover", uri, line, column)
+        contents = result["contents"] if result else ""
         return contents["value"] if isinstance(contents, dict) else str(contents)
 
     def ask(self, method: str, params: dict[str, Any]) -> Any:
@@ -78,28 +78,28 @@ class LanguageServer:
         number = next(self._numbers)
         self._send({"id": number, "method": method, "params": params})
         while number not in self._answers:
-            self._take()
+            self._handle_next_message()
         return self._answers.pop(number)
 
     def close(self) -> None:
         """End the process."""
         self.ask("shutdown", {})
         self._process.terminate()
-        self._process.wait(PATIENCE)
+        self._process.wait(TIMEOUT_S)
 
-    def _at(self, what: str, uri: str, line: int, column: int) -> Any:
+    def _ask_at(self, request: str, uri: str, line: int, column: int) -> Any:
         position = {"line": line, "character": column}
-        return self.ask(f"textDocument/{what}", {"textDocument": {"uri": uri}, "position": position})
+        return self.ask(f"textDocument/{request}", {"textDocument": {"uri": uri}, "position": position})
 
-    def _take(self) -> None:
-        """Deal with the next message."""
+    def _handle_next_message(self) -> None:
+        """Wait for the next message; store or answer it."""
         try:
-            message = self._told.get(timeout=PATIENCE)
+            message = self._messages.get(timeout=TIMEOUT_S)
         except Empty:
-            raise TimeoutError("yaml-language-server says nothing") from None
+            raise TimeoutError("yaml-language-server does not answer") from None
         match message:
-            case {"method": "textDocument/publishDiagnostics", "params": {"uri": uri, "diagnostics": found}}:
-                self._found[uri] = [_diagnostic(one) for one in found]
+            case {"method": "textDocument/publishDiagnostics", "params": {"uri": uri, "diagnostics": diagnostics}}:
+                self._diagnostics[uri] = [_diagnostic(item) for item in diagnostics]
             case {"method": "workspace/configuration", "id": number, "params": {"items": items}}:
                 self._send({"id": number, "result": [SETTINGS.get(item.get("section", ""), {}) for item in items]})
             case {"method": _, "id": number}:
@@ -115,16 +115,16 @@ class LanguageServer:
         self._process.stdin.write(b"Content-Length: %d\r\n\r\n%s" % (len(body), body))
         self._process.stdin.flush()
 
-    def _listen(self) -> None:
+    def _read_messages(self) -> None:
         assert self._process.stdout is not None
         while header := self._process.stdout.readline():
             length = int(header.partition(b":")[2])
             while self._process.stdout.readline().strip():
                 pass
-            self._told.put(json.loads(self._process.stdout.read(length)))
+            self._messages.put(json.loads(self._process.stdout.read(length)))
 
 
-def _diagnostic(expected: dict[str, Any]) -> Diagnostic:
-    begin, end = expected["range"]["start"], expected["range"]["end"]
+def _diagnostic(item: dict[str, Any]) -> Diagnostic:
+    begin, end = item["range"]["start"], item["range"]["end"]
     column = end["character"] if end["line"] == begin["line"] else -1
-    return Diagnostic(begin["line"], begin["character"], column, expected["message"])
+    return Diagnostic(begin["line"], begin["character"], column, item["message"])
