@@ -1,4 +1,7 @@
-"""Fixtures: a session with one run of each outcome, whose texts contain markup and control characters."""
+"""Fixtures: finished runs, and a session with a passed, a failed, and a crashed run.
+
+The texts of the crashed run contain markup, control characters, and commands of CI systems.
+"""
 
 from dataclasses import replace
 
@@ -20,6 +23,7 @@ PATH = "scenarios/faults/lidar_off.scenario.yaml"
 
 @pytest.fixture
 def passed():
+    """Return a run that passed."""
     finding = Finding(Status.PASS, "path_length", "9.86 m", "≤ 10.00 m", 0.14, "m", 9.86, 4320, (1.0, 2.0))
     return RunFinished(
         RunResult(
@@ -38,6 +42,7 @@ def passed():
 
 @pytest.fixture
 def failed():
+    """Return a run with a violated criterion and a warning."""
     late = Finding(
         status=Status.FAIL,
         what="stopped_within",
@@ -72,6 +77,7 @@ def failed():
 
 @pytest.fixture
 def crashed():
+    """Return a run whose worker crashed, with hostile texts."""
     tail = "::error::owned\n##[error]x\n\x1b[31mred\x1b[0m ]]> <script>&\nSegmentation fault"
     return RunFinished(
         RunResult(
@@ -87,11 +93,13 @@ def crashed():
 
 @pytest.fixture
 def skipped(passed):
+    """Return a skipped run."""
     return replace(passed, result=replace(passed.result, outcome=Outcome.SKIPPED, verdicts=(), lines=()))
 
 
 @pytest.fixture
 def session(passed, failed, crashed):
+    """Return the events of a session of three runs."""
     return [
         SessionStarted("0.1.0", 3, 3, 2, "out", ("evil/[red]::error::x", "faults/lidar_off", "navigation/goal")),
         RunStarted(passed.key, passed.result.path, 60.0),

@@ -40,7 +40,7 @@ EXPECTED = """\
 
 @pytest.fixture
 def comparison() -> Comparison:
-    """Two scenarios with two stacks."""
+    """Return a comparison of two stacks in two scenarios."""
     return Comparison(
         {"ref": "reference", "mine": "./nav '<b>'"},
         {
@@ -60,12 +60,12 @@ def test_console_output_snapshot(comparison) -> None:
 
 
 def test_tables_fit_into_the_columns_of_a_terminal_and_use_a_wider_one(comparison) -> None:
-    long = {"a" * 90 + "/one": comparison.outcomes["navigation/goal"]}
+    outcomes = {"a" * 90 + "/one": comparison.outcomes["navigation/goal"]}
     for columns in (80, 200):
-        text = lines(Comparison(comparison.stacks, long, comparison.baseline_comparisons), columns)
+        text = lines(Comparison(comparison.stacks, outcomes, comparison.baseline_comparisons), columns)
         tables = [line for line in text if "worse " not in line]
         assert max(map(len, tables)) <= columns
-        assert (next(iter(long)) in "\n".join(text)) == (columns == 200)
+        assert (next(iter(outcomes)) in "\n".join(text)) == (columns == 200)
 
 
 def test_long_name_is_shortened_in_the_middle() -> None:
@@ -74,17 +74,17 @@ def test_long_name_is_shortened_in_the_middle() -> None:
 
 
 def test_first_changed_outcomes_are_listed_and_the_rest_counted(comparison) -> None:
-    many = BaselineComparison("mine", 30, 0, 0, 0, (FLIP,) * 25, 0.0, ())
-    text = lines(Comparison(comparison.stacks, comparison.outcomes, (many,)))
-    assert sum("worse " in line for line in text) == 11  # ten, and the heading
+    many_flips = BaselineComparison("mine", 30, 0, 0, 0, (FLIP,) * 25, 0.0, ())
+    text = lines(Comparison(comparison.stacks, comparison.outcomes, (many_flips,)))
+    assert sum("worse " in line for line in text) == 11  # ten, and the row of the table
     assert "    and 15 more, in the JSON results" in text
 
 
 def test_comparison_is_before_the_last_line_of_piped_output(comparison) -> None:
     out = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
-    with text_reporter(out) as listen:
-        listen(SessionStarted("0.1.0", 20, 2, 1, ids=("a/b", "a/c"), stacks=("ref=reference", "mine=./nav")))
-        listen(SessionFinished(1, 0, 0, 10.0, 1.0, comparison=comparison))
+    with text_reporter(out) as listener:
+        listener(SessionStarted("0.1.0", 20, 2, 1, ids=("a/b", "a/c"), stacks=("ref=reference", "mine=./nav")))
+        listener(SessionFinished(1, 0, 0, 10.0, 1.0, comparison=comparison))
     out.seek(0)
     text = out.read()
     assert text.startswith("simscen 0.1.0 - 2 scenarios - 2 stacks - 20 runs - 1 worker\n")
@@ -119,32 +119,35 @@ def test_comparison_in_results_json(comparison, passed) -> None:
 
 
 @pytest.mark.parametrize(
-    ("against", "conclusion"),
+    ("baseline_comparison", "conclusion"),
     [
         (BaselineComparison("candidate", 0, 5, 0, 0, (), 1.0, ()), "nothing was compared: 5 pairs with an error"),
         (BaselineComparison("candidate", 4, 1, 0, 0, (), 1.0, ()), "candidate is not significantly worse in 4 pairs"),
     ],
 )
-def test_comparison_with_crashed_runs_is_not_good(against, conclusion) -> None:
-    outcomes = {"baseline": OutcomeCounts(5), "candidate": OutcomeCounts(against.pairs, 0, against.error_pairs)}
-    sessions = Comparison({"baseline": "a", "candidate": "b"}, {"goal": outcomes}, (against,))
-    *_, last = session_comparison_lines(sessions, {}, is_worse=False)
-    assert plain_text(last) == conclusion
-    assert last[0].role == "warning"
+def test_comparison_with_crashed_runs_is_not_good(baseline_comparison, conclusion) -> None:
+    outcomes = {
+        "baseline": OutcomeCounts(5),
+        "candidate": OutcomeCounts(baseline_comparison.pairs, 0, baseline_comparison.error_pairs),
+    }
+    sessions = Comparison({"baseline": "a", "candidate": "b"}, {"goal": outcomes}, (baseline_comparison,))
+    *_, conclusion_line = session_comparison_lines(sessions, {}, is_worse=False)
+    assert plain_text(conclusion_line) == conclusion
+    assert conclusion_line[0].role == "warning"
     markdown = session_comparison_markdown(sessions, {}, is_worse=False)
     assert markdown[0] == f"### simscen: {conclusion}"
 
 
 def test_markdown_without_differences_has_no_empty_table() -> None:
-    against = BaselineComparison("candidate", 4, 0, 0, 0, (), 1.0, ())
+    baseline_comparison = BaselineComparison("candidate", 4, 0, 0, 0, (), 1.0, ())
     outcomes = {"baseline": OutcomeCounts(4), "candidate": OutcomeCounts(4)}
-    sessions = Comparison({"baseline": "a", "candidate": "b"}, {"goal": outcomes}, (against,))
+    sessions = Comparison({"baseline": "a", "candidate": "b"}, {"goal": outcomes}, (baseline_comparison,))
     markdown = session_comparison_markdown(sessions, {}, is_worse=False)
     assert not [line for line in markdown if "interval |" in line]
 
 
 def test_small_numbers_have_one_more_digit() -> None:
-    near = MetricDifference("min_clearance", "m", 6, 0.0716, 0.0309, -0.0407, (-0.0512, -0.0298), 6, 0, 0, 0.03)
-    assert difference_cells(near)[1:5] == ("0.072", "0.031", "-0.041", "-0.051 … -0.030")
+    clearance = MetricDifference("min_clearance", "m", 6, 0.0716, 0.0309, -0.0407, (-0.0512, -0.0298), 6, 0, 0, 0.03)
+    assert difference_cells(clearance)[1:5] == ("0.072", "0.031", "-0.041", "-0.051 … -0.030")
     assert difference_cells(TIME)[1:5] == ("25.34", "28.23", "+2.89", "+0.78 … +4.95")
     assert difference_cells(REPLANS)[1] == "3.00"

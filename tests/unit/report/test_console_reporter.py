@@ -1,3 +1,5 @@
+"""Tests of the console reporters: text, colors, GitHub, and JSON."""
+
 import io
 import json
 import re
@@ -49,33 +51,34 @@ page: out/report.html
 """
 
 
-def of(run, **changes):
-    """The run with another result."""
+def with_result(run, **changes):
+    """Return the run with other values in its result."""
     return replace(run, result=replace(run.result, **changes))
 
 
 def test_common_folder_of_the_ids_is_omitted(passed):
     out = io.StringIO()
-    one, other = (of(passed, key=RunKey(f"scenarios/{name}", 1)) for name in ("faults/a", "fancy/long"))
+    first, second = (with_result(passed, key=RunKey(f"scenarios/{name}", 1)) for name in ("faults/a", "fancy/long"))
     ids = ("scenarios/fancy/long", "scenarios/faults/a")
-    expected(text_reporter(utf8(out)), [SessionStarted("0.1.0", 2, 2, 1, ids=ids), one, other])
+    send(text_reporter(Utf8Stream(out)), [SessionStarted("0.1.0", 2, 2, 1, ids=ids), first, second])
     assert re.findall(r"✓ (\S+ *) ", out.getvalue()) == ["faults/a    ", "fancy/long  "]
 
 
-def expected(reporter, session):
-    with reporter as listen:
+def send(reporter, session):
+    """Send the events of a session to a reporter."""
+    with reporter as listener:
         for event in session:
-            listen(event)
+            listener(event)
 
 
 def test_piped_output_snapshot(session):
     out = io.StringIO()
-    expected(text_reporter(utf8(out)), session)
+    send(text_reporter(Utf8Stream(out)), session)
     assert out.getvalue() == EXPECTED
 
 
-class utf8:
-    """A stream that says it is UTF-8, which StringIO does not."""
+class Utf8Stream:
+    """Text stream with the encoding UTF-8; StringIO has no encoding."""
 
     encoding = "utf-8"
 
@@ -95,7 +98,7 @@ class utf8:
 def test_ascii_stream_gets_ascii_symbols(session):
     raw = io.BytesIO()
     out = io.TextIOWrapper(raw, encoding="ascii")
-    expected(text_reporter(out), session)
+    send(text_reporter(out), session)
     out.flush()
     text = raw.getvalue().decode("ascii")
     assert "  + navigation/goal" in text
@@ -109,14 +112,14 @@ def test_ascii_terminal_gets_plain_lines(session):
 
     raw = io.BytesIO()
     out = Terminal(raw, encoding="ascii")
-    expected(text_reporter(out), session)
+    send(text_reporter(out), session)
     out.flush()
     assert b"\x1b" not in raw.getvalue()
 
 
 def test_terminal_output_is_colored_and_user_text_is_not_markup(session):
     out = io.StringIO()
-    expected(text_reporter(out, live=True), session)
+    send(text_reporter(out, live=True), session)
     plain = re.sub(r"\x1b(\[[0-9;?]*[a-zA-Z]|\]8;.*?\x1b\\)", "", out.getvalue())
     for line in EXPECTED.splitlines():
         if "##" not in line:
@@ -125,19 +128,21 @@ def test_terminal_output_is_colored_and_user_text_is_not_markup(session):
 
 def test_runs_of_one_scenario_show_their_seeds(passed):
     out = io.StringIO()
-    other = of(passed, key=RunKey("navigation/goal", 2))
-    expected(text_reporter(utf8(out)), [SessionStarted("0.1.0", 2, 1, 1, seeds=2), passed, other])
+    second = with_result(passed, key=RunKey("navigation/goal", 2))
+    send(text_reporter(Utf8Stream(out)), [SessionStarted("0.1.0", 2, 1, 1, seeds=2), passed, second])
     assert "1 scenario · 2 runs · 1 worker\n" in out.getvalue()
     assert "navigation/goal (seed 1) " in out.getvalue()
     assert "navigation/goal (seed 2) " in out.getvalue()
 
 
 def test_plain_output_contains_no_ci_commands(session, failed):
-    sly = replace(of(failed, key=RunKey("::set-output name=x::y", 1)), again="::stop-commands::x\n##[group]x")
-    named = replace(failed.result.verdicts[0], id="::error::y", criterion="::error::y")
-    sly = of(sly, verdicts=(named,), lines=(1,))
+    evil_run = replace(
+        with_result(failed, key=RunKey("::set-output name=x::y", 1)), again="::stop-commands::x\n##[group]x"
+    )
+    evil_verdict = replace(failed.result.verdicts[0], id="::error::y", criterion="::error::y")
+    evil_run = with_result(evil_run, verdicts=(evil_verdict,), lines=(1,))
     out = io.StringIO()
-    expected(text_reporter(utf8(out)), [*session, sly])
+    send(text_reporter(Utf8Stream(out)), [*session, evil_run])
     assert not re.search(r"^\s*::|##\[", out.getvalue(), re.MULTILINE)
 
 
@@ -149,8 +154,8 @@ def test_github_annotations_have_the_line_of_the_criterion_and_are_escaped(faile
         "%0Adrove 0.31 m blind at 0.37 m/s; the newest scan was 0.9 s old"
     )
     assert warning.startswith("::warning file=scenarios/faults/lidar_off.scenario.yaml,line=28,")
-    sly = of(crashed, error=replace(crashed.result.error, message="100 %, a:b\r\n::warning::x"))
-    (line,) = annotations(sly)
+    evil_run = with_result(crashed, error=replace(crashed.result.error, message="100 %, a:b\r\n::warning::x"))
+    (line,) = annotations(evil_run)
     assert "\n" not in line
     assert "file=scenarios/evil/[red]%3A%3Aerror%3A%3Ax.scenario.yaml,line=1," in line
     assert "100 %25, a:b" in line
@@ -176,40 +181,40 @@ def test_github_summary_lists_failures_first_and_is_escaped(session, passed, cra
     rows = summary.splitlines()[4:]
     assert "crashed: SIGSEGV" in rows[0]
     assert "navigation/goal" in rows[1]
-    evil = of(passed, key=RunKey("<script>|*x*[a](b)@me#1", 1))
-    (row,) = summary_markdown([evil], session[-1]).splitlines()[4:5]
+    evil_run = with_result(passed, key=RunKey("<script>|*x*[a](b)@me#1", 1))
+    (row,) = summary_markdown([evil_run], session[-1]).splitlines()[4:5]
     assert not re.search(r"<script|\*x\*|\[a\]|@me", row)
     assert row.count("|") == 5
 
 
 def test_github_summary_stays_below_the_size_limit_of_github(session, failed):
     violations = failed.result.verdicts * 100
-    runs = [of(failed, key=RunKey("a/b", seed), verdicts=violations, lines=()) for seed in range(1, 400)]
+    runs = [with_result(failed, key=RunKey("a/b", seed), verdicts=violations, lines=()) for seed in range(1, 400)]
     summary = summary_markdown(runs, session[-1])
     assert len(summary.encode()) < 2**20
-    listed = sum(line.startswith("| ❌") for line in summary.splitlines())
-    assert f"and {len(runs) - listed} more" in summary
+    row_count = sum(line.startswith("| ❌") for line in summary.splitlines())
+    assert f"and {len(runs) - row_count} more" in summary
 
 
-def test_in_the_summary_every_criterion_has_its_own_line(session, failed):
+def test_every_criterion_has_its_own_line_in_the_github_summary(session, failed):
     (row,) = summary_markdown([failed], session[-1]).splitlines()[4:5]
-    stopped, fast = row.rsplit("|", 2)[1].split("<br>")
-    assert stopped.startswith(" stopped&#95;within: 0.84 s &#62; 0.50 s") and fast.startswith("speed: 0.60 m/s")
+    stopping, speeding = row.rsplit("|", 2)[1].split("<br>")
+    assert stopping.startswith(" stopped&#95;within: 0.84 s &#62; 0.50 s") and speeding.startswith("speed: 0.60 m/s")
 
 
 def test_summary_shows_pictures_of_failures_that_have_a_url(session, passed, failed):
-    here = replace(failed, artifacts=replace(failed.artifacts, picture="out/runs/a b)/seed-7/map.png"))
-    expected = summary_markdown([passed, here], session[-1], "https://example.org/raw/pictures/1/")
-    assert expected.endswith(
+    with_picture = replace(failed, artifacts=replace(failed.artifacts, picture="out/runs/a b)/seed-7/map.png"))
+    summary = summary_markdown([passed, with_picture], session[-1], "https://example.org/raw/pictures/1/")
+    assert summary.endswith(
         "**faults/lidar&#95;off (seed 7)**\n\n"
         "![map of the run](https://example.org/raw/pictures/1/runs/a%20b%29/seed-7/map.png)\n\n"
     )
-    assert "![" not in summary_markdown([passed, here], session[-1])
+    assert "![" not in summary_markdown([passed, with_picture], session[-1])
 
 
 def test_github_output_contains_the_plain_lines(session):
     out, summary = io.StringIO(), io.StringIO()
-    expected(GitHubReporter(utf8(out), summary), session)
+    send(GitHubReporter(Utf8Stream(out), summary), session)
     lines = [line for line in out.getvalue().splitlines() if not line.startswith("::")]
     assert "\n".join(lines) + "\n" == EXPECTED
     assert summary.getvalue().startswith("### simscen: 1 passed, 1 failed, 1 error\n")
@@ -217,7 +222,7 @@ def test_github_output_contains_the_plain_lines(session):
 
 def test_json_format_is_the_results_file(session, passed, failed, crashed):
     out = io.StringIO()
-    expected(JsonReporter(out), session)
+    send(JsonReporter(out), session)
     assert json.loads(out.getvalue()) == json.loads("".join(json_parts([passed, failed, crashed], "out")))
     assert "##[" not in out.getvalue()
 
@@ -225,18 +230,18 @@ def test_json_format_is_the_results_file(session, passed, failed, crashed):
 @pytest.mark.parametrize("live", [True, False])
 def test_aborted_session_restores_the_terminal(session, live):
     out = io.StringIO()
-    with pytest.raises(KeyboardInterrupt), text_reporter(out, live=live) as listen:
-        listen(session[0])
-        listen(session[1])
+    with pytest.raises(KeyboardInterrupt), text_reporter(out, live=live) as listener:
+        listener(session[0])
+        listener(session[1])
         raise KeyboardInterrupt
-    hidden, shown = out.getvalue().count("\x1b[?25l"), out.getvalue().count("\x1b[?25h")
-    assert hidden == shown
+    hide_count, show_count = out.getvalue().count("\x1b[?25l"), out.getvalue().count("\x1b[?25h")
+    assert hide_count == show_count
 
 
 def test_repeat_command_is_one_quoted_shell_line(failed):
     words = ["simscen", "run", "a.yaml", "--stack", "x=sh -c 'echo  two;\n\techo \"it'\"'\"'s\"'"]
     out = io.StringIO()
-    expected(text_reporter(utf8(out)), [replace(failed, again=shlex.join(words))])
+    send(text_reporter(Utf8Stream(out)), [replace(failed, again=shlex.join(words))])
     (line,) = [line for line in out.getvalue().splitlines() if line.startswith("      again")]
     shell = ["bash", "-c", f"printf '%s\\0' {line.removeprefix('      again     ')}"]
     assert subprocess.run(shell, capture_output=True, text=True, check=True).stdout.split("\0")[:-1] == words

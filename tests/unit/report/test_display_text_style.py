@@ -1,4 +1,4 @@
-"""Detection of color and live display."""
+"""Tests of the detection of colors and live display."""
 
 import io
 
@@ -8,20 +8,22 @@ from simscen.report.display_text import TerminalStyle, detect_style
 
 
 class Stream(io.StringIO):
-    def __init__(self, terminal, encoding="utf-8"):
+    """Text stream that is a terminal or not, with an encoding."""
+
+    def __init__(self, is_terminal, encoding="utf-8"):
         super().__init__()
-        self._terminal, self._encoding = terminal, encoding
+        self._is_terminal, self._encoding = is_terminal, encoding
 
     @property
     def encoding(self):
         return self._encoding
 
     def isatty(self):
-        return self._terminal
+        return self._is_terminal
 
 
 @pytest.mark.parametrize(
-    ("terminal", "environ", "look"),
+    ("is_terminal", "environ", "style"),
     [
         (True, {}, TerminalStyle(has_color=True, has_live_progress=True, is_terminal=True)),
         (False, {}, TerminalStyle(has_color=False, has_live_progress=False, is_terminal=False)),
@@ -45,8 +47,8 @@ class Stream(io.StringIO):
     ],
     ids=str,
 )
-def test_environment_variables_override_the_terminal(terminal, environ, look):
-    assert detect_style(Stream(terminal), environ) == look
+def test_environment_variables_override_the_terminal(is_terminal, environ, style):
+    assert detect_style(Stream(is_terminal), environ) == style
 
 
 def test_ascii_stream_gets_no_escape_sequences():

@@ -18,19 +18,20 @@ RUN = (
 )
 
 
-def texts(line, columns):
+def wrapped_lines(line, columns):
+    """Return the plain text of a line that is wrapped at a width."""
     return [plain_text(part) for part in wrap_line(line, columns)]
 
 
 def test_column_is_wrapped_as_a_whole():
-    assert texts(RUN, 80) == [
+    assert wrapped_lines(RUN, 80) == [
         "  ✓ navigation/goal   18.2 s simulated in 0.21 s",
         "    tightest: path_length +0.14 m, 1 % of its limit",
     ]
 
 
 def test_long_column_is_wrapped_between_words():
-    assert texts(RUN, 40) == [
+    assert wrapped_lines(RUN, 40) == [
         "  ✓ navigation/goal",
         "    18.2 s simulated in 0.21 s",
         "    tightest: path_length +0.14 m, 1 %",
@@ -40,13 +41,15 @@ def test_long_column_is_wrapped_between_words():
 
 def test_text_after_a_label_has_a_hanging_indent():
     line = (StyledText("      happened  ", "quiet"), StyledText("the pallet falls: t = 10.00 s, it fell"))
-    assert texts(line, 42) == ["      happened  the pallet falls: t =", "              10.00 s, it fell"]
+    assert wrapped_lines(line, 42) == ["      happened  the pallet falls: t =", "              10.00 s, it fell"]
 
 
 @pytest.mark.parametrize("columns", [40, 60, 80])
 def test_wrapped_command_can_be_copied(columns):
     words = ["simscen", "run", "a b.yaml", "--stack", "mine=./my_nav --verbose", "--world-path", "worlds", "--lenient"]
-    lines = texts((StyledText("      again     ", "quiet"), StyledText(shlex.join(words), is_shell=True)), columns)
+    lines = wrapped_lines(
+        (StyledText("      again     ", "quiet"), StyledText(shlex.join(words), is_shell=True)), columns
+    )
     assert len(lines) > 1
     assert all(len(line) <= columns for line in lines)
     text = "\n".join(lines).replace("again", "", 1).strip()
@@ -57,8 +60,8 @@ def test_wrapped_command_can_be_copied(columns):
 def test_long_path_is_not_broken():
     path = "simscen-out/20261122T074142Z-09d4/runs/scenarios/faults/lidar_off/seed-1/map.png"
     line = (StyledText("      picture   ", "quiet"), StyledText(path, file=path))
-    assert texts(line, 40)[-1] == path
-    assert texts(line, len(path) + 2) == ["      picture", f"  {path}"]
+    assert wrapped_lines(line, 40)[-1] == path
+    assert wrapped_lines(line, len(path) + 2) == ["      picture", f"  {path}"]
 
 
 def test_wrapping_breaks_only_at_spaces():
@@ -68,7 +71,7 @@ def test_wrapping_breaks_only_at_spaces():
         StyledText("1 failed", "bad"),
         StyledText(" · and a good deal more"),
     )
-    assert all(not text.lstrip().startswith(",") for n in range(9, 40) for text in texts(line, n))
+    assert all(not text.lstrip().startswith(",") for columns in range(9, 40) for text in wrapped_lines(line, columns))
 
 
 def test_lines_are_not_wrapped_without_a_terminal():
@@ -82,7 +85,7 @@ TEXTS = st.text(st.characters(codec="utf-8", exclude_categories=("C", "Zl", "Zp"
 @example(["  ", "", " a ", "b"], 20)
 def test_wrapping_keeps_all_words_in_order_within_the_width(parts, columns):
     line = tuple(StyledText(part) for part in parts)
-    lines = texts(line, columns)
+    lines = wrapped_lines(line, columns)
     assert "".join("".join(lines).split()) == "".join(plain_text(line).split())
     for text in lines:
         assert display_width(text) <= columns or len(text.split()) == 1

@@ -1,4 +1,4 @@
-"""Tests of junit.xml with other readers."""
+"""Tests of junit.xml with junitparser and the schema of Jenkins."""
 
 import io
 import re
@@ -25,36 +25,36 @@ JENKINS = {  # attributes that Jenkins' junit-10.xsd allows
 }
 
 
-def of(run, **changes):
-    """The run with another result."""
+def with_result(run, **changes):
+    """Return the run with other values in its result."""
     return replace(run, result=replace(run.result, **changes))
 
 
-def read(runs, **options):
+def read_junit(runs, **options):
     return junitparser.JUnitXml.fromstring(b"".join(xml_parts(runs, **options)))
 
 
-def cases(document):
+def cases_by_name(document):
     return {case.name: case for suite in document for case in suite}
 
 
 def test_junitparser_reads_one_case_for_each_run(passed, failed, crashed):
-    document = read([failed, crashed, passed])
+    document = read_junit([failed, crashed, passed])
     assert (document.tests, document.failures, document.errors) == (3, 1, 1)
     assert [suite.name for suite in document] == sorted(run.result.path for run in (passed, failed, crashed))
-    found = cases(document)
-    assert found["goal [seed 1]"].is_passed
-    assert found["goal [seed 1]"].classname == "navigation.goal"
-    assert found["lidar_off [seed 7]"].result[0].type == "stopped_within"
+    cases = cases_by_name(document)
+    assert cases["goal [seed 1]"].is_passed
+    assert cases["goal [seed 1]"].classname == "navigation.goal"
+    assert cases["lidar_off [seed 7]"].result[0].type == "stopped_within"
 
 
 def test_junitparser_reads_known_failures_and_unrun_cases_as_skipped(passed, failed):
-    known = of(failed, outcome=Outcome.FAILED_AS_EXPECTED, reason="NAV-1")
-    skipped = of(passed, outcome=Outcome.SKIPPED, verdicts=(), lines=(), reason="NAV-2")
-    document = read([known, skipped])
+    known_failure = with_result(failed, outcome=Outcome.FAILED_AS_EXPECTED, reason="NAV-1")
+    skipped = with_result(passed, outcome=Outcome.SKIPPED, verdicts=(), lines=(), reason="NAV-2")
+    document = read_junit([known_failure, skipped])
     assert (document.failures, document.errors) == (0, 0)
     assert [suite.skipped for suite in document] == [1, 1]
-    messages = {case.result[0].message for case in cases(document).values()}
+    messages = {case.result[0].message for case in cases_by_name(document).values()}
     assert messages == {
         "failed as expected: NAV-1 (stopped_within: 0.84 s > 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41))",
         "NAV-2",
@@ -72,14 +72,14 @@ def test_failure_has_position_and_reason_of_each_criterion(failed):
     ]
 
 
-def test_file_line_properties_and_attachments_are_there(failed):
+def test_testcase_has_file_line_properties_and_attachments(failed):
     (case,) = ElementTree.fromstring(b"".join(xml_parts([failed]))).iter("testcase")
     properties = {entry.get("name"): entry.get("value") for entry in case.iter("property")}
     assert case.get("file") == failed.result.path
-    called_elsewhere = replace(failed, file="../scenarios/lidar_off.scenario.yaml")
-    suite = ElementTree.fromstring(b"".join(xml_parts([called_elsewhere])))[0]
-    assert (suite.get("name"), suite[0].get("file")) == (called_elsewhere.file,) * 2
-    assert case.get("line") == "27", "where the first failed criterion is written"
+    with_other_path = replace(failed, file="../scenarios/lidar_off.scenario.yaml")
+    suite = ElementTree.fromstring(b"".join(xml_parts([with_other_path])))[0]
+    assert (suite.get("name"), suite[0].get("file")) == (with_other_path.file,) * 2
+    assert case.get("line") == "27", "the line of the first failed criterion"
     assert case.get("time") == "0.350"
     assert properties["simulated_seconds"] == "31.000"
     assert properties["margin.stopped_within"] == "-0.34 s"
@@ -93,9 +93,11 @@ def test_file_line_properties_and_attachments_are_there(failed):
 
 
 def test_strict_family_conforms_to_the_jenkins_schema(passed, failed, crashed):
-    known = of(failed, outcome=Outcome.FAILED_AS_EXPECTED, reason="NAV-1")
-    skipped = of(passed, outcome=Outcome.SKIPPED, verdicts=(), lines=(), reason="NAV-2")
-    root = ElementTree.fromstring(b"".join(xml_parts([passed, failed, crashed, known, skipped], family="xunit2")))
+    known_failure = with_result(failed, outcome=Outcome.FAILED_AS_EXPECTED, reason="NAV-1")
+    skipped = with_result(passed, outcome=Outcome.SKIPPED, verdicts=(), lines=(), reason="NAV-2")
+    root = ElementTree.fromstring(
+        b"".join(xml_parts([passed, failed, crashed, known_failure, skipped], family="xunit2"))
+    )
     for element in root.iter():
         assert set(element.keys()) <= JENKINS[element.tag]
         if (seconds := element.get("time")) is not None:
@@ -106,15 +108,15 @@ def test_strict_family_conforms_to_the_jenkins_schema(passed, failed, crashed):
     "kind", ["crashed", "timeout", "out-of-memory", "invalid", "interrupted", "not-run", "internal"]
 )
 def test_aborted_run_is_an_error_with_its_kind(crashed, kind):
-    run = of(crashed, error=RunFailure(kind, "why", "worker's last words"))
+    run = with_result(crashed, error=RunFailure(kind, "why", "output of the worker"))
     (element,) = ElementTree.fromstring(b"".join(xml_parts([run]))).iter("error")
     assert element.get("type") == kind
-    assert "worker's last words" in element.text
+    assert "output of the worker" in element.text
 
 
-def test_names_are_unique_even_when_runs_are_not(passed):
-    document = read([passed, passed, passed])
-    assert len(cases(document)) == 3
+def test_names_are_unique_even_if_runs_are_equal(passed):
+    document = read_junit([passed, passed, passed])
+    assert len(cases_by_name(document)) == 3
 
 
 def test_order_of_finished_runs_does_not_change_the_file(passed, failed, crashed):
@@ -131,7 +133,7 @@ def test_document_with_any_text_is_well_formed(name, tail, kind):
 
 
 def test_escape_sequences_and_lone_surrogates_are_made_visible(crashed):
-    run = of(crashed, error=RunFailure("crashed", "\x1b[31m \ud800 \u202e", "\x00"))
+    run = with_result(crashed, error=RunFailure("crashed", "\x1b[31m \ud800 \u202e", "\x00"))
     text = b"".join(xml_parts([run])).decode()
     assert r"\x1b[31m \ud800 \u202e" in text
     assert r"\x00" in text

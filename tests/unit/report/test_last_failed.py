@@ -1,4 +1,4 @@
-"""The runs that failed last, according to the sessions of an output folder."""
+"""Tests of the runs that failed last, according to the sessions in an output folder."""
 
 import json
 from dataclasses import replace
@@ -14,18 +14,18 @@ from simscen.report.session_history import last_failed, sessions_in
 
 @pytest.fixture
 def session(tmp_path, passed, failed, crashed, skipped):
-    """`session(n, a="failed", b="passed")` writes the n-th session of the folder; "…" names a kind of error."""
-    made = {"passed": passed, "failed": failed, "skipped": skipped}
+    """Return a function that writes the n-th session: `session(n, a="failed")`; other outcomes are kinds of errors."""
+    runs_by_outcome = {"passed": passed, "failed": failed, "skipped": skipped}
 
     def write(number, **outcomes):
         folder = tmp_path / f"s{number}"
         folder.mkdir()
         journal = Journal(folder)
-        journal.plan([PlannedRun(key(name), "x") for name in outcomes], "0.1.0", 1)
+        journal.plan([PlannedRun(run_key(name), "x") for name in outcomes], "0.1.0", 1)
         for name, outcome in outcomes.items():
-            broken = replace(crashed, result=replace(crashed.result, error=RunFailure(outcome, "")))
-            run = made.get(outcome, broken)
-            journal(replace(run, result=replace(run.result, key=key(name))))
+            aborted = replace(crashed, result=replace(crashed.result, error=RunFailure(outcome, "")))
+            run = runs_by_outcome.get(outcome, aborted)
+            journal(replace(run, result=replace(run.result, key=run_key(name))))
         journal.close()
         (folder / "run.json").write_text(json.dumps({"written": f"2026-01-0{number}T00:00:00+00:00"}))
         return folder
@@ -33,11 +33,13 @@ def session(tmp_path, passed, failed, crashed, skipped):
     return write
 
 
-def key(name):
+def run_key(name):
+    """Return the key of the run of a scenario, or of its repetition if the name ends with `_again`."""
     return RunKey(name.removesuffix("_again"), 1).repetition if name.endswith("_again") else RunKey(name, 1)
 
 
 def failed_in(folder):
+    """Return the scenarios that failed last."""
     return {key.scenario for key in last_failed(folder)}
 
 
@@ -71,7 +73,7 @@ def test_skipped_run_keeps_its_earlier_outcome(session, tmp_path):
     assert failed_in(tmp_path) == {"a"}
 
 
-def test_one_failure_of_two_determinism_runs_counts(session, tmp_path):
+def test_run_has_failed_if_its_repetition_differs(session, tmp_path):
     session(1, a="passed", a_again="nondeterministic")
     assert failed_in(tmp_path) == {"a"}
 
@@ -85,12 +87,12 @@ def test_unreadable_journals_and_the_latest_link_are_ignored(session, tmp_path):
 
 
 def test_folder_of_another_user_beside_the_sessions_is_ignored(session, tmp_path, monkeypatch):
-    folder, foreign, read = session(1, a="failed"), session(2, a="failed"), Path.stat
+    folder, foreign, original_stat = session(1, a="failed"), session(2, a="failed"), Path.stat
 
     def stat(path, **options):
         if foreign in path.parents:
             raise PermissionError(13, "Permission denied", str(path))
-        return read(path, **options)
+        return original_stat(path, **options)
 
     monkeypatch.setattr(Path, "stat", stat)
     assert sessions_in(tmp_path) == [folder]
@@ -98,7 +100,7 @@ def test_folder_of_another_user_beside_the_sessions_is_ignored(session, tmp_path
 
 def test_expected_failure_is_not_a_failure(session, tmp_path, failed):
     journal = Journal(session(1, a="failed"), resume=True)
-    journal.plan([PlannedRun(key("a"), "x")], "0.1.0", 1)
-    journal(replace(failed, result=replace(failed.result, key=key("a"), outcome=Outcome.FAILED_AS_EXPECTED)))
+    journal.plan([PlannedRun(run_key("a"), "x")], "0.1.0", 1)
+    journal(replace(failed, result=replace(failed.result, key=run_key("a"), outcome=Outcome.FAILED_AS_EXPECTED)))
     journal.close()
     assert failed_in(tmp_path) == set()

@@ -1,4 +1,4 @@
-"""Results as Parquet tables, read back by pyarrow."""
+"""Tests of results as Parquet tables, which pyarrow reads."""
 
 import math
 from pathlib import Path
@@ -39,10 +39,10 @@ def runs(count: int) -> list[RunFinished]:
 
 
 def test_each_run_is_a_row_with_its_metrics_and_values(tmp_path: Path) -> None:
-    broken = RunFinished(error_result(RunKey("b", 1), "b.scenario.yaml", RunFailure("timeout", "too slow")))
-    done = [*reversed(runs(4)), broken]
+    aborted = RunFinished(error_result(RunKey("b", 1), "b.scenario.yaml", RunFailure("timeout", "too slow")))
+    finished_runs = [*reversed(runs(4)), aborted]
     values = {RunKey("a", seed, f"variation-{seed}"): {"x": f"{seed} cm", "robot": "amr"} for seed in range(1, 5)}
-    files = parquet.write_parquet(tmp_path / "tables", done, values)
+    files = parquet.write_parquet(tmp_path / "tables", finished_runs, values)
     assert [file.name for file in files] == ["runs.parquet", "verdicts.parquet"]
     table = pq.read_table(files[0])
     rows = table.to_pylist()
@@ -63,12 +63,12 @@ def test_each_run_is_a_row_with_its_metrics_and_values(tmp_path: Path) -> None:
 
 
 def test_groups_of_rows_are_one_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = parquet.write_parquet(tmp_path / "whole", runs(25), {})
+    whole_files = parquet.write_parquet(tmp_path / "whole", runs(25), {})
     monkeypatch.setattr(parquet, "RUNS_PER_GROUP", 10)
-    parts = parquet.write_parquet(tmp_path / "parts", runs(25), {})
-    for one, two in zip(whole, parts, strict=True):
-        assert pq.read_table(one) == pq.read_table(two)
-    assert pq.ParquetFile(parts[0]).num_row_groups == 3
+    part_files = parquet.write_parquet(tmp_path / "parts", runs(25), {})
+    for table_file, parts_file in zip(whole_files, part_files, strict=True):
+        assert pq.read_table(table_file) == pq.read_table(parts_file)
+    assert pq.ParquetFile(part_files[0]).num_row_groups == 3
 
 
 def test_a_session_without_runs_has_empty_tables(tmp_path: Path) -> None:

@@ -41,9 +41,9 @@ def room():
     return OccupancyGrid(cells, 0.1)
 
 
-def everything(**changes):
-    """A robot that is carried off, with all that a picture knows."""
-    words = {
+def full_scene(**changes):
+    """Return a scene with a kidnapped robot and each part that a picture can have."""
+    sketch = {
         "seconds": 10,
         "truth": TRUTH,
         "belief": [[0, 1, 1], [4, 1, 3], [8, 1, 4.5], [8.1, 8, 1], [10, 9, 1]],
@@ -75,8 +75,10 @@ def everything(**changes):
         "footprint": [[-0.2, -0.2], [0.2, 0], [-0.2, 0.2]],
         "regions": {"ward": [[6, 2], [8, 2], [8, 3], [6, 3]]},
     })  # fmt: skip
-    trace = synthetic_trace(words)
-    criteria = [AnyCriterion.model_validate(one) for one in ({"goals_reached": {}}, {"clearance": {"min": 2.0}})]
+    trace = synthetic_trace(sketch)
+    criteria = [
+        AnyCriterion.model_validate(criterion) for criterion in ({"goals_reached": {}}, {"clearance": {"min": 2.0}})
+    ]
     result = judge_run(RunKey("room/all", 3), "room/all.scenario.yaml", criteria, trace, case)
     scenery = Scenery(
         places={"dock": Pose2(1, 1)},
@@ -95,48 +97,48 @@ def drawn_parts(scene):
     return map_picture.draw_map_canvas(scene).parts
 
 
-def output(scene):
-    """The parts, one a line: what, then where in meters."""
+def part_lines(scene):
+    """Return a line for each part of a picture: its name, and its points in m."""
     lines = []
-    for what, points in drawn_parts(scene):
+    for name, points in drawn_parts(scene):
         rounded = np.round(points, 2) + 0.0
-        lines.append(f"{what}: " + " ".join(f"({x:.2f}, {y:.2f})" for x, y in rounded[:8].tolist()))
+        lines.append(f"{name}: " + " ".join(f"({x:.2f}, {y:.2f})" for x, y in rounded[:8].tolist()))
     return lines
 
 
-def of(scene, what):
-    """The points of the parts that are called so."""
-    return [points for name, points in drawn_parts(scene) if name.startswith(what)]
+def points_of(scene, prefix):
+    """Return the points of each part whose name starts with a prefix."""
+    return [points for name, points in drawn_parts(scene) if name.startswith(prefix)]
 
 
 def test_picture_has_all_parts_at_their_positions():
-    assert output(everything()) == GOLDEN.read_text(encoding="utf-8").splitlines()
+    assert part_lines(full_scene()) == GOLDEN.read_text(encoding="utf-8").splitlines()
 
 
 def test_closed_door_is_drawn_from_hinge_to_post():
-    (panel,) = of(everything(), "door door")
+    (panel,) = points_of(full_scene(), "door door")
     assert (panel[:, 1].min(), panel[:, 1].max()) == pytest.approx((2.0, 3.0))
     assert panel[:, 0].mean() == pytest.approx(5.0, abs=0.001)
 
 
 def test_kidnapping_is_a_gap_with_marks_on_both_sides():
-    scene = everything()
-    ways = of(scene, "path")
-    assert [np.round(way, 1).tolist() for way in ways] == [[[1, 1], [1, 3]], [[7, 1], [9, 1]]]
-    assert np.round(of(scene, "lifted")[0], 1).tolist() == [[1, 3]]
-    assert np.round(of(scene, "set down")[0], 1).tolist() == [[7, 1]]
+    scene = full_scene()
+    paths = points_of(scene, "path")
+    assert [np.round(path, 1).tolist() for path in paths] == [[[1, 1], [1, 3]], [[7, 1], [9, 1]]]
+    assert np.round(points_of(scene, "lifted")[0], 1).tolist() == [[1, 3]]
+    assert np.round(points_of(scene, "set down")[0], 1).tolist() == [[7, 1]]
 
 
 def test_height_just_below_one_meter_is_readable():
     ramp = DrivableSurface("ramp", ((7, 4), (9, 4), (9, 5), (7, 5)), 0.996, (0.05, 0.0))
-    scene = replace(everything(), scenery=Scenery(ground=(ramp,)))
-    canvas = map_picture.draw_map_canvas(everything())
+    scene = replace(full_scene(), scenery=Scenery(ground=(ramp,)))
+    canvas = map_picture.draw_map_canvas(full_scene())
     assert [label.text for label in draw_ground(canvas, scene)] == ["ramp, 1 m high"]
 
 
 def test_time_marks_are_drawn_only_while_the_true_pose_is_known(monkeypatch):
-    scene, marks = everything(truth=[[0, 1, 1], [10, 6, 1]]), []
-    monkeypatch.setattr(Canvas, "disc", lambda canvas, x, y, *rest, **options: marks.append(round(x, 6)))
+    scene, marks = full_scene(truth=[[0, 1, 1], [10, 6, 1]]), []
+    monkeypatch.setattr(Canvas, "disc", lambda canvas, x, y, *arguments, **options: marks.append(round(x, 6)))
     canvas = map_picture.draw_map_canvas(scene)
     known = (scene.trace.truth.ticks >= 720) & (scene.trace.truth.ticks <= 1680)
     marks.clear()
@@ -145,32 +147,34 @@ def test_time_marks_are_drawn_only_while_the_true_pose_is_known(monkeypatch):
 
 
 def test_short_teleport_is_a_gap():
-    near = everything(truth=[[0, 1, 1], [4, 1, 3], [4.02, 1.1, 3], [10, 3, 3]])
-    assert len(of(near, "path")) == 2
+    scene = full_scene(truth=[[0, 1, 1], [4, 1, 3], [4.02, 1.1, 3], [10, 3, 3]])
+    assert len(points_of(scene, "path")) == 2
 
 
 def test_jump_of_the_belief_is_not_a_line():
-    assert len(of(everything(), "belief")) == 2
+    assert len(points_of(full_scene(), "belief")) == 2
 
 
-@pytest.mark.parametrize(("goal", "fate"), [("shelf", "failed"), ("never", "not tried"), ("late", "reached")])
-def test_goal_shows_its_result(goal, fate):
-    assert [name for name, _ in drawn_parts(everything()) if name.startswith(f"goal {goal}")] == [f"goal {goal} {fate}"]
+@pytest.mark.parametrize(("goal", "result"), [("shelf", "failed"), ("never", "not tried"), ("late", "reached")])
+def test_goal_shows_its_result(goal, result):
+    assert [name for name, _ in drawn_parts(full_scene()) if name.startswith(f"goal {goal}")] == [
+        f"goal {goal} {result}"
+    ]
 
 
 def test_goal_that_was_never_sent_is_not_drawn():
-    assert of(everything(), "goal unsent") == []
+    assert points_of(full_scene(), "goal unsent") == []
 
 
 def test_goal_reached_only_by_the_estimate_is_drawn_as_failed():
     events = [[0, "goal.accepted", "shelf"], [9, "goal.reached", "shelf"]]
-    assert "goal shelf failed" in {name for name, _ in drawn_parts(everything(events=events))}
+    assert "goal shelf failed" in {name for name, _ in drawn_parts(full_scene(events=events))}
 
 
 def goal_parts(events, goals, **case):
-    """The names of the drawn goals of a run without criteria."""
+    """Return the names of the drawn goals and labels of a run without criteria."""
     trace = synthetic_trace({"seconds": 10, "truth": [[0, 1, 1], [10, 8, 1]], "events": events})
-    result = replace(everything().result, verdicts=())
+    result = replace(full_scene().result, verdicts=())
     scene = Scene(trace, synthetic_case({"goals": goals, **case}), room(), result)
     return {name for name, _ in drawn_parts(scene) if name.startswith(("goal ", "label "))}
 
@@ -192,19 +196,19 @@ def test_failure_is_as_expected_only_with_the_expected_error_code(expected, labe
 
 
 def test_log_without_true_poses_is_drawn():
-    scene = everything()
-    nothing = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
-    parts = drawn_parts(replace(scene, trace=replace(scene.trace, truth=nothing, velocity=nothing)))
+    scene = full_scene()
+    no_samples = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+    parts = drawn_parts(replace(scene, trace=replace(scene.trace, truth=no_samples, velocity=no_samples)))
     assert {"belief", "goal shelf failed"} <= {name for name, _ in parts}
 
 
 @pytest.mark.parametrize("kind", ["floor.changed", "zone.switched", "object.spawned"])
 def test_events_without_data_are_tolerated(kind):
-    assert of(everything(events=[[1, kind, "odd", {"x": "far"}]]), "path")
+    assert points_of(full_scene(events=[[1, kind, "odd", {"x": "far"}]]), "path")
 
 
 def test_samples_that_are_not_finite_are_outside_of_the_picture():
-    scene = everything()
+    scene = full_scene()
     values = scene.trace.truth.values.copy()
     values[5] = np.nan
     truth = Samples(scene.trace.truth.ticks, values)
@@ -214,46 +218,48 @@ def test_samples_that_are_not_finite_are_outside_of_the_picture():
 
 
 def test_failure_has_the_error_code_and_name_of_nav2():
-    assert map_picture.end_reason(everything()) == "navigation ended, FAILED NO_VALID_PATH (208)"
-    assert any("shelf: failed, NO_VALID_PATH (208)" in name for name, _ in drawn_parts(everything()))
+    assert map_picture.end_reason(full_scene()) == "navigation ended, FAILED NO_VALID_PATH (208)"
+    assert any("shelf: failed, NO_VALID_PATH (208)" in name for name, _ in drawn_parts(full_scene()))
 
 
 def test_labels_do_not_overlap_paths_robots_goals_or_each_other():
-    canvas = map_picture.draw_map_canvas(everything())
-    busy, boxes = canvas.blocked_cells, []
-    for note in canvas.texts:
-        wide = map_picture.font(note.size).getlength(note.text)
-        left, right = (note.x - wide / 2) / LABEL_CELL_PX, (note.x + wide / 2) / LABEL_CELL_PX
-        top, low = (note.y - note.size / 2) / LABEL_CELL_PX, (note.y + note.size / 2) / LABEL_CELL_PX
-        covered = busy[max(0, int(top)) : int(low) + 1, max(0, int(left)) : int(right) + 1]
-        assert covered.mean() < 0.15, note.text
-        assert not any(left < r and a < right and top < b and t < low for a, t, r, b in boxes), note.text
-        boxes.append((left, top, right, low))
+    canvas = map_picture.draw_map_canvas(full_scene())
+    blocked, boxes = canvas.blocked_cells, []
+    for label in canvas.texts:
+        width = map_picture.font(label.size).getlength(label.text)
+        left, right = (label.x - width / 2) / LABEL_CELL_PX, (label.x + width / 2) / LABEL_CELL_PX
+        top, bottom = (label.y - label.size / 2) / LABEL_CELL_PX, (label.y + label.size / 2) / LABEL_CELL_PX
+        blocked_part = blocked[max(0, int(top)) : int(bottom) + 1, max(0, int(left)) : int(right) + 1]
+        assert blocked_part.mean() < 0.15, label.text
+        assert not any(left < r and a < right and top < b and t < bottom for a, t, r, b in boxes), label.text
+        boxes.append((left, top, right, bottom))
 
 
 def test_reasons_beside_the_map_are_not_truncated():
-    long = " ".join(f"reason{k}" for k in range(60)) + " " + "x" * 90
-    assert " ".join(sidebar._wrap(long)).replace(" ", "") == long.replace(" ", "")
-    scene = everything()
+    text = " ".join(f"reason{k}" for k in range(60)) + " " + "x" * 90
+    assert " ".join(sidebar._wrap(text)).replace(" ", "") == text.replace(" ", "")
+    scene = full_scene()
     verdicts = tuple(
-        replace(v, findings=tuple(replace(f, detail=(long,) * 5) for f in v.findings)) for v in scene.result.verdicts
+        replace(v, findings=tuple(replace(f, detail=(text,) * 5) for f in v.findings)) for v in scene.result.verdicts
     )
-    tall = replace(scene, result=replace(scene.result, verdicts=verdicts))
-    assert draw_map_picture(tall).height > draw_map_picture(scene).height + 400
+    long_reasons = replace(scene, result=replace(scene.result, verdicts=verdicts))
+    assert draw_map_picture(long_reasons).height > draw_map_picture(scene).height + 400
 
 
 def test_legend_explains_each_symbol_of_the_map(monkeypatch):
     texts = []
     monkeypatch.setattr(sidebar, "draw_text", lambda draw, item: texts.append(item.text))
-    draw_map_picture(everything())
+    draw_map_picture(full_scene())
     assert {"robot at an event", "robot at a mark", "named place", "collision", "violated criterion"} <= set(texts)
 
 
 def test_each_of_several_robots_is_drawn_with_its_name():
-    one = everything()
+    scene = full_scene()
     names = {
         name
-        for name, _ in drawn_parts(scene_with_robots(one, {"a": (one.trace, one.case), "b": (one.trace, one.case)}))
+        for name, _ in drawn_parts(
+            scene_with_robots(scene, {"a": (scene.trace, scene.case), "b": (scene.trace, scene.case)})
+        )
     }
     assert {"a: path", "b: path", "goal a: late reached", "a: robot at the end", "b: belief"} <= names
 
@@ -276,17 +282,17 @@ pass: [{collisions: {max: 0}}]
 """
 
 
-def test_picture_from_the_log_has_the_parts_of_that_of_the_run(tmp_path):
+def test_picture_from_the_log_has_the_same_parts_as_the_picture_of_the_run(tmp_path):
     file = tmp_path / "doors.scenario.yaml"
     file.write_text(DOORS)
     prepared = prepare(load_scenario(file, tmp_path))
     run = simulate(prepared, log=tmp_path / "run.mcap")
     scene = Scene(run.trace, run.case, prepared.built.map, run.result, scenery_in(prepared))
     log = read_log(tmp_path / "run.mcap")
-    found = scenery_from_header(log.header)
-    assert found.map is not None
-    again = Scene(log.trace, log.header.case, found.map.grid, run.result, found)
-    assert output(again) == output(scene)
-    (gate,), (slide,) = of(again, "door gate"), of(again, "door slide")
+    scenery = scenery_from_header(log.header)
+    assert scenery.map is not None
+    scene_from_log = Scene(log.trace, log.header.case, scenery.map.grid, run.result, scenery)
+    assert part_lines(scene_from_log) == part_lines(scene)
+    (gate,), (slide,) = points_of(scene_from_log, "door gate"), points_of(scene_from_log, "door slide")
     assert (gate[:, 1].min(), gate[:, 1].max()) == pytest.approx((1.0, 2.0))
     assert (slide[:, 1].min(), slide[:, 1].max()) == pytest.approx((0.0, 1.0))

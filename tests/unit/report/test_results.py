@@ -1,3 +1,5 @@
+"""Tests of results.json."""
+
 import json
 from dataclasses import replace
 
@@ -17,8 +19,8 @@ def test_results_contain_each_run_once(passed, failed, crashed):
 
 
 def test_results_contain_the_figures_of_the_session(passed, failed, crashed):
-    measured = replace(passed, result=replace(passed.result, metrics={"collisions": 2.0, "path_length": 500.0}))
-    figures = results_document([measured, failed, crashed])["suite"]
+    with_metrics = replace(passed, result=replace(passed.result, metrics={"collisions": 2.0, "path_length": 500.0}))
+    figures = results_document([with_metrics, failed, crashed])["suite"]
     assert (figures["runs"], figures["measured_runs"], figures["collisions_per_km"]) == (3, 1, 4.0)
 
 
@@ -32,14 +34,14 @@ def test_results_do_not_depend_on_wall_time_or_order(passed, failed):
 
 
 def test_determinism_runs_do_not_count_as_evidence(passed, failed):
-    again = [replace(run, result=replace(run.result, key=run.key.repetition)) for run in (passed, failed)]
-    assert results_document([passed, failed, *again])["suite"] == results_document([passed, failed])["suite"]
+    repetitions = [replace(run, result=replace(run.result, key=run.key.repetition)) for run in (passed, failed)]
+    assert results_document([passed, failed, *repetitions])["suite"] == results_document([passed, failed])["suite"]
 
 
 def test_stacks_are_not_pooled(passed, failed):
-    def by(run, stack):
+    def with_stack(run, stack):
         return replace(run, result=replace(run.result, key=replace(run.key, stack_name=stack)))
 
-    document = results_document([by(passed, "a"), by(passed, "a.again"), by(failed, "b")])
+    document = results_document([with_stack(passed, "a"), with_stack(passed, "a.again"), with_stack(failed, "b")])
     assert "suite" not in document
     assert document["suites"] == {"a": results_document([passed])["suite"], "b": results_document([failed])["suite"]}

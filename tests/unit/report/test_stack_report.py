@@ -1,4 +1,4 @@
-"""Tests of what an external stack reported about itself, on replay pages."""
+"""Tests of the report of an external stack on replay pages: behavior tree, log lines, and parameters."""
 
 import json
 import sys
@@ -37,29 +37,31 @@ def log_with(*lines: tuple[int, int, str, str], stack: dict[str, str] | None = N
     return Log(LogHeader("hall/drive", 7, Case(Pose2(0, 0), ())), trace, "", True, sensors=sensors, stack=stack or {})
 
 
-def change(tick: int, node: str, before: str, after: str) -> tuple[int, int, str, str]:
-    return tick, INFO, BEHAVIOR_TREE_LOGGER, tree_change(node, before, after)
+def tree_change_line(tick: int, node: str, old: str, new: str) -> tuple[int, int, str, str]:
+    """Return the log line of a node of a behavior tree that changed its status."""
+    return tick, INFO, BEHAVIOR_TREE_LOGGER, tree_change(node, old, new)
 
 
-class Spy(PackedColumns):
-    """Keeps the values of the columns."""
+class ColumnsSpy(PackedColumns):
+    """Columns that are not packed: `add` returns the values."""
 
     def add(self, values: Any, step: float = 1.0) -> Any:
         return list(values)
 
 
-def reported(nodes: object) -> Log:
+def log_with_parameters(nodes: object) -> Log:
+    """Return the log of a stack that reported parameters by node."""
     return log_with(stack={"about": json.dumps({"parameters": nodes})})
 
 
 def test_changes_of_a_behavior_tree_keep_their_order_within_a_tick() -> None:
     lines = [
-        change(0, "Root", "IDLE", "RUNNING"),
-        change(0, "name: a -> b", "IDLE", "RUNNING"),
+        tree_change_line(0, "Root", "IDLE", "RUNNING"),
+        tree_change_line(0, "name: a -> b", "IDLE", "RUNNING"),
         (12, WARNING, "amcl", "no transform"),
-        change(24, "Root", "RUNNING", "FAILURE"),
+        tree_change_line(24, "Root", "RUNNING", "FAILURE"),
     ]
-    tree = behavior_tree_data(log_with(*lines), Spy())
+    tree = behavior_tree_data(log_with(*lines), ColumnsSpy())
     assert tree is not None
     names = [[tree["nodes"][k] for k in tree["node"]]]
     names += [[tree["statuses"][k] for k in tree[key]] for key in ("before", "status")]
@@ -77,19 +79,21 @@ def test_stack_report_contains_log_lines_but_no_simscen_events() -> None:
         (6, ERROR, "controller_server", "x" * 1000),
         (7, INFO, BEHAVIOR_TREE_LOGGER, "not a change"),
     ]
-    read = log_lines_data(log_with(*lines), Spy())
-    assert [line[:3] for line in read] == [
+    entries = log_lines_data(log_with(*lines), ColumnsSpy())
+    assert [line[:3] for line in entries] == [
         [5, "warning", "planner_server"],
         [6, "error", "controller_server"],
         [7, "info", BEHAVIOR_TREE_LOGGER],
     ]
-    assert read[0][3] == "no path"
-    assert read[1][3] == f"{'x' * stack_report.MAX_LINE_CHARACTERS} … (1000 characters)"
+    assert entries[0][3] == "no path"
+    assert entries[1][3] == f"{'x' * stack_report.MAX_LINE_CHARACTERS} … (1000 characters)"
 
 
 def test_parameters_are_shown_as_in_a_file_with_the_main_ones_marked() -> None:
     controller = {"FollowPath.vx_max": 1.0, "empty": "", "list": ["x"], "no": False}
-    nodes = parameters_data(reported({"/amcl": {"z_hit": 0.5}, "/controller_server": controller}), Spy())
+    nodes = parameters_data(
+        log_with_parameters({"/amcl": {"z_hit": 0.5}, "/controller_server": controller}), ColumnsSpy()
+    )
     assert [(node["node"], node["total"]) for node in nodes] == [("/controller_server", 4), ("/amcl", 1)]
     assert nodes[0]["values"] == [
         ["FollowPath.vx_max", "1.0", True],
@@ -101,37 +105,37 @@ def test_parameters_are_shown_as_in_a_file_with_the_main_ones_marked() -> None:
 
 @pytest.mark.parametrize("nodes", [None, [], {"/amcl": 3}, {"/amcl": {}}, "text"])
 def test_parameters_in_another_form_are_not_shown(nodes: object) -> None:
-    assert parameters_data(reported(nodes), Spy()) == []
+    assert parameters_data(log_with_parameters(nodes), ColumnsSpy()) == []
 
 
 @pytest.mark.parametrize("about", ["{", "[]", "3"])
 def test_description_that_is_not_an_object_has_no_parameters(about: str) -> None:
-    assert parameters_data(log_with(stack={"about": about}), Spy()) == []
+    assert parameters_data(log_with(stack={"about": about}), ColumnsSpy()) == []
 
 
 def test_log_without_an_external_stack_has_no_stack_report() -> None:
-    empty = log_with((0, INFO, EVENT_LOGGER, "goal.accepted shelf"))
-    assert behavior_tree_data(empty, Spy()) is None
-    assert log_lines_data(empty, Spy()) == parameters_data(empty, Spy()) == []
+    log_ = log_with((0, INFO, EVENT_LOGGER, "goal.accepted shelf"))
+    assert behavior_tree_data(log_, ColumnsSpy()) is None
+    assert log_lines_data(log_, ColumnsSpy()) == parameters_data(log_, ColumnsSpy()) == []
 
 
-def test_the_last_changes_and_the_main_parameters_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_last_changes_and_main_parameters_of_a_large_report_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stack_report, "MAX_TREE_CHANGES", 2)
     monkeypatch.setattr(stack_report, "MAX_LINES", 1)
     monkeypatch.setattr(stack_report, "MAX_PARAMETERS", 1)
     lines: Sequence[tuple[int, int, str, str]] = [
-        *(change(tick, "Root", "IDLE", "RUNNING") for tick in range(3)),
-        *(change(tick, "GoalUpdated", "IDLE", "FAILURE") for tick in range(2, 4)),
+        *(tree_change_line(tick, "Root", "IDLE", "RUNNING") for tick in range(3)),
+        *(tree_change_line(tick, "GoalUpdated", "IDLE", "FAILURE") for tick in range(2, 4)),
         (3, ERROR, "amcl", "first"),
         (4, ERROR, "amcl", "last"),
     ]
     nodes = {"/amcl": {"a": 1, "max_particles": 2000}}
-    log_ = replace(log_with(*lines), stack=reported(nodes).stack)
-    columns = Spy()
-    tree, shown = behavior_tree_data(log_, columns), parameters_data(log_, columns)
+    log_ = replace(log_with(*lines), stack=log_with_parameters(nodes).stack)
+    columns = ColumnsSpy()
+    tree, parameters = behavior_tree_data(log_, columns), parameters_data(log_, columns)
     assert tree is not None and tree["ticks"] == [1, 2]
     assert [text for *_, text in log_lines_data(log_, columns)] == ["last"]
-    assert shown == [{"node": "/amcl", "values": [["max_particles", "2000", True]], "total": 2}]
+    assert parameters == [{"node": "/amcl", "values": [["max_particles", "2000", True]], "total": 2}]
     assert columns.reductions == [
         "changes of the behavior tree, without conditions: 2 of 5",
         "parameters of the stack: 1 of 2",
@@ -141,7 +145,7 @@ def test_the_last_changes_and_the_main_parameters_are_kept(monkeypatch: pytest.M
 
 def test_example_stack_reports_all_parts() -> None:
     log_ = with_nav2_report(log_with())
-    tree = behavior_tree_data(log_, Spy())
+    tree = behavior_tree_data(log_, ColumnsSpy())
     assert tree is not None and "FollowPath" in tree["nodes"]
-    assert log_lines_data(log_, Spy()) == [[720, "error", "controller_server", "Failed to make progress"]]
-    assert [node["node"] for node in parameters_data(log_, Spy())] == [*list(PARAMETERS)[1:], "/amcl"]
+    assert log_lines_data(log_, ColumnsSpy()) == [[720, "error", "controller_server", "Failed to make progress"]]
+    assert [node["node"] for node in parameters_data(log_, ColumnsSpy())] == [*list(PARAMETERS)[1:], "/amcl"]

@@ -1,4 +1,4 @@
-"""Tests of texts about studies."""
+"""Test of the text of a claim."""
 
 import pytest
 

@@ -23,42 +23,48 @@ from simscen.report.suite.study_section import study_html
 VOID = ("meta", "img", "input", "rect", "polyline", "circle")
 
 
-def of(run, **changes):
-    """The run with another result."""
+def with_result(run, **changes):
+    """Return the run with other values in its result."""
     return replace(run, result=replace(run.result, **changes))
 
 
-def called(run, scenario, seed=1, variation=""):
-    """The same run of another scenario."""
-    return of(run, key=RunKey(scenario, seed, variation))
+def with_key(run, scenario, seed=1, variation=""):
+    """Return the run with another scenario, seed, and variation."""
+    return with_result(run, key=RunKey(scenario, seed, variation))
 
 
-class Tags(HTMLParser):
+class TagParser(HTMLParser):
+    """Parser that collects tags with their attributes, and checks that each tag is closed."""
+
     def __init__(self):
         super().__init__()
-        self.seen, self.open = [], []
+        self.tags, self.open = [], []
 
     def handle_starttag(self, tag, attributes):
-        self.seen.append((tag, dict(attributes)))
+        self.tags.append((tag, dict(attributes)))
         if tag not in VOID:
             self.open.append(tag)
 
     def handle_startendtag(self, tag, attributes):
-        self.seen.append((tag, dict(attributes)))
+        self.tags.append((tag, dict(attributes)))
 
     def handle_endtag(self, tag):
         assert self.open.pop() == tag
 
 
-def parsed(html):
-    tags = Tags()
-    tags.feed(html)
-    assert tags.open == []
-    return tags.seen
+def tags_of(html):
+    """Return the tags of a page, each with its attributes, and check that all tags are closed."""
+    parser = TagParser()
+    parser.feed(html)
+    assert parser.open == []
+    return parser.tags
 
 
 def runs_on(html):
-    return [attributes for tag, attributes in parsed(html) if tag == "details" and "run" in attributes["class"].split()]
+    """Return the attributes of the elements of runs, in their order on the page."""
+    return [
+        attributes for tag, attributes in tags_of(html) if tag == "details" and "run" in attributes["class"].split()
+    ]
 
 
 def test_failures_come_first_and_are_expanded(passed, failed, crashed):
@@ -68,7 +74,7 @@ def test_failures_come_first_and_are_expanded(passed, failed, crashed):
     assert "<h1>✓ 1 passed, ✗ 1 failed, ! 1 error</h1>" in html
 
 
-def test_each_violated_criterion_has_a_line_with_its_reason_and_where_it_is_written(failed):
+def test_each_violated_criterion_has_a_row_with_its_reason_and_its_line_of_the_file(failed):
     html = to_html(SessionReport([failed]))
     row = html[html.index("<td>fail</td>") : html.index("</tr>", html.index("<td>fail</td>"))]
     assert "stopped_within" in row
@@ -80,37 +86,37 @@ def test_each_violated_criterion_has_a_line_with_its_reason_and_where_it_is_writ
 
 def test_console_text_of_a_failure_can_be_copied(passed, failed):
     assert "console output" not in to_html(SessionReport([passed]))
-    given = to_html(SessionReport([failed])).partition("console output")[2].partition("</pre>")[0]
-    assert "stopped_within: 0.84 s &gt; 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)\n" in given
-    assert "again     simscen run" in given
+    console_text = to_html(SessionReport([failed])).partition("console output")[2].partition("</pre>")[0]
+    assert "stopped_within: 0.84 s &gt; 0.50 s after lidar.off, at t = 10.84 s, (2.10, 3.41)\n" in console_text
+    assert "again     simscen run" in console_text
 
 
 def test_external_text_is_escaped_in_tags_attributes_and_links(passed, crashed):
-    evil = '"><script>alert(1)</script><img src=x onerror=y>'
-    bad = replace(
-        of(passed, key=RunKey(f"{evil}/x", 1, evil, "s"), reason=evil, ended=evil),
-        again=evil,
-        file=f"javascript:{evil}",
-        tags=(evil, "javascript:1"),
+    markup = '"><script>alert(1)</script><img src=x onerror=y>'
+    evil_run = replace(
+        with_result(passed, key=RunKey(f"{markup}/x", 1, markup, "s"), reason=markup, ended=markup),
+        again=markup,
+        file=f"javascript:{markup}",
+        tags=(markup, "javascript:1"),
         artifacts=Artifacts("javascript:1", "javascript:alert(1)", "/etc/passwd", "out/../../x"),
     )
-    harmless = {tag for tag, _ in parsed(to_html(SessionReport([passed, crashed])))}
-    html = to_html(SessionReport([bad, crashed], folder="out", title=evil))
-    seen = parsed(html)
-    assert {tag for tag, _ in seen} <= harmless | {"option", "select", "span"}
-    assert [tag for tag, _ in seen].count("script") == 1
-    assert not any(name.startswith("on") for _, attributes in seen for name in attributes)
-    assert not any("javascript" in (attributes.get("href") or "") for _, attributes in seen)
-    assert not [attributes for tag, attributes in seen if tag == "a"]
+    usual_tags = {tag for tag, _ in tags_of(to_html(SessionReport([passed, crashed])))}
+    html = to_html(SessionReport([evil_run, crashed], folder="out", title=markup))
+    tags = tags_of(html)
+    assert {tag for tag, _ in tags} <= usual_tags | {"option", "select", "span"}
+    assert [tag for tag, _ in tags].count("script") == 1
+    assert not any(name.startswith("on") for _, attributes in tags for name in attributes)
+    assert not any("javascript" in (attributes.get("href") or "") for _, attributes in tags)
+    assert not [attributes for tag, attributes in tags if tag == "a"]
     assert not re.search("\x1b", html)
 
 
 def test_content_security_policy_allows_only_own_style_and_script(passed):
     html = to_html(SessionReport([passed]))
-    policy = next(a["content"] for tag, a in parsed(html) if a.get("http-equiv") == "Content-Security-Policy")
+    policy = next(a["content"] for tag, a in tags_of(html) if a.get("http-equiv") == "Content-Security-Policy")
     assert policy.startswith("default-src 'none'; img-src data:; style-src 'sha256-")
     assert "unsafe" not in policy
-    assert not [a for _, a in parsed(html) if "style" in a or (a.get("src") or "data:")[:5] != "data:"]
+    assert not [a for _, a in tags_of(html) if "style" in a or (a.get("src") or "data:")[:5] != "data:"]
 
 
 def test_page_does_not_depend_on_the_order_of_results(passed, failed, crashed):
@@ -119,8 +125,8 @@ def test_page_does_not_depend_on_the_order_of_results(passed, failed, crashed):
 
 
 def test_repeated_scenario_is_a_group_with_a_mark_for_each_run(passed, failed):
-    group = [called(passed, "a/speeds", seed, variation) for seed in (1, 2) for variation in ("slow", "fast")]
-    html = to_html(SessionReport([*group, called(failed, "a/speeds", 3, "slow"), called(passed, "b/alone")]))
+    group = [with_key(passed, "a/speeds", seed, variation) for seed in (1, 2) for variation in ("slow", "fast")]
+    html = to_html(SessionReport([*group, with_key(failed, "a/speeds", 3, "slow"), with_key(passed, "b/alone")]))
     assert "4 of 5 as expected" in html
     assert 'aria-label="runs: passed, passed, passed, passed, failed"' in html
     assert html.count('class="group many" open') == 1
@@ -129,8 +135,8 @@ def test_repeated_scenario_is_a_group_with_a_mark_for_each_run(passed, failed):
 
 def test_runs_have_attributes_for_filters_and_sorting(failed):
     (data,) = runs_on(to_html(SessionReport([replace(failed, tags=("door", "smoke"))])))
-    found = {name: value for name, value in data.items() if name.startswith("data-")}
-    assert found == {
+    data_attributes = {name: value for name, value in data.items() if name.startswith("data-")}
+    assert data_attributes == {
         "data-status": "failed",
         "data-tags": "door smoke",
         "data-theme": "faults",
@@ -147,7 +153,7 @@ def test_smallest_margin_is_relative_to_its_limit(passed, failed):
     assert scenario_folder(RunKey("goal", 1)) == ""
 
 
-def test_every_run_has_an_anchor_of_its_own(passed):
+def test_every_run_has_a_different_anchor(passed):
     keys = [RunKey("a/b", 1), RunKey("a/b", 2), RunKey("a/b", 1, "x=1"), RunKey("a/b", 1, "x=1", "dwb")]
     assert [anchor(key) for key in keys] == [
         "run-a-b-seed-1", "run-a-b-seed-2", "run-a-b-x=1-seed-1", "run-a-b-x=1-seed-1-dwb",
@@ -160,7 +166,7 @@ def test_links_point_to_existing_files_of_the_run(failed, tmp_path):
     (folder / "runs/a b/worker.log").write_text("given")
     (folder / "runs/a b/stack.log").write_text("")
     run = replace(failed, artifacts=Artifacts(str(folder / "runs/a b"), str(folder / "runs/a b/run.mcap")))
-    links = [a["href"] for tag, a in parsed(to_html(SessionReport([run], folder=str(folder)))) if tag == "a"]
+    links = [a["href"] for tag, a in tags_of(to_html(SessionReport([run], folder=str(folder)))) if tag == "a"]
     assert links == ["./runs/a%20b/run.mcap", "./runs/a%20b/worker.log"]
 
 
@@ -168,7 +174,7 @@ def test_picture_is_embedded_in_the_page(failed, tmp_path):
     path = tmp_path / "map.png"
     Image.new("RGB", (4, 4)).save(path)
     html = to_html(SessionReport([replace(failed, artifacts=Artifacts(picture=str(path)))]))
-    (image,) = [attributes for tag, attributes in parsed(html) if tag == "img"]
+    (image,) = [attributes for tag, attributes in tags_of(html) if tag == "img"]
     assert image["src"].startswith("data:image/png;base64,")
     assert image["alt"] == "map of faults/lidar_off, seed 7: failed"
 
@@ -183,19 +189,19 @@ def test_embedded_pictures_are_limited_with_failures_first(passed, failed, tmp_p
     monkeypatch.setattr(elements, "MAX_EMBEDDED_BYTES", picture.stat().st_size)
     runs = [replace(run, artifacts=Artifacts(picture=str(picture))) for run in (passed, failed)]
     html = to_html(SessionReport(runs))
-    assert [tag for tag, _ in parsed(html)].count("img") == 1
+    assert [tag for tag, _ in tags_of(html)].count("img") == 1
     assert html.index("<img") < html.index(f"picture: <code>{picture}")
 
 
 @pytest.fixture
 def sessions(tmp_path, passed, failed):
-    """A folder with two sessions, and a third that has just ended."""
+    """Return an output folder with three sessions, of which the last one has just ended."""
     out = tmp_path / "simscen-out"
-    runs = [called(passed, "a/flaky"), called(passed, "a/steady")]
-    broke = [called(failed, "a/flaky"), called(passed, "a/steady")]
-    for number, (name, answers) in enumerate((("one", runs), ("two", broke), ("three", runs))):
+    runs = [with_key(passed, "a/flaky"), with_key(passed, "a/steady")]
+    changed_runs = [with_key(failed, "a/flaky"), with_key(passed, "a/steady")]
+    for number, (name, finished_runs) in enumerate((("one", runs), ("two", changed_runs), ("three", runs))):
         (out / name).mkdir(parents=True)
-        (out / name / "results.json").write_text("".join(json_parts(answers)))
+        (out / name / "results.json").write_text("".join(json_parts(finished_runs)))
         (out / name / "events.jsonl").write_text("")
         (out / name / "run.json").write_text(json.dumps({"written": f"2026-01-0{number + 1}T00:00:00+00:00"}))
     (out / "latest").symlink_to("three")
@@ -203,10 +209,10 @@ def sessions(tmp_path, passed, failed):
 
 
 def test_earlier_sessions_are_listed_with_changes(sessions, passed):
-    past = past_sessions(sessions / "three")
-    assert [session.name for session in past] == ["two", "one"]
-    assert past_sessions(sessions / "latest") == past
-    html = to_html(SessionReport([called(passed, "a/flaky"), called(passed, "a/steady")], past))
+    earlier_sessions = past_sessions(sessions / "three")
+    assert [session.name for session in earlier_sessions] == ["two", "one"]
+    assert past_sessions(sessions / "latest") == earlier_sessions
+    html = to_html(SessionReport([with_key(passed, "a/flaky"), with_key(passed, "a/steady")], earlier_sessions))
     assert "1 newly passing" in html
     assert html.index("../two/report.html") < html.index("../one/report.html")
     assert '<a href="#run-a-flaky-seed-1">a/flaky, seed 1</a>: passed, failed before' in html
@@ -215,30 +221,34 @@ def test_earlier_sessions_are_listed_with_changes(sessions, passed):
 
 
 def test_skipped_runs_have_no_change_and_hide_no_earlier_outcome(sessions, passed, skipped):
-    skips = "".join(json_parts([called(skipped, "a/flaky"), called(passed, "a/steady")]))
+    results_text = "".join(json_parts([with_key(skipped, "a/flaky"), with_key(passed, "a/steady")]))
     results = sessions / "three/results.json"
-    results.write_text(skips)
+    results.write_text(results_text)
     (sessions / "four").mkdir()
     (sessions / "four/events.jsonl").write_text("")
     (sessions / "four/run.json").write_text(json.dumps({"written": "2026-01-04T00:00:00+00:00"}))
-    past = past_sessions(sessions / "four")
-    assert [session.name for session in past] == ["three", "two", "one"]
-    html = to_html(SessionReport([called(passed, "a/flaky"), called(passed, "a/steady")], past))
+    earlier_sessions = past_sessions(sessions / "four")
+    assert [session.name for session in earlier_sessions] == ["three", "two", "one"]
+    html = to_html(SessionReport([with_key(passed, "a/flaky"), with_key(passed, "a/steady")], earlier_sessions))
     assert "a/flaky, seed 1</a>: passed, failed before" in html
     assert [run.get("data-changed") for run in runs_on(html)] == ["1", None]
-    assert "no change since the last session" in to_html(SessionReport([called(skipped, "a/flaky")], past))
+    assert "no change since the last session" in to_html(
+        SessionReport([with_key(skipped, "a/flaky")], earlier_sessions)
+    )
 
 
-def test_share_of_good_runs_includes_runs_that_are_not_listed(sessions, passed, failed, monkeypatch):
+def test_share_of_expected_outcomes_includes_runs_that_are_not_listed(sessions, passed, failed, monkeypatch):
     monkeypatch.setattr(page, "MAX_LISTED_RUNS", 1)
-    runs = [called(passed, f"a/{number}") for number in range(3)] + [called(failed, "a/flaky")]
+    runs = [with_key(passed, f"a/{number}") for number in range(3)] + [with_key(failed, "a/flaky")]
     html = to_html(SessionReport(runs, past_sessions(sessions / "three")))
     assert "share of runs as expected, oldest first: 100%, 50%, 75%" in html
 
 
 def test_heading_of_a_scenario_counts_runs_that_are_not_listed(passed, failed, monkeypatch):
     monkeypatch.setattr(page, "MAX_LISTED_RUNS", 1)
-    html = to_html(SessionReport([called(passed, "a/flaky", seed) for seed in (1, 2)] + [called(failed, "a/flaky", 3)]))
+    html = to_html(
+        SessionReport([with_key(passed, "a/flaky", seed) for seed in (1, 2)] + [with_key(failed, "a/flaky", 3)])
+    )
     assert [run.get("data-status") for run in runs_on(html)] == ["failed"]
     assert ">2 of 3 as expected<" in html
 
@@ -279,7 +289,7 @@ def test_points_of_a_study_link_to_files_and_have_finite_positions(passed):
         ParameterEffect("x", "clearance", 0.9, 0.01, 3, True),
         ParameterEffect("y", "clearance", 0.4, 0.02, 3, False),
     )
-    values = {one.key: {"x": one.key.seed, "y": "a"} for one in runs}
+    values = {run_.key: {"x": run_.key.seed, "y": "a"} for run_ in runs}
     html = study_html(Study("a/b", True, 3, 0, 0, None, None, (), effects, {}, values), runs, "out")
     assert re.findall('href="([^"]*)"', html) == ["./seed-1%2050%25/replay.html"]
     assert html.count("<circle") == 2 and "nan" not in html
