@@ -29,7 +29,7 @@ CODES = {
     "SC023": "A referenced file, model, or robot does not exist.",
     "SC024": "Files extend each other in a circle, or there are too many of them.",
     "SC025": "The file is a world, map, robot, or stack, but a scenario is expected.",
-    "SC030": "A name refers to nothing: no such place, region, door, object, goal, event, fault or robot.",
+    "SC030": "A name refers to nothing: no such place, region, door, object, goal, event, fault, or robot.",
     "SC031": "The robot has no sensor of that name.",
     "SC032": "The fault cannot affect that sensor, or its values do not suit it.",
     "SC033": "Two objects, goals, events, faults, or other entries have the same name.",
